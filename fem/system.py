@@ -1,0 +1,31 @@
+"""Second-order systems M q'' + C q' + K q = f: the one type that the full and the reduced model share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class SecondOrderSystem:
+    """A linear structure in n coordinates, with the vectors that load and observe it.
+
+    mass, stiffness : (n, n) symmetric (Hermitian for one harmonic index of a cyclic part), scipy.sparse or ndarray [kg], [N/m]
+    damping : (n, n) like stiffness, or None for none [N s/m]
+    loads : name -> (n,) force per unit of the named load [N/N]
+    outputs : name -> (n,) row that observes a displacement, output = row . q [m/m]
+    """
+
+    mass: Any
+    stiffness: Any
+    damping: Any = None
+    loads: Mapping[str, np.ndarray] = field(default_factory=dict)
+    outputs: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def n_dof(self) -> int:
+        """Number of coordinates n."""
+        return int(self.stiffness.shape[0])

@@ -1,0 +1,1 @@
+"""Part -> mesh: Gmsh scripts, contact grids, measured surfaces."""

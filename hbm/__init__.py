@@ -1,0 +1,1 @@
+"""Reduced model -> response: harmonic balance with friction contact, continuation, wear."""

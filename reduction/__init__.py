@@ -1,0 +1,1 @@
+"""Full -> reduced model: Craig-Bampton and its relatives."""

@@ -1,0 +1,46 @@
+"""The reduced model: what the harmonic balance sees of a part."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fem.interface import ContactInterface
+from fem.system import SecondOrderSystem
+
+
+@dataclass(frozen=True)
+class ReducedModel:
+    """A small system with its contact interface, and the way back to the full field.
+
+    system : dense, n coordinates; contact and accessory DOFs first, then modal coordinates
+    interface : in reduced coordinates, B is dense (n_pair * n_component, n)
+    basis : (n_full, n) with q_full = basis @ q, or None where there is no full model (matrices from a file)
+    info : facts for reports, such as the number of masters, modes, the truncation frequency and solver names
+    per_harmonic : harmonic -> (system, B) where a harmonic sees another system than `system`
+        (cyclic harmonic index, displacement prescribed in harmonic 0); complex Hermitian where cyclic
+    """
+
+    system: SecondOrderSystem
+    interface: ContactInterface
+    basis: np.ndarray | None = None
+    info: Mapping[str, object] = field(default_factory=dict)
+    per_harmonic: Callable[[int], tuple[SecondOrderSystem, np.ndarray]] | None = None
+
+    def at_harmonic(self, h: int) -> tuple[SecondOrderSystem, np.ndarray]:
+        """System and contact map (n_pair * n_component, n) that harmonic h sees."""
+        if self.per_harmonic is not None:
+            return self.per_harmonic(h)
+        return self.system, np.asarray(self.interface.B)
+
+    def reconstruct(self, q: np.ndarray) -> np.ndarray:
+        """Full displacement (n_full, ...) [m] of reduced coordinates q (n, ...)."""
+        if self.basis is None:
+            raise ValueError("this model came as matrices: it has no full field to reconstruct")
+        return np.tensordot(self.basis, q, axes=1)
+
+    def with_damping(self, damping: np.ndarray | None) -> ReducedModel:
+        """The same model with another damping matrix (n, n) [N s/m]."""
+        return replace(self, system=replace(self.system, damping=damping))
