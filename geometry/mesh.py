@@ -131,7 +131,7 @@ def _volume_cell_type(file: meshio.Mesh, path: str | Path) -> str:
     if len(present) == 1 and present[0] in _VOLUME_CELLS:
         return present[0]
     if set(present) & set(_FIRST_ORDER):
-        raise ValueError(f"mesh file '{path}' has first-order elements, {', '.join(present)}: write it with second order")
+        raise ValueError(f"mesh file '{path}' has elements of first order: write it with elements of second order")
     raise ValueError(
         f"mesh file '{path}' has volume elements {', '.join(present) or 'of no kind'}: "
         f"give it one kind out of {', '.join(_VOLUME_CELLS)}"
