@@ -12,7 +12,7 @@ from math import ceil
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import gaussian_filter
-from scipy.spatial import Delaunay, QhullError, cKDTree
+from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from geometry.surface import HeightMap
 
@@ -52,7 +52,7 @@ def onto_nodes(surface: HeightMap, nodes: np.ndarray) -> np.ndarray:
                 f"{low[k]:g} to {high[k]:g} m: centre it on the patch or measure the whole face"
             )
     try:
-        patch = Delaunay(nodes)
+        sides = ConvexHull(nodes).equations
     except (QhullError, ValueError):
         raise ValueError(f"{surface.name}: {len(nodes)} contact nodes on a line span no area to average over") from None
     tree = cKDTree(nodes)
@@ -65,7 +65,7 @@ def onto_nodes(surface: HeightMap, nodes: np.ndarray) -> np.ndarray:
     ]
     x, y = (start + (np.arange(n) + 0.5) / n * (stop - start) for start, stop, n in zip(low, high, counts, strict=True))
     cells = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    cells = cells[patch.find_simplex(cells) >= 0]
+    cells = cells[(cells @ sides[:, :2].T + sides[:, 2] <= 0).all(axis=1)]
     limits = np.array([[surface.x[0], surface.y[0]], [surface.x[-1], surface.y[-1]]])
     heights = RegularGridInterpolator((surface.x, surface.y), surface.z)(np.clip(cells, *limits))
     owner = tree.query(cells)[1]
