@@ -201,10 +201,12 @@ def test_rectangle_against_boundary_elements_with_both_shear_components(a, b):
 @pytest.mark.parametrize(("radius", "depth", "within"), [(2.0, 0.005, 0.02), (2.0, 0.02, 0.03)])
 def test_rounded_rectangle_against_unilateral_boundary_elements(radius, depth, within):
     """Pressure of a punch with four round edges by an active set; its slope dP/d(depth) is the tangent stiffness."""
-    n, half, reach = 44, 0.5, 0.75
-    edge = np.linspace(-reach, reach, n + 1)
-    middle = (edge[1:] + edge[:-1]) / 2
-    influence = _cells(edge, edge, _love) / pi
+    n, half, reach = 22, 0.5, 0.75  # cells of one quarter
+    edge = np.linspace(-reach, reach, 2 * n + 1)
+    middle = (edge[1:] + edge[:-1])[n:] / 2
+    rows = _cells(edge, edge, _love).reshape((2 * n,) * 4)[n:, n:]
+    rows = rows[:, :, n:] + rows[:, :, n - 1 :: -1]
+    influence = (rows[..., n:] + rows[..., n - 1 :: -1]).reshape(n * n, n * n) / pi
     drop = np.clip(abs(middle) - half, 0, None) ** 2 / (2 * radius)
     gap = (drop[:, None] + drop).ravel()
 
@@ -217,7 +219,7 @@ def test_rounded_rectangle_against_unilateral_boundary_elements(radius, depth, w
             if (kept == active).all():
                 break
             active = kept
-        return pressure.sum() * (edge[1] - edge[0]) ** 2
+        return 4 * pressure.sum() * (edge[1] - edge[0]) ** 2
 
     tangent = (load(1.05 * depth) - load(0.95 * depth)) / (0.1 * depth)
     k_n, _ = rectangular_punch(1.0, 1.0, 1.0, 0.0, inf, 0.0, edge_radius=radius, load=load(depth))
