@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from hbm.balance import HarmonicBalance
+    from hbm.newton import Solution
 
 CONVERGED = "converged"
 
@@ -50,3 +55,36 @@ def amplitude(coefficients: np.ndarray, has_static: bool = True) -> np.ndarray:
     """
     dynamic = coefficients[..., 1:] if has_static else coefficients
     return np.sqrt(np.sum(dynamic**2, axis=-1))
+
+
+class BranchBuilder:
+    """Collects solutions into a Branch."""
+
+    def __init__(self, balance: HarmonicBalance):
+        self._balance = balance
+        self.omega: list[float] = []
+        self.x: list[np.ndarray] = []
+        self._rows: list[tuple[np.ndarray, float, str, int]] = []
+
+    def add(self, solution: Solution) -> None:
+        """Append one solution, converged or not."""
+        state = solution.state
+        self.omega.append(state.omega)
+        self.x.append(state.x)
+        energy = float(self._balance.energy(state).sum())
+        self._rows.append((self._balance.outputs(state), energy, solution.outcome, solution.steps))
+
+    def finish(self, end: str) -> Branch:
+        """The branch; `end` says why it ends where it ends."""
+        response, energy, outcome, steps = zip(*self._rows, strict=True)
+        x = np.stack(self.x)
+        return Branch(
+            omega=np.array(self.omega),
+            output_names=self._balance.compliance.output_names,
+            response=np.stack(response),
+            contact=x.reshape(len(x), -1, x.shape[-1]),
+            energy=np.array(energy),
+            outcome=outcome,
+            newton_steps=np.array(steps),
+            end=end,
+        )

@@ -1,0 +1,220 @@
+"""Harmonic balance in compliance form: unknown is the relative displacement at the contacts, nothing else.
+
+    R(x) = x - x_lin(w) - G(w) g(x),    g(x) = k x - f_c(x)
+
+g is the departure of the contact from its stuck, closed state; where all is stuck it vanishes and x = x_lin.
+Source  design of tribodyn; x_lin and G in hbm.compliance; f_c from a contact law by alternating frequency/time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hbm import law as contact_law
+from hbm.compliance import CompliancePoint, ContactCompliance
+from hbm.excitation import Excitation
+from hbm.harmonics import HarmonicBasis
+from hbm.krylov import gmres
+from hbm.law import ContactCycle, ContactParameters
+from reduction.model import ReducedModel
+
+
+@dataclass(frozen=True)
+class State:
+    """The balance evaluated at one x.
+
+    x : (n_pair, n_component, n_coeff) relative displacement [m]
+    cycle : contact forces, their derivative and status
+    g : (n_contact, n_coeff) departure from stuck and closed [N]
+    residual : (n_contact, n_coeff) R(x) [m]
+    """
+
+    omega: float
+    x: np.ndarray
+    cycle: ContactCycle
+    g: np.ndarray
+    residual: np.ndarray
+
+    @property
+    def flat(self) -> np.ndarray:
+        """(n_contact, n_coeff) relative displacement [m]."""
+        return self.x.reshape(-1, self.x.shape[2])
+
+
+class HarmonicBalance:
+    """The nonlinear problem of one scene: reduced model, contact law, harmonics, excitation.
+
+    model : reduced model whose contact map orders its rows pair by pair, component by component
+    law : name of a contact law; parameters : of every pair; omega_max : largest frequency to come [rad/s]
+    memory : (n_pair, n_state) slider positions at the start of the load path [m], zeros by default: the contact is
+        closed without shear, and a pair that never slips keeps the shear that the loads put on it
+    """
+
+    def __init__(
+        self,
+        model: ReducedModel,
+        law: str,
+        parameters: ContactParameters,
+        basis: HarmonicBasis,
+        excitation: Excitation,
+        omega_max: float,
+        memory: np.ndarray | None = None,
+    ):
+        self.law = contact_law.load(law)
+        contact_law.check_components(self.law, parameters.components)
+        self.law_name = law
+        self.model = model
+        self.parameters = parameters
+        self.basis = basis
+        self.excitation = excitation
+        self.omega_max = omega_max
+        if memory is None:
+            memory = np.zeros((parameters.n_pair, self.law.n_state(parameters.components)))
+        self.memory = memory
+        self.load_factor = 1.0
+        self.compliance = ContactCompliance(model, parameters.stiffness, basis, excitation, omega_max)
+        self._point: CompliancePoint | None = None
+
+    @property
+    def n_unknown(self) -> int:
+        """Number of unknowns: pairs x components x harmonic coefficients."""
+        return self.parameters.stiffness.size * self.basis.n_coeff
+
+    def with_gap(self, gap: np.ndarray) -> HarmonicBalance:
+        """The same problem with another gap (n_pair,) [m], as wear makes it; everything linear is shared."""
+        return self._changed(parameters=replace(self.parameters, gap=np.asarray(gap, float)))
+
+    def with_parameters(self, parameters: ContactParameters) -> HarmonicBalance:
+        """The same problem with other contact parameters; the stuck reference springs stay those of the first."""
+        return self._changed(parameters=parameters)
+
+    def with_memory(self, memory: np.ndarray) -> HarmonicBalance:
+        """The same problem from another start of the load path."""
+        return self._changed(memory=memory)
+
+    def with_load(self, factor: float) -> HarmonicBalance:
+        """The same problem with the harmonics >= 1 of the excitation times a factor."""
+        return self._changed(load_factor=factor)
+
+    def _changed(self, **changes: object) -> HarmonicBalance:
+        other = object.__new__(HarmonicBalance)
+        other.__dict__.update(self.__dict__)
+        other.__dict__.update(changes)
+        return other
+
+    def at(self, omega: float) -> CompliancePoint:
+        """The linear side at one frequency, the last one kept."""
+        if self._point is None or self._point.omega != omega:
+            self._point = self.compliance.at(omega)
+        return self._point
+
+    def _loaded(self, coefficients: np.ndarray) -> np.ndarray:
+        return coefficients if self.load_factor == 1.0 else coefficients * np.where(self.basis.order, self.load_factor, 1.0)
+
+    def x_lin(self, omega: float) -> np.ndarray:
+        """(n_contact, n_coeff) response with every contact stuck and closed, the gap ignored [m]."""
+        return self._loaded(self.at(omega).x_lin)
+
+    def stuck(self, omega: float) -> np.ndarray:
+        """The same as a first guess x (n_pair, n_component, n_coeff) [m]."""
+        x = self.x_lin(omega)
+        return x.reshape(self.parameters.n_pair, -1, x.shape[-1])
+
+    def evaluate(self, omega: float, x: np.ndarray, jacobian: bool = True) -> State:
+        """The balance at x (n_pair, n_component, n_coeff)."""
+        cycle = contact_law.cycle(self.law, x, self.parameters, self.basis, self.memory, jacobian)
+        flat = x.reshape(-1, x.shape[2])
+        g = self.compliance.k[:, None] * flat - cycle.force.reshape(flat.shape)
+        return State(omega, x, cycle, g, flat - self.x_lin(omega) - self.at(omega).apply(g))
+
+    def linearise(self, state: State) -> Linearisation:
+        """d R / d x at a state whose contact derivative was asked for."""
+        return Linearisation(self, state)
+
+    def frequency_slope(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """d / d omega at fixed x of R (n_contact, n_coeff) and of the outputs (n_output, n_coeff)."""
+        point = self.at(state.omega)
+        x_load, y_load = point.slope(None)
+        x_contact, y_contact = point.slope(state.g)
+        return -self._loaded(x_load) - x_contact, self._loaded(y_load) + y_contact
+
+    def outputs(self, state: State) -> np.ndarray:
+        """(n_output, n_coeff) response of the observed outputs [m]."""
+        point = self.at(state.omega)
+        return self._loaded(point.outputs_lin) + point.outputs(state.g)
+
+    def energy(self, state: State) -> np.ndarray:
+        """(n_pair,) friction work per cycle, all components [J]."""
+        return self.basis.work_per_cycle(state.cycle.force, state.x).sum(axis=1)
+
+    def preload(self, state: State) -> float:
+        """Static normal force of the whole contact [N]; zero where the law has no normal component."""
+        components = self.parameters.components
+        if "n" not in components or not self.basis.has_static:
+            return 0.0
+        return float(state.cycle.force[:, components.index("n"), 0].sum())
+
+
+class Linearisation:
+    """I - G dg/dx, with dg/dx block diagonal over pairs and zero where a pair stays stuck and closed."""
+
+    def __init__(self, balance: HarmonicBalance, state: State):
+        jac = state.cycle.jacobian
+        if jac is None:
+            raise ValueError("linearise needs a state evaluated with its contact derivative")
+        n_pair, m, _ = jac.shape
+        n_coeff = state.x.shape[2]
+        n_comp = m // n_coeff
+        dg = -jac
+        k = balance.compliance.k.reshape(n_pair, n_comp)
+        dg[:, np.arange(m), np.arange(m)] += np.repeat(k, n_coeff, axis=1)
+        self.active = np.flatnonzero(np.abs(dg).max(axis=(1, 2)) > 1e-14 * k.max(axis=1))
+        self._rows = (self.active[:, None] * n_comp + np.arange(n_comp)).ravel()
+        self._dg = np.ascontiguousarray(dg[self.active])
+        self._shape = (n_pair * n_comp, n_coeff)
+        self._balance = balance
+        self._omega = state.omega
+        self._product = balance.at(state.omega).jacobian_product(self._rows)
+
+    def departure_slope(self, direction: np.ndarray) -> np.ndarray:
+        """dg/dx . direction: (n_contact, n_coeff)."""
+        out = np.zeros(self._shape)
+        out[self._rows] = self._g_slope(direction[self._rows])
+        return out
+
+    def _g_slope(self, active_direction: np.ndarray) -> np.ndarray:
+        shape = active_direction.shape
+        return np.matmul(self._dg, active_direction.reshape(len(self.active), -1, 1)).reshape(shape)
+
+    def solve(self, rhs: np.ndarray, tolerance: float, max_products: int = 200) -> tuple[np.ndarray, int, float]:
+        """Solve (I - G dg/dx) d = rhs for rhs (n_contact, n_coeff).
+
+        Returns d, products spent, relative residual reached
+        """
+        if len(self.active) == 0:
+            return rhs.copy(), 0, 0.0
+        n_coeff = self._shape[1]
+
+        def product(v: np.ndarray) -> np.ndarray:
+            d = v.reshape(-1, n_coeff)
+            return (d - self._product(self._g_slope(d))).ravel()
+
+        d, spent, reached = gmres(product, rhs[self._rows].ravel(), tolerance, max_products)
+        d = d.reshape(-1, n_coeff)
+        if len(self._rows) == self._shape[0]:
+            return d, spent, reached
+        g = np.zeros(self._shape)
+        g[self._rows] = self._g_slope(d)
+        full = rhs + self._balance.at(self._omega).apply(g)
+        full[self._rows] = d
+        return full, spent, reached
+
+    def dense(self) -> np.ndarray:
+        """The Jacobian as a matrix (n_contact * n_coeff, same), column by column; for checks and as fallback."""
+        n = self._shape[0] * self._shape[1]
+        point = self._balance.at(self._omega)
+        eye = np.eye(n).reshape(n, *self._shape)
+        columns = [(e - point.apply(self.departure_slope(e))).ravel() for e in eye]
+        return np.stack(columns, axis=1)

@@ -1,0 +1,45 @@
+"""Excitation: which named loads act in which harmonic, and how the other body moves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hbm.harmonics import HarmonicBasis
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """Periodic loads on a system, as complex amplitudes F_h of F(t) = Re sum_h F_h exp(i h w t).
+
+    loads : (harmonic, name of a load of the system) -> complex amplitude [N]; harmonic 0 is the static load
+    base : (n_pair * n_component, n_coeff) prescribed motion of body 2 at the contact [m], or None for a fixed ground
+    """
+
+    loads: Mapping[tuple[int, str], complex] = field(default_factory=dict)
+    base: np.ndarray | None = None
+
+    @classmethod
+    def of(
+        cls, static: Mapping[str, float] | None = None, harmonic: Mapping[int, Mapping[str, complex]] | None = None
+    ) -> Excitation:
+        """Excitation from static loads [N] by name and harmonic amplitudes [N] by harmonic and name."""
+        loads: dict[tuple[int, str], complex] = {(0, name): value for name, value in (static or {}).items()}
+        for h, named in (harmonic or {}).items():
+            loads.update({(h, name): value for name, value in named.items()})
+        return cls(loads)
+
+    def check(self, basis: HarmonicBasis, known: Mapping[str, object]) -> None:
+        """Raise ValueError where a load is unknown or its harmonic is not kept."""
+        for (h, name), value in self.loads.items():
+            if name not in known:
+                raise ValueError(f"no load '{name}' in the model: it has {', '.join(sorted(known)) or 'none'}")
+            if value != 0 and h not in basis.harmonics:
+                raise ValueError(f"load '{name}' acts in harmonic {h}, which is not kept: keep it in {basis.harmonics}")
+
+    def scaled(self, factor: float, dynamic_only: bool = True) -> Excitation:
+        """The same excitation with its harmonics >= 1 (or all) times a factor."""
+        loads = {(h, n): v * factor if h or not dynamic_only else v for (h, n), v in self.loads.items()}
+        return Excitation(loads, self.base)

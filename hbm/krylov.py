@@ -1,0 +1,58 @@
+"""GMRES for Newton directions: short, matrix-free, deterministic."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+
+def gmres(
+    product: Callable[[np.ndarray], np.ndarray], b: np.ndarray, tolerance: float, max_products: int
+) -> tuple[np.ndarray, int, float]:
+    """Solve A x = b by GMRES without restart, orthogonalised twice.
+
+    product : A times a vector (n,)
+    Returns x, products spent, relative residual reached
+    Source  Saad and Schultz 1986
+    """
+    beta = float(np.linalg.norm(b))
+    if beta == 0.0:
+        return np.zeros_like(b), 0, 0.0
+    size = min(max_products, len(b))
+    v = np.empty((size + 1, len(b)))
+    h = np.zeros((size + 1, size))
+    v[0] = b / beta
+    cs, sn = np.zeros(size), np.zeros(size)
+    rhs = np.zeros(size + 1)
+    rhs[0] = beta
+    k = 0
+    for k in range(1, size + 1):
+        w = product(v[k - 1])
+        span = v[:k]
+        coefficients = span @ w
+        w = w - coefficients @ span
+        again = span @ w
+        w -= again @ span
+        column = h[:, k - 1]
+        column[:k] = coefficients + again
+        norm = np.linalg.norm(w)
+        for i in range(k - 1):  # earlier Givens rotations
+            column[i], column[i + 1] = cs[i] * column[i] + sn[i] * column[i + 1], cs[i] * column[i + 1] - sn[i] * column[i]
+        radius = np.hypot(column[k - 1], norm)
+        if radius == 0.0:
+            k -= 1
+            break
+        cs[k - 1], sn[k - 1] = column[k - 1] / radius, norm / radius
+        column[k - 1] = radius
+        rhs[k] = -sn[k - 1] * rhs[k - 1]
+        rhs[k - 1] *= cs[k - 1]
+        if abs(rhs[k]) <= tolerance * beta or norm <= 1e-14 * radius:
+            break
+        v[k] = w / norm
+    if k == 0:
+        return np.zeros_like(b), 1, 1.0
+    y = np.zeros(k)
+    for i in range(k - 1, -1, -1):
+        y[i] = (rhs[i] - h[i, i + 1 : k] @ y[i + 1 :]) / h[i, i]
+    return y @ v[:k], k, abs(rhs[k]) / beta

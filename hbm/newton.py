@@ -1,0 +1,123 @@
+"""Newton-Krylov for the balance: inexact directions, a line search, a direct fallback, and an outcome in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hbm.balance import HarmonicBalance, State
+from hbm.branch import CONVERGED
+
+
+@dataclass(frozen=True)
+class NewtonOptions:
+    """tolerance : on the residual relative to the displacement; max_steps : Newton steps; max_products : per direction."""
+
+    tolerance: float = 1e-8
+    max_steps: int = 40
+    max_products: int = 300
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Where Newton ended.
+
+    outcome : "converged" or a sentence
+    steps, products : Newton steps and Krylov products spent
+    history : relative residual after each step, the start first
+    """
+
+    state: State
+    outcome: str
+    steps: int
+    products: int
+    history: tuple[float, ...]
+
+    @property
+    def converged(self) -> bool:
+        """Whether the residual is below the tolerance."""
+        return self.outcome == CONVERGED
+
+
+def relative_residual(state: State, x_lin: np.ndarray) -> float:
+    """|R| / max(|x|, |x_lin|), Euclidean; invariant to the units of length and force."""
+    scale = max(np.linalg.norm(state.x), np.linalg.norm(x_lin))
+    return float(np.linalg.norm(state.residual) / scale) if scale > 0 else float(np.linalg.norm(state.residual))
+
+
+def solve(balance: HarmonicBalance, omega: float, start: np.ndarray, options: NewtonOptions | None = None) -> Solution:
+    """Solve the balance at one frequency.
+
+    omega : [rad/s]; start : (n_pair, n_component, n_coeff) first guess [m]
+    Returns a Solution; its state is the best met, also where it did not converge
+    Source  inexact Newton with the forcing term of Eisenstat and Walker 1996, choice 2
+    """
+    options = options or NewtonOptions()
+    x_lin = balance.x_lin(omega)
+    state = balance.evaluate(omega, start)
+    error = relative_residual(state, x_lin)
+    history = [error]
+    forcing = 1e-2
+    products = 0
+    for step in range(1, options.max_steps + 1):
+        if error <= options.tolerance:
+            return Solution(state, CONVERGED, step - 1, products, tuple(history))
+        linear = balance.linearise(state)
+        target = max(min(forcing, 0.1), 0.3 * options.tolerance / error, 1e-12)
+        direction, spent, reached = linear.solve(-state.residual, target, options.max_products)
+        products += spent
+        if reached > max(10 * target, 0.5):  # Krylov stalled: the direct way
+            direction = np.linalg.solve(linear.dense(), -state.residual.ravel()).reshape(state.residual.shape)
+        state, new_error = _search(balance, omega, state, direction, error, x_lin)
+        history.append(new_error)
+        if new_error >= error * (1 - 1e-10):
+            if new_error <= options.tolerance:
+                break
+            return Solution(state, f"no descent from relative residual {error:.1e}", step, products, tuple(history))
+        forcing = 0.5 * (new_error / error) ** 1.5
+        error = new_error
+    outcome = CONVERGED if error <= options.tolerance else f"not converged in {options.max_steps} steps: {error:.1e}"
+    return Solution(state, outcome, len(history) - 1, products, tuple(history))
+
+
+def _search(
+    balance: HarmonicBalance, omega: float, state: State, direction: np.ndarray, error: float, x_lin: np.ndarray
+) -> tuple[State, float]:
+    """Backtrack until the residual falls; the derivative has kinks, so the best trial is kept if none falls enough."""
+    best, best_error = state, error
+    length = 1.0
+    for _ in range(12):
+        trial = balance.evaluate(omega, state.x + length * direction.reshape(state.x.shape))
+        trial_error = relative_residual(trial, x_lin)
+        if trial_error < best_error:
+            best, best_error = trial, trial_error
+        if trial_error <= (1 - 0.1 * length) * error:
+            return trial, trial_error
+        length *= 0.5
+    return best, best_error
+
+
+def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None) -> Solution:
+    """Solve without a neighbouring solution: from the stuck response, else by raising the vibration load in steps.
+
+    The ramp halves its step where it fails; products and steps of the whole way are counted in the Solution.
+    """
+    first = solve(balance, omega, balance.stuck(omega), options)
+    if first.converged:
+        return first
+    steps, products = first.steps, first.products
+    factor, stride = 0.0, 0.25
+    start = balance.with_load(0.0).stuck(omega)
+    last = solve(balance.with_load(0.0), omega, start, options)
+    while last.converged and stride > 1e-3:
+        target = min(1.0, factor + stride)
+        trial = solve(balance.with_load(target * balance.load_factor), omega, last.state.x, options)
+        steps, products = steps + trial.steps, products + trial.products
+        if trial.converged:
+            factor, last, stride = target, trial, 1.5 * stride
+            if factor == 1.0:
+                return Solution(last.state, CONVERGED, steps, products, last.history)
+        else:
+            stride *= 0.5
+    return Solution(first.state, f"{first.outcome}; load ramp stopped at {factor:.0%}", steps, products, first.history)
