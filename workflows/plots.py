@@ -1,4 +1,4 @@
-"""Curves of a result, drawn with matplotlib: each function draws one figure, `draw` writes all that the result allows."""
+"""Curves of a result, drawn with matplotlib: each function draws one figure, `draw` writes all that can be drawn."""
 
 from __future__ import annotations
 
@@ -12,44 +12,22 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hbm.branch import CONVERGED
+from workflows import maps
 from workflows.result import Result
-
-BLUE, ORANGE, GREEN, RED, GREY, INK = "#2f6db3", "#e08214", "#3a923a", "#c03d3e", "#8a8f98", "#22262d"
-WEAR_MAP = "viridis"
-
-STYLE: dict[str, Any] = {
-    "figure.dpi": 150,
-    "savefig.dpi": 150,
-    "font.size": 10,
-    "axes.edgecolor": INK,
-    "axes.labelcolor": INK,
-    "axes.titlesize": 11,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.grid": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.axisbelow": True,
-    "grid.color": "#dfe2e6",
-    "grid.linewidth": 0.7,
-    "lines.linewidth": 1.7,
-    "legend.frameon": False,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "text.color": INK,
-}
+from workflows.style import BLUE, GREEN, GREY, INK, ORANGE, RED, STYLE, WEAR_MAP
 
 
 def draw(result: Result, folder: Path) -> list[Path]:
     """Write every figure that the result has data for as a PNG; returns their paths."""
     figures: list[tuple[str, Callable[[Result], Figure], bool]] = [
         ("frf", frequency_response, result.frf is not None or result.wear is not None),
-        ("cycles_per_step", cycles_per_step, _steps(result) > 0),
-        ("peak", amplitude_against_cycles, _steps(result) > 0),
-        ("preload", preload_against_cycles, _steps(result) > 0),
-        ("depth", depth_against_cycles, _steps(result) > 0),
-        ("energy", energy_against_cycles, _steps(result) > 0),
+        ("cycles_per_step", cycles_per_step, result.wear_steps > 0),
+        ("peak", amplitude_against_cycles, result.wear_steps > 0),
+        ("preload", preload_against_cycles, result.wear_steps > 0),
+        ("depth", depth_against_cycles, result.wear_steps > 0),
+        ("energy", energy_against_cycles, result.wear_steps > 0),
         ("hysteresis", hysteresis_loops, result.loops is not None),
+        ("patch", maps.patch_maps, result.wear_steps > 0),
     ]
     written = []
     for name, function, possible in figures:
@@ -73,7 +51,7 @@ def frequency_response(result: Result) -> Figure:
             good = np.array([outcome == CONVERGED for outcome in result.frf.outcome])
             amplitude = scale * result.frf.amplitude(result.frf.output_names[0])
             axes.plot(result.frf.frequency[good], amplitude[good], color=BLUE, label="unworn contact")
-        if result.wear is not None and _steps(result):
+        if result.wear is not None and result.wear_steps:
             wear = result.wear
             hertz = wear.omega / (2 * np.pi)
             unit_cycles, scale_cycles = _cycles(wear.cycles[-1])
@@ -92,7 +70,7 @@ def cycles_per_step(result: Result) -> Figure:
     """Cycles that each wear step stands for."""
     wear = _wear(result)
     with _axes() as (figure, axes):
-        count = wear.cycles_in_step[: _steps(result)]
+        count = wear.cycles_in_step[: result.wear_steps]
         unit, scale = _cycles(count.max())
         axes.step(np.arange(1, len(count) + 1), scale * count, where="mid", color=BLUE)
         axes.set(xlabel="wear step", ylabel=f"cycles in the step{unit}", title="Cycles per wear step")
@@ -197,7 +175,7 @@ def chosen_pairs(result: Result) -> list[int]:
     middle = int(np.argmin(np.linalg.norm(patch.points - patch.points.mean(0), axis=1)))
     if wear is None or not len(wear.depth):
         return [middle] * len(CHOSEN)
-    depth, energy = wear.depth[-1], wear.energy[: max(_steps(result), 1)].sum(0)
+    depth, energy = wear.depth[-1], wear.energy[: max(result.wear_steps, 1)].sum(0)
     return [middle, int(np.argmax(depth)), int(np.argmin(depth)), int(np.argmax(energy))]
 
 
@@ -211,11 +189,6 @@ def _axes(width: float = 7.2, height: float = 4.2, rows: int = 1, share: bool = 
 def _wear(result: Result) -> Any:
     assert result.wear is not None
     return result.wear
-
-
-def _steps(result: Result) -> int:
-    """Number of wear steps taken."""
-    return 0 if result.wear is None else int(np.count_nonzero(result.wear.cycles_in_step))
 
 
 def _largest_amplitude(result: Result) -> float:

@@ -44,6 +44,23 @@ class Patch:
     faces: np.ndarray
     free_deflection: np.ndarray
 
+    @property
+    def flat(self) -> np.ndarray:
+        """(n_pair, 2) positions in the mean tangential plane, from the middle of the patch [m]."""
+        return np.asarray((self.points - self.points.mean(0)) @ self.frames.mean(0)[:2].T)
+
+    def shares(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Cut every face into one quadrangle for each of its corners, to show what has one value for each pair.
+
+        points : (n_pair, d) where the pairs are drawn
+        Returns (n_share, 4, d) corners of the quadrangles, and (n_share,) the pair each belongs to
+        """
+        corner = points[self.faces]
+        before, after = np.roll(corner, 1, axis=1), np.roll(corner, -1, axis=1)
+        middle = np.broadcast_to(corner.mean(1, keepdims=True), corner.shape)
+        share = np.stack([corner, (corner + after) / 2, middle, (corner + before) / 2], axis=2)
+        return share.reshape(-1, 4, points.shape[1]), self.faces.ravel()
+
 
 @dataclass(frozen=True)
 class References:
@@ -104,3 +121,25 @@ class Result:
     wear: WearHistory | None = None
     fields: Fields | None = None
     loops: Loops | None = None
+
+    @property
+    def wear_steps(self) -> int:
+        """Number of wear steps taken."""
+        return 0 if self.wear is None else int(np.count_nonzero(self.wear.cycles_in_step))
+
+    def shown_rows(self) -> np.ndarray:
+        """Wear rows that pictures show: those of the fields, else the first, the middle and the last worn."""
+        if self.fields is not None:
+            return self.fields.row
+        last = max(self.wear_steps - 1, 0)
+        return np.unique([0, last // 2, last])
+
+    def depth_after(self, row: int) -> np.ndarray:
+        """(n_pair,) wear depth when the step of a row is done, or that of the row where none was taken [m]."""
+        assert self.wear is not None
+        return np.asarray(self.wear.depth[min(row + 1, len(self.wear.depth) - 1)])
+
+    def cycles_after(self, row: int) -> float:
+        """Cycles when the step of a row is done."""
+        assert self.wear is not None
+        return float(self.wear.cycles[row] + self.wear.cycles_in_step[row])
