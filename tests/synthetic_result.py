@@ -65,6 +65,7 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
         cycles=np.concatenate([[0.0], np.cumsum(cycles_in_step)[:-1]]),
         cycles_in_step=cycles_in_step,
         depth=depth,
+        worn=np.diff(depth, axis=0, append=depth[-1:]),
         energy=np.tile(2 * np.sqrt(1 - t**2)[:, None], n_pair),
         preload=6e3 * (1 - t),
         normal_force=np.outer(6e3 * (1 - t), where.area / where.area.sum()),

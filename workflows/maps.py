@@ -67,7 +67,7 @@ def _status(axes: Any, patch: Patch, status: np.ndarray) -> None:
     """The status of each pair on its share of the patch."""
     corners, pair = patch.shares(1e3 * patch.flat)
     colors = [STATUS[int(bits)][1] for bits in status[pair]]
-    axes.add_collection(PolyCollection(corners, facecolors=colors, edgecolors=colors, linewidths=0.3))
+    axes.add_collection(PolyCollection(list(corners), facecolors=colors, edgecolors=colors, linewidths=0.3))
     axes.plot(*(1e3 * patch.flat.T), ".", color="white", ms=1.5)
     axes.set_aspect("equal")
 

@@ -19,7 +19,8 @@ from workflows.style import INK, PRESSURE_MAP, STATUS, WEAR_MAP
 SYSTEM_LIBRARIES = "libgl1 libegl1 libgomp1"
 COLUMN, ROW = 640, 460  # pixels of one view
 BODY, PAPER = "#c9ced6", "white"
-PROBE = "import pyvista as p; v = p.Plotter(off_screen=True, window_size=(64, 64)); v.add_mesh(p.Sphere()); v.screenshot()"
+SHADE = {"ambient": 0.45, "diffuse": 0.6}
+PROBE = "import pyvista as pv; view = pv.Plotter(off_screen=True); view.add_mesh(pv.Sphere()); view.screenshot()"
 
 
 class RenderingUnavailable(RuntimeError):
@@ -76,6 +77,7 @@ def worn_patch(result: Result, path: Path, wear: float | None = None) -> Path:
     pressure = history.normal_force[rows] / patch.area
     wear = wear or _wear_scale(patch, depth)
     flat = np.column_stack([patch.flat, np.zeros(len(patch.area))])
+    outline = pv.PolyData(flat, _polygons(patch.faces)).extract_feature_edges(40)
     view = _plotter((3, len(rows)))
     for column, row in enumerate(rows):
         points = flat.copy()
@@ -93,7 +95,7 @@ def worn_patch(result: Result, path: Path, wear: float | None = None) -> Path:
                 _add_status(view, patch, points, values)
             else:
                 _add_field(view, surface, values, largest, label, colors, f"{line} {column}")
-            view.add_mesh(pv.PolyData(flat, _polygons(patch.faces)).extract_feature_edges(40), color=INK, line_width=1.5)
+            view.add_mesh(outline, color=INK, line_width=1.5)
             view.camera.position = np.array([-0.9, -1.3, 1.2])
             view.camera.up = (0, 0, 1)
             view.camera.focal_point = (0, 0, 0)
@@ -128,7 +130,7 @@ def worn_part(result: Result, path: Path, deformation: float | None = None, wear
         points = part.points + deformation * shape
         points[patch.nodes] -= wear * 0.5 * depth[column][:, None] * inward  # half of the depth for each surface
         body = _surface(points, part.cells, cell_type, 2)
-        view.add_mesh(body, color=BODY, ambient=0.45, diffuse=0.6, smooth_shading=True, split_sharp_edges=True)
+        view.add_mesh(body, color=BODY, **SHADE, smooth_shading=True, split_sharp_edges=True)
         view.add_mesh(resting, color="#9aa1ab", line_width=1)
         worn = pv.PolyData(points[patch.nodes] + 2e-3 * size * inward, _polygons(patch.faces))
         _add_field(view, worn, 1e3 * depth[column], 1e3 * depth.max(), "total wear depth / mm", WEAR_MAP, f"0 {column}")
@@ -195,11 +197,12 @@ def _add_field(
     bar = {
         "title": label + " " * (1 + int(place.split()[1])),  # pyvista draws one bar for each title
         "vertical": False, "position_x": 0.2, "position_y": 0.02, "width": 0.6, "height": 0.13,
-        "title_font_size": 17, "label_font_size": 15, "color": INK, "fmt": "%.3g", "n_labels": 3, "font_family": "arial",
+        "title_font_size": 17, "label_font_size": 15, "color": INK, "fmt": "%.3g", "n_labels": 3,
+        "font_family": "arial",
     }  # fmt: skip
     view.add_mesh(
-        surface, scalars=place, cmap=colors, clim=(0, max(largest, 1e-12)), ambient=0.45, diffuse=0.6, smooth_shading=True,
-        scalar_bar_args=bar,
+        surface, scalars=place, cmap=colors, clim=(0, max(largest, 1e-12)), smooth_shading=True, scalar_bar_args=bar,
+        **SHADE,
     )  # fmt: skip
 
 
@@ -213,9 +216,10 @@ def _add_status(view: Any, patch: Patch, points: np.ndarray, status: np.ndarray)
         here = corners[status[pair] == bits]
         if len(here):
             quads = np.arange(4 * len(here)).reshape(-1, 4)
-            view.add_mesh(pv.PolyData(here.reshape(-1, 3), _polygons(quads)), color=color, ambient=0.45, diffuse=0.6)
+            view.add_mesh(pv.PolyData(here.reshape(-1, 3), _polygons(quads)), color=color, **SHADE)
             legend.append([name, color])
-    view.add_legend(legend, bcolor=None, face="rectangle", size=(0.36, 0.06 * len(legend)), loc="lower center", font_family="arial")
+    size = (0.36, 0.06 * len(legend))
+    view.add_legend(legend, bcolor=None, face="rectangle", size=size, loc="lower center", font_family="arial")
 
 
 def _surface(points: np.ndarray, cells: np.ndarray, cell_type: int, subdivision: int) -> Any:

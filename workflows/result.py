@@ -112,7 +112,7 @@ class Result:
     """
 
     provenance: Mapping[str, str]
-    facts: Mapping[str, str | int | float]
+    facts: Mapping[str, str | int | float | np.ndarray]
     state: str
     patch: Patch | None = None
     part: PartMesh | None = None
@@ -135,9 +135,9 @@ class Result:
         return np.unique([0, last // 2, last])
 
     def depth_after(self, row: int) -> np.ndarray:
-        """(n_pair,) wear depth when the step of a row is done, or that of the row where none was taken [m]."""
+        """(n_pair,) wear depth when the step of a row is done [m]."""
         assert self.wear is not None
-        return np.asarray(self.wear.depth[min(row + 1, len(self.wear.depth) - 1)])
+        return np.asarray(self.wear.depth[row] + self.wear.worn[row])
 
     def cycles_after(self, row: int) -> float:
         """Cycles when the step of a row is done."""

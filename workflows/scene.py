@@ -5,11 +5,14 @@ Every key of the file is a field below; a key that is not here is an error. What
 
 from __future__ import annotations
 
+import difflib
+from dataclasses import asdict, fields
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, StrictInt, model_validator
 
+from geometry import parts
 from workflows.units import to_si
 
 
@@ -57,20 +60,65 @@ class Heading(Table):
 
 
 class Geometry(Table):
-    """A part of geometry/ with its parameters, or a mesh file; and the groups that are held fixed."""
+    """A part of geometry/ or a mesh file, and the groups that are held fixed.
+
+    All other keys of the table are parameters of the part; those left out have the part's own defaults.
+    """
 
     part: str | None = None
     mesh: str | None = None
-    parameters: dict[str, Any] = Field(default_factory=dict)
     fixed: tuple[str, ...] = ()
+    parameters: dict[str, int | float] = Field(default_factory=dict)
 
-    @model_validator(mode="after")
-    def _one_source(self) -> Geometry:
-        if (self.part is None) == (self.mesh is None):
+    @model_validator(mode="before")
+    @classmethod
+    def _gather_parameters(cls, table: Any) -> Any:
+        if not isinstance(table, dict) or "parameters" in table:
+            return table
+        own = {key: value for key, value in table.items() if key in cls.model_fields}
+        other = {key: value for key, value in table.items() if key not in cls.model_fields}
+        if ("part" in own) == ("mesh" in own):
             raise ValueError('expected either part = "name" or mesh = "file.msh", and not both')
-        if self.mesh is not None and self.parameters:
-            raise ValueError("expected no parameters beside mesh, because a mesh file has none")
-        return self
+        if not isinstance(own.get("part"), str):
+            return own | other  # a mesh file has no parameters: the other keys are unknown ones
+        return own | {"parameters": part_parameters(own["part"], other)}
+
+
+def part_parameters(part: str, given: dict[str, Any]) -> dict[str, int | float]:
+    """Parameters of a part of geometry/ in SI units, all of them.
+
+    given : key -> number or text with a unit (a length, an angle or a pure number)
+    Raises  ValueError: no such part, unknown key, or a value that the part refuses
+    """
+    kind = parts.load(part).Parameters
+    known = {item.name: item.type for item in fields(kind)}
+    values = {}
+    for key, value in given.items():
+        if key not in known:
+            raise ValueError(unknown_key(f"geometry.{key}", [*Geometry.model_fields, *known]))
+        values[key] = _parameter(key, value, whole=known[key] in (int, "int"))
+    return asdict(kind(**values))
+
+
+def _parameter(key: str, value: Any, whole: bool) -> int | float:
+    if whole:
+        if type(value) is not int:
+            raise ValueError(f"geometry.{key}: expected a whole number, got {value!r}")
+        return value
+    for unit in ("m", "rad", ""):
+        try:
+            return to_si(value, unit)
+        except ValueError:
+            continue
+    raise ValueError(f"geometry.{key}: expected a length, an angle or a number, got {value!r}")
+
+
+def unknown_key(key: str, known: list[str]) -> str:
+    """Clause about a key that does not exist, with the one that was probably meant and all that exist."""
+    names = [name for name in known if name != "parameters"]
+    close = difflib.get_close_matches(key.rpartition(".")[2], names, n=1)
+    hint = f" (did you mean {close[0]}?)" if close else ""
+    return f"unknown key {key}{hint}, known here: {', '.join(names)}"
 
 
 class Material(Table):
@@ -82,11 +130,16 @@ class Material(Table):
 
 
 class Contact(Table):
-    """A patch of nodes against the ground and the contact law of every node."""
+    """A face of the part against the ground or against another face of it, and the contact law of every node.
+
+    t1 is the direction that the first tangential component follows; vertices_only leaves the mid-side nodes out.
+    """
 
     group: str
-    normal: Direction
+    opposite: str | None = None
+    t1: Direction
     components: tuple[Literal["t1", "t2", "n"], ...] = ("t1", "t2", "n")
+    vertices_only: StrictBool = False
     law: str = "jenkins"
     tangential_stiffness: Annotated[Stiffness, Field(gt=0)]
     normal_stiffness: Annotated[Stiffness, Field(gt=0)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,9 +10,10 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from workflows.scene import Scene
+from workflows.scene import Scene, unknown_key
 
 SCENES = Path(__file__).parent / "scenes"
+MOST_PROBLEMS = 3  # told in one sentence
 
 
 class SceneError(ValueError):
@@ -79,7 +79,8 @@ def parse(text: str, label: str, overrides: Sequence[str] = (), folder: Path = S
         scene = Scene.model_validate(data)
     except ValidationError as error:
         problems = [_sentence(problem) for problem in error.errors()]
-        raise SceneError(f"{label}: {'; '.join(problems)}") from None
+        more = f"; and {len(problems) - MOST_PROBLEMS} more" if len(problems) > MOST_PROBLEMS else ""
+        raise SceneError(f"{label}: {'; '.join(problems[:MOST_PROBLEMS])}{more}") from None
     return SceneFile(Path(label).stem, text, tuple(overrides), folder, scene)
 
 
@@ -109,14 +110,12 @@ def _sentence(problem: Any) -> str:
     kind, given, context = problem["type"], problem["input"], problem.get("ctx", {})
     key = _key(location)
     if kind == "extra_forbidden":
-        known = _fields(location[:-1])
-        close = difflib.get_close_matches(str(location[-1]), known, n=1)
-        hint = f" (did you mean {close[0]}?)" if close else ""
-        return f"unknown key {key}{hint}, known here: {', '.join(known)}"
+        return unknown_key(key, _fields(location[:-1]))
     if kind == "missing":
         return f"{key} is missing"
     if kind == "value_error":
-        return f"{key}: {context['error']}"
+        sentence = str(context["error"])
+        return sentence if key in sentence else f"{key}: {sentence}"
     limits = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "at least")}
     limits |= {"less_than": ("lt", "below"), "less_than_equal": ("le", "at most")}
     if kind in limits:

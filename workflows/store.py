@@ -57,6 +57,7 @@ SCHEMA: dict[str, tuple[type, dict[str, tuple[tuple[str, ...], str]]]] = {
             "cycles": (("row",), ""),
             "cycles_in_step": (("row",), ""),
             "depth": (("row", "pair"), "m"),
+            "worn": (("row", "pair"), "m"),
             "energy": (("row", "pair"), "J"),
             "preload": (("row",), "N"),
             "normal_force": (("row", "pair"), "N"),
