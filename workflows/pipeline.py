@@ -79,6 +79,9 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
         with progress.stage("contact compliance"):
             model = make_model(scene, part, reduced)
         result = earlier or described(file, model)
+        previous = None if earlier else store.set_aside(keep.path)
+        if previous:
+            progress.say(f"the result that was here is now {previous}")
         keep(result)
         if result.frf is None:
             with progress.track("frequency response") as advance:

@@ -59,3 +59,8 @@ class Progress:
         """One line."""
         if self._console is not None:
             self._console.print(text, highlight=False)
+
+
+def console_progress() -> Progress:
+    """Progress on standard output; standard error is kept for what goes wrong."""
+    return Progress(Console())

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hbm.branch import Branch
+from hbm.evolution import LOST
 from hbm.wear_history import WearHistory
 
 
@@ -126,6 +127,11 @@ class Result:
     def wear_steps(self) -> int:
         """Number of wear steps taken."""
         return 0 if self.wear is None else int(np.count_nonzero(self.wear.cycles_in_step))
+
+    @property
+    def contact_lost(self) -> bool:
+        """Whether wear went on until every pair was separated."""
+        return self.wear is not None and self.wear.end == LOST
 
     def shown_rows(self) -> np.ndarray:
         """Wear rows that pictures show: those of the fields, else the first, the middle and the last worn."""

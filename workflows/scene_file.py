@@ -42,6 +42,11 @@ def names() -> list[str]:
     return sorted(path.stem for path in SCENES.glob("*.toml"))
 
 
+def title(name: str) -> str:
+    """Title of a scene that comes with the program, without checking the rest of it."""
+    return str(tomllib.loads((SCENES / f"{name}.toml").read_text(encoding="utf-8"))["scene"]["title"])
+
+
 def find(name: str) -> Path:
     """File of a scene: one that comes with the program, or a path to a .toml file; raises SceneError."""
     path = SCENES / f"{name}.toml" if name in names() else Path(name)

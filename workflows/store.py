@@ -101,6 +101,15 @@ def save(path: Path, result: Result) -> None:
             new.unlink()
 
 
+def set_aside(path: Path) -> Path | None:
+    """Keep a result that is about to be replaced as result.previous.h5; returns where it is now, None if none was."""
+    if not path.exists():
+        return None
+    previous = path.with_name(f"{path.stem}.previous{path.suffix}")
+    os.replace(path, previous)
+    return previous
+
+
 def _write(file: h5py.File, result: Result) -> None:
     file.attrs["format"] = FORMAT
     file.attrs["state"] = result.state
