@@ -8,12 +8,12 @@ Source  Tamatam 2021, eq. 3.29-3.31 and figure 3.6.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hbm import law as contact_law
-from hbm import wear_law
+from hbm import newton, wear_law
 from hbm.balance import HarmonicBalance
 from hbm.operating_point import AtFrequency, AtPeak, OperatingPoint
 from hbm.wear_history import WearHistory, WearRow, history
@@ -90,7 +90,28 @@ def _locate(problem: WearProblem, balance: HarmonicBalance, rows: list[WearRow])
     x = last.displacement.reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
     before = problem.balance.with_gap(balance.parameters.gap - last.worn)
     guess = x + before.gap_response(before.evaluate(last.omega, x), last.worn)
-    return problem.site.next(balance, last.omega, guess)
+    point = problem.site.next(balance, last.omega, guess)
+    if point.solution.converged:
+        return point
+    x, solves = _carry(before, last.omega, x, last.worn)
+    again = problem.site.next(balance, last.omega, x)
+    return replace(again, solves=again.solves + point.solves + solves)
+
+
+def _carry(before: HarmonicBalance, omega: float, x: np.ndarray, opening: np.ndarray) -> tuple[np.ndarray, int]:
+    """Follow x at fixed frequency while the gaps open, in steps that halve where Newton fails; x and solves spent."""
+    gap, done, stride, solves = before.parameters.gap, 0.0, 0.5, 0
+    while done < 1.0 and stride > 1e-3:
+        reach = min(1.0, done + stride)
+        here, there = before.with_gap(gap + done * opening), before.with_gap(gap + reach * opening)
+        guess = x + here.gap_response(here.evaluate(omega, x), (reach - done) * opening)
+        solution = newton.solve(there, omega, guess)
+        solves += 1
+        if solution.converged:
+            x, done, stride = solution.state.x, reach, 1.5 * stride
+        else:
+            stride *= 0.5
+    return x, solves
 
 
 def _reason_to_stop(point: OperatingPoint, fastest: float) -> str:
