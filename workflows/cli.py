@@ -109,7 +109,7 @@ def _earlier(path: Path, file: scene_file.SceneFile) -> Result | None:
     result = store.load(path)
     key = pipeline.same_problem(Scene.model_validate_json(result.provenance["scene"]), file.scene)
     if key:
-        raise ValueError(f"{path} is the result of another scene, {key} differs: run without --resume or with its scene")
+        raise ValueError(f"{path} is the result of another scene, {key} differs: run its scene, or without --resume")
     return result
 
 

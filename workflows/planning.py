@@ -1,7 +1,7 @@
 """What a scene will model and what it will cost, from its mesh alone: nothing is assembled, factorised or solved.
 
-The costs are rules of thumb, measured on the beam scene with one thread and on clamped cubes for the factorisation; they
-are meant to tell seconds from hours, and are good to a factor of about three.
+The costs are rules of thumb, measured on the beam scene with one thread and on clamped cubes for the factorisation.
+They are meant to tell seconds from hours, and are good to a factor of about three.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from fem.constraints import Clamp, free_dofs, named
 from hbm.harmonics import HarmonicBasis
+from reduction.craig_bampton import POINT_LOAD
 from workflows.pipeline import check_names, make_mesh
 from workflows.scene import Scene
 from workflows.scene_file import SceneFile
@@ -52,6 +53,7 @@ class Plan:
     def lines(self) -> list[tuple[str, str]]:
         """The plan as pairs of a name and a readable value."""
         steps = "as many as it takes" if self.wear_steps is None else f"about {self.wear_steps}"
+        response, wear = (_time(count * self.solve_seconds) for count in (self.response_solves, self.wear_solves))
         return [
             ("mesh", f"{self.elements} elements, {self.nodes} nodes"),
             ("full model", f"{self.full_dofs} DOFs"),
@@ -60,8 +62,8 @@ class Plan:
             ("unknowns", f"{self.unknowns} in each balance solve"),
             ("memory", f"about {self.memory / 1e9:.1g} GB"),
             ("reduction", f"about {_time(self.reduction_seconds)}"),
-            ("response", f"{self.response_solves} solves, about {_time(self.response_solves * self.solve_seconds)}"),
-            ("wear", f"{steps} steps, about {_time(self.wear_solves * self.solve_seconds)}" if self.wear_solves else "none"),
+            ("response", f"{self.response_solves} solves, about {response}"),
+            ("wear", f"{steps} steps, about {wear}" if self.wear_solves else "none"),
             ("whole run", f"about {_time(self.seconds)} on one core, to a factor of three"),
         ]
 
@@ -110,13 +112,16 @@ def plan(file: SceneFile) -> Plan:
 def _contact(scene: Scene, mesh: object, node_sets: dict[str, np.ndarray], free: np.ndarray) -> tuple[int, int]:
     """Number of node pairs, and of master DOFs that the contact, point loads and the output make."""
     faces = [scene.contact.group, *([] if scene.contact.opposite is None else [scene.contact.opposite])]
-    points = [load.group for load in (*scene.loads.static.values(), *scene.loads.harmonic.values()), scene.response]
+    points = [*scene.loads.static.values(), *scene.loads.harmonic.values(), scene.response]
     nodes = [named(node_sets, name, "face") for name in faces]
     corners = np.arange(int(mesh.nvertices))  # type: ignore[attr-defined]
     if scene.contact.vertices_only:
         nodes = [np.intersect1d(side, corners) for side in nodes]
     masters = [(side[:, None] * 3 + np.arange(3)).ravel() for side in nodes]
-    masters += [3 * group[:1] for group in (named(node_sets, name) for name in points) if len(group) <= 10]
+    touched = [
+        (named(node_sets, point.group)[:, None] * 3 + np.flatnonzero(point.direction)).ravel() for point in points
+    ]
+    masters += [dofs for dofs in touched if len(dofs) <= POINT_LOAD]
     return len(nodes[0]), len(np.intersect1d(np.concatenate(masters), free))
 
 

@@ -33,7 +33,7 @@ def linear_references(balance: HarmonicBalance, output: str, start: float, stop:
 def _amplitudes(
     balance: HarmonicBalance, system: SecondOrderSystem, stiffness: np.ndarray, output: str, omega: np.ndarray
 ) -> np.ndarray:
-    """Amplitude by the lowest modes and the static remainder of the others, off by (h w / w_omitted)^2 of the latter."""
+    """Amplitude by the lowest modes and the static remainder of the others; off by (h w / w_omitted)^2 of that."""
     basis = balance.basis
     try:
         factor = sla.cho_factor(stiffness)

@@ -92,11 +92,12 @@ def lines(result: Result) -> list[tuple[str, str]]:
         shown.append(("frequency", pair("peak_hz", 1, "Hz")))
         shown.append(("amplitude", pair("peak_m", 1e3, "mm")))
     if numbers["depth_max_m"] is not None:
+        deepest, mean = 1e3 * numbers["depth_max_m"], 1e3 * numbers["depth_mean_m"]
         life = "contact not lost" if numbers["life_cycles"] is None else "contact lost"
         shown += [
             ("preload", pair("preload_N", 1, "N")),
             ("cycles", f"{numbers['cycles']:.4g} ({life})"),
-            ("wear depth", f"{1e3 * numbers['depth_max_m']:.4f} mm largest, {1e3 * numbers['depth_mean_m']:.4f} mm mean"),
+            ("wear depth", f"{deepest:.4f} mm largest, {mean:.4f} mm mean"),
             ("worn volume", f"{1e9 * numbers['volume_m3']:.5g} mm3"),
             ("friction work", f"{numbers['energy_J']:.5g} J"),
             ("wear steps", f"{numbers['wear_steps']} with {numbers['hbm_solves']} balance solves"),
