@@ -72,9 +72,8 @@ def build(parameters: Parameters, path: str | Path) -> None:
 
     Groups: volume "leaf"; surfaces "upper_contact", "lower_contact", "front" (the rest of z = 0), "back" (z = thickness);
     points "left_pin", "right_pin" (n_row nodes across each spring seat, mid-thickness), "left_hole", "right_hole" (their
-    middles), "spine" (the line x = 0, all heights, mid-thickness), "locator" (the middle of the seats on x = 0, all
-    through the thickness), "upper_centre" (middle of the upper patch), "middle" (of the leaf, the nearest node),
-    "lower_corner" (outermost node of the lower edge at x > 0), all three on z = 0
+    middles), "upper_centre" (middle of the upper patch), "middle" (of the leaf, the nearest node) and "lower_corner"
+    (outermost node of the lower edge, x > 0), all three on z = 0
     """
     p = parameters
     half = p.angle / 2
@@ -102,19 +101,15 @@ def build(parameters: Parameters, path: str | Path) -> None:
     at_pin = half * (1 - 2 * p.pin_column / (p.n_column - 1))
     seat, middle = np.array([below, p.pin_height, above]), p.thickness / 2
     heights = _second_order(np.unique(np.concatenate([s.v for s in strips])))
-    levels = _second_order(through)
 
-    def line(theta: float, at: np.ndarray, z: np.ndarray | float) -> np.ndarray:
-        at, z = np.broadcast_arrays(at, z)
-        return place(np.stack([np.full(at.shape, theta), at, z], axis=1))
+    def line(theta: float, at: np.ndarray, z: float) -> np.ndarray:
+        return place(np.stack([np.full(at.shape, theta), at, np.full(at.shape, z)], axis=1))
 
     points = {
         "left_pin": line(-at_pin, seat, middle),
         "right_pin": line(at_pin, seat, middle),
         "left_hole": line(-at_pin, seat[1:2], middle),
         "right_hole": line(at_pin, seat[1:2], middle),
-        "spine": line(0.0, heights, middle),
-        "locator": line(0.0, np.full(levels.shape, p.pin_height), levels),
         "upper_centre": line(0.0, np.array([high - p.patch_height / 2]), 0.0),
         "middle": line(0.0, heights[np.abs(heights).argmin()][None], 0.0),
         "lower_corner": line(half, np.array([low]), 0.0),
