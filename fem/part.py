@@ -63,6 +63,7 @@ class Part:
     """system : over the free DOFs; interface : likewise; free : (n_free,) DOF of the mesh that each one is,
     node * 3 + component; points : (n_node, 3) coordinates of the nodes [m]; mesh : scikit-fem's;
     held : (k, n_free) motions that are held besides, held @ q = 0, for reduction.held
+    pairs : contact face -> its pairs in the interface
     """
 
     system: SecondOrderSystem
@@ -71,6 +72,7 @@ class Part:
     points: np.ndarray
     mesh: Any
     held: np.ndarray
+    pairs: Mapping[str, slice]
 
     def field(self, q: np.ndarray) -> np.ndarray:
         """Displacement (n_node, 3, ...) [m] of all nodes from free DOFs q (n_free, ...)."""
@@ -102,7 +104,10 @@ def build(
     K = sum((spring.matrix(mesh, node_sets) for spring in springs), start=K)
     points = coordinates(mesh)
     free = free_dofs(K.shape[0], clamps, node_sets)
-    interface = join([contact.build(mesh) for contact in contacts])
+    built = [contact.build(mesh) for contact in contacts]
+    ends = np.cumsum([0] + [one.n_pair for one in built])
+    pairs = {contact.face: slice(*ends[i : i + 2].tolist()) for i, contact in enumerate(contacts)}
+    interface = join(built)
     system = SecondOrderSystem(
         mass=M[free][:, free],
         stiffness=K[free][:, free],
@@ -110,4 +115,4 @@ def build(
         outputs={name: output.vector(mesh, node_sets)[free] for name, output in outputs.items()},
     )
     rows = np.array([motion.row(points, M)[free] for motion in held]).reshape(len(held), len(free))
-    return Part(system, replace(interface, B=interface.B[:, free]), free, points, mesh, rows)
+    return Part(system, replace(interface, B=interface.B[:, free]), free, points, mesh, rows, pairs)

@@ -22,18 +22,30 @@ def linear_references(balance: HarmonicBalance, output: str, start: float, stop:
     """
     omega = np.linspace(start, stop, POINTS)
     system, interface = balance.model.system, balance.model.interface
-    stuck = stuck_stiffness(system.stiffness, interface.B, balance.parameters.stiffness)
+    k = balance.parameters.stiffness
+    stuck = stuck_stiffness(system.stiffness, interface.B, k)
+    pull = np.zeros((system.n_dof, len(balance.basis.harmonics)))
+    base = balance.excitation.base
+    moved = pull if base is None else interface.B.T @ (k.ravel()[:, None] * balance.basis.to_complex(base))
     return References(
         omega,
-        _amplitudes(balance, system, system.stiffness, output, omega),
-        _amplitudes(balance, system, stuck, output, omega),
+        _amplitudes(balance, system, system.stiffness, pull, output, omega),
+        _amplitudes(balance, system, stuck, moved, output, omega),
     )
 
 
 def _amplitudes(
-    balance: HarmonicBalance, system: SecondOrderSystem, stiffness: np.ndarray, output: str, omega: np.ndarray
+    balance: HarmonicBalance,
+    system: SecondOrderSystem,
+    stiffness: np.ndarray,
+    pull: np.ndarray,
+    output: str,
+    omega: np.ndarray,
 ) -> np.ndarray:
-    """Amplitude by the lowest modes and the static remainder of the others; off by (h w / w_omitted)^2 of that."""
+    """Amplitude by the lowest modes and the static remainder of the others; off by (h w / w_omitted)^2 of that.
+
+    pull : (n_dof, n_harmonic) forces besides the loads [N]
+    """
     basis = balance.basis
     try:
         factor = sla.cho_factor(stiffness)
@@ -45,9 +57,9 @@ def _amplitudes(
     amplitudes = np.zeros((len(omega), len(basis.harmonics)), complex)
     for position, h in enumerate(basis.harmonics):
         loads = [value * system.loads[name] for (order, name), value in balance.excitation.loads.items() if order == h]
-        if not loads:
+        force = np.sum([pull[:, position], *loads], axis=0)
+        if not force.any():
             continue
-        force = np.sum(loads, axis=0)
         modal = phi.T @ force
         remainder = row @ sla.cho_solve(factor, force) - (row @ phi) @ (modal / lam)
         for i, s in enumerate(1j * h * omega):
