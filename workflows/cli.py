@@ -129,6 +129,28 @@ def list_() -> None:
 
 
 @app.command
+def bench(
+    *,
+    quick: Annotated[bool, Parameter(negative=())] = False,
+    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+) -> None:
+    """Measure the solver beside the dense algorithm of the thesis on the beam scene (tables 7.1 to 7.3).
+
+    Parameters
+    ----------
+    quick
+        Harmonics 0+1 and 0+3 on one thread, in under a minute.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import bench as benchmark
+    from workflows.progress import console_progress
+
+    rows = benchmark.run(quick, console_progress().say)
+    print(json.dumps(benchmark.as_records(rows), indent=2) if as_json else benchmark.as_text(rows))
+
+
+@app.command
 def show(result: Path, *, as_json: Annotated[bool, Parameter(name="--json", negative=())] = False) -> None:
     """Say what a result holds.
 

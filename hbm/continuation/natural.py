@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -65,8 +65,11 @@ def _step(balance: HarmonicBalance, builder: BranchBuilder, omega: float, option
 
 
 def predict(builder: BranchBuilder, omega: float) -> np.ndarray:
-    """Lagrange extrapolation of the last points to a frequency: (n_pair, n_component, n_coeff) [m]."""
-    known = np.array(builder.omega[-DEGREE - 1 :])
-    x = builder.x[-DEGREE - 1 :]
-    weights = [np.prod((omega - np.delete(known, i)) / (known[i] - np.delete(known, i))) for i in range(len(known))]
-    return sum(w * xi for w, xi in zip(weights, x, strict=True))
+    """Extrapolation of the last points to a frequency: (n_pair, n_component, n_coeff) [m]."""
+    return extrapolate(np.array(builder.omega[-DEGREE - 1 :]), builder.x[-DEGREE - 1 :], omega)
+
+
+def extrapolate(known: np.ndarray, values: Sequence[np.ndarray], at: float) -> np.ndarray:
+    """Lagrange polynomial through values known at points (n,), taken at another point."""
+    weights = [np.prod((at - np.delete(known, i)) / (known[i] - np.delete(known, i))) for i in range(len(known))]
+    return np.sum([w * value for w, value in zip(weights, values, strict=True)], axis=0)
