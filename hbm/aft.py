@@ -42,8 +42,8 @@ def march(
     Source  Cameron and Griffin 1989 (AFT); derivatives of the recursion as in Siewert et al. 2010
     """
     phi = basis.synthesis if jacobian else basis.synthesis[:, :0]
-    force, jac, status = _periodic(law, x @ basis.synthesis.T, parameters, memory, phi, basis.analysis)
-    return ContactCycle(force @ basis.analysis, jac if jacobian else None, status)
+    force, jac, status = _periodic(law, basis.to_time(x), parameters, memory, phi, basis.analysis)
+    return ContactCycle(basis.from_time(force), jac if jacobian else None, status)
 
 
 def history(
@@ -59,7 +59,7 @@ def history(
     """
     if memory is None:
         memory = np.zeros((parameters.n_pair, law.n_state(parameters.components)))
-    samples = x @ basis.synthesis.T
+    samples = basis.to_time(x)
     return samples, _periodic(law, samples, parameters, memory, basis.synthesis[:, :0], basis.analysis)[0]
 
 

@@ -61,7 +61,7 @@ def cycle(
 
 @functools.cache
 def _grid(harmonics: tuple[int, ...]) -> np.ndarray:
-    """(n_coeff, 5 * n_cell) values, slopes, curvatures in the middle of equal cells, values and slopes at their ends."""
+    """(n_coeff, 5 * n_cell) values, slopes, curvatures in the middle of equal cells; values, slopes at their ends."""
     basis = HarmonicBasis((0, *harmonics), 2 * harmonics[-1] + 1)
     right = TURN * np.arange(1, CELLS * harmonics[-1] + 1) / (CELLS * harmonics[-1])
     middle, end = basis.functions(right - 0.5 * right[0]), basis.functions(right)

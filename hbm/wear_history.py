@@ -2,9 +2,83 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from hbm.balance import HarmonicBalance
+    from hbm.operating_point import OperatingPoint
+
+
+@dataclass(frozen=True)
+class WearRow:
+    """One wear step; the fields are those of WearHistory, without the row axis.
+
+    worn : (n_pair,) depth that the step wears after this state [m]
+    """
+
+    cycles: float
+    cycles_in_step: float
+    depth: np.ndarray
+    worn: np.ndarray
+    energy: np.ndarray
+    preload: float
+    normal_force: np.ndarray
+    status: np.ndarray
+    omega: float
+    amplitude: float
+    displacement: np.ndarray
+    force: np.ndarray
+    response: np.ndarray
+    solves: int
+    step_error: float
+    work: np.ndarray
+    duty_omega: np.ndarray
+    duty_displacement: np.ndarray
+
+    @classmethod
+    def of(
+        cls,
+        balance: HarmonicBalance,
+        points: Sequence[OperatingPoint],
+        depth: np.ndarray,
+        cycles: float,
+        cycles_in_step: float,
+        worn: np.ndarray,
+        work: np.ndarray,
+        solves: int,
+        step_error: float = 0.0,
+    ) -> WearRow:
+        """The row of solved operating points, one per duty; the first one is what the row shows."""
+        point = points[0]
+        state = point.state
+        shape = (-1, state.x.shape[2])
+        normal = np.zeros(len(depth))
+        if "n" in balance.parameters.components and balance.basis.has_static:
+            normal = state.cycle.force[:, balance.parameters.components.index("n"), 0]
+        return cls(
+            cycles=cycles,
+            cycles_in_step=cycles_in_step,
+            depth=depth,
+            worn=worn,
+            energy=np.maximum(balance.energy(state), 0.0),
+            preload=balance.preload(state),
+            normal_force=normal,
+            status=state.cycle.status,
+            omega=state.omega,
+            amplitude=point.amplitude,
+            displacement=state.x.reshape(shape),
+            force=state.cycle.force.reshape(shape),
+            response=point.response,
+            solves=solves,
+            step_error=step_error,
+            work=work,
+            duty_omega=np.array([p.state.omega for p in points]),
+            duty_displacement=np.stack([p.state.x.reshape(shape) for p in points]),
+        )
 
 
 @dataclass(frozen=True)
@@ -14,6 +88,7 @@ class WearHistory:
     cycles : (n_row,) vibration cycles passed before the row's state
     cycles_in_step : (n_row,) cycles that the state stands for; 0 in the last row, where contact is lost
     depth : (n_row, n_pair) total wear depth of the pair, both surfaces together [m]
+    worn : (n_row, n_pair) depth that is worn from this row to the next [m]
     energy : (n_row, n_pair) dissipated energy per cycle [J]
     preload : (n_row,) static normal force of the whole contact [N]
     normal_force : (n_row, n_pair) mean normal force over the cycle [N]
@@ -23,12 +98,17 @@ class WearHistory:
     displacement, force : (n_row, n_pair * n_component, n_coeff) Fourier coefficients at the contact [m], [N]
     response : (n_row, n_output, n_coeff) Fourier coefficients of the outputs [m]
     solves : (n_row,) harmonic balance solves spent on the row
+    step_error : (n_row,) estimated local error of the step over its tolerance; 0 where the rule has no estimate
+    work : (n_row, n_pair) friction work from this row to the next [J]
+    duty_omega, duty_displacement : (n_row, n_duty) [rad/s], (n_row, n_duty, n_contact, n_coeff) [m]: every duty of a
+        mission; the fields above show the first
     end : sentence that says why the run ended
     """
 
     cycles: np.ndarray
     cycles_in_step: np.ndarray
     depth: np.ndarray
+    worn: np.ndarray
     energy: np.ndarray
     preload: np.ndarray
     normal_force: np.ndarray
@@ -39,4 +119,18 @@ class WearHistory:
     force: np.ndarray
     response: np.ndarray
     solves: np.ndarray
+    step_error: np.ndarray
+    work: np.ndarray
+    duty_omega: np.ndarray
+    duty_displacement: np.ndarray
     end: str
+
+    def rows(self) -> list[WearRow]:
+        """The rows one by one."""
+        names = [f.name for f in fields(WearRow)]
+        return [WearRow(**{name: getattr(self, name)[i] for name in names}) for i in range(len(self.cycles))]
+
+
+def history(rows: list[WearRow], end: str) -> WearHistory:
+    """Rows put together."""
+    return WearHistory(**{f.name: np.array([getattr(r, f.name) for r in rows]) for f in fields(WearRow)}, end=end)

@@ -43,9 +43,9 @@ def cycle(
     x : (n_pair, 1, n_coeff) [m]; memory : (n_pair, 0)
     """
     kn = parameters.stiffness[:, :1]
-    load = kn * (x[:, 0] @ basis.synthesis.T - parameters.gap[:, None])
+    load = kn * (basis.to_time(x[:, 0]) - parameters.gap[:, None])
     closed = load > 0.0
-    force = np.where(closed, load, 0.0) @ basis.analysis
+    force = basis.from_time(np.where(closed, load, 0.0))
     status = STICKS * closed.any(axis=1) + SEPARATES * (~closed).any(axis=1)
     if not jacobian:
         return ContactCycle(force[:, None], None, status)

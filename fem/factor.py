@@ -1,0 +1,118 @@
+"""Sparse factorisation of a symmetric matrix: PARDISO where it is installed, else SuperLU after METIS."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from scipy.sparse import csc_matrix, csr_matrix, triu
+from scipy.sparse.linalg import splu
+
+# Relative residual of the softest direction that still counts as regular. Measured: a plate 2000 times longer than
+# thick reaches 0.05, a body that can move rigidly 6 to 1000.
+SINGULAR = 0.5
+
+
+class Factor(Protocol):
+    """name : of the solver; solve : (n,) or (n, k) right-hand sides -> solution of the same shape."""
+
+    name: str
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray: ...
+
+
+def factorise(K: Any, definite: bool = True, solver: str | None = None) -> Factor:
+    """Factorise a sparse symmetric real matrix once, for many right-hand sides.
+
+    K : (n, n) scipy.sparse; definite : K is positive definite (False for a shifted, indefinite matrix)
+    solver : "pardiso" or "superlu", the best available unless told
+    Raises  ValueError where K is singular, as when a body can still move rigidly
+    """
+    K = csr_matrix(K)
+    if solver is None:
+        solver = "pardiso" if pardiso_available() else "superlu"
+    try:
+        factor: Factor = Pardiso(K, definite) if solver == "pardiso" else SuperLU(K)
+        regular = softest_residual(K, factor) < SINGULAR
+    except (RuntimeError, ArithmeticError):
+        regular = False
+    if not regular:
+        raise ValueError(
+            "the stiffness matrix is singular to working precision: some body can move rigidly, or is too thin; "
+            "clamp it, or keep some of its nodes as masters"
+        )
+    return factor
+
+
+def softest_residual(K: csr_matrix, factor: Factor) -> float:
+    """|K x - b| / |b| for b along the softest direction, found by two inverse iterations from a fixed start.
+
+    A rigid-body motion cannot be balanced by K, whatever the factorisation made of its pivots.
+    """
+    x = np.random.default_rng(0).standard_normal(K.shape[0])
+    residual = np.inf
+    for _ in range(2):
+        b = x / np.linalg.norm(x)
+        x = factor.solve(b)
+        residual = float(np.linalg.norm(K @ x - b))
+        if not np.isfinite(residual) or not x.any():
+            return np.inf
+    return residual
+
+
+def pardiso_available() -> bool:
+    """Whether pypardiso and its MKL library load."""
+    try:
+        import pypardiso  # noqa: F401
+    except (ImportError, OSError):
+        return False
+    return True
+
+
+class Pardiso:
+    """MKL PARDISO on the upper triangle, mtype 2 (positive definite) or -2 (indefinite)."""
+
+    def __init__(self, K: csr_matrix, definite: bool = True) -> None:
+        from pypardiso import PyPardisoSolver
+        from pypardiso.pardiso_wrapper import PyPardisoError
+
+        self.name = "MKL PARDISO, " + ("Cholesky" if definite else "LDL^T")
+        self._upper = triu(K, format="csr")
+        self._upper.sort_indices()
+        self._solver = PyPardisoSolver(mtype=2 if definite else -2)
+        # METIS, and no iterative refinement unless pivots were perturbed: MKL's defaults refine twice, 5 times slower
+        for place, value in {1: 1, 2: 2, 8: 0, 10: 8}.items():
+            self._solver.set_iparm(place, value)
+        try:
+            self._solver.factorize(self._upper)
+        except (PyPardisoError, ValueError) as error:
+            raise ArithmeticError(str(error)) from error
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray:
+        """Solution of the same shape as rhs, (n,) or (n, k)."""
+        return self._solver.solve(self._upper, np.asarray(rhs, dtype=float))
+
+    def __del__(self) -> None:
+        if hasattr(self, "_solver"):
+            self._solver.free_memory(everything=True)
+
+
+class SuperLU:
+    """SuperLU in symmetric mode after a METIS nested dissection."""
+
+    def __init__(self, K: csr_matrix) -> None:
+        import pymetis
+
+        self.name = "SuperLU after METIS"
+        graph = K - csr_matrix((K.diagonal(), (np.arange(K.shape[0]),) * 2), shape=K.shape)
+        graph.eliminate_zeros()
+        order, _ = pymetis.nested_dissection(pymetis.CSRAdjacency(graph.indptr, graph.indices))
+        self._order = np.asarray(order)
+        permuted = csc_matrix(K[self._order][:, self._order])
+        self._lu = splu(permuted, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray:
+        """Solution of the same shape as rhs, (n,) or (n, k)."""
+        solution = np.empty(np.shape(rhs))
+        solution[self._order] = self._lu.solve(np.asarray(rhs, dtype=float)[self._order])
+        return solution

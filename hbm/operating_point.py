@@ -1,0 +1,208 @@
+"""Where the cycle is taken: at a fixed frequency, or at the resonance peak, which is tracked directly.
+
+The peak is the zero of d A^2 / d omega along the branch, with dx/d omega from the linearised balance; no sweep is needed
+once a neighbouring peak is known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from hbm import newton
+from hbm.balance import HarmonicBalance, State
+from hbm.branch import CONVERGED, amplitude
+from hbm.continuation import natural
+from hbm.newton import NewtonOptions, Solution
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """A solution that the vibration cycle is taken from.
+
+    amplitude : of the response output [m]; response : (n_output, n_coeff) [m]; solves : balance solves spent
+    """
+
+    solution: Solution
+    amplitude: float
+    response: np.ndarray
+    solves: int
+
+    @property
+    def state(self) -> State:
+        """The solved state."""
+        return self.solution.state
+
+
+@dataclass(frozen=True)
+class AtFrequency:
+    """The cycle at a fixed frequency [rad/s]."""
+
+    output: str
+    omega: float
+    newton: NewtonOptions = field(default_factory=NewtonOptions)
+
+    def first(self, balance: HarmonicBalance) -> OperatingPoint:
+        """Solve without a neighbour."""
+        return _point(balance, newton.solve_from_rest(balance, self.omega, self.newton), self.output, 1)
+
+    def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
+        """Solve from a neighbouring x; `omega` is the neighbour's and ignored here."""
+        solution, solves = newton.solve(balance, self.omega, x, self.newton), 1
+        if not solution.converged:
+            solution, solves = newton.solve_from_rest(balance, self.omega, self.newton), 2
+        return _point(balance, solution, self.output, solves)
+
+
+@dataclass(frozen=True)
+class AtPeak:
+    """The cycle at the resonance peak of an output.
+
+    start, stop : range that the first search scans [rad/s], n_scan : its points; it starts at `start`
+    tolerance : relative, on the frequency of the peak
+    """
+
+    output: str
+    start: float
+    stop: float
+    n_scan: int = 60
+    tolerance: float = 1e-5
+    newton: NewtonOptions = field(default_factory=NewtonOptions)
+
+    def first(self, balance: HarmonicBalance) -> OperatingPoint:
+        """Scan the range, then refine its highest point."""
+        branch = natural.follow(balance, self.start, self.stop, natural.Options(self.n_scan, newton=self.newton))
+        height = branch.amplitude(self.output, balance.basis.has_static)
+        best = int(np.argmax(np.where([o == CONVERGED for o in branch.outcome], height, -1.0)))
+        x = branch.contact[best].reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
+        width = abs(self.stop - self.start) / (self.n_scan - 1)
+        found = self._refine(balance, branch.omega[best], x, 0.5 * width)
+        return OperatingPoint(found.solution, found.amplitude, found.response, found.solves + len(branch.omega))
+
+    def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
+        """Refine from a neighbouring peak."""
+        return self._refine(balance, omega, x, 2e-4 * omega)
+
+    def _refine(self, balance: HarmonicBalance, omega: float, x: np.ndarray, stride: float) -> OperatingPoint:
+        def solve(w: float, guess: np.ndarray) -> _Slope:
+            solution = newton.solve(balance, w, guess, self.newton)
+            return _Slope.of(balance, solution, self.output)
+
+        here = solve(omega, x)
+        solves = 1
+        if not here.solution.converged:
+            return _point(balance, here.solution, self.output, solves)
+        resolution = self.tolerance * omega
+        uphill = other = None  # the latest points on either side of the zero, once it is bracketed
+        before: _Slope | None = None
+        best = here
+        while solves < 60:
+            side = float(np.sign(here.slope))
+            if uphill is not None and other is not None:
+                target = _zero(uphill, other)
+            elif before is None:
+                target = here.omega + side * stride
+            else:  # extrapolate the slope, never further than a few strides and always uphill
+                reach = abs(here.omega - before.omega)
+                guess = (_zero(before, here) - here.omega) * side
+                target = here.omega + side * (min(guess, 8 * reach) if guess > 0 else 3 * reach)
+            target = float(np.clip(target, 1e-3 * omega, balance.omega_max))
+            if abs(target - best.omega) <= resolution:
+                break
+            there = solve(target, here.predict(target))
+            solves += 1
+            if not there.solution.converged:
+                if uphill is not None and other is not None:
+                    break
+                stride, before = 0.25 * min(stride, abs(target - here.omega)), None
+                if stride < resolution:
+                    break
+                continue
+            if there.slope * here.slope <= 0 and uphill is None:
+                uphill, other = here, there
+            elif uphill is not None and other is not None:
+                if there.slope * uphill.slope > 0:
+                    other = replace(other, weight=0.5 * other.weight)  # Illinois: an end that stays loses weight
+                    uphill = there
+                else:
+                    uphill = replace(uphill, weight=0.5 * uphill.weight)
+                    other = there
+            before, here = here, there
+            if abs(there.slope) <= abs(best.slope):
+                best = there
+        return _point(balance, best.solution, self.output, solves)
+
+
+def _zero(a: _Slope, b: _Slope) -> float:
+    """Where the straight line through two slopes vanishes [rad/s]."""
+    fa, fb = a.weight * a.slope, b.weight * b.slope
+    return (a.omega * fb - b.omega * fa) / (fb - fa) if fa != fb else 0.5 * (a.omega + b.omega)
+
+
+@dataclass(frozen=True)
+class BesidePeak:
+    """The cycle at a fixed ratio to the frequency of the resonance peak, which is tracked as `AtPeak` does."""
+
+    peak: AtPeak
+    ratio: float
+
+    def first(self, balance: HarmonicBalance) -> OperatingPoint:
+        """Find the peak, then go to the ratio."""
+        return self._beside(balance, self.peak.first(balance))
+
+    def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
+        """From a neighbouring x at the ratio: back to the peak, refine it, and to the ratio again."""
+        solution, solves = self._walk(balance, omega, omega / self.ratio, x)
+        at_peak = self.peak.next(balance, omega / self.ratio, solution.state.x)
+        found = self._beside(balance, at_peak)
+        return replace(found, solves=found.solves + solves)
+
+    def _beside(self, balance: HarmonicBalance, peak: OperatingPoint) -> OperatingPoint:
+        omega = peak.state.omega
+        solution, solves = self._walk(balance, omega, self.ratio * omega, peak.state.x)
+        return _point(balance, solution, self.peak.output, peak.solves + solves)
+
+    def _walk(self, balance: HarmonicBalance, start: float, stop: float, x: np.ndarray) -> tuple[Solution, int]:
+        """Natural steps of half a per cent from one frequency to another."""
+        count = max(1, int(np.ceil(abs(stop / start - 1) / 5e-3)))
+        for omega in np.linspace(start, stop, count + 1):
+            solution = newton.solve(balance, omega, x, self.peak.newton)
+            if solution.converged:
+                x = solution.state.x
+        return solution, count + 1
+
+
+@dataclass(frozen=True)
+class _Slope:
+    """A solved point with d A^2 / d omega and d x / d omega."""
+
+    solution: Solution
+    omega: float
+    slope: float
+    dx: np.ndarray
+    weight: float = 1.0
+
+    @classmethod
+    def of(cls, balance: HarmonicBalance, solution: Solution, output: str) -> _Slope:
+        state = solution.state
+        slope_r, slope_y = balance.frequency_slope(state)
+        linear = balance.linearise(state)
+        dx = linear.solve(-slope_r, 1e-8)[0]
+        dy = slope_y + balance.at(state.omega).outputs(linear.departure_slope(dx))
+        row = balance.compliance.output_names.index(output)
+        y = balance.outputs(state)[row]
+        dynamic = balance.basis.order > 0
+        return cls(solution, state.omega, float(2 * y[dynamic] @ dy[row][dynamic]), dx.reshape(state.x.shape))
+
+    def predict(self, omega: float) -> np.ndarray:
+        return self.solution.state.x + (omega - self.omega) * self.dx
+
+
+def _point(balance: HarmonicBalance, solution: Solution, output: str, solves: int) -> OperatingPoint:
+    response = balance.outputs(solution.state)
+    row = balance.compliance.output_names.index(output)
+    return OperatingPoint(solution, float(amplitude(response[row], balance.basis.has_static)), response, solves)
+
+
+Site = AtFrequency | AtPeak | BesidePeak
