@@ -87,7 +87,8 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
             with progress.track("frequency response") as advance:
                 frf = follow_response(scene, model.balance, advance)
             with progress.stage("linear references"):
-                references = linear_references(model.balance, OUTPUT, *response_range(scene))
+                low, high = scene.response.references or scene.response.frequency
+                references = linear_references(model.balance, OUTPUT, 2 * np.pi * low, 2 * np.pi * high)
             result = keep(replace(result, frf=frf, references=references, state="response computed"))
         check_branch(result.frf)
         if scene.wear is not None:

@@ -112,15 +112,15 @@ def plan(file: SceneFile) -> Plan:
 def _contact(scene: Scene, mesh: object, node_sets: dict[str, np.ndarray], free: np.ndarray) -> tuple[int, int]:
     """Number of node pairs, and of master DOFs that the contact, point loads and the output make."""
     faces = [scene.contact.group, *([] if scene.contact.opposite is None else [scene.contact.opposite])]
-    points = [*scene.loads.static.values(), *scene.loads.harmonic.values(), scene.response]
+    points = [(load.group, load.direction) for load in scene.loads.static.values()]
+    points += [(load.group, load.direction) for load in scene.loads.harmonic.values()]
+    points += [(scene.response.group, scene.response.direction)]
     nodes = [named(node_sets, name, "face") for name in faces]
     corners = np.arange(int(mesh.nvertices))  # type: ignore[attr-defined]
     if scene.contact.vertices_only:
         nodes = [np.intersect1d(side, corners) for side in nodes]
     masters = [(side[:, None] * 3 + np.arange(3)).ravel() for side in nodes]
-    touched = [
-        (named(node_sets, point.group)[:, None] * 3 + np.flatnonzero(point.direction)).ravel() for point in points
-    ]
+    touched = [(named(node_sets, group)[:, None] * 3 + np.flatnonzero(axis)).ravel() for group, axis in points]
     masters += [dofs for dofs in touched if len(dofs) <= POINT_LOAD]
     return len(nodes[0]), len(np.intersect1d(np.concatenate(masters), free))
 

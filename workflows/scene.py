@@ -182,20 +182,24 @@ class Loads(Table):
 
 
 class Response(Table):
-    """Which displacement is observed, and the frequency response that is computed."""
+    """Which displacement is observed, and the frequency response that is computed.
+
+    references is the range in which the linear references are drawn, the same as frequency unless told.
+    """
 
     group: str
     direction: Direction
     frequency: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]]
+    references: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]] | None = None
     points: Annotated[StrictInt, Field(ge=2)] = 60
     method: str = "natural"
     options: dict[str, Any] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _range(self) -> Response:
-        if self.frequency[0] >= self.frequency[1]:
-            low, high = self.frequency
-            raise ValueError(f"expected frequency = [low, high] with low below high, got {low:g} Hz and {high:g} Hz")
+        for key, (low, high) in (("frequency", self.frequency), ("references", self.references or self.frequency)):
+            if low >= high:
+                raise ValueError(f"expected {key} = [low, high] with low below high, got {low:g} Hz and {high:g} Hz")
         return self
 
 
