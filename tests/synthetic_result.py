@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hbm.branch import CONVERGED, Branch
+from hbm.evolution import LOST
 from hbm.wear_history import WearHistory
 from workflows.result import Fields, Loops, PartMesh, Patch, References, Result
 from workflows.scene_file import read
@@ -76,7 +77,7 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
         force=1e6 * displacement,
         response=row_response,
         solves=np.full(n_row, 4),
-        end="contact is lost",
+        end=LOST,
     )
     rows = np.array([0, n_row // 2, n_row - 1])
     shape = (part.points[:, 0] / LENGTH) ** 2
@@ -88,7 +89,7 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
     return Result(
         provenance={"scene_name": "beam", "scene_text": file.text, "scene": file.scene.model_dump_json()},
         facts={"seconds": 12.5, "delta_max_m": 5e-3, "unknowns": 9 * n_pair, "model_dofs": 3 * n_pair + 17},
-        state="complete: contact is lost",
+        state=f"complete: {LOST}",
         patch=where,
         part=part,
         references=References(omega, np.abs(resonance(415, 0.01)), np.abs(resonance(530, 0.01))),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -79,6 +80,8 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
         with progress.stage("contact compliance"):
             model = make_model(scene, part, reduced)
         result = earlier or described(file, model)
+        if wears(scene):
+            step_depth(scene, result.patch)  # raises before anything long is begun
         previous = None if earlier else store.set_aside(keep.path)
         if previous:
             progress.say(f"the result that was here is now {previous}")
@@ -91,11 +94,25 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
                 references = linear_references(model.balance, OUTPUT, 2 * np.pi * low, 2 * np.pi * high)
             result = keep(replace(result, frf=frf, references=references, state="response computed"))
         check_branch(result.frf)
-        if scene.wear is not None:
+        if wears(scene):
             with progress.track("wear") as advance:
                 result = wear_down(scene, model, result, keep, advance)
         state = "complete" if result.wear is None else f"complete: {result.wear.end}"
         return keep(replace(result, state=state))
+
+
+def wears(scene: Scene) -> bool:
+    """Whether a scene asks for wear steps."""
+    return scene.wear is not None and scene.wear.max_steps > 0
+
+
+def is_complete(result: Result, scene: Scene) -> bool:
+    """Whether a result holds everything that a scene of the same problem asks for."""
+    if not result.state.startswith("complete") or not wears(scene):
+        return result.state.startswith("complete")
+    assert scene.wear is not None
+    stopped = result.wear is None or result.wear.end.startswith("stopped after")
+    return not stopped or result.wear_steps >= scene.wear.max_steps
 
 
 def check_names(scene: Scene) -> None:
@@ -218,7 +235,7 @@ def wear_down(
     def on_row(row: WearRow) -> None:
         rows.append(row)
         keep(replace(result, wear=history(rows, "unfinished"), state=f"unfinished: {len(rows)} wear steps are done"))
-        done = float(patch.area @ (row.depth + row.worn)) / to_wear
+        done = float(patch.area @ (row.depth + row.worn)) / to_wear if to_wear > 0 else 0.0
         advance(done, f"step {len(rows)}, {row.cycles + row.cycles_in_step:.3g} cycles, {row.preload:.4g} N")
 
     problem = evolution.WearProblem(balance, site, wear.law, wear.coefficient, patch.area)
@@ -230,13 +247,14 @@ def wear_down(
     return result
 
 
-def step_depth(scene: Scene, patch: Patch) -> float:
+def step_depth(scene: Scene, patch: Patch | None) -> float:
     """Largest depth of one wear step [m]; raises ValueError where it is a share of a deflection that is not finite."""
     assert scene.wear is not None
     step = scene.wear.step
     if step.depth is not None:
         return step.depth
     assert step.share is not None
+    assert patch is not None
     delta_max = float(patch.free_deflection.max())
     if not (np.isfinite(delta_max) and delta_max > 0):
         raise ValueError(
@@ -291,6 +309,8 @@ def provenance(file: SceneFile) -> dict[str, str]:
         "overrides": "\n".join(file.overrides),
         "scene": file.scene.model_dump_json(),
         "versions": ", ".join(f"{name} {package_version(name)}" for name in PACKAGES),
+        "python": platform.python_version(),
+        "platform": platform.platform(),
         "seed": str(SEED),
         "threads": str(file.scene.solver.threads),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
