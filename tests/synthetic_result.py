@@ -62,21 +62,27 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
     displacement = 1e-4 * rng.standard_normal((n_row, 3 * n_pair, 3))
     depth = 5e-3 * t[:, None] * (1 + 0.1 * np.sin(300 * where.points[:, 0]))
     cycles_in_step = np.append(np.linspace(3e6, 1e6, n_row - 1), 0.0)
+    energy = np.tile(2 * np.sqrt(1 - t**2)[:, None], n_pair)
+    omega_row = 2 * np.pi * (500 - 85 * t)
     wear = WearHistory(
         cycles=np.concatenate([[0.0], np.cumsum(cycles_in_step)[:-1]]),
         cycles_in_step=cycles_in_step,
         depth=depth,
         worn=np.diff(depth, axis=0, append=depth[-1:]),
-        energy=np.tile(2 * np.sqrt(1 - t**2)[:, None], n_pair),
+        energy=energy,
         preload=6e3 * (1 - t),
         normal_force=np.outer(6e3 * (1 - t), where.area / where.area.sum()),
         status=np.where(t[:, None] * np.ones(n_pair) < 0.6, 3, 6).astype(np.int64),
-        omega=2 * np.pi * (500 - 85 * t),
+        omega=omega_row,
         amplitude=np.hypot(row_response[:, 0, 1], row_response[:, 0, 2]),
         displacement=displacement,
         force=1e6 * displacement,
         response=row_response,
         solves=np.full(n_row, 4),
+        step_error=np.zeros(n_row),
+        work=cycles_in_step[:, None] * energy,
+        duty_omega=omega_row[:, None],
+        duty_displacement=displacement[:, None],
         end=LOST,
     )
     rows = np.array([0, n_row // 2, n_row - 1])

@@ -97,7 +97,7 @@ def test_show_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Non
     assert numbers["depth_max_m"] == wear.depth[-1].max()
     assert numbers["depth_mean_m"] == pytest.approx(wear.depth[-1].mean())
     assert numbers["life_cycles"] == wear.cycles[-1]
-    assert numbers["energy_J"] == pytest.approx(sum(wear.cycles_in_step * wear.energy.sum(1)))
+    assert numbers["energy_J"] == pytest.approx(wear.work.sum())
     assert numbers["volume_m3"] == pytest.approx(wear.depth[-1] @ patch.area)
     assert numbers["wear_steps"] == 8
     assert numbers["hbm_solves"] == 36

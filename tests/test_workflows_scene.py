@@ -21,6 +21,9 @@ WRONG = {
     "wear.step=0": ["wear.step", "above 0"],
     "wear.step=5 N": ["wear.step", "share of delta_max"],
     "wear.at=somewhere": ["wear.at", '"peak"'],
+    "wear.at=3 mm of peak": ["wear.at", '"98 % of peak"'],
+    "wear.step=": ["wear", "step", "thesis"],
+    "wear.rule=guess": ["wear.rule", "'thesis'"],
     "wear.max_steps=-1": ["wear.max_steps", "at least 0"],
     "harmonics.kept=[0, 3.5]": ["harmonics.kept[1]", "whole number"],
     "harmonics.kept=[0]": ["harmonics", "rising harmonic numbers"],
@@ -92,7 +95,22 @@ def test_overrides_change_add_and_take_out() -> None:
     assert scene.reduction.cutoff == 5e3
     assert scene.wear is not None
     assert scene.wear.step.depth == 50e-6
-    assert scene.wear.at == 430.0
+    assert scene.wear.at.frequency == 430.0
+    wear = read("beam", ["wear.at=98 % of peak"]).scene.wear
+    assert wear is not None
+    assert wear.at.peak == 0.98
+
+
+def test_a_mission_shares_its_cycles_out() -> None:
+    mission = 'wear.mission=[{at = "peak", share = "60 %"}, {at = "400 Hz", share = 0.4, load = "50 %"}]'
+    wear = read("beam", ["wear.at=", mission]).scene.wear
+    assert wear is not None
+    assert [duty.share for duty in wear.mission] == [0.6, 0.4]
+    assert wear.mission[1].load == 0.5
+    with pytest.raises(SceneError, match="either at or mission"):
+        read("beam", [mission])
+    with pytest.raises(SceneError, match=r"sum to 1, got 0\.9"):
+        read("beam", ["wear.at=", mission.replace("60", "50")])
 
 
 @pytest.mark.parametrize("name", scene_file.names())
