@@ -137,7 +137,7 @@ def test_a_failed_solve_says_where_and_leaves_with_3(tmp_path: Path) -> None:
     _, err = process.communicate()
     assert process.returncode == 3
     assert err.count("\n") == 1
-    assert "300 Hz" in err
+    assert "ended at 380 Hz" in err
     assert store.load(tmp_path / "result.h5").frf is not None
 
 
@@ -187,3 +187,17 @@ def test_a_share_of_no_deflection_is_refused_before_long_work(tmp_path: Path) ->
     with pytest.raises(ValueError, match=r"wear\.step: a share of delta_max needs static loads"):
         pipeline.run(read("beam", [*SMALL, "loads.static.press.value=0 N"]), tmp_path, Progress())
     assert not (tmp_path / "result.h5").exists()
+
+
+def test_the_error_controlled_rule_runs_from_a_scene(tmp_path: Path) -> None:
+    mission = 'wear.mission=[{at = "peak", share = "60 %"}, {at = "98 % of peak", share = "40 %"}]'
+    overrides = [*SMALL, "wear.rule=error_controlled", "wear.step=", "wear.at=", "wear.max_steps=3", mission]
+    result = pipeline.run(read("beam", overrides), tmp_path, Progress())
+    wear, patch = result.wear, result.patch
+    assert wear is not None
+    assert patch is not None
+    assert result.state == "complete: stopped after 3 wear steps"
+    assert wear.duty_omega.shape == (3, 2)
+    assert wear.duty_omega[:, 1] == pytest.approx(0.98 * wear.duty_omega[:, 0], rel=1e-4)
+    assert wear.step_error.max() <= 1.0
+    assert wear.worn.sum(0) @ patch.area == pytest.approx(2e-15 * wear.work.sum(), rel=1e-12)

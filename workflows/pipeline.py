@@ -74,7 +74,7 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
         with progress.stage("contact compliance"):
             model = make_model(scene, part, reduced)
         result = earlier or described(file, part, model.balance)
-        if wears(scene):
+        if wears(scene) and result.patch is not None:
             step_limit(scene, result.patch)  # raises before anything long is begun
         previous = None if earlier else store.set_aside(keep.path)
         if previous:
