@@ -23,6 +23,7 @@ app = cyclopts.App(
     name="tribodyn",
     help="From geometry to worn surface: vibration, friction and fretting wear of jointed parts.",
     version_flags=["--version"],
+    suppress_keyboard_interrupt=False,
 )
 Overrides = Annotated[
     tuple[str, ...],
@@ -82,7 +83,7 @@ def run(
     progress = console_progress()
     path = folder / "result.h5"
     earlier = _earlier(path, file) if resume else None
-    if earlier is not None and earlier.state.startswith("complete"):
+    if earlier is not None and pipeline.is_complete(earlier, file.scene):
         progress.say(f"{path} is complete already")
         result = earlier
     else:
