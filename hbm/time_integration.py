@@ -1,9 +1,9 @@
 """Direct time integration of the reduced model with the same contact law, to a periodic state.
 
-The independent check of a harmonic balance: M q'' + C q' + K q + B^T f_c = F(t) is stepped through time by the generalised
-alpha method, of second order and unconditionally stable for the linear part, in the modal coordinates of the structure
-without contact, all of them, so that nothing is truncated. The law is the same `step` kernel, but nothing else is shared:
-no harmonics, no compliance, no alternation of domains.
+The independent check of a harmonic balance: M q'' + C q' + K q + B^T f_c = F(t) is stepped through time by the
+generalised alpha method, of second order and unconditionally stable for the linear part, in the modal coordinates of
+the structure without contact, all of them, so that nothing is truncated. The law is the same `step` kernel, but nothing
+else is shared: no harmonics, no compliance between harmonics, no alternation of domains.
 The start (a harmonic balance state, or static equilibrium) and the acceleration of the transient only choose where
 the march begins; what is returned is always one plainly integrated period together with the drift over it.
 """
@@ -52,8 +52,8 @@ class Options:
 class Slopes:
     """Derivatives of the contact law along one period, for the linearised motion.
 
-    force_x (n_step, n_pair, c, c), force_s (n_step, n_pair, c, n_state) : of the force with x and with the memory before
-    memory_x (n_step, n_pair, n_state, c), memory_s (n_step, n_pair, n_state, n_state) : of the memory after the step
+    force_x, force_s : (n_step, n_pair, c, c), (n_step, n_pair, c, n_state) force with x and with the memory before
+    memory_x, memory_s : (n_step, n_pair, n_state, c), (n_step, n_pair, n_state, n_state) memory after the step
     """
 
     force_x: np.ndarray
@@ -132,7 +132,9 @@ class TimeStepper:
         self.O = np.array([system.outputs[name] @ phi for name in names]).reshape(len(names), len(phi))
         full = np.zeros_like(phi) if system.damping is None else phi.T @ np.asarray(system.damping) @ phi
         own = np.abs(np.diag(full))
-        self.diagonal = bool(np.all(np.abs(full - np.diag(np.diag(full))) <= 1e-9 * np.sqrt(np.outer(own, own)) + 1e-13 * own.max()))
+        self.diagonal = bool(
+            np.all(np.abs(full - np.diag(np.diag(full))) <= 1e-9 * np.sqrt(np.outer(own, own)) + 1e-13 * own.max())
+        )
         self.damping = np.diag(full)[None].copy() if self.diagonal else np.ascontiguousarray(full)
         self._full_damping = full
         rho = options.spectral_radius
@@ -166,8 +168,11 @@ class TimeStepper:
         n = self.options.steps
         return coefficients @ self.balance.basis.functions(2 * np.pi * np.arange(1, n + 1) / n).T
 
-    def start_from(self, state: State) -> Motion:
-        """The motion at t = 0 of a balance state: every coordinate in equilibrium with its contact forces."""
+    def start_from(self, state: State, at_rest: bool = False) -> Motion:
+        """The motion at t = 0 of a balance state, every coordinate in equilibrium with its contact forces.
+
+        at_rest : leave out all but harmonic 0
+        """
         basis = self.balance.basis
         k = self.balance.compliance.k
         pull = k[:, None] * (state.flat + self._base) - state.cycle.force.reshape(len(k), -1)
@@ -175,6 +180,8 @@ class TimeStepper:
         stuck = np.diag(self.lam) + self.U.T @ (k[:, None] * self.U)
         eta, v = np.zeros(len(self.lam)), np.zeros(len(self.lam))
         for i, h in enumerate(basis.harmonics):
+            if at_rest and h > 0:
+                break
             s = 1j * h * self.omega
             amplitude = np.linalg.solve(stuck + s * self._full_damping + s * s * np.eye(len(stuck)), force[:, i])
             eta += amplitude.real
@@ -188,10 +195,12 @@ class TimeStepper:
         x = (self.U @ eta).reshape(self.n_pair, self.c) - self.base[-1]
         n_state = memory.shape[1]
         f, slope = np.zeros_like(x), np.zeros((self.n_pair, self.c, self.c))
-        unused = [np.zeros((self.n_pair, *shape)) for shape in ((self.c, n_state), (n_state, self.c), (n_state, n_state))]
+        unused = [
+            np.zeros((self.n_pair, *shape)) for shape in ((self.c, n_state), (n_state, self.c), (n_state, n_state))
+        ]
         time_step.evaluate(self.law, x, memory.copy(), self.packed, f, slope, *unused)
         if a is None:
-            load = self._load_coefficients @ self.balance.basis.functions(0.0)
+            load = self._load_coefficients @ self.balance.basis.functions(np.zeros(()))
             drag = self.damping[0] * v if self.diagonal else self.damping @ v
             a = load - drag - self.lam * eta - self.U.T @ f.ravel()
         return Motion(eta.copy(), v.copy(), a.copy(), x, f, memory.copy(), slope)
@@ -209,8 +218,8 @@ class TimeStepper:
         factor = time_step.refactor(self.compliance, end.slope)
         failed, speed, spent, _ = time_step.march(
             self.law, self.packed, self.scheme, self.lam, self.damping, self.inverse, self.diagonal, self.U,
-            self.O, self.compliance, self.load, self.base, end.eta, end.v, end.a, end.x, end.f, end.memory, factor, end.slope,
-            xs, fs, ys, bits, slopes,
+            self.O, self.compliance, self.load, self.base, end.eta, end.v, end.a, end.x, end.f, end.memory, factor,
+            end.slope, xs, fs, ys, bits, slopes,
         )  # fmt: skip
         if failed >= 0:
             raise IntegrationFailed(
@@ -278,7 +287,7 @@ def integrate(
 ) -> PeriodicMotion:
     """Integrate the problem of a harmonic balance to its periodic motion at one frequency.
 
-    omega : [rad/s]; start : balance state to start from, or None for rest: static equilibrium, from the balance's memory
+    omega : [rad/s]; start : balance state to start from, or None for rest: the balance's static equilibrium
     with_slopes : record the derivatives of the law along the last period
     Returns the last period, also where it is not periodic within max_periods, as its outcome then says
     Raises  ValueError for models with no equation of motion in time; IntegrationFailed
@@ -295,8 +304,7 @@ def _rest(stepper: TimeStepper) -> Motion:
     solution = newton.solve(still, stepper.omega, still.stuck(stepper.omega))
     if not solution.converged:
         raise ValueError(f"no static equilibrium to start from ({solution.outcome}): start from a balance state")
-    motion = stepper.start_from(solution.state)
-    return stepper.motion(motion.eta, np.zeros_like(motion.v), None, motion.memory)
+    return stepper.start_from(solution.state, at_rest=True)
 
 
 def _to_periodic(stepper: TimeStepper, motion: Motion, options: Options, with_slopes: bool) -> PeriodicMotion:

@@ -114,7 +114,31 @@ def solve_contact(step, p, A, P, J, x_free, x, s, scale, f, J_new, Fs, Sx, Ss):
 
 @numba.njit(cache=True)
 def march(
-    step, p, scheme, lam, damping, inverse, diagonal, U, O, A, load, base, eta, v, a, x, f, s, P, J, xs, fs, ys, bits, slopes
+    step,
+    p,
+    scheme,
+    lam,
+    damping,
+    inverse,
+    diagonal,
+    U,
+    O,
+    A,
+    load,
+    base,
+    eta,
+    v,
+    a,
+    x,
+    f,
+    s,
+    P,
+    J,
+    xs,
+    fs,
+    ys,
+    bits,
+    slopes,
 ):
     """March one period; the state (eta, v, a, x, f, s) moves on in place, the records are filled.
 
@@ -123,7 +147,7 @@ def march(
     slopes : derivatives (df/dx, df/ds, ds/dx, ds/ds) of each step, or of length 0 where they are not wanted
     Returns the step that failed or -1, the largest |v|, the contact iterations spent, and P
     """
-    h, am, af, beta, gamma = scheme
+    h, _, af, beta, gamma = scheme
     n_pair, c = x.shape
     n_state = s.shape[1]
     f_new, J_new = np.empty_like(f), np.empty_like(J)
