@@ -199,7 +199,7 @@ def _departure_slope(balance: HarmonicBalance, state: State, basis: HarmonicBasi
 
 def _contact_in_modes(slope: np.ndarray, phi: np.ndarray, static: np.ndarray) -> np.ndarray:
     """Phi^T dg of modal displacements, contact flexibility `static` (W_0) in series: (m n_coeff, m n_coeff)."""
-    n_pair, c, nc = slope.shape[:3]
+    _, c, nc = slope.shape[:3]
     active = np.flatnonzero(np.abs(slope).max(axis=(1, 2, 3, 4)) > 0)
     if len(active) == 0:
         return np.zeros((phi.shape[1] * nc, phi.shape[1] * nc))

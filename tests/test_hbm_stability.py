@@ -1,4 +1,4 @@
-"""Hill's method and Floquet multipliers: against eigenvalues, finite differences, each other, and the turns of a branch."""
+"""Hill's method and Floquet multipliers: against eigenvalues, finite differences, each other, and turns of a branch."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def test_fold_of_a_lifting_mass_is_marked_where_the_branch_turns():
 
     guess = np.r_[1.0, 0.5, 0, np.zeros(8), 0.9]
     for amplitude in np.linspace(0.4, 2.4, 81):  # up the left flank, through the fold
-        guess, _, flag, _ = fsolve(equations, guess, args=(amplitude,), xtol=1e-12, full_output=True)
+        guess, *_ = fsolve(equations, guess, args=(amplitude,), xtol=1e-12, full_output=True)
         x = np.zeros((1, 2, basis.n_coeff))
         x[0, 1] = guess[:-1] * lift
         state = balance.evaluate(guess[-1] * 200.0, x)
