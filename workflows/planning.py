@@ -25,6 +25,7 @@ BACK_SUBSTITUTION_SECONDS = 1.5e-7  # for each DOF and right-hand side
 DENSE_SECONDS = 3e-9  # for each cubed coordinate of the reduced model, all eigenvalue problems together
 SOLVE_SECONDS = 6e-8  # of a balance solve, for each squared contact coordinate and harmonic coefficient
 SOLVES_AT_PEAK = 10
+EQUIVALENT_SHARE = 0.3  # the step of the thesis's rule that takes as many steps as the error-controlled one does
 STEPS_AT_ONE_PERCENT, STEPS_EXPONENT = 411, -0.5  # to loss of contact; Tamatam 2021, table 4.2
 
 
@@ -113,8 +114,9 @@ def _contact(scene: Scene, mesh: object, node_sets: dict[str, np.ndarray], free:
     """Number of node pairs, and of master DOFs that the contact, point loads and the output make."""
     contact = scene.contact
     faces = [*contact.groups, *([] if contact.opposite is None else [contact.opposite])]
-    outputs = [scene.response, *scene.response.others.values()]
-    loads = [load for load in (*scene.loads.static.values(), *scene.loads.harmonic.values()) if load.direction]
+    loads = [*scene.loads.static.values(), *scene.loads.harmonic.values()]
+    points = [(load.group, load.direction) for load in loads if load.direction is not None]
+    points += [(output.group, output.direction) for output in (scene.response, *scene.response.others.values())]
     nodes = [named(node_sets, name, "face") for name in faces]
     corners = np.arange(int(mesh.nvertices))  # type: ignore[attr-defined]
     if contact.vertices_only:
@@ -122,10 +124,7 @@ def _contact(scene: Scene, mesh: object, node_sets: dict[str, np.ndarray], free:
     alone = contact.plane is not None and contact.components == ("n",)
     axes = np.flatnonzero(contact.plane) if alone else np.arange(3)
     masters = [(side[:, None] * 3 + axes).ravel() for side in nodes]
-    touched = [
-        (named(node_sets, point.group)[:, None] * 3 + np.flatnonzero(point.direction)).ravel()
-        for point in [*loads, *outputs]
-    ]
+    touched = [(named(node_sets, group)[:, None] * 3 + np.flatnonzero(axis)).ravel() for group, axis in points]
     masters += [dofs for dofs in touched if len(dofs) <= POINT_LOAD]
     pairs = sum(len(side) for side in nodes[: len(contact.groups)])
     return pairs, len(np.intersect1d(np.concatenate(masters), free))
@@ -135,10 +134,14 @@ def _wear(scene: Scene) -> tuple[int | None, int]:
     """Wear steps and balance solves to expect."""
     if scene.wear is None or scene.wear.max_steps == 0:
         return 0, 0
-    share, most = scene.wear.step.share, scene.wear.max_steps
-    steps = most if share is None else min(most, round(STEPS_AT_ONE_PERCENT * (100 * share) ** STEPS_EXPONENT))
-    at_peak = isinstance(scene.wear.at, str)
-    solves = steps * SOLVES_AT_PEAK + scene.response.points if at_peak else steps
+    most, share = scene.wear.max_steps, None if scene.wear.step is None else scene.wear.step.share
+    if scene.wear.rule == "error_controlled":
+        share = EQUIVALENT_SHARE
+    likely = most if share is None else round(STEPS_AT_ONE_PERCENT * (100 * share) ** STEPS_EXPONENT)
+    steps = min(most, likely)
+    solves = 0
+    for place in [duty.at for duty in scene.wear.mission] or [scene.wear.at]:
+        solves += steps if place.peak is None else steps * SOLVES_AT_PEAK + scene.response.points
     return (None if share is None else steps), solves
 
 
