@@ -1,4 +1,4 @@
-"""Leaf seal of a combustor: a thin annular sector with a curved contact patch along its upper and lower edge (thesis 6.2).
+"""Leaf seal of a combustor: a thin annular sector with curved contact patches along two edges (thesis 6.2).
 
 The leaf stands in the plane x (circumferential), y (radial, up), z (axial): z = 0 is the face that touches nozzle and
 liner, z = thickness the face that the pressure pushes. The origin lies in the middle of the sector at mid-height.
@@ -70,8 +70,8 @@ class Parameters:
 def build(parameters: Parameters, path: str | Path) -> None:
     """Write the mesh.
 
-    Groups: volume "leaf"; surfaces "upper_contact", "lower_contact", "front" (the rest of z = 0), "back" (z = thickness);
-    points "left_pin", "right_pin" (n_row nodes across each spring seat, mid-thickness), "left_hole", "right_hole" (their
+    Groups: volume "leaf"; surfaces "upper_contact", "lower_contact", "front" (the rest of z = 0) and "back"; points
+    "left_pin", "right_pin" (three nodes across each spring seat, mid-thickness), "left_hole", "right_hole" (their
     middles), "upper_centre" (middle of the upper patch), "middle" (of the leaf, the nearest node) and "lower_corner"
     (outermost node of the lower edge, x > 0), all three on z = 0
     """

@@ -19,7 +19,9 @@ from reduction.linear import linear_modes, system_modes
 STEEL = Material(210e9, 0.3, 7860.0)
 PARAMETERS = leaf_seal.Parameters(n_column=9, n_web=1, pin_column=1)
 IN_PLANE = [Clamp("left_hole", "xy"), Clamp("right_hole", "y")]
-CONTACTS = [Contact(name, (-1, 0, 0), components=("n",), plane=(0, 0, -1)) for name in ("upper_contact", "lower_contact")]
+PATCHES = ("upper_contact", "lower_contact")
+CONTACTS = [Contact(name, (-1, 0, 0), components=("n",), plane=(0, 0, -1)) for name in PATCHES]
+NO_TURN = [NoMeanRotation((0, 1, 0))]
 
 
 @pytest.fixture(scope="module")
@@ -29,10 +31,8 @@ def leaf(tmp_path_factory):
     return SimpleNamespace(**dict(zip(("mesh", "node_sets"), mesh_file.read(path), strict=True)))
 
 
-def part(leaf, springs=(), held=(NoMeanRotation((0, 1, 0)),)):
-    return fem.part.build(
-        leaf.mesh, leaf.node_sets, STEEL, IN_PLANE, CONTACTS, {}, {}, springs=springs, held=held
-    )
+def part(leaf, springs=()):
+    return fem.part.build(leaf.mesh, leaf.node_sets, STEEL, IN_PLANE, CONTACTS, {}, {}, springs=springs, held=NO_TURN)
 
 
 def test_held_rotation_leaves_two_rigid_modes_and_every_elastic_one(leaf):

@@ -152,7 +152,7 @@ def make_part(scene: Scene, mesh: Any, node_sets: dict[str, np.ndarray]) -> Part
             name: NodalForce(output.group, output.direction)
             for name, output in {OUTPUT: response, **response.others}.items()
         },
-        springs=[Spring(s.group, s.direction, s.stiffness, s.opposite) for s in scene.springs.values()],
+        springs=springs(scene),
         held=[] if scene.geometry.no_turning is None else [NoMeanRotation(scene.geometry.no_turning)],
     )  # fmt: skip
 
@@ -161,6 +161,11 @@ def clamps(scene: Scene) -> list[Clamp]:
     """What holds the part, whole groups or along some axes."""
     geometry = scene.geometry
     return [*(Clamp(group) for group in geometry.fixed), *(Clamp(*item) for item in geometry.fixed_axes.items())]
+
+
+def springs(scene: Scene) -> list[Spring]:
+    """Joints that give way."""
+    return [Spring(s.group, s.direction, s.stiffness, s.opposite) for s in scene.springs.values()]
 
 
 def make_load(load: StaticLoad) -> Load:
@@ -203,12 +208,12 @@ def make_model(scene: Scene, part: Part, reduced: ReducedModel) -> Model:
         gap=reduced.interface.gap,
     )
     basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples)
-    excitation = excite(scene, part, basis)
-    return Model(part, reduced, HarmonicBalance(reduced, contact.law, parameters, basis, excitation, response_range(scene)[1]))
+    excitation, omega_max = excite(scene, part, basis), response_range(scene)[1]
+    return Model(part, reduced, HarmonicBalance(reduced, contact.law, parameters, basis, excitation, omega_max))
 
 
 def excite(scene: Scene, part: Part, basis: HarmonicBasis) -> Excitation:
-    """The loads of the scene, F cos(h w t + phase) as complex amplitude F exp(i phase), and the motion of the ground."""
+    """The loads of the scene, F cos(h w t + phase) as amplitude F exp(i phase), and the motion of the ground."""
     loads: dict[tuple[int, str], complex] = {(0, name): load.amplitude for name, load in scene.loads.static.items()}
     for name, load in scene.loads.harmonic.items():
         loads[load.harmonic, name] = load.amplitude * np.exp(1j * load.phase)

@@ -121,8 +121,9 @@ def _contact(scene: Scene, mesh: object, node_sets: dict[str, np.ndarray], free:
     corners = np.arange(int(mesh.nvertices))  # type: ignore[attr-defined]
     if contact.vertices_only:
         nodes = [np.intersect1d(side, corners) for side in nodes]
-    alone = contact.plane is not None and contact.components == ("n",)
-    axes = np.flatnonzero(contact.plane) if alone else np.arange(3)
+    axes = np.arange(3)
+    if contact.plane is not None and contact.components == ("n",):
+        axes = np.flatnonzero(contact.plane)
     masters = [(side[:, None] * 3 + axes).ravel() for side in nodes]
     touched = [(named(node_sets, group)[:, None] * 3 + np.flatnonzero(axis)).ravel() for group, axis in points]
     masters += [dofs for dofs in touched if len(dofs) <= POINT_LOAD]

@@ -167,9 +167,8 @@ class Contact(Table):
 
     @model_validator(mode="after")
     def _only_what_the_components_need(self) -> Contact:
-        tangential = any(c != "n" for c in self.components)
-        wanted = {"tangential_stiffness": tangential, "friction": tangential, "normal_stiffness": "n" in self.components}
-        for name, need in wanted.items():
+        along, across = any(c != "n" for c in self.components), "n" in self.components
+        for name, need in (("tangential_stiffness", along), ("friction", along), ("normal_stiffness", across)):
             if need != (getattr(self, name) is not None):
                 verb = "is missing" if need else "has no meaning"
                 raise ValueError(f"contact.{name} {verb} for the components {', '.join(self.components)}")
