@@ -195,8 +195,10 @@ def response_options(scene: Scene) -> Any:
     for key, value in given.items():
         if key not in known:
             raise ValueError(unknown_key(f"response.options.{key}", list(known)))
-        if type(value) not in ((int,) if known[key] in (int, "int") else (int, float)):
-            raise ValueError(f"response.options.{key}: expected {'a whole number' if known[key] in (int, 'int') else 'a number'}, got {value!r}")
+        whole = known[key] in (int, "int")
+        if type(value) not in ((int,) if whole else (int, float)):
+            expected = "a whole number" if whole else "a number"
+            raise ValueError(f"response.options.{key}: expected {expected}, got {value!r}")
     points = {"n_points": scene.response.points} if "n_points" in known else {}
     return kind(**{**points, "newton": newton_options(scene), **given})
 
