@@ -75,7 +75,7 @@ def test_planar_coulomb_on_a_circle(n_samples, ratio):
     assert cycle.status[0] == SLIPS
     energy = basis.work_per_cycle(cycle.force, x).sum()
     exact_energy = 2 * np.pi * amplitude * limit * np.cos(alpha)
-    assert energy == pytest.approx(exact_energy, rel=8 / n_samples / (ratio - 1))
+    assert energy == pytest.approx(exact_energy, rel=2 * np.pi / n_samples * (2 * np.pi / n_samples + 2 / (ratio - 1)))
 
 
 def test_planar_coulomb_on_a_circle_converges_with_the_samples():
