@@ -14,10 +14,13 @@ class HarmonicBasis:
 
     harmonics : kept harmonics, any strictly increasing set; x_0 is there only where 0 is among them
     n_samples : equidistant time samples of one period; more than twice the highest harmonic, so that none is aliased
+    transitions : contact forces are taken at the samples ("sampled"), or the instants of stick, slip, contact and
+        separation are located and the forces between them integrated in closed form ("located", see hbm.located)
     """
 
     harmonics: tuple[int, ...]
     n_samples: int = 128
+    transitions: str = "sampled"
 
     def __post_init__(self) -> None:
         if not self.harmonics or self.harmonics[0] < 0 or any(np.diff(self.harmonics) <= 0):
@@ -29,6 +32,8 @@ class HarmonicBasis:
                 f"{self.n_samples} time samples cannot carry harmonic {self.harmonics[-1]}: "
                 f"take at least {2 * self.harmonics[-1] + 1}"
             )
+        if self.transitions not in ("sampled", "located"):
+            raise ValueError(f"transitions must be 'sampled' or 'located', not '{self.transitions}'")
 
     @property
     def has_static(self) -> bool:
@@ -92,6 +97,15 @@ class HarmonicBasis:
         for h in self.dynamic:
             columns += [np.cos(h * angle), np.sin(h * angle)]
         return np.stack(columns, axis=-1)
+
+    def to_time(self, coefficients: np.ndarray) -> np.ndarray:
+        """(..., n_coeff) -> (..., n_samples) samples of one period."""
+        flat = coefficients.reshape(-1, self.n_coeff) @ self.synthesis.T  # one product, not one per pair
+        return flat.reshape(*coefficients.shape[:-1], self.n_samples)
+
+    def from_time(self, samples: np.ndarray) -> np.ndarray:
+        """(..., n_samples) samples of one period -> (..., n_coeff)."""
+        return (samples.reshape(-1, self.n_samples) @ self.analysis).reshape(*samples.shape[:-1], self.n_coeff)
 
     def to_complex(self, coefficients: np.ndarray) -> np.ndarray:
         """(..., n_coeff) real -> (..., n_harmonic) complex amplitudes X_h = a - i b, with X_0 = x_0."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,7 +13,7 @@ from hbm.branch import Branch, BranchBuilder
 from hbm.newton import NewtonOptions, Solution
 from hbm.parameter import Parameter
 
-DEGREE = 3  # of the extrapolating polynomial
+DEGREE = 2  # of the extrapolating polynomial
 
 
 @dataclass(frozen=True)
@@ -68,8 +68,11 @@ def _step(path: Parameter, builder: BranchBuilder, value: float, options: Option
 
 
 def predict(builder: BranchBuilder, value: float) -> np.ndarray:
-    """Lagrange extrapolation of the last points to a value: (n_pair, n_component, n_coeff) [m]."""
-    known = np.array(builder.value[-DEGREE - 1 :])
-    x = builder.x[-DEGREE - 1 :]
-    weights = [np.prod((value - np.delete(known, i)) / (known[i] - np.delete(known, i))) for i in range(len(known))]
-    return sum(w * xi for w, xi in zip(weights, x, strict=True))
+    """Extrapolation of the last points to a value of the parameter: (n_pair, n_component, n_coeff) [m]."""
+    return extrapolate(np.array(builder.value[-DEGREE - 1 :]), builder.x[-DEGREE - 1 :], value)
+
+
+def extrapolate(known: np.ndarray, values: Sequence[np.ndarray], at: float) -> np.ndarray:
+    """Lagrange polynomial through values known at points (n,), taken at another point."""
+    weights = [np.prod((at - np.delete(known, i)) / (known[i] - np.delete(known, i))) for i in range(len(known))]
+    return np.sum([w * value for w, value in zip(weights, values, strict=True)], axis=0)

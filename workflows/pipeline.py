@@ -1,0 +1,336 @@
+"""From a scene to a result, stage by stage: mesh, part, reduced model, harmonic balance, response, wear."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+import fem.part
+from fem.constraints import Clamp
+from fem.loads import NodalForce
+from fem.material import Material
+from fem.part import Part
+from geometry import mesh as mesh_reader
+from geometry import parts
+from hbm import continuation, error_controlled_rule, law, thesis_rule, wear_law
+from hbm.balance import HarmonicBalance
+from hbm.branch import CONVERGED, Branch
+from hbm.evolution import Duty, WearProblem
+from hbm.excitation import Excitation
+from hbm.harmonics import HarmonicBasis
+from hbm.newton import NewtonOptions
+from hbm.operating_point import AtFrequency, AtPeak, BesidePeak
+from hbm.wear_history import WearRow, history
+from reduction.craig_bampton import craig_bampton
+from reduction.damping import modal_damping, rayleigh
+from reduction.model import ReducedModel
+from workflows import store
+from workflows.description import described
+from workflows.fields import displacement_fields, hysteresis_loops
+from workflows.progress import Progress
+from workflows.references import linear_references
+from workflows.result import Patch, Result
+from workflows.scene import Damping, HarmonicLoad, Place, Scene, StaticLoad
+from workflows.scene_file import SceneFile
+
+OUTPUT = "response"
+
+
+class SolveFailed(RuntimeError):
+    """A solve did not converge; the message says where and why, and the result file holds what came before."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """The nonlinear problem of a scene with what it was made from."""
+
+    part: Part
+    reduced: ReducedModel
+    balance: HarmonicBalance
+
+
+def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | None = None) -> Result:
+    """Compute everything that a scene asks for, and keep it in `folder`/result.h5 while it grows.
+
+    earlier : an unfinished result of the same scene to go on from
+    Raises  ValueError: the scene asks for what cannot be, SolveFailed: after what was computed is kept
+    """
+    scene, clock = file.scene, Clock(earlier)
+    check_names(scene)
+    keep = Keeper(folder / "result.h5", clock)
+    with threadpool_limits(scene.solver.threads):
+        with progress.stage("mesh"):
+            mesh, node_sets = make_mesh(file, folder)
+        with progress.stage("mass and stiffness"):
+            part = make_part(scene, mesh, node_sets)
+        with progress.stage("reduction"):
+            reduced = reduce_part(scene, part)
+        with progress.stage("contact compliance"):
+            model = make_model(scene, part, reduced)
+        result = earlier or described(file, part, model.balance)
+        if wears(scene) and result.patch is not None:
+            step_limit(scene, result.patch)  # raises before anything long is begun
+        previous = None if earlier else store.set_aside(keep.path)
+        if previous:
+            progress.say(f"the result that was here is now {previous}")
+        keep(result)
+        if result.frf is None:
+            with progress.track("frequency response") as advance:
+                frf = follow_response(scene, model.balance, advance)
+            with progress.stage("linear references"):
+                low, high = scene.response.references or scene.response.frequency
+                references = linear_references(model.balance, OUTPUT, 2 * np.pi * low, 2 * np.pi * high)
+            result = keep(replace(result, frf=frf, references=references, state="response computed"))
+        check_branch(result.frf)
+        if wears(scene):
+            with progress.track("wear") as advance:
+                result = wear_down(scene, model, result, keep, advance)
+        state = "complete" if result.wear is None else f"complete: {result.wear.end}"
+        return keep(replace(result, state=state))
+
+
+def wears(scene: Scene) -> bool:
+    """Whether a scene asks for wear steps."""
+    return scene.wear is not None and scene.wear.max_steps > 0
+
+
+def is_complete(result: Result, scene: Scene) -> bool:
+    """Whether a result holds everything that a scene of the same problem asks for."""
+    if not result.state.startswith("complete") or not wears(scene):
+        return result.state.startswith("complete")
+    assert scene.wear is not None
+    stopped = result.wear is None or result.wear.end.startswith("stopped after")
+    return not stopped or result.wear_steps >= scene.wear.max_steps
+
+
+def check_names(scene: Scene) -> None:
+    """Raise ValueError where a scene names a law or a method that does not exist, before anything is built."""
+    law.check_components(law.load(scene.contact.law), scene.contact.components)
+    continuation.load(scene.response.method)
+    if scene.wear is not None:
+        wear_law.load(scene.wear.law)
+
+
+def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]]:
+    """The mesh with its node sets: read from the scene's file, or built from the part and kept in `folder`."""
+    geometry = file.scene.geometry
+    if geometry.mesh is not None:
+        return mesh_reader.read(file.folder / geometry.mesh)
+    assert geometry.part is not None
+    part, path = parts.load(geometry.part), folder / "mesh.msh"
+    part.build(part.Parameters(**geometry.parameters), path)
+    return mesh_reader.read(path)
+
+
+def make_part(scene: Scene, mesh: Any, node_sets: dict[str, np.ndarray]) -> Part:
+    """Mass, stiffness, loads, output and contact of the mesh, held where the scene says."""
+    contact, response = scene.contact, scene.response
+    loads: dict[str, StaticLoad | HarmonicLoad] = {**scene.loads.static, **scene.loads.harmonic}
+    return fem.part.build(
+        mesh,
+        node_sets,
+        Material(scene.material.young, scene.material.poisson, scene.material.density),
+        [Clamp(group) for group in scene.geometry.fixed],
+        [
+            fem.part.Contact(
+                contact.group, contact.t1, contact.opposite, contact.components, contact.gap, contact.vertices_only
+            )
+        ],
+        {name: NodalForce(load.group, load.direction) for name, load in loads.items()},
+        {OUTPUT: NodalForce(response.group, response.direction)},
+    )
+
+
+def reduce_part(scene: Scene, part: Part) -> ReducedModel:
+    """The part on its contact and load nodes and a few modes, with the scene's damping."""
+    reduced = craig_bampton(part.system, part.interface, scene.reduction.modes, scene.reduction.cutoff)
+    return reduced.with_damping(damping_matrix(scene.damping, reduced))
+
+
+def damping_matrix(damping: Damping, reduced: ReducedModel) -> np.ndarray | None:
+    """Damping matrix (n, n) [N s/m] of the reduced model, None where the scene has no damping."""
+    if damping.modal is not None:
+        return modal_damping(reduced.system, damping.modal)
+    if damping.mass is not None or damping.stiffness is not None:
+        return rayleigh(reduced.system, damping.mass or 0.0, damping.stiffness or 0.0)
+    return None
+
+
+def make_model(scene: Scene, part: Part, reduced: ReducedModel) -> Model:
+    """The harmonic balance of the scene."""
+    contact = scene.contact
+    stiffness = reduced.interface.stiffness(contact.tangential_stiffness, contact.normal_stiffness)
+    parameters = law.ContactParameters.of(
+        contact.components, stiffness, friction=contact.friction, gap=reduced.interface.gap
+    )
+    basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples)
+    balance = HarmonicBalance(reduced, contact.law, parameters, basis, excite(scene), response_range(scene)[1])
+    return Model(part, reduced, balance)
+
+
+def excite(scene: Scene) -> Excitation:
+    """The loads of the scene: F cos(h w t + phase) is the complex amplitude F exp(i phase)."""
+    loads: dict[tuple[int, str], complex] = {(0, name): load.value for name, load in scene.loads.static.items()}
+    for name, load in scene.loads.harmonic.items():
+        loads[load.harmonic, name] = load.value * np.exp(1j * load.phase)
+    return Excitation(loads)
+
+
+def follow_response(scene: Scene, balance: HarmonicBalance, advance: Callable[[float, str], None]) -> Branch:
+    """The response curve of the unworn contact by the scene's continuation method."""
+    method, response = continuation.load(scene.response.method), scene.response
+    options = {"n_points": response.points, "newton": newton_options(scene), **response.options}
+    try:
+        chosen = method.Options(**options)
+    except TypeError as error:
+        raise ValueError(f"response.options: method {response.method} does not take them ({error})") from None
+    return method.follow(balance, *response_range(scene), chosen, lambda done, wanted: advance(done / wanted, ""))
+
+
+def response_range(scene: Scene) -> tuple[float, float]:
+    """Lowest and highest frequency of the response [rad/s]."""
+    low, high = scene.response.frequency
+    return 2 * np.pi * low, 2 * np.pi * high
+
+
+def newton_options(scene: Scene) -> NewtonOptions:
+    """How exactly every balance is solved."""
+    return NewtonOptions(tolerance=scene.solver.tolerance)
+
+
+def check_branch(branch: Branch | None) -> None:
+    """Raise SolveFailed where a response curve did not come to its end."""
+    if branch is not None and branch.outcome[-1] != CONVERGED:
+        raise SolveFailed(f"the frequency response {branch.end}")
+
+
+def wear_down(
+    scene: Scene, model: Model, result: Result, keep: Keeper, advance: Callable[[float, str], None]
+) -> Result:
+    """Wear until contact is lost; every step is kept as soon as it is done."""
+    assert scene.wear is not None
+    assert result.patch is not None
+    patch, wear = result.patch, scene.wear
+    rows = [] if result.wear is None else result.wear.rows()
+    to_wear = float(patch.area @ patch.free_deflection)
+
+    def on_row(row: WearRow) -> None:
+        rows.append(row)
+        keep(replace(result, wear=history(rows, "unfinished"), state=f"unfinished: {len(rows)} wear steps are done"))
+        done = float(patch.area @ (row.depth + row.worn)) / to_wear if to_wear > 0 else 0.0
+        advance(done, f"step {len(rows)}, {row.cycles + row.cycles_in_step:.3g} cycles, {row.preload:.4g} N")
+
+    duties = mission(scene)
+    problem = WearProblem(model.balance, duties, wear.law, wear.coefficient, patch.area, wear.lost_below)
+    limit = step_limit(scene, patch)
+    if wear.rule == "thesis":
+        worn = thesis_rule.evolve(problem, limit, wear.max_steps, on_row, result.wear)
+    else:
+        tolerance = error_controlled_rule.Tolerance(wear.tolerance, limit)
+        worn = error_controlled_rule.evolve(problem, tolerance, wear.max_steps, on_row, result.wear)
+    result = with_pictures_of(replace(result, wear=worn), model, duties[0])
+    if worn.end.startswith("solve failed"):
+        keep(replace(result, state=worn.end))
+        raise SolveFailed(f"wear step {len(worn.cycles)}: {worn.end}")
+    return result
+
+
+def mission(scene: Scene) -> tuple[Duty, ...]:
+    """Where the cycles that wear are taken: the scene's one place, or the duties of its mission."""
+    assert scene.wear is not None
+    newton = newton_options(scene)
+    peak = AtPeak(OUTPUT, *response_range(scene), scene.response.points, newton=newton)
+
+    def site(place: Place) -> AtFrequency | AtPeak | BesidePeak:
+        if place.frequency is not None:
+            return AtFrequency(OUTPUT, 2 * np.pi * place.frequency, newton)
+        assert place.peak is not None
+        return peak if place.peak == 1.0 else BesidePeak(peak, place.peak)
+
+    if not scene.wear.mission:
+        return (Duty(site(scene.wear.at)),)
+    return tuple(Duty(site(duty.at), duty.share, duty.load) for duty in scene.wear.mission)
+
+
+def step_limit(scene: Scene, patch: Patch) -> float:
+    """Largest depth of one wear step by the thesis's rule, or delta_max that the other rule measures errors by [m].
+
+    Raises  ValueError where delta_max is needed and the scene has none
+    """
+    assert scene.wear is not None
+    step = scene.wear.step
+    if scene.wear.rule == "thesis" and step is not None and step.depth is not None:
+        return step.depth
+    delta_max = float(patch.free_deflection.max())
+    if not (np.isfinite(delta_max) and delta_max > 0):
+        raise ValueError(
+            "wear.step: a share of delta_max needs static loads that press the contact of a part held without it; "
+            'give a depth such as "50 um" and rule = "thesis"'
+        )
+    share = step.share if scene.wear.rule == "thesis" and step is not None else None
+    return delta_max if share is None else share * delta_max
+
+
+def with_pictures_of(result: Result, model: Model, duty: Duty) -> Result:
+    """The result with displacement fields and hysteresis loops of the rows that pictures show."""
+    assert result.wear is not None
+    if not result.wear_steps:
+        return result
+    rows, numbers = result.wear.rows(), replace(result, fields=None).shown_rows()
+    balance = model.balance.with_load(duty.load)
+    return replace(
+        result,
+        fields=displacement_fields(balance, model.part, rows, numbers),
+        loops=hysteresis_loops(balance, rows, numbers),
+    )
+
+
+class Clock:
+    """Seconds of computing, those of an interrupted run included."""
+
+    def __init__(self, earlier: Result | None):
+        self._before = 0.0 if earlier is None else float(earlier.facts["seconds"])
+        self._start = time.perf_counter()
+
+    def seconds(self) -> float:
+        """Seconds so far."""
+        return self._before + time.perf_counter() - self._start
+
+
+@dataclass(frozen=True)
+class Keeper:
+    """Writes each new state of the result to its file."""
+
+    path: Path
+    clock: Clock
+
+    def __call__(self, result: Result) -> Result:
+        """Write a result with the seconds it took, and give it back."""
+        timed = replace(result, facts={**result.facts, "seconds": self.clock.seconds()})
+        store.save(self.path, timed)
+        return timed
+
+
+def same_problem(first: Scene, second: Scene) -> str:
+    """Empty where one scene's result can be gone on from by the other, else the first key that differs.
+
+    What is drawn, how many wear steps are wanted and how many threads work may differ.
+    """
+    ignored: dict[str, Any] = {"scene": True, "pictures": True, "solver": {"threads"}, "wear": {"max_steps"}}
+    return _difference(first.model_dump(exclude=ignored), second.model_dump(exclude=ignored))
+
+
+def _difference(first: Any, second: Any) -> str:
+    if isinstance(first, dict) and isinstance(second, dict):
+        for key in [*first, *(k for k in second if k not in first)]:
+            below = _difference(first.get(key), second.get(key))
+            if below:
+                return f"{key}.{below}".rstrip(".")
+        return ""
+    return "" if first == second else "."
