@@ -54,14 +54,18 @@ class Expansion:
         self._system = (mass, damping, stuck)
         self._ports = ports
         n = len(mass)
+        loose = SingularStuckSystem(
+            "the part can move as a rigid body even with all contacts stuck: clamp it, add a spring, "
+            "or raise the contact stiffness"
+        )
         try:
             factor = sla.cho_factor(stuck)
         except np.linalg.LinAlgError:
-            raise SingularStuckSystem(
-                "the part can move as a rigid body even with all contacts stuck: clamp it, add a spring, "
-                "or raise the contact stiffness"
-            ) from None
+            raise loose from None
         lam, phi = sla.eigh(stuck, mass, subset_by_index=None if n < ALL_MODES_BELOW else (0, CANDIDATES[-1][0] - 1))
+        # a rigid mode comes out of the eigenvalue problem as rounding of the stiffest ones, of either sign
+        if lam[0] <= n * np.finfo(float).eps * np.max(np.diag(stuck).real / np.diag(mass).real):
+            raise loose
         before = np.inf
         for m, order in [*((m, order) for m, order in CANDIDATES if m < len(lam)), (len(lam), 1 if len(lam) == n else 8)]:
             self._build(lam[:m], phi[:, :m], factor, order)
