@@ -218,8 +218,8 @@ def _contact(load, grid, hs, contact, closed):
     n = _roots(load, hs, grid[0], grid[1], grid[3], contact, 1)
     contact[n] = TURN
     n_closed = 0
-    for j in range(n):
-        closed[j] = _at(load, hs, 0.5 * (contact[j] + contact[j + 1]))[0] > 0.0
+    for j in range(n):  # without a change of sign the mean tells it, else the signs alternate
+        closed[j] = load[0] > 0.0 if n == 1 else (grid[3, -1] >= 0.0) == (j % 2 == 0)
         n_closed += closed[j]
     return n, n_closed
 
