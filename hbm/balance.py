@@ -111,7 +111,9 @@ class HarmonicBalance:
         return self._point
 
     def _loaded(self, coefficients: np.ndarray) -> np.ndarray:
-        return coefficients if self.load_factor == 1.0 else coefficients * np.where(self.basis.order, self.load_factor, 1.0)
+        if self.load_factor == 1.0:
+            return coefficients
+        return coefficients * np.where(self.basis.order, self.load_factor, 1.0)
 
     def x_lin(self, omega: float) -> np.ndarray:
         """(n_contact, n_coeff) response with every contact stuck and closed, the gap ignored [m]."""
