@@ -207,7 +207,7 @@ def make_model(scene: Scene, part: Part, reduced: ReducedModel) -> Model:
         friction=contact.friction or 0.0,
         gap=reduced.interface.gap,
     )
-    basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples)
+    basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples, scene.harmonics.transitions)
     excitation, omega_max = excite(scene, part, basis), response_range(scene)[1]
     return Model(part, reduced, HarmonicBalance(reduced, contact.law, parameters, basis, excitation, omega_max))
 
