@@ -8,7 +8,12 @@ import numpy as np
 from scipy.linalg import null_space
 
 from fem.system import SecondOrderSystem
+from reduction.craig_bampton import REPORTED_MODES
+from reduction.linear import linear_modes
 from reduction.model import ReducedModel
+
+# facts about frequencies of the model before; the free ones are told anew
+STALE = ("free_frequency_error", "stuck_frequency", "stuck_frequency_error")
 
 
 def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:
@@ -34,7 +39,10 @@ def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:
         {name: N.T @ row for name, row in s.outputs.items()},
     )
     interface = replace(model.interface, B=np.asarray(model.interface.B) @ N)
-    return replace(model, system=system, interface=interface, basis=model.basis @ N)
+    held_model = replace(model, system=system, interface=interface, basis=model.basis @ N)
+    facts = {name: fact for name, fact in model.info.items() if name not in STALE}
+    frequency, _ = linear_modes(held_model, n=min(REPORTED_MODES, N.shape[1]))
+    return replace(held_model, info={**facts, "free_frequency": frequency})
 
 
 def _congruent(N: np.ndarray, matrix: np.ndarray) -> np.ndarray:
