@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
@@ -145,7 +146,7 @@ def reduced_leaf(scene: Scene, parameters: leaf_seal.Parameters) -> Leaf:
     part = pipeline.make_part(scene.model_copy(update={"springs": {}}), mesh, node_sets)
     rows, shares = zip(*(spring.elongation(mesh, node_sets) for spring in pipeline.springs(scene)), strict=True)
     seats = [row[:, part.free] for row in rows]
-    masters = np.concatenate([seat.nonzero()[1] for seat in seats])
+    masters = np.concatenate([seat.nonzero()[1] for seat in seats]).tolist()
     model = hold(
         craig_bampton(part.system, part.interface, scene.reduction.modes, scene.reduction.cutoff, masters), part.held
     )
@@ -154,9 +155,15 @@ def reduced_leaf(scene: Scene, parameters: leaf_seal.Parameters) -> Leaf:
     return Leaf(system.mass, system.stiffness, model.interface, seat_rows, np.concatenate(shares))
 
 
+def dimensions(scene: Scene) -> leaf_seal.Parameters:
+    """The leaf of a scene."""
+    parameters: dict[str, Any] = scene.geometry.parameters
+    return leaf_seal.Parameters(**parameters)
+
+
 def of_scene(scene: Scene) -> Fit:
     """The leaf as a scene has it, beside the published ratios; its unit is the best one."""
-    parameters = leaf_seal.Parameters(**scene.geometry.parameters)
+    parameters = dimensions(scene)
     spring = next(iter(scene.springs.values())).stiffness
     contact = scene.contact.normal_stiffness or 0.0
     columns = reduced_leaf(scene, parameters).columns(spring, contact)
@@ -189,7 +196,7 @@ def fit(scene: Scene, pin_column: int, max_steps: int = 20) -> Fit:
 
     Every shape gets its own best unit and stiffnesses, so that only the shape is searched for.
     """
-    first = leaf_seal.Parameters(**scene.geometry.parameters)
+    first = dimensions(scene)
     lower, start, upper, scale = (np.array(column) for column in zip(*SHAPE.values(), strict=True))
 
     def parameters(shape: np.ndarray) -> leaf_seal.Parameters:
@@ -229,7 +236,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print(f"error {100 * found.rms:.2f} % r.m.s.; 1.00 is {found.unit:.4g} Hz")
     print(f"contact of both patches over spring of one pin: {found.contact / found.spring:.3g}")
     print(found.toml())
-    print(asdict(found.parameters))
 
 
 if __name__ == "__main__":
