@@ -1,0 +1,45 @@
+"""The one door to Gmsh: a quiet session that always ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+SYSTEM_LIBRARIES = "libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1"
+
+
+class GmshUnavailable(ValueError):
+    """Gmsh cannot be imported on this machine."""
+
+
+@contextmanager
+def session() -> Iterator[Any]:
+    """Run Gmsh quietly and without the user's own settings; finalise it whatever happens.
+
+    Yields the gmsh module, with an empty model
+    Raises GmshUnavailable: the package or one of its system libraries is missing
+    """
+    try:
+        import gmsh
+    except (ImportError, OSError) as error:  # its shared library is opened with ctypes: OSError
+        raise GmshUnavailable(
+            f"gmsh cannot be loaded ({error}): install its system libraries with "
+            f"'apt-get install --no-install-recommends {SYSTEM_LIBRARIES}', or start tribodyn through ./tribodyn."
+        ) from error
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("General.NumThreads", 1)  # the same mesh on every machine
+        yield gmsh
+    finally:
+        gmsh.finalize()
+
+
+def save(gmsh: Any, path: str | Path) -> None:
+    """Write the current mesh as binary MSH 4.1, elements of physical groups only."""
+    gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
+    gmsh.option.setNumber("Mesh.Binary", 1)
+    gmsh.option.setNumber("Mesh.SaveAll", 0)
+    gmsh.write(str(path))

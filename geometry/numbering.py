@@ -1,0 +1,64 @@
+"""How the nodes of second-order elements are numbered, told once, by where they lie.
+
+A node beyond the corners lies at the mean of the corners that support it: two for an edge, four for a face, eight
+for the middle. From that follow reference coordinates, and from two lists of reference coordinates follows the
+permutation between any two programs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+# The order of meshio, which is VTK's.
+HEX_CORNERS = np.array(
+    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=float
+)
+HEX_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+HEX_FACES = ((0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (3, 2, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7))
+TET_CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+TET_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
+QUAD_CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
+QUAD_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0))
+
+
+def _reference(corners: np.ndarray, *supports: tuple[tuple[int, ...], ...]) -> np.ndarray:
+    beyond = [corners[list(support)].mean(axis=0) for group in supports for support in group]
+    return np.vstack([corners, *beyond])
+
+
+REFERENCE_POINTS = {
+    "hexahedron27": _reference(HEX_CORNERS, HEX_EDGES, HEX_FACES, (tuple(range(8)),)),
+    "hexahedron20": _reference(HEX_CORNERS, HEX_EDGES),
+    "tetra10": _reference(TET_CORNERS, TET_EDGES),
+    "quad9": _reference(QUAD_CORNERS, QUAD_EDGES, (tuple(range(4)),)),
+}
+
+
+def permutation(source: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Find where each target node stands in the source's numbering.
+
+    source, target : (n, d) reference coordinates of the same nodes in two numberings, on the same reference element
+    Returns (n,) so that source[result] equals target
+    Raises ValueError: the two do not list the same nodes
+    """
+    distance = np.abs(source[None, :, :] - target[:, None, :]).max(axis=2)
+    order = distance.argmin(axis=1)
+    if len(source) != len(target) or distance.min(axis=1).max() > 1e-9:
+        raise ValueError("the two node numberings do not describe the same element: give both on one reference element")
+    return order
+
+
+def serendipity_to_lagrange(positions: np.ndarray) -> np.ndarray:
+    """Add the face and middle nodes that a 20-node hexahedron implies; its shape does not change.
+
+    positions : (n, 20, 3) node positions in the order of meshio
+    Returns (n, 27, 3)
+    Source  the 20-node shape functions at the face centres (corners -1/4, edges 1/2) and in the middle (-1/4, 1/4)
+    """
+    edge_of = {frozenset(edge): 8 + i for i, edge in enumerate(HEX_EDGES)}
+    faces = []
+    for face in HEX_FACES:
+        edges = [edge_of[frozenset(pair)] for pair in zip(face, face[1:] + face[:1], strict=True)]
+        faces.append(positions[:, edges].sum(axis=1) / 2 - positions[:, list(face)].sum(axis=1) / 4)
+    middle = positions[:, 8:].sum(axis=1) / 4 - positions[:, :8].sum(axis=1) / 4
+    return np.concatenate([positions, np.stack([*faces, middle], axis=1)], axis=1)

@@ -1,0 +1,38 @@
+"""Find a part by the name of its file.
+
+A part is a file in this folder that defines `class Parameters` (a frozen dataclass in SI units that validates itself)
+and `def build(parameters, path)` (writes a second-order .msh with physical groups). Nothing else lists it.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib
+from pathlib import Path
+from types import ModuleType
+
+_FOLDER = Path(__file__).parent
+
+
+def names() -> tuple[str, ...]:
+    """Return the names of all parts, sorted; no part is imported for it."""
+    return tuple(sorted(file.stem for file in _FOLDER.glob("*.py") if _is_part(file)))
+
+
+def load(name: str) -> ModuleType:
+    """Import a part.
+
+    name : its file name without .py
+    Returns the module, with `Parameters` and `build`
+    Raises ValueError: there is no such part
+    """
+    if name not in names():
+        raise ValueError(f"there is no part '{name}': the parts are {', '.join(names())}")
+    return importlib.import_module(f"geometry.{name}")
+
+
+def _is_part(file: Path) -> bool:
+    body = ast.parse(file.read_text(encoding="utf-8")).body
+    classes = {node.name for node in body if isinstance(node, ast.ClassDef)}
+    functions = {node.name for node in body if isinstance(node, ast.FunctionDef)}
+    return "Parameters" in classes and "build" in functions
