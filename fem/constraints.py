@@ -1,0 +1,63 @@
+"""Which DOFs are free, clamped or prescribed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+AXES = "xyz"
+
+
+def named(groups: Mapping[str, np.ndarray], name: str, kind: str = "node set") -> np.ndarray:
+    """The group of that name.
+
+    Raises  ValueError that lists the names which exist, or says that the group is empty
+    """
+    if name not in groups:
+        raise ValueError(f"the mesh has no {kind} '{name}'; it has {', '.join(sorted(groups)) or 'none'}")
+    if len(groups[name]) == 0:
+        raise ValueError(f"the {kind} '{name}' is empty; check the geometry that defines it")
+    return np.asarray(groups[name])
+
+
+@dataclass(frozen=True)
+class Clamp:
+    """Hold a node set. nodes : its name; axes : which of "xyz" are held."""
+
+    nodes: str
+    axes: str = AXES
+
+    def __post_init__(self) -> None:
+        if not self.axes or set(self.axes) - set(AXES):
+            raise ValueError(f"clamp '{self.nodes}': axes = '{self.axes}' must be some of the letters x, y, z")
+
+    def dofs(self, node_sets: Mapping[str, np.ndarray]) -> np.ndarray:
+        """DOFs that are held."""
+        nodes = named(node_sets, self.nodes)
+        return (nodes[:, None] * 3 + [AXES.index(a) for a in self.axes]).ravel()
+
+
+def free_dofs(n_dof: int, clamps: Iterable[Clamp], node_sets: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Sorted DOFs (n_free,) that no clamp holds.
+
+    Raises  ValueError where everything is held
+    """
+    free = np.ones(n_dof, dtype=bool)
+    for clamp in clamps:
+        free[clamp.dofs(node_sets)] = False
+    if not free.any():
+        raise ValueError("the clamps hold every DOF of the part; leave some node free")
+    return np.flatnonzero(free)
+
+
+def partition(n_dof: int, prescribed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Split DOFs of a system into (free, prescribed), both sorted index arrays.
+
+    Raises  ValueError where a prescribed DOF lies outside the system
+    """
+    prescribed = np.unique(prescribed)
+    if len(prescribed) and not 0 <= prescribed[0] <= prescribed[-1] < n_dof:
+        raise ValueError(f"a prescribed DOF lies outside the {n_dof} DOFs of the system; clamped DOFs cannot be moved")
+    return np.setdiff1d(np.arange(n_dof), prescribed), prescribed

@@ -1,0 +1,140 @@
+"""Builders of contact interfaces: a patch against the ground, or against the nodes of another patch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.spatial import cKDTree
+
+from fem.interface import COMPONENTS, ContactInterface
+from fem.loads import unit
+from fem.surface import Surface, surface
+
+
+def ground_contact(
+    mesh: Any,
+    facets: np.ndarray,
+    t1: Sequence[float],
+    components: Sequence[str] = COMPONENTS,
+    gap: float | np.ndarray = 0.0,
+    vertices_only: bool = False,
+) -> ContactInterface:
+    """Nodes of a face against the ground, which body 1 approaches along its outward normal.
+
+    mesh : scikit-fem mesh; facets : facets of the face; t1 : (3,) direction whose part along the face is t1
+    components : those a scene needs, of t1, t2, n; gap : opening before loading [m], one or (n_pair,)
+    vertices_only : no pairs at mid-side and mid-face nodes
+    Returns the interface with B over all 3 n_node DOFs of the mesh, pairs in ascending node order
+    Raises  ValueError for an empty face, a t1 along the normal, unknown components, a gap of the wrong length
+    """
+    return _interface(mesh, surface(mesh, facets, vertices_only), t1, components, gap)
+
+
+def pair_contact(
+    mesh: Any,
+    facets_1: np.ndarray,
+    facets_2: np.ndarray,
+    t1: Sequence[float],
+    components: Sequence[str] = COMPONENTS,
+    gap: float | np.ndarray = 0.0,
+    vertices_only: bool = False,
+    tolerance: float = 1e-4,
+) -> ContactInterface:
+    """Nodes of face 1 against the matching nodes of face 2, which may be larger.
+
+    tolerance : largest distance of two matching nodes, as a part of the length of face 1
+    Other arguments, returns and errors as ground_contact; ValueError too where a node of face 1 finds no partner
+    """
+    interface, B_2 = pair_halves(mesh, facets_1, facets_2, t1, components, gap, vertices_only, tolerance)
+    return replace(interface, B=interface.B - B_2)
+
+
+def pair_halves(
+    mesh: Any,
+    facets_1: np.ndarray,
+    facets_2: np.ndarray,
+    t1: Sequence[float],
+    components: Sequence[str] = COMPONENTS,
+    gap: float | np.ndarray = 0.0,
+    vertices_only: bool = False,
+    tolerance: float = 1e-4,
+    rotation: np.ndarray | None = None,
+) -> tuple[ContactInterface, csr_matrix]:
+    """Both halves of a contact whose second body is the copy of this mesh turned by a rotation.
+
+    rotation : (3, 3) that carries face 2 of this mesh onto face 1, as the next sector of a cyclic part does
+    Returns interface whose B is the half of body 1, and the half B_2 of the turned body 2 in its own sector
+        coordinates: relative displacement = B q - B_2 q_2
+    """
+    rotation = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
+    face_1 = surface(mesh, facets_1, vertices_only)
+    face_2 = surface(mesh, facets_2, vertices_only)
+    length = float(np.linalg.norm(np.ptp(face_1.points, axis=0)))
+    distance, partner = cKDTree(face_2.points @ rotation.T).query(face_1.points)
+    lost = distance > tolerance * length
+    if lost.any() or len(np.unique(partner)) < len(partner):
+        worst = face_1.points[distance.argmax()]
+        raise ValueError(
+            f"the two contact faces do not match: {lost.sum()} of {len(partner)} nodes of the first have no partner on the "
+            f"second, the farthest at ({worst[0]:.4g}, {worst[1]:.4g}, {worst[2]:.4g}) m is {distance.max():.3g} m away; "
+            "mesh both with the same grid"
+        )
+    interface = _interface(mesh, face_1, t1, components, gap)
+    turned = _rows(interface.frames, components) @ rotation
+    return interface, _map(turned, face_2.nodes[partner], mesh)
+
+
+def _interface(
+    mesh: Any, face: Surface, t1: Sequence[float], components: Sequence[str], gap: float | np.ndarray
+) -> ContactInterface:
+    """Interface of the nodes of one face, with B of that face alone."""
+    components = tuple(components)
+    if not components or components != tuple(c for c in COMPONENTS if c in components):
+        raise ValueError(f"contact components {list(components)} must be some of t1, t2, n, in this order")
+    if np.ndim(gap) and np.shape(gap) != face.area.shape:
+        raise ValueError(f"the contact gap has {np.size(gap)} values for {len(face.area)} node pairs; give one for each")
+    frames = contact_frames(face.normals, t1)
+    return ContactInterface(
+        components=components,
+        points=face.points,
+        frames=frames,
+        area=face.area,
+        gap=np.broadcast_to(np.asarray(gap, dtype=float), face.area.shape).copy(),
+        B=_map(_rows(frames, components), face.nodes, mesh),
+        faces=face.faces,
+    )
+
+
+def contact_frames(normals: np.ndarray, t1: Sequence[float]) -> np.ndarray:
+    """Right-handed frames (k, 3, 3), rows t1, t2, n, from normals (k, 3) and a direction that t1 follows.
+
+    Raises  ValueError where the direction is along a normal
+    """
+    direction = unit(t1, "the contact direction t1")
+    along = direction - (normals @ direction)[:, None] * normals
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    if (length < 1e-3).any():
+        raise ValueError(f"the contact direction t1 = {list(t1)} is along the contact normal; give one along the face")
+    first = along / length
+    return np.stack([first, np.cross(normals, first), normals], axis=1)
+
+
+def _rows(frames: np.ndarray, components: Sequence[str]) -> np.ndarray:
+    """The rows of the frames (n_pair, n_component, 3) that the components need."""
+    return frames[:, [COMPONENTS.index(c) for c in components]]
+
+
+def _map(rows: np.ndarray, nodes: np.ndarray, mesh: Any) -> csr_matrix:
+    """Sparse map (n_pair * n_component, 3 n_node) from DOFs to rows (n_pair, n_component, 3) . u(node)."""
+    n_pair, n_component, _ = rows.shape
+    columns = np.broadcast_to((nodes[:, None] * 3 + np.arange(3))[:, None], rows.shape)
+    lines = np.broadcast_to(np.arange(n_pair * n_component).reshape(n_pair, n_component, 1), rows.shape)
+    rows = np.where(np.abs(rows) < 1e-14, 0.0, rows)  # rounding of a frame must not make a DOF a master
+    shape = (n_pair * n_component, mesh.doflocs.shape[1] * 3)
+    matrix = csr_matrix((rows.ravel(), (lines.ravel(), columns.ravel())), shape=shape)
+    matrix.eliminate_zeros()
+    return matrix

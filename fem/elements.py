@@ -1,0 +1,77 @@
+"""Element geometry in batches: shape functions, gradients and weights at the quadrature points.
+
+Nodes are the columns of the second-order mesh's `doflocs`; a displacement DOF is node * 3 + component (x, y, z).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from scipy.sparse import bsr_matrix, csr_matrix
+from skfem import MeshHex2, MeshTet2
+from skfem.quadrature import get_quadrature
+
+# Gauss rules that integrate the mass of straight-sided elements exactly: 27 points in a hexahedron, 14 in a tetrahedron.
+DEFAULT_ORDER = 5
+BATCH = 256
+
+
+def coordinates(mesh: Any) -> np.ndarray:
+    """Coordinates of all second-order nodes (n_node, 3) [m]."""
+    return np.asarray(mesh.doflocs.T)
+
+
+def connectivity(mesh: Any) -> np.ndarray:
+    """Nodes of the elements (n_element, 27 or 10), in scikit-fem's local order.
+
+    Raises  ValueError where the mesh is not of 27-node hexahedra or 10-node tetrahedra
+    """
+    if not isinstance(mesh, MeshHex2 | MeshTet2):
+        raise ValueError(
+            f"the mesh is a {type(mesh).__name__}, but elasticity needs second-order hexahedra (MeshHex2) or "
+            "tetrahedra (MeshTet2); raise the element order of the geometry"
+        )
+    return np.asarray(mesh.dofs.element_dofs.T)
+
+
+def batches(mesh: Any, order: int | None = None) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+    """Yield (elements, N, grad N, weight) for up to 256 elements at a time.
+
+    order : polynomial order of the quadrature rule, 5 unless told
+    Yields elements (n_e,), N (n_q, n_a) [-], gradient (n_e, n_q, 3, n_a) [1/m], weight |J| w (n_e, n_q) [m3]
+    Raises  ValueError where an element is folded
+    """
+    nodes, points = connectivity(mesh), coordinates(mesh)
+    element = mesh.elem()
+    X, w = get_quadrature(element, DEFAULT_ORDER if order is None else order)
+    values, slopes = zip(*(element.lbasis(X, a) for a in range(nodes.shape[1])), strict=True)
+    N = np.stack(np.broadcast_arrays(*values)).T
+    dN = np.stack([np.stack(np.broadcast_arrays(*s)) for s in slopes]).transpose(2, 1, 0)  # n_q, 3 local, n_a
+    for start in range(0, len(nodes), BATCH):
+        elements = np.arange(start, min(start + BATCH, len(nodes)))
+        J = dN @ points[nodes[elements]][:, None]  # J[e, q, i, j] = d x_j / d X_i
+        det = np.linalg.det(J)
+        folded = (np.sign(det) != np.sign(det[:, :1])).any(axis=1) | (det[:, 0] == 0)
+        if folded.any():
+            where = points[nodes[elements[folded.argmax()]]].mean(axis=0)
+            raise ValueError(f"the mesh has a folded element near ({where[0]:.4g}, {where[1]:.4g}, {where[2]:.4g}) m")
+        yield elements, N, np.linalg.solve(J, dN[None]), np.abs(det) * w
+
+
+def scatter(nodes: np.ndarray, n_node: int, blocks: np.ndarray) -> csr_matrix:
+    """Sum element matrices into a sparse matrix over node * k + component.
+
+    nodes : (n_element, n_a); blocks : (n_element, n_a, n_a, k, k) symmetric element matrices, k components per node
+    Returns (n_node * k, n_node * k)
+    """
+    k = blocks.shape[-1]
+    key = (nodes[:, :, None].astype(np.int64) * n_node + nodes[:, None, :]).ravel()
+    pattern, place = np.unique(key, return_inverse=True)
+    flat = blocks.reshape(len(key), k * k)
+    data = np.stack([np.bincount(place, flat[:, c], len(pattern)) for c in range(k * k)], axis=1)
+    indptr = np.searchsorted(pattern, np.arange(n_node + 1, dtype=np.int64) * n_node)
+    matrix = bsr_matrix((data.reshape(-1, k, k), pattern % n_node, indptr), shape=(n_node * k, n_node * k)).tocsr()
+    matrix.sort_indices()
+    return matrix

@@ -1,0 +1,89 @@
+"""Loads and outputs as vectors over all DOFs of the mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from fem.constraints import named
+from fem.elements import coordinates
+from fem.surface import face_integrals, facet_nodes
+
+
+class Load(Protocol):
+    """A load that knows its force vector (3 n_node,) per unit of its amplitude."""
+
+    def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any) -> np.ndarray: ...
+
+
+@dataclass(frozen=True)
+class NodalForce:
+    """A resultant of 1 N in a direction, shared evenly by a node set.
+
+    As an output the same vector observes the mean displacement of the set in that direction [m/m].
+    nodes : name of the node set; direction : (3,), need not be a unit vector
+    """
+
+    nodes: str
+    direction: Sequence[float]
+
+    def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any = None) -> np.ndarray:
+        """Force vector (3 n_node,) [N/N]."""
+        nodes = named(node_sets, self.nodes)
+        force = np.zeros((mesh.doflocs.shape[1], 3))
+        force[nodes] = unit(self.direction, f"the direction at node set '{self.nodes}'") / len(nodes)
+        return force.ravel()
+
+
+@dataclass(frozen=True)
+class Pressure:
+    """1 Pa on a face of the mesh, pushing into the body; consistent nodal forces. face : its boundary name."""
+
+    face: str
+
+    def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any = None) -> np.ndarray:
+        """Force vector (3 n_node,) [N/Pa]."""
+        facets = named(mesh.boundaries or {}, self.face, "face")
+        force = np.zeros((mesh.doflocs.shape[1], 3))
+        np.add.at(force, facet_nodes(mesh, facets), -face_integrals(mesh, facets)[1])
+        return force.ravel()
+
+
+@dataclass(frozen=True)
+class BodyForce:
+    """Acceleration of 1 m/s2 of the frame's gravity in a direction: force density rho g. direction : (3,)."""
+
+    direction: Sequence[float]
+
+    def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any) -> np.ndarray:
+        """Force vector (3 n_node,) [N s2/m]; exact, as a constant field lies in the element space."""
+        direction = unit(self.direction, "the direction of the body force")
+        return mass @ np.tile(direction, mesh.doflocs.shape[1])
+
+
+@dataclass(frozen=True)
+class Centrifugal:
+    """Centrifugal force of a rotation of 1 rad/s about an axis. axis : (3,); point : (3,) on the axis [m]."""
+
+    axis: Sequence[float]
+    point: Sequence[float] = (0.0, 0.0, 0.0)
+
+    def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any) -> np.ndarray:
+        """Force vector (3 n_node,) [N s2/rad2], to be scaled by speed squared; exact for isoparametric elements."""
+        axis = unit(self.axis, "the axis of rotation")
+        arm = coordinates(mesh) - np.asarray(self.point, dtype=float)
+        return mass @ (arm - np.outer(arm @ axis, axis)).ravel()
+
+
+def unit(direction: Sequence[float], what: str) -> np.ndarray:
+    """Unit vector (3,) along a direction.
+
+    Raises  ValueError, naming what, for a zero vector or a wrong length
+    """
+    vector = np.asarray(direction, dtype=float)
+    if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
+        raise ValueError(f"{what} must be three numbers that are not all zero, but is {list(np.ravel(direction))}")
+    return vector / np.linalg.norm(vector)

@@ -1,0 +1,91 @@
+"""From mesh to a full second-order system with its contact: the chain that a scene runs for each part."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fem.constraints import Clamp, free_dofs, named
+from fem.contact import ground_contact, pair_contact
+from fem.elasticity import assemble
+from fem.elements import coordinates
+from fem.interface import COMPONENTS, ContactInterface
+from fem.loads import Load, NodalForce
+from fem.material import Material
+from fem.system import SecondOrderSystem
+
+
+@dataclass(frozen=True)
+class Contact:
+    """What a scene says about one contact.
+
+    face : boundary name of body 1; opposite : boundary name of body 2, None for the ground
+    t1 : (3,) direction that the first tangent follows; components : those modelled; gap : [m], one or per pair
+    vertices_only : pairs at the element corners only
+    """
+
+    face: str
+    t1: Sequence[float]
+    opposite: str | None = None
+    components: Sequence[str] = COMPONENTS
+    gap: float | np.ndarray = 0.0
+    vertices_only: bool = False
+
+    def build(self, mesh: Any) -> ContactInterface:
+        """The interface over all DOFs of the mesh."""
+        faces = mesh.boundaries or {}
+        first = named(faces, self.face, "face")
+        if self.opposite is None:
+            return ground_contact(mesh, first, self.t1, self.components, self.gap, self.vertices_only)
+        second = named(faces, self.opposite, "face")
+        return pair_contact(mesh, first, second, self.t1, self.components, self.gap, self.vertices_only)
+
+
+@dataclass(frozen=True)
+class Part:
+    """system : over the free DOFs; interface : likewise; free : (n_free,) DOF of the mesh that each one is,
+    node * 3 + component; points : (n_node, 3) coordinates of the nodes [m]; mesh : scikit-fem's.
+    """
+
+    system: SecondOrderSystem
+    interface: ContactInterface
+    free: np.ndarray
+    points: np.ndarray
+    mesh: Any
+
+    def field(self, q: np.ndarray) -> np.ndarray:
+        """Displacement (n_node, 3, ...) [m] of all nodes from free DOFs q (n_free, ...)."""
+        full = np.zeros((3 * len(self.points), *q.shape[1:]), dtype=q.dtype)
+        full[self.free] = q
+        return full.reshape(len(self.points), 3, *q.shape[1:])
+
+
+def build(
+    mesh: Any,
+    node_sets: Mapping[str, np.ndarray],
+    material: Material | Mapping[str, Material],
+    clamps: Sequence[Clamp],
+    contact: Contact,
+    loads: Mapping[str, Load],
+    outputs: Mapping[str, NodalForce],
+    order: int | None = None,
+) -> Part:
+    """Assemble a part, hold it, and say where it touches, is loaded and is watched.
+
+    mesh, node_sets : as geometry.mesh.read gives them; material : one, or subdomain name -> material
+    order : quadrature order, 5 unless told
+    Raises  ValueError where a name is unknown or a group is empty, one sentence
+    """
+    M, K = assemble(mesh, material, order)
+    free = free_dofs(K.shape[0], clamps, node_sets)
+    interface = contact.build(mesh)
+    system = SecondOrderSystem(
+        mass=M[free][:, free],
+        stiffness=K[free][:, free],
+        loads={name: load.vector(mesh, node_sets, M)[free] for name, load in loads.items()},
+        outputs={name: output.vector(mesh, node_sets)[free] for name, output in outputs.items()},
+    )
+    return Part(system, replace(interface, B=interface.B[:, free]), free, coordinates(mesh), mesh)

@@ -1,0 +1,98 @@
+"""A part of the surface: its nodes, normals, tributary areas and polygons."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from skfem import ElementQuad1, ElementQuad2, ElementTriP1, ElementTriP2, MeshHex2
+from skfem.quadrature import get_quadrature
+
+from fem.elements import connectivity, coordinates
+
+# Corners of the four (three) corner-ordered quads that a nine-node face (the triangle of corners that a six-node face) shows.
+NINE_NODE_QUADS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
+FACE_ORDER = 6
+
+
+@dataclass(frozen=True)
+class Surface:
+    """nodes : (k,) mesh nodes, sorted; points : (k, 3) [m]; normals : (k, 3) outward unit vectors, averaged by area;
+    area : (k,) tributary area [m2], sums to the area of the surface;
+    faces : (n_face, 4 or 3) corner-ordered polygons, as positions in `nodes`.
+    """
+
+    nodes: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
+    area: np.ndarray
+    faces: np.ndarray
+
+
+def surface(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -> Surface:
+    """The surface made of some facets of the mesh.
+
+    facets : indices of boundary facets; vertices_only : leave out the mid-side and mid-face nodes
+    Tributary areas are the consistent integrals of the shape functions of the nodes kept: 1/36, 4/36, 16/36 of a flat
+    nine-node face, 1/4 or 1/3 with vertices only. They are positive there; six-node faces have none at the corners.
+    Raises  ValueError where there are no facets, where they lie inside the body, or where an area is not positive
+    """
+    facets = np.asarray(facets, dtype=int)
+    if len(facets) == 0:
+        raise ValueError("a contact or load surface has no faces; check the geometry that defines it")
+    if (mesh.f2t[1, facets] >= 0).any():
+        raise ValueError("a contact or load surface lies inside the body; give faces of its boundary")
+    face_nodes = facet_nodes(mesh, facets)
+    weighted, vectors = face_integrals(mesh, facets, vertices_only)
+    if vertices_only:
+        face_nodes = face_nodes[:, : weighted.shape[1]]
+    nodes, local = np.unique(face_nodes, return_inverse=True)
+    local = local.reshape(face_nodes.shape)
+    area = np.bincount(local.ravel(), weighted.ravel())
+    if (area <= 1e-9 * area.sum()).any():
+        raise ValueError(
+            "consistent areas are not positive at the corners of these faces; use their vertices only, or nine-node faces"
+        )
+    normals = np.stack([np.bincount(local.ravel(), vectors[:, :, i].ravel()) for i in range(3)], axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    polygons = local if vertices_only else np.vstack(local[:, NINE_NODE_QUADS])
+    return Surface(nodes, coordinates(mesh)[nodes], normals, area, polygons)
+
+
+def facet_nodes(mesh: Any, facets: np.ndarray) -> np.ndarray:
+    """Nodes of the facets (n_facet, 9 or 6): corners in cyclic order, then mid-sides, then the middle."""
+    connectivity(mesh)
+    parts = [mesh.facets[:, facets], mesh.dofs.edge_dofs[0][mesh.f2e[:, facets]]]
+    if isinstance(mesh, MeshHex2):
+        parts.append(mesh.dofs.facet_dofs[:, facets])
+    return np.vstack(parts).T
+
+
+def face_integrals(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Integrals of N_a and of N_a times the outward normal over each facet.
+
+    Returns (n_facet, k) [m2] and (n_facet, k, 3) [m2]; k nodes of the facet, or its vertices
+    """
+    hexahedra = isinstance(mesh, MeshHex2)
+    geometry = ElementQuad2() if hexahedra else ElementTriP2()
+    linear: Any = ElementQuad1() if hexahedra else ElementTriP1()
+    X, w = get_quadrature(geometry, FACE_ORDER)
+    nodes, points = facet_nodes(mesh, facets), coordinates(mesh)
+    slopes = np.stack([_tabulate(geometry.lbasis(X, a)[1]) for a in range(nodes.shape[1])])  # n_a, 2, n_q
+    tangents = np.einsum("aiq,fax->fiqx", slopes, points[nodes])
+    normal = np.cross(tangents[:, 0], tangents[:, 1])  # |normal| is the area element
+    body = points[mesh.t[:, mesh.f2t[0, facets]]].mean(axis=0)
+    outward = points[nodes].mean(axis=1) - body
+    normal *= np.sign(np.einsum("fqx,fx->f", normal, outward))[:, None, None]
+    if vertices_only:
+        N = np.stack([_tabulate(linear.lbasis(X, a)[0]) for a in range(4 if hexahedra else 3)])
+    else:
+        N = np.stack([_tabulate(geometry.lbasis(X, a)[0]) for a in range(nodes.shape[1])])
+    vectors = np.einsum("aq,fqx,q->fax", N, normal, w)
+    return np.einsum("aq,fq,q->fa", N, np.linalg.norm(normal, axis=2), w), vectors
+
+
+def _tabulate(values: Any) -> np.ndarray:
+    """One array of values that scikit-fem may give as a tuple of arrays of several shapes."""
+    return np.stack(np.broadcast_arrays(*values)) if isinstance(values, tuple | list) else np.asarray(values)

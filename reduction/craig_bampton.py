@@ -1,0 +1,138 @@
+"""Craig-Bampton reduction: contact and accessory DOFs stay, the rest becomes fixed-interface modes.
+
+Source  Craig and Bampton, AIAA Journal 6(7), 1968; Tamatam 2021, appendix A, whose equation numbers stand as comments
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csc_matrix, csr_matrix
+from threadpoolctl import threadpool_limits
+
+from fem.factor import Factor, factorise
+from fem.interface import ContactInterface
+from fem.modes import modes
+from fem.system import SecondOrderSystem
+from reduction.linear import linear_modes
+from reduction.model import ReducedModel
+from reduction.truncation import frequency_error
+
+POINT_LOAD = 30  # a load or output on more DOFs than this is distributed: projected, but it makes no masters
+BLOCK = 128  # right-hand sides solved at once
+REPORTED_MODES = 10
+
+
+def craig_bampton(
+    system: SecondOrderSystem,
+    interface: ContactInterface,
+    n_modes: int | None = None,
+    cutoff: float | None = None,
+    extra_masters: Sequence[int] = (),
+    solver: str | None = None,
+) -> ReducedModel:
+    """Reduce a full system to its contact DOFs, accessory DOFs and fixed-interface modes.
+
+    system : sparse, n_full DOFs; interface : B over the same DOFs
+    n_modes : fixed-interface modes kept, or cutoff : all of them up to this frequency [Hz]; give one of the two
+    extra_masters : DOFs of the system to keep besides those of the contact and of point loads and outputs
+    solver : see fem.factor.factorise
+    Returns the model; coordinates are the masters in ascending order, then the modes; loads and outputs are projected.
+        info: masters (DOFs of the system), n_full, n_masters, n_modes, factorisation, first_omitted_frequency [Hz],
+        free_frequency [Hz] of the first modes and free_frequency_error, their estimated relative error by truncation
+    Raises  ValueError where n_modes and cutoff are both or neither given, too many modes are asked, or a body can move
+        rigidly with its masters held
+    """
+    K, M = csr_matrix(system.stiffness), csr_matrix(system.mass)
+    m = master_dofs(system, interface, extra_masters)
+    s = np.setdiff1d(np.arange(system.n_dof), m)
+    K_ss, M_ss = K[s][:, s], M[s][:, s]
+    factor = factorise(K_ss, solver=solver)
+    psi = constraint_modes(factor, csc_matrix(K[s][:, m]))
+    omega, phi, omitted = fixed_interface_modes(K_ss, M_ss, factor, n_modes, cutoff)
+
+    n_m = len(m)
+    basis = np.zeros((system.n_dof, n_m + len(omega)))
+    basis[m, np.arange(n_m)] = 1.0  # A.5
+    basis[s, :n_m] = psi
+    basis[s, n_m:] = phi
+    inertia = M @ basis
+    mass = _symmetric(basis.T @ inertia)  # A.6
+    mass[n_m:, n_m:] = np.eye(len(omega))
+    stiffness = np.diag(np.concatenate([np.zeros(n_m), omega**2]))
+    stiffness[:n_m, :n_m] = _symmetric(K[m][:, m] + K[m][:, s] @ psi)  # A.7
+
+    reduced = SecondOrderSystem(
+        mass,
+        stiffness,
+        None if system.damping is None else _symmetric(basis.T @ (system.damping @ basis)),
+        {name: basis.T @ load for name, load in system.loads.items()},  # A.8
+        {name: basis.T @ row for name, row in system.outputs.items()},
+    )
+    model = ReducedModel(reduced, replace(interface, B=np.asarray(interface.B @ basis)), basis)
+    frequency, q = linear_modes(model, n=min(REPORTED_MODES, reduced.n_dof))
+    # K R q vanishes at the slaves but for the modal part: K_ss psi + K_sm = 0
+    residual = K_ss @ (phi @ q[n_m:]) - (inertia @ q)[s] * (2 * np.pi * frequency) ** 2
+    info = {
+        "masters": m,
+        "n_full": system.n_dof,
+        "n_masters": n_m,
+        "n_modes": len(omega),
+        "factorisation": factor.name,
+        "first_omitted_frequency": omitted / (2 * np.pi),
+        "free_frequency": frequency,
+        "free_frequency_error": frequency_error(factor, residual, 2 * np.pi * frequency, omitted),
+    }
+    return replace(model, info=info)
+
+
+def master_dofs(system: SecondOrderSystem, interface: ContactInterface, extra: Sequence[int] = ()) -> np.ndarray:
+    """Sorted DOFs that stay: those the contact map touches, those of point loads and outputs, and the extra ones.
+
+    Raises  ValueError where an extra master lies outside the system
+    """
+    extra_dofs = np.asarray(extra, dtype=int).ravel()
+    if len(extra_dofs) and not 0 <= extra_dofs.min() <= extra_dofs.max() < system.n_dof:
+        raise ValueError(f"Craig-Bampton: an extra master lies outside the {system.n_dof} DOFs of the system")
+    touched = [np.flatnonzero(v) for v in (*system.loads.values(), *system.outputs.values())]
+    points = [dofs for dofs in touched if len(dofs) <= POINT_LOAD]
+    return np.unique(np.concatenate([csc_matrix(interface.B).nonzero()[1], extra_dofs, *points])).astype(int)
+
+
+def constraint_modes(factor: Factor, K_sm: csc_matrix) -> np.ndarray:
+    """Static shapes Psi = -K_ss^-1 K_sm (n_slave, n_master) of unit displacements of the masters, solved in blocks."""
+    psi = np.empty(K_sm.shape)
+    with threadpool_limits(1):
+        for start in range(0, K_sm.shape[1], BLOCK):
+            psi[:, start : start + BLOCK] = -factor.solve(K_sm[:, start : start + BLOCK].toarray())
+    return psi
+
+
+def fixed_interface_modes(
+    K_ss: Any, M_ss: Any, factor: Factor, n_modes: int | None, cutoff: float | None
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Modes with the masters held: omega (k,) [rad/s], phi (n_slave, k), and the first omega left out (inf for none).
+
+    Raises  ValueError where not exactly one of n_modes, cutoff is given, or more modes are asked than there are
+    """
+    n_slave = K_ss.shape[0]
+    if (n_modes is None) == (cutoff is None):
+        raise ValueError("Craig-Bampton: give the number of modes or the cutoff frequency, one of the two")
+    if n_modes is not None and not 0 <= n_modes <= n_slave:
+        raise ValueError(f"Craig-Bampton: {n_modes} modes were asked of {n_slave} DOFs that are not masters")
+    wanted = 16 if n_modes is None else n_modes
+    while True:
+        omega, phi = modes(K_ss, M_ss, min(wanted + 1, n_slave), factor=factor)
+        if cutoff is None or omega[-1] > 2 * np.pi * cutoff or len(omega) == n_slave:
+            break
+        wanted *= 2
+    kept = wanted if cutoff is None else int(np.sum(omega <= 2 * np.pi * cutoff))
+    return omega[:kept], phi[:, :kept], float(omega[kept]) if kept < len(omega) else np.inf
+
+
+def _symmetric(matrix: Any) -> np.ndarray:
+    matrix = np.asarray(matrix)
+    return (matrix + matrix.T) / 2
