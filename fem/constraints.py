@@ -52,12 +52,12 @@ def free_dofs(n_dof: int, clamps: Iterable[Clamp], node_sets: Mapping[str, np.nd
     return np.flatnonzero(free)
 
 
-def partition(n_dof: int, prescribed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Split DOFs of a system into (free, prescribed), both sorted index arrays.
+def partition(n_dof: int, chosen: np.ndarray, what: str) -> tuple[np.ndarray, np.ndarray]:
+    """Split the DOFs of a system into (others, chosen), both sorted: prescribed from free ones, masters from slaves.
 
-    Raises  ValueError where a prescribed DOF lies outside the system
+    Raises  ValueError, naming what was chosen, where one lies outside the system
     """
-    prescribed = np.unique(prescribed)
-    if len(prescribed) and not 0 <= prescribed[0] <= prescribed[-1] < n_dof:
-        raise ValueError(f"a prescribed DOF lies outside the {n_dof} DOFs of the system; clamped DOFs cannot be moved")
-    return np.setdiff1d(np.arange(n_dof), prescribed), prescribed
+    chosen = np.unique(np.asarray(chosen, dtype=int))
+    if len(chosen) and not 0 <= chosen[0] <= chosen[-1] < n_dof:
+        raise ValueError(f"a {what} lies outside the {n_dof} DOFs of the system; clamped DOFs are no part of it")
+    return np.setdiff1d(np.arange(n_dof), chosen), chosen

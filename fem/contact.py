@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, vstack
 from scipy.spatial import cKDTree
 
 from fem.interface import COMPONENTS, ContactInterface
@@ -79,13 +79,33 @@ def pair_halves(
     if lost.any() or len(np.unique(partner)) < len(partner):
         worst = face_1.points[distance.argmax()]
         raise ValueError(
-            f"the two contact faces do not match: {lost.sum()} of {len(partner)} nodes of the first have no partner on the "
-            f"second, the farthest at ({worst[0]:.4g}, {worst[1]:.4g}, {worst[2]:.4g}) m is {distance.max():.3g} m away; "
-            "mesh both with the same grid"
+            f"the two contact faces do not match: {lost.sum()} of {len(partner)} nodes of the first have no partner on "
+            f"the second, the farthest at ({worst[0]:.4g}, {worst[1]:.4g}, {worst[2]:.4g}) m is {distance.max():.3g} m "
+            "away; mesh both with the same grid"
         )
     interface = _interface(mesh, face_1, t1, components, gap)
     turned = _rows(interface.frames, components) @ rotation
     return interface, _map(turned, face_2.nodes[partner], mesh)
+
+
+def join(interfaces: Sequence[ContactInterface]) -> ContactInterface:
+    """Several contacts of one mesh as one interface, pairs in the order given.
+
+    Raises  ValueError where there is none, or where they differ in components or in the shape of their faces
+    """
+    if not interfaces:
+        raise ValueError("the part has no contact; name at least one contact face")
+    if len({(i.components, i.faces.shape[1]) for i in interfaces}) > 1:
+        raise ValueError("the contacts of a part must have the same components, and faces of one shape")
+    first = np.cumsum([0] + [i.n_pair for i in interfaces])
+    names = ("points", "frames", "area", "gap")
+    fields = {name: np.concatenate([getattr(i, name) for i in interfaces]) for name in names}
+    return ContactInterface(
+        components=interfaces[0].components,
+        **fields,
+        B=vstack([i.B for i in interfaces], format="csr"),
+        faces=np.concatenate([i.faces + start for i, start in zip(interfaces, first, strict=False)]),
+    )
 
 
 def _interface(
@@ -96,7 +116,7 @@ def _interface(
     if not components or components != tuple(c for c in COMPONENTS if c in components):
         raise ValueError(f"contact components {list(components)} must be some of t1, t2, n, in this order")
     if np.ndim(gap) and np.shape(gap) != face.area.shape:
-        raise ValueError(f"the contact gap has {np.size(gap)} values for {len(face.area)} node pairs; give one for each")
+        raise ValueError(f"the contact gap has {np.size(gap)} values for {len(face.area)} node pairs; give one each")
     frames = contact_frames(face.normals, t1)
     return ContactInterface(
         components=components,

@@ -13,7 +13,7 @@ from scipy.sparse import bsr_matrix, csr_matrix
 from skfem import MeshHex2, MeshTet2
 from skfem.quadrature import get_quadrature
 
-# Gauss rules that integrate the mass of straight-sided elements exactly: 27 points in a hexahedron, 14 in a tetrahedron.
+# Exact for the mass of straight-sided elements: 27 Gauss points in a hexahedron, 14 points in a tetrahedron.
 DEFAULT_ORDER = 5
 BATCH = 256
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, triu
 from scipy.sparse.linalg import splu
 
-# Smallest over largest eigenvalue that still counts as regular. A clamped thin part reaches 1e-12, rounding gives 1e-16.
+# Smallest over largest eigenvalue that still counts as regular: a clamped thin part reaches 1e-12, rounding 1e-16.
 SINGULAR = 1e-14
 
 
@@ -52,14 +52,14 @@ def reciprocal_condition(K: csr_matrix, factor: Factor) -> float:
         x = factor.solve(x)
         if not np.isfinite(x).all() or not x.any():
             return 0.0
-        smallest = 1 / np.linalg.norm(x)
+        smallest = 1 / float(np.linalg.norm(x))
     return float(smallest / abs(K).sum(axis=1).max())
 
 
 def pardiso_available() -> bool:
     """Whether pypardiso and its MKL library load."""
     try:
-        import pypardiso  # noqa: F401, PLC0415
+        import pypardiso  # noqa: F401
     except (ImportError, OSError):
         return False
     return True
@@ -69,8 +69,8 @@ class Pardiso:
     """MKL PARDISO on the upper triangle, mtype 2 (positive definite) or -2 (indefinite)."""
 
     def __init__(self, K: csr_matrix, definite: bool = True) -> None:
-        from pypardiso import PyPardisoSolver  # noqa: PLC0415
-        from pypardiso.pardiso_wrapper import PyPardisoError  # noqa: PLC0415
+        from pypardiso import PyPardisoSolver
+        from pypardiso.pardiso_wrapper import PyPardisoError
 
         self.name = "MKL PARDISO, " + ("Cholesky" if definite else "LDL^T")
         self._upper = triu(K, format="csr")
@@ -94,7 +94,7 @@ class SuperLU:
     """SuperLU in symmetric mode after a METIS nested dissection."""
 
     def __init__(self, K: csr_matrix) -> None:
-        import pymetis  # noqa: PLC0415
+        import pymetis
 
         self.name = "SuperLU after METIS"
         graph = K - csr_matrix((K.diagonal(), (np.arange(K.shape[0]),) * 2), shape=K.shape)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fem.constraints import Clamp, free_dofs, named
-from fem.contact import ground_contact, pair_contact
+from fem.contact import ground_contact, join, pair_contact
 from fem.elasticity import assemble
 from fem.elements import coordinates
 from fem.interface import COMPONENTS, ContactInterface
@@ -68,7 +68,7 @@ def build(
     node_sets: Mapping[str, np.ndarray],
     material: Material | Mapping[str, Material],
     clamps: Sequence[Clamp],
-    contact: Contact,
+    contacts: Sequence[Contact],
     loads: Mapping[str, Load],
     outputs: Mapping[str, NodalForce],
     order: int | None = None,
@@ -81,7 +81,7 @@ def build(
     """
     M, K = assemble(mesh, material, order)
     free = free_dofs(K.shape[0], clamps, node_sets)
-    interface = contact.build(mesh)
+    interface = join([contact.build(mesh) for contact in contacts])
     system = SecondOrderSystem(
         mass=M[free][:, free],
         stiffness=K[free][:, free],

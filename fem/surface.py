@@ -11,7 +11,7 @@ from skfem.quadrature import get_quadrature
 
 from fem.elements import connectivity, coordinates
 
-# Corners of the four (three) corner-ordered quads that a nine-node face (the triangle of corners that a six-node face) shows.
+# The four quads that a nine-node face shows, in its own node order: corners, mid-sides, middle.
 NINE_NODE_QUADS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
 FACE_ORDER = 6
 
@@ -52,11 +52,11 @@ def surface(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -> Surfa
     area = np.bincount(local.ravel(), weighted.ravel())
     if (area <= 1e-9 * area.sum()).any():
         raise ValueError(
-            "consistent areas are not positive at the corners of these faces; use their vertices only, or nine-node faces"
+            "consistent areas are not positive at the corners of these faces; use vertices only, or nine-node faces"
         )
-    normals = np.stack([np.bincount(local.ravel(), vectors[:, :, i].ravel()) for i in range(3)], axis=1)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    polygons = local if vertices_only else np.vstack(local[:, NINE_NODE_QUADS])
+    summed = np.stack([np.bincount(local.ravel(), vectors[:, :, i].ravel()) for i in range(3)], axis=1)
+    normals = summed / np.linalg.norm(summed, axis=1, keepdims=True)
+    polygons = local if vertices_only else local[:, NINE_NODE_QUADS].reshape(-1, 4)
     return Surface(nodes, coordinates(mesh)[nodes], normals, area, polygons)
 
 

@@ -140,6 +140,21 @@ class HarmonicBalance:
         x_contact, y_contact = point.slope(state.g)
         return -self._loaded(x_load) - x_contact, self._loaded(y_load) + y_contact
 
+    def gap_response(self, state: State, opening: np.ndarray) -> np.ndarray:
+        """First-order change of x (n_pair, n_component, n_coeff) when each gap opens by (n_pair,) [m].
+
+        A gap acts as a static shift of the normal displacement: f_c(x; gap + d) = f_c(x - d e_n; gap).
+        """
+        if not self.basis.has_static:
+            return np.zeros_like(state.x)
+        n_coeff = self.basis.n_coeff
+        column = self.parameters.components.index("n") * n_coeff
+        jac = state.cycle.jacobian
+        assert jac is not None
+        g_slope = (jac[:, :, column] * opening[:, None]).reshape(-1, n_coeff)
+        moved, _, _ = self.linearise(state).solve(self.at(state.omega).apply(g_slope), 1e-6)
+        return moved.reshape(state.x.shape)
+
     def outputs(self, state: State) -> np.ndarray:
         """(n_output, n_coeff) response of the observed outputs [m]."""
         point = self.at(state.omega)

@@ -23,8 +23,8 @@ from hbm.excitation import Excitation
 from hbm.harmonics import HarmonicBasis
 from reduction.model import ReducedModel
 
-RESOLUTION = 1e-11  # relative error allowed in the expansion
-CANDIDATES = ((24, 4), (48, 4), (96, 4), (192, 4), (192, 6), (384, 6))  # modes and powers of s tried in turn
+RESOLUTION = 5e-10  # relative error allowed in the expansion at the highest frequency asked for
+CANDIDATES = ((24, 4), (48, 4), (48, 6), (96, 6), (192, 6))  # modes and powers of s tried in turn
 ALL_MODES_BELOW = 1500  # coordinates up to which all modes are computed at once
 
 

@@ -2,9 +2,70 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from hbm.balance import HarmonicBalance
+    from hbm.operating_point import OperatingPoint
+
+
+@dataclass(frozen=True)
+class WearRow:
+    """One wear step; the fields are those of WearHistory, without the row axis.
+
+    worn : (n_pair,) depth that the step wears after this state [m]
+    """
+
+    cycles: float
+    cycles_in_step: float
+    depth: np.ndarray
+    worn: np.ndarray
+    energy: np.ndarray
+    preload: float
+    normal_force: np.ndarray
+    status: np.ndarray
+    omega: float
+    amplitude: float
+    displacement: np.ndarray
+    force: np.ndarray
+    response: np.ndarray
+    solves: int
+
+    @classmethod
+    def of(
+        cls,
+        balance: HarmonicBalance,
+        point: OperatingPoint,
+        depth: np.ndarray,
+        cycles: float,
+        cycles_in_step: float,
+        worn: np.ndarray,
+    ) -> WearRow:
+        """The row of a solved operating point."""
+        state = point.state
+        shape = (-1, state.x.shape[2])
+        normal = np.zeros(len(depth))
+        if "n" in balance.parameters.components and balance.basis.has_static:
+            normal = state.cycle.force[:, balance.parameters.components.index("n"), 0]
+        return cls(
+            cycles=cycles,
+            cycles_in_step=cycles_in_step,
+            depth=depth,
+            worn=worn,
+            energy=np.maximum(balance.energy(state), 0.0),
+            preload=balance.preload(state),
+            normal_force=normal,
+            status=state.cycle.status,
+            omega=state.omega,
+            amplitude=point.amplitude,
+            displacement=state.x.reshape(shape),
+            force=state.cycle.force.reshape(shape),
+            response=point.response,
+            solves=point.solves,
+        )
 
 
 @dataclass(frozen=True)
@@ -14,6 +75,7 @@ class WearHistory:
     cycles : (n_row,) vibration cycles passed before the row's state
     cycles_in_step : (n_row,) cycles that the state stands for; 0 in the last row, where contact is lost
     depth : (n_row, n_pair) total wear depth of the pair, both surfaces together [m]
+    worn : (n_row, n_pair) depth that is worn from this row to the next [m]
     energy : (n_row, n_pair) dissipated energy per cycle [J]
     preload : (n_row,) static normal force of the whole contact [N]
     normal_force : (n_row, n_pair) mean normal force over the cycle [N]
@@ -29,6 +91,7 @@ class WearHistory:
     cycles: np.ndarray
     cycles_in_step: np.ndarray
     depth: np.ndarray
+    worn: np.ndarray
     energy: np.ndarray
     preload: np.ndarray
     normal_force: np.ndarray
@@ -40,3 +103,13 @@ class WearHistory:
     response: np.ndarray
     solves: np.ndarray
     end: str
+
+    def rows(self) -> list[WearRow]:
+        """The rows one by one."""
+        names = [f.name for f in fields(WearRow)]
+        return [WearRow(**{name: getattr(self, name)[i] for name in names}) for i in range(len(self.cycles))]
+
+
+def history(rows: list[WearRow], end: str) -> WearHistory:
+    """Rows put together."""
+    return WearHistory(**{f.name: np.array([getattr(r, f.name) for r in rows]) for f in fields(WearRow)}, end=end)

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 from threadpoolctl import threadpool_limits
 
+from fem.constraints import partition
 from fem.factor import Factor, factorise
 from fem.interface import ContactInterface
 from fem.modes import modes
@@ -47,8 +48,7 @@ def craig_bampton(
         rigidly with its masters held
     """
     K, M = csr_matrix(system.stiffness), csr_matrix(system.mass)
-    m = master_dofs(system, interface, extra_masters)
-    s = np.setdiff1d(np.arange(system.n_dof), m)
+    s, m = partition(system.n_dof, master_dofs(system, interface, extra_masters), "master")
     K_ss, M_ss = K[s][:, s], M[s][:, s]
     factor = factorise(K_ss, solver=solver)
     psi = constraint_modes(factor, csc_matrix(K[s][:, m]))
@@ -90,16 +90,10 @@ def craig_bampton(
 
 
 def master_dofs(system: SecondOrderSystem, interface: ContactInterface, extra: Sequence[int] = ()) -> np.ndarray:
-    """Sorted DOFs that stay: those the contact map touches, those of point loads and outputs, and the extra ones.
-
-    Raises  ValueError where an extra master lies outside the system
-    """
-    extra_dofs = np.asarray(extra, dtype=int).ravel()
-    if len(extra_dofs) and not 0 <= extra_dofs.min() <= extra_dofs.max() < system.n_dof:
-        raise ValueError(f"Craig-Bampton: an extra master lies outside the {system.n_dof} DOFs of the system")
+    """DOFs that stay, in any order: those the contact map touches, those of point loads and outputs, and the extra."""
     touched = [np.flatnonzero(v) for v in (*system.loads.values(), *system.outputs.values())]
     points = [dofs for dofs in touched if len(dofs) <= POINT_LOAD]
-    return np.unique(np.concatenate([csc_matrix(interface.B).nonzero()[1], extra_dofs, *points])).astype(int)
+    return np.concatenate([csc_matrix(interface.B).nonzero()[1], np.asarray(extra, dtype=int).ravel(), *points])
 
 
 def constraint_modes(factor: Factor, K_sm: csc_matrix) -> np.ndarray:

@@ -13,7 +13,9 @@ from fem.system import SecondOrderSystem
 from reduction.model import ReducedModel
 
 
-def linear_modes(model: ReducedModel, stiffness: np.ndarray | None = None, n: int = 10) -> tuple[np.ndarray, np.ndarray]:
+def linear_modes(
+    model: ReducedModel, stiffness: np.ndarray | None = None, n: int = 10
+) -> tuple[np.ndarray, np.ndarray]:
     """The n lowest modes of a reduced model, free or with contact springs.
 
     stiffness : (n_pair, n_component) [N/m], None for the free state

@@ -1,7 +1,7 @@
 """A reduced model as an HDF5 file, so that a response needs no mesh.
 
-Layout: /system (mass, stiffness, damping, loads/<name>, outputs/<name>), /interface (points, frames, area, gap, B, faces),
-/basis, /info; attributes format, version at the root, components on /interface.
+Layout: /system (mass, stiffness, damping, loads/<name>, outputs/<name>), /interface (points, frames, area, gap, B,
+faces), /basis, /info; attributes format, version at the root, components on /interface.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import h5py
-import numpy as np
 
 from fem.interface import ContactInterface
 from fem.system import SecondOrderSystem
@@ -27,7 +26,7 @@ def save(model: ReducedModel, path: str | Path) -> None:
     Raises  ValueError for a model whose harmonics see different systems: those are a function, not data
     """
     if model.per_harmonic is not None:
-        raise ValueError("this reduced model differs from harmonic to harmonic and cannot be stored; store its parts instead")
+        raise ValueError("this model differs from harmonic to harmonic and cannot be stored; store what it is made of")
     path = Path(path)
     partial = path.with_name(path.name + ".partial")
     with h5py.File(partial, "w") as file:
@@ -62,8 +61,8 @@ def load(path: str | Path) -> ReducedModel:
             raise ValueError(f"'{path}' is an HDF5 file but no reduced model; give one that tribodyn's reduction wrote")
         if file.attrs["version"] != VERSION:
             raise ValueError(
-                f"'{path}' is a reduced model of version {file.attrs['version']}, this program reads version {VERSION}; "
-                "run the reduction again"
+                f"'{path}' is a reduced model of version {file.attrs['version']}, but this program reads version "
+                f"{VERSION}; run the reduction again"
             )
         system = _read(file["system"])
         interface = _read(file["interface"])
