@@ -52,8 +52,9 @@ def stiffness_blocks(gradient: np.ndarray, weight: np.ndarray, lam: np.ndarray, 
     gradient : (n_e, n_q, 3, n_a) [1/m]; weight : (n_e, n_q) [m3]; lam, mu : (n_e,) [Pa]
     """
     n_e, n_q, _, n_a = gradient.shape
-    g = (gradient * np.sqrt(weight)[:, :, None, None]).reshape(n_e, n_q, 3 * n_a)  # column i * n_a + a
-    G = (g.transpose(0, 2, 1) @ g).reshape(n_e, 3, n_a, 3, n_a).transpose(0, 2, 4, 1, 3)  # e, a, b, i, j
+    g = gradient.reshape(n_e, n_q, 3 * n_a)  # column i * n_a + a
+    G = g.transpose(0, 2, 1) @ (weight[:, :, None] * g)
+    G = G.reshape(n_e, 3, n_a, 3, n_a).transpose(0, 2, 4, 1, 3)  # e, a, b, i, j
     lam, mu = lam[:, None, None, None, None], mu[:, None, None, None, None]
     trace = np.trace(G, axis1=3, axis2=4)[..., None, None]
     return lam * G + mu * (G.swapaxes(3, 4) + trace * np.eye(3))

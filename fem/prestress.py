@@ -1,0 +1,65 @@
+"""Stiffness of a stressed and spinning part: stress stiffening and spin softening about a static equilibrium.
+
+Linear statics give the stress once; the vibration about it is linear. Coriolis forces are left out, as is usual for
+blades, and the static displacement is not added to the geometry.
+Source  Cook, Malkus, Plesha and Witt, Concepts and Applications of Finite Element Analysis, 2002, chapter 18
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_matrix, identity, kron
+
+from fem.elasticity import per_element, symmetric
+from fem.elements import batches, connectivity, scatter
+from fem.factor import factorise
+from fem.loads import unit
+from fem.material import Material
+from fem.part import Part
+
+
+def prestressed(part: Part, material: Material | Mapping[str, Material], force: np.ndarray, softening: Any = 0) -> Part:
+    """The part vibrating about its static equilibrium under a force.
+
+    material : the one it was built with; force : (n_free,) static force [N], such as speed^2 times a centrifugal load
+    softening : `spin_softening` at that speed over the free DOFs [N/m], 0 where it does not spin
+    Returns the part with stiffness K + softening + geometric stiffness of the stress under the force
+    Raises  ValueError where the part can move rigidly
+    """
+    K = part.system.stiffness + softening
+    u = part.field(factorise(K, definite=False).solve(force))
+    stress_stiffness = geometric_stiffness(part.mesh, material, u)[part.free][:, part.free]
+    return replace(part, system=replace(part.system, stiffness=csr_matrix(K + stress_stiffness)))
+
+
+def geometric_stiffness(mesh: Any, material: Material | Mapping[str, Material], u: np.ndarray) -> csr_matrix:
+    """K_(ai)(bj) = delta_ij integral of g_a . sigma . g_b over all DOFs (3 n_node, 3 n_node) [N/m].
+
+    u : (n_node, 3) static displacement [m] whose stress sigma stiffens (tension) or softens (compression)
+    """
+    nodes = connectivity(mesh)
+    lam, mu, _ = per_element(mesh, material)
+    blocks = np.empty((*nodes.shape, nodes.shape[1], 1, 1))
+    for elements, _, gradient, weight in batches(mesh):
+        slope = gradient @ u[nodes[elements]][:, None]  # d u_j / d x_i
+        trace = np.trace(slope, axis1=2, axis2=3)[..., None, None]
+        stress = lam[elements, None, None, None] * trace * np.eye(3)
+        stress = stress + mu[elements, None, None, None] * (slope + slope.swapaxes(2, 3))
+        weighted = weight[..., None, None] * (stress @ gradient)
+        blocks[elements] = symmetric(np.einsum("eqia,eqib->eab", gradient, weighted, optimize=True)[..., None, None])
+    return kron(scatter(nodes, mesh.doflocs.shape[1], blocks), identity(3), format="csr")
+
+
+def spin_softening(mass: Any, axis: Sequence[float], speed: float) -> csr_matrix:
+    """-speed^2 M P, P taking the part normal to the axis: the centrifugal force grows with the displacement.
+
+    mass : (3 n_node, 3 n_node) of whole nodes [kg]; axis : (3,); speed : [rad/s]
+    Returns (3 n_node, 3 n_node) [N/m]
+    """
+    direction = unit(axis, "the axis of rotation")
+    normal = np.eye(3) - np.outer(direction, direction)
+    return csr_matrix(-(speed**2) * mass @ kron(identity(mass.shape[0] // 3), normal))
