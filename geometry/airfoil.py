@@ -20,7 +20,7 @@ class Section:
     stagger: float
 
     def at(self, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Positions x, y [m] at fractions u of the chord and v of the thickness; the mean line is centred on the origin.
+        """Positions x, y [m] at fractions u of the chord and v of the thickness, centred on the mean line.
 
         Mean line and thickness are parabolas: no sharp edge folds a cell
         """

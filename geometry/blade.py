@@ -83,8 +83,8 @@ class Parameters:
             raise ValueError("geometry.root_fill must stay below 1 and geometry.couple_height must not exceed 1")
         if abs(self.shroud_angle) >= pi / 2 or self.contact_length * np.cos(self.shroud_angle) >= self.shroud_length:
             raise ValueError(
-                f"geometry.contact_length is {self.contact_length}: at geometry.shroud_angle it must be shorter along the "
-                f"axis than geometry.shroud_length ({self.shroud_length})"
+                f"geometry.contact_length is {self.contact_length}: at geometry.shroud_angle it must be shorter along "
+                f"the axis than geometry.shroud_length ({self.shroud_length})"
             )
         if not 0 <= self.disk_radius < self.hub_radius - self.root_height:
             raise ValueError(

@@ -49,13 +49,16 @@ class Platform:
         """(n, 2) how far the section lies from the straight quadrilateral of its corners [m]."""
         square = np.array([0.0, 0.0, 1.0, 1.0]), np.array([0.0, 1.0, 0.0, 1.0])
         weights = np.stack([(1 - u) * (1 - v), (1 - u) * v, u * (1 - v), u * v])
-        return np.stack([exact - corner @ weights for exact, corner in zip(self.section.at(u, v), self.section.at(*square))], 1)
+        exact, corners = np.stack(self.section.at(u, v)), np.stack(self.section.at(*square))
+        return (exact - corners @ weights).T
 
     def mapping(self, i: int, j: int) -> Callable[[np.ndarray], np.ndarray]:
         """`position` of one block."""
         return lambda p: self.position(i, j, p)
 
-    def blocks(self, n_row: tuple[int, ...], n_column: tuple[int, ...], n_up: int, volume: str, names: Names) -> list[Block]:
+    def blocks(
+        self, n_row: tuple[int, ...], n_column: tuple[int, ...], n_up: int, volume: str, names: Names
+    ) -> list[Block]:
         """The nine blocks with uniform cells.
 
         n_row, n_column : elements of the three rows and columns; n_up : elements upwards
@@ -80,12 +83,11 @@ def platform(section: Section, heights: tuple[float, float], left: np.ndarray, r
     x, y = section.at(*np.broadcast_arrays(u, v))
     corners[:, 1:3, 1:3, 0], corners[:, 1:3, 1:3, 1] = x, y
     corners[:, 1:3, 1:3, 2] = np.asarray(heights)[:, None, None]
+    lean = np.tan(section.stagger / 2)  # edges leave the section half-way between the chord and the axis
     for end, inner in ((0, 0), (3, 1)):
         first, last = corners[:, end, 0], corners[:, end, 3]
-        width = last[0, 1] - first[0, 1]
-        middle = np.clip((y[inner].mean() - first[0, 1]) / width, 0.3, 0.7)
-        half = max(0.5 * np.ptp(y[inner]) / width, 0.08)
-        for j, fraction in ((1, middle - half), (2, middle + half)):
+        aim = y[inner] + lean * (first[0, 0] - x[inner])
+        for j, fraction in enumerate((aim - first[0, 1]) / (last[0, 1] - first[0, 1]), start=1):
             corners[:, end, j] = first + fraction * (last - first)
     return Platform(corners, section)
 

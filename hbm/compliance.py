@@ -169,17 +169,17 @@ class ContactCompliance:
                 self._load[load_names.index(name), basis.harmonics.index(h)] = value
         self.base = excitation.base
         self.groups: list[tuple[Expansion, list[int]]] = []
-        shared: dict[int, int] = {}
-        for position, h in enumerate(basis.harmonics):
-            system, b = model.at_harmonic(h)
-            if id(system) in shared:
-                self.groups[shared[id(system)]][1].append(position)
-                continue
-            rows = [b, *(np.conj(system.loads[n])[None] for n in load_names), *(system.outputs[n][None] for n in self.output_names)]
-            ports = np.concatenate([np.asarray(r) for r in rows])
-            shared[id(system)] = len(self.groups)
-            s_max = (basis.harmonics[-1] if model.per_harmonic is None else h) * omega_max
-            self.groups.append((Expansion(system, np.asarray(b), self.k, ports, s_max), [position]))
+        seen = [model.at_harmonic(h) for h in basis.harmonics]
+        sharing: dict[int, list[int]] = {}
+        for position, (system, _) in enumerate(seen):
+            sharing.setdefault(id(system), []).append(position)
+        for positions in sharing.values():
+            system, b = seen[positions[0]]
+            loads = [np.conj(system.loads[name])[None] for name in load_names]
+            outputs = [system.outputs[name][None] for name in self.output_names]
+            ports = np.concatenate([np.asarray(rows) for rows in (b, *loads, *outputs)])
+            s_max = basis.harmonics[positions[-1]] * omega_max
+            self.groups.append((Expansion(system, np.asarray(b), self.k, ports, s_max), positions))
         self.error = max(e.error for e, _ in self.groups)
 
     def at(self, omega: float) -> CompliancePoint:
