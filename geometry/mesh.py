@@ -104,20 +104,22 @@ def quality(mesh: Any) -> Quality:
     at = np.hstack([mesh.elem.doflocs.T, points])
     jacobian = np.moveaxis(mesh.mapping().DF(at), (0, 1), (-2, -1))  # (element, point, 3, 3)
     determinant = np.linalg.det(jacobian)
+    determinant *= np.sign(determinant.sum()) or 1.0  # scikit-fem's own meshes are numbered in a mirror throughout
     edges = np.linalg.norm(jacobian, axis=-2)
     if mesh.elem.refdom.nnodes == 4:
         a, b, c = np.moveaxis(jacobian, -1, 0)
         ab, ac, bc = (np.linalg.norm(d, axis=-1) for d in (b - a, c - a, c - b))
         la, lb, lc = np.moveaxis(edges, -1, 0)
         corner_products = np.stack([la * lb * lc, la * ab * ac, lb * ab * bc, lc * ac * bc])
-        scaled = np.sqrt(2.0) * determinant / corner_products.max(axis=0)
+        full = corner_products.max(axis=0) / np.sqrt(2.0)
     else:
-        scaled = determinant / edges.prod(axis=-1)
+        full = edges.prod(axis=-1)
+    scaled = np.divide(determinant, full, out=np.zeros_like(full), where=full > 0)
     element, _ = np.unravel_index(scaled.argmin(), scaled.shape)
     lowest = float(scaled.min())
-    if lowest <= 0.0:
+    if not lowest > 0.0:
         centre = ", ".join(f"{x:.4g}" for x in mesh.p[:, mesh.t[:, element]].mean(axis=1))
-        inverted = int((scaled <= 0.0).any(axis=1).sum())
+        inverted = int((~(scaled > 0.0)).any(axis=1).sum())
         raise ValueError(
             f"{inverted} of {mesh.nelements} mesh elements are inverted or degenerate, the worst at ({centre}) m: "
             "refine the mesh there or soften the shape"

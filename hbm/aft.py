@@ -38,11 +38,11 @@ def march(
     jac = np.zeros((n_pair, n_comp * n_coeff, n_comp * n_coeff))
     status = np.zeros(n_pair, np.int64)
     late = _march(
-        law.step, x @ basis.synthesis.T, parameters.packed(), memory, basis.synthesis, basis.analysis, force, jac, status
+        law.step, basis.to_time(x), parameters.packed(), memory, basis.synthesis, basis.analysis, force, jac, status
     )
     if late >= 0:
         raise CycleNotPeriodic(f"contact pair {late} did not settle to a periodic cycle within {MAX_CYCLES} cycles")
-    return ContactCycle(force @ basis.analysis, jac if jacobian else None, status)
+    return ContactCycle(basis.from_time(force), jac if jacobian else None, status)
 
 
 def history(
@@ -57,7 +57,7 @@ def history(
     n_pair, n_comp, n_coeff = x.shape
     force = np.zeros((n_pair, n_comp, basis.n_samples))
     jac = np.zeros((n_pair, n_comp * n_coeff, n_comp * n_coeff))
-    samples = x @ basis.synthesis.T
+    samples = basis.to_time(x)
     status = np.zeros(n_pair, np.int64)
     _march(law.step, samples, parameters.packed(), memory, basis.synthesis, basis.analysis, force, jac, status)
     return samples, force

@@ -14,6 +14,7 @@ Source  block elimination of modal coordinates (ours); static correction of trun
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg as sla
@@ -82,17 +83,19 @@ class Expansion:
             if full:
                 break
             y_before, y = y, -quasi_static(damping @ y + mass @ y_before)
-        p = self.n_port
+        p, n = self.n_port, self._n_contact
         self.order = len(moments)
         self.w = np.stack([self._ports @ y[:, :p] for y in moments])  # (order, port, port)
         self.e = np.stack([self._ports @ y[:, p:] for y in moments])  # (order, port, mode)
         self.t = np.stack([cphi.conj().T @ y[:, p:] for y in moments])  # (order, mode, mode)
         self.b = self._ports @ phi  # (port, mode)
-        n = self._n_contact
-        self.contact_moments = np.ascontiguousarray(self.w[:, :n, :n])
-        self.contact_modes = np.ascontiguousarray(self.b[:n])
         self.lam = lam
         self.c = phi.conj().T @ cphi
+        self.w0 = np.ascontiguousarray(self.w[0, :n, :n])
+        # higher moments contribute |s| / omega_next and less: single precision keeps them exact enough
+        single = np.complex64 if np.iscomplexobj(self.w) else np.float32
+        self.w0_single, self.b_single = self.w0.astype(single), self.b[:n].astype(single)
+        self.higher = np.ascontiguousarray(self.w[1:, :n, :n], dtype=single)
 
     def at(self, s: complex) -> PortCompliance:
         """The compliance at s = i h w."""
@@ -120,12 +123,20 @@ class PortCompliance:
     right: np.ndarray
     core: np.ndarray
 
-    def apply(self, force: np.ndarray) -> np.ndarray:
-        """(n_port, ...) displacement of the ports under port forces (n_port, ...)."""
+    @cached_property
+    def core_single(self) -> np.ndarray:
+        """The core in single precision; for a real system as the real matrix on [a, b] (on x_0 where s = 0)."""
+        if np.iscomplexobj(self.expansion.w0):
+            return self.core.astype(np.complex64)
+        re, im = self.core.real, self.core.imag
+        return (re if self.s == 0 else np.block([[re, im], [-im, re]])).astype(np.float32)
+
+    def apply(self, force: np.ndarray, columns: slice = slice(None), rows: slice = slice(None)) -> np.ndarray:
+        """Displacement of the ports in `rows` under forces (n, ...) at the ports in `columns`."""
         w = self.expansion.w
-        out = self.left @ (self.core @ (self.right @ force))
+        out = self.left[rows] @ (self.core @ (self.right[:, columns] @ force))
         for k in range(self.expansion.order):
-            out = out + self.power[k] * (w[k] @ force)
+            out = out + self.power[k] * _product(w[k, rows, columns], force)
         return out
 
     def slope(self, force: np.ndarray) -> np.ndarray:
@@ -141,8 +152,15 @@ class PortCompliance:
         inner = self.core @ (self.right @ force)
         out = d_left @ inner + self.left @ (self.core @ (d_right @ force - d_core @ inner))
         for j in range(1, x.order):
-            out = out + d_power[j] * (x.w[j] @ force)
+            out = out + d_power[j] * _product(x.w[j], force)
         return out
+
+
+def _product(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """matrix @ vector, without widening a real matrix to complex."""
+    if np.iscomplexobj(matrix) or not np.iscomplexobj(vector):
+        return matrix @ vector
+    return matrix @ vector.real + 1j * (matrix @ vector.imag)
 
 
 class ContactCompliance:
@@ -162,7 +180,7 @@ class ContactCompliance:
         excitation.check(basis, system.loads)
         self.output_names = tuple(system.outputs)
         load_names = sorted({name for _, name in excitation.loads})
-        self._n_load = len(load_names)
+        self.n_load = len(load_names)
         self._load = np.zeros((len(load_names), len(basis.harmonics)), complex)
         for (h, name), value in excitation.loads.items():
             if h in basis.harmonics:
@@ -181,6 +199,7 @@ class ContactCompliance:
             s_max = basis.harmonics[positions[-1]] * omega_max
             self.groups.append((Expansion(system, np.asarray(b), self.k, ports, s_max), positions))
         self.error = max(e.error for e, _ in self.groups)
+        self.shared_real = len(self.groups) == 1 and not np.iscomplexobj(self.groups[0][0].w0)
 
     def at(self, omega: float) -> CompliancePoint:
         """The compliance at one excitation frequency [rad/s]."""
@@ -194,10 +213,6 @@ class ContactCompliance:
             base = np.zeros((self.n_contact, self.basis.n_coeff)) if self.base is None else self.base
             contact, load = self.basis.to_complex(self.k[:, None] * base), self._load
         return np.concatenate([contact, load, np.zeros((len(self.output_names), load.shape[1]))])
-
-    def split(self, ports: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Complex port displacements -> real coefficients of the contacts and of the outputs."""
-        return self.basis.to_real(ports[: self.n_contact]), self.basis.to_real(ports[self.n_contact + self._n_load :])
 
 
 class CompliancePoint:
@@ -215,43 +230,69 @@ class CompliancePoint:
         self._ports = [
             [expansion.at(1j * basis.harmonics[p] * omega) for p in positions] for expansion, positions in compliance.groups
         ]
-        x, self.outputs_lin = compliance.split(self._through_ports(compliance.port_force(None)))
+        n, stop = compliance.n_contact, compliance.n_contact + compliance.n_load
+        excited = slice(n, stop) if compliance.base is None else slice(0, stop)
+        ports = self._through_ports(compliance.port_force(None)[excited], excited)
+        x, self.outputs_lin = basis.to_real(ports[:n]), basis.to_real(ports[stop:])
         self.x_lin = x if compliance.base is None else x - compliance.base
 
-    def _through_ports(self, force: np.ndarray, slope: bool = False) -> np.ndarray:
-        out = np.zeros_like(force)
+    def _through_ports(self, force: np.ndarray, columns: slice = slice(None), rows: slice = slice(None)) -> np.ndarray:
+        first = self._c.groups[0][0]
+        out = np.zeros((len(range(*rows.indices(first.n_port))), force.shape[1]), complex)
         for (_, positions), ports in zip(self._c.groups, self._ports, strict=True):
             for p, port in zip(positions, ports, strict=True):
-                out[:, p] = port.slope(force[:, p]) if slope else port.apply(force[:, p])
+                out[:, p] = port.apply(force[:, p], columns, rows)
         return out
 
     def apply(self, g: np.ndarray) -> np.ndarray:
         """G g: (n_contact, n_coeff) relative displacement [m] under contact forces g (n_contact, n_coeff) [N]."""
         n, basis = self._c.n_contact, self._c.basis
+        if self._c.shared_real:
+            return self._apply_shared_real(g)
         force = basis.to_complex(g)
         out = np.zeros_like(force)
         for (expansion, positions), ports in zip(self._c.groups, self._ports, strict=True):
-            w = expansion.contact_moments
-            f = force[:, positions]
-            columns = f if np.iscomplexobj(w) else np.concatenate([f.real, f.imag], axis=1)
-            moved = (w.reshape(-1, n) @ columns).reshape(len(w), n, -1)
-            if not np.iscomplexobj(w):
-                moved = moved[..., : len(positions)] + 1j * moved[..., len(positions) :]
-            powers = np.stack([port.power for port in ports], axis=1)
-            y = np.einsum("kp,knp->np", powers, moved)
-            for i, port in enumerate(ports):
-                y[:, i] += port.left[:n] @ (port.core @ (port.right[:, :n] @ f[:, i]))
-            out[:, positions] = y
+            for p, port in zip(positions, ports, strict=True):
+                y = expansion.w0 @ force[:, p] + port.left[:n] @ (port.core @ (port.right[:, :n] @ force[:, p]))
+                for k, moment in enumerate(expansion.higher, start=1):
+                    y += port.power[k] * (moment @ force[:, p].astype(np.complex64))
+                out[:, p] = y
         return basis.to_real(out)
+
+    def _apply_shared_real(self, g: np.ndarray) -> np.ndarray:
+        """The same for one real system: every moment meets all harmonics in one real product."""
+        n, basis = self._c.n_contact, self._c.basis
+        expansion, ports = self._c.groups[0][0], self._ports[0]
+        force = basis.to_complex(g)
+        moved = np.zeros_like(force)
+        for i, port in enumerate(ports):
+            moved[:, i] = port.left[:n] @ (port.core @ (port.right[:, :n] @ force[:, i]))
+        if len(expansion.higher):
+            dynamic = slice(int(basis.has_static), None)
+            f = force[:, dynamic]
+            columns = np.concatenate([f.real, f.imag], axis=1).astype(np.float32)
+            higher = (expansion.higher.reshape(-1, n) @ columns).reshape(len(expansion.higher), n, -1)
+            half = f.shape[1]
+            for k, z in enumerate(higher, start=1):
+                power = np.array([port.power[k] for port in ports[dynamic]])
+                moved[:, dynamic] += power * (z[:, :half] + 1j * z[:, half:])
+        return basis.to_real(moved) + expansion.w0 @ g
 
     def outputs(self, g: np.ndarray) -> np.ndarray:
         """(n_output, n_coeff) outputs under contact forces g alone [m]."""
-        return self._c.split(self._through_ports(self._c.port_force(g)))[1]
+        c = self._c
+        contacts, outputs = slice(0, c.n_contact), slice(c.n_contact + c.n_load, None)
+        return c.basis.to_real(self._through_ports(c.basis.to_complex(g), contacts, outputs))
 
     def slope(self, g: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         """d / d omega of contact displacement and outputs under g alone, or under the excitation where g is None."""
-        moved = self._through_ports(self._c.port_force(g), slope=True)
-        return self._c.split(moved * (1j * self._harmonics))
+        c = self._c
+        force = c.port_force(g)
+        moved = np.zeros_like(force)
+        for (_, positions), ports in zip(c.groups, self._ports, strict=True):
+            for p, port in zip(positions, ports, strict=True):
+                moved[:, p] = 1j * self._harmonics[p] * port.slope(force[:, p])
+        return c.basis.to_real(moved[: c.n_contact]), c.basis.to_real(moved[c.n_contact + c.n_load :])
 
     def jacobian_product(self, rows: np.ndarray) -> JacobianProduct:
         """The product with G restricted to contact rows (active ones), to the accuracy a Newton direction needs."""
@@ -259,28 +300,32 @@ class CompliancePoint:
 
 
 class JacobianProduct:
-    """G restricted to active rows: static remainder W_0 plus the dynamics of the lowest modes."""
+    """G restricted to active rows, to the accuracy of a Newton direction: W_0 and the lowest modes, single precision."""
 
     def __init__(self, compliance: ContactCompliance, ports: list[list[PortCompliance]], rows: np.ndarray):
         self._basis = compliance.basis
+        self._shared_real = compliance.shared_real
         self._groups = []
+        everything = len(rows) == compliance.n_contact
         for (expansion, positions), at in zip(compliance.groups, ports, strict=True):
-            everything = len(rows) == compliance.n_contact
-            w0 = expansion.contact_moments[0] if everything else np.ascontiguousarray(expansion.contact_moments[0][np.ix_(rows, rows)])
-            b = expansion.contact_modes if everything else np.ascontiguousarray(expansion.contact_modes[rows])
-            self._groups.append((w0, b, b.conj().T.copy(), [p.core for p in at], positions))
+            w0, b = expansion.w0_single, expansion.b_single
+            if not everything:
+                w0, b = w0[np.ix_(rows, rows)], b[rows]
+            self._groups.append((w0, b, np.ascontiguousarray(b.conj().T), [p.core_single for p in at], positions))
 
     def __call__(self, d: np.ndarray) -> np.ndarray:
         """G d for d (n_active, n_coeff)."""
-        out = np.empty_like(d)
-        if len(self._groups) == 1 and not np.iscomplexobj(self._groups[0][0]):
+        if self._shared_real:
             w0, b, bt, cores, _ = self._groups[0]
-            np.matmul(w0, d, out=out)
-            z = self._basis.to_complex(bt @ d)
-            for i, core in enumerate(cores):
-                z[:, i] = core @ z[:, i]
-            out += b @ self._basis.to_real(z)
-            return out
+            single = d.astype(np.float32)
+            z = bt @ single
+            column = 0
+            for core in cores:  # on [a, b] of one harmonic, or on x_0
+                width = len(core) // len(z)
+                part = core @ z[:, column : column + width].T.ravel()
+                z[:, column : column + width] = part.reshape(width, -1).T
+                column += width
+            return w0 @ single + b @ z
         force = self._basis.to_complex(d)
         moved = np.empty_like(force)
         for w0, b, bt, cores, positions in self._groups:

@@ -93,6 +93,15 @@ class HarmonicBasis:
             columns += [np.cos(h * angle), np.sin(h * angle)]
         return np.stack(columns, axis=-1)
 
+    def to_time(self, coefficients: np.ndarray) -> np.ndarray:
+        """(..., n_coeff) -> (..., n_samples) samples of one period."""
+        flat = coefficients.reshape(-1, self.n_coeff) @ self.synthesis.T  # one product, not one per pair
+        return flat.reshape(*coefficients.shape[:-1], self.n_samples)
+
+    def from_time(self, samples: np.ndarray) -> np.ndarray:
+        """(..., n_samples) samples of one period -> (..., n_coeff)."""
+        return (samples.reshape(-1, self.n_samples) @ self.analysis).reshape(*samples.shape[:-1], self.n_coeff)
+
     def to_complex(self, coefficients: np.ndarray) -> np.ndarray:
         """(..., n_coeff) real -> (..., n_harmonic) complex amplitudes X_h = a - i b, with X_0 = x_0."""
         s = int(self.has_static)

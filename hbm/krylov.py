@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numba
 import numpy as np
 
 
@@ -36,17 +37,11 @@ def gmres(
         w -= again @ span
         column = h[:, k - 1]
         column[:k] = coefficients + again
-        norm = np.linalg.norm(w)
-        for i in range(k - 1):  # earlier Givens rotations
-            column[i], column[i + 1] = cs[i] * column[i] + sn[i] * column[i + 1], cs[i] * column[i + 1] - sn[i] * column[i]
-        radius = np.hypot(column[k - 1], norm)
+        norm = float(np.sqrt(w @ w))
+        radius = _rotate(column, cs, sn, rhs, k, norm)
         if radius == 0.0:
             k -= 1
             break
-        cs[k - 1], sn[k - 1] = column[k - 1] / radius, norm / radius
-        column[k - 1] = radius
-        rhs[k] = -sn[k - 1] * rhs[k - 1]
-        rhs[k - 1] *= cs[k - 1]
         if abs(rhs[k]) <= tolerance * beta or norm <= 1e-14 * radius:
             break
         v[k] = w / norm
@@ -56,3 +51,19 @@ def gmres(
     for i in range(k - 1, -1, -1):
         y[i] = (rhs[i] - h[i, i + 1 : k] @ y[i + 1 :]) / h[i, i]
     return y @ v[:k], k, abs(rhs[k]) / beta
+
+
+@numba.njit(cache=True)
+def _rotate(column, cs, sn, rhs, k, norm):
+    """Turn column k of the Hessenberg matrix upper triangular and the right-hand side with it; returns the diagonal."""
+    for i in range(k - 1):
+        a, b = column[i], column[i + 1]
+        column[i] = cs[i] * a + sn[i] * b
+        column[i + 1] = cs[i] * b - sn[i] * a
+    radius = np.hypot(column[k - 1], norm)
+    if radius > 0.0:
+        cs[k - 1], sn[k - 1] = column[k - 1] / radius, norm / radius
+        column[k - 1] = radius
+        rhs[k] = -sn[k - 1] * rhs[k - 1]
+        rhs[k - 1] *= cs[k - 1]
+    return radius

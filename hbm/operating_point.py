@@ -6,7 +6,7 @@ once a neighbouring peak is known.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -67,7 +67,7 @@ class AtPeak:
     start: float
     stop: float
     n_scan: int = 60
-    tolerance: float = 1e-6
+    tolerance: float = 1e-5
     newton: NewtonOptions = field(default_factory=NewtonOptions)
 
     def first(self, balance: HarmonicBalance) -> OperatingPoint:
@@ -82,7 +82,7 @@ class AtPeak:
 
     def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
         """Refine from a neighbouring peak."""
-        return self._refine(balance, omega, x, 1e-3 * omega)
+        return self._refine(balance, omega, x, 2e-4 * omega)
 
     def _refine(self, balance: HarmonicBalance, omega: float, x: np.ndarray, stride: float) -> OperatingPoint:
         def solve(w: float, guess: np.ndarray) -> _Slope:
@@ -93,40 +93,84 @@ class AtPeak:
         solves = 1
         if not here.solution.converged:
             return _point(balance, here.solution, self.output, solves)
-        side = np.sign(here.slope)
-        low_bound, high_bound = 1e-3 * omega, balance.omega_max
-        while True:  # walk uphill until the slope changes sign
-            target = float(np.clip(here.omega + side * stride, low_bound, high_bound))
+        resolution = self.tolerance * omega
+        uphill = other = None  # the latest points on either side of the zero, once it is bracketed
+        before: _Slope | None = None
+        best = here
+        while solves < 60:
+            side = float(np.sign(here.slope))
+            if uphill is not None and other is not None:
+                target = _zero(uphill, other)
+            elif before is None:
+                target = here.omega + side * stride
+            else:  # extrapolate the slope, never further than a few strides and always uphill
+                reach = abs(here.omega - before.omega)
+                guess = (_zero(before, here) - here.omega) * side
+                target = here.omega + side * (min(guess, 8 * reach) if guess > 0 else 3 * reach)
+            target = float(np.clip(target, 1e-3 * omega, balance.omega_max))
+            if abs(target - best.omega) <= resolution:
+                break
             there = solve(target, here.predict(target))
             solves += 1
             if not there.solution.converged:
-                stride *= 0.25
-                if stride < self.tolerance * omega:
-                    return _point(balance, here.solution, self.output, solves)
+                if uphill is not None and other is not None:
+                    break
+                stride, before = 0.25 * min(stride, abs(target - here.omega)), None
+                if stride < resolution:
+                    break
                 continue
-            if there.slope * side <= 0 or target in (low_bound, high_bound):
-                break
-            here, stride = there, 2.0 * stride
-        a, b = here, there
-        best = a if abs(a.slope) < abs(b.slope) else b
-        weight_a = weight_b = 1.0
-        while abs(b.omega - a.omega) > self.tolerance * omega and solves < 60:
-            share = weight_a * a.slope / (weight_a * a.slope - weight_b * b.slope)
-            w = a.omega + min(max(share, 0.02), 0.98) * (b.omega - a.omega)
-            nearest = a if abs(w - a.omega) < abs(w - b.omega) else b
-            c = solve(w, nearest.predict(w))
-            solves += 1
-            if not c.solution.converged:
-                break
-            moved = abs(c.omega - best.omega)
-            best = c
-            if c.slope * side > 0:  # Illinois: halve the weight of an end that stays
-                a, weight_a, weight_b = c, 1.0, 0.5 * weight_b
-            else:
-                b, weight_b, weight_a = c, 1.0, 0.5 * weight_a
-            if moved <= self.tolerance * omega:
-                break
+            if there.slope * here.slope <= 0 and uphill is None:
+                uphill, other = here, there
+            elif uphill is not None and other is not None:
+                if there.slope * uphill.slope > 0:
+                    other = replace(other, weight=0.5 * other.weight)  # Illinois: an end that stays loses weight
+                    uphill = there
+                else:
+                    uphill = replace(uphill, weight=0.5 * uphill.weight)
+                    other = there
+            before, here = here, there
+            if abs(there.slope) <= abs(best.slope):
+                best = there
         return _point(balance, best.solution, self.output, solves)
+
+
+def _zero(a: _Slope, b: _Slope) -> float:
+    """Where the straight line through two slopes vanishes [rad/s]."""
+    fa, fb = a.weight * a.slope, b.weight * b.slope
+    return (a.omega * fb - b.omega * fa) / (fb - fa) if fa != fb else 0.5 * (a.omega + b.omega)
+
+
+@dataclass(frozen=True)
+class BesidePeak:
+    """The cycle at a fixed ratio to the frequency of the resonance peak, which is tracked as `AtPeak` does."""
+
+    peak: AtPeak
+    ratio: float
+
+    def first(self, balance: HarmonicBalance) -> OperatingPoint:
+        """Find the peak, then go to the ratio."""
+        return self._beside(balance, self.peak.first(balance))
+
+    def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
+        """From a neighbouring x at the ratio: back to the peak, refine it, and to the ratio again."""
+        solution, solves = self._walk(balance, omega, omega / self.ratio, x)
+        at_peak = self.peak.next(balance, omega / self.ratio, solution.state.x)
+        found = self._beside(balance, at_peak)
+        return replace(found, solves=found.solves + solves)
+
+    def _beside(self, balance: HarmonicBalance, peak: OperatingPoint) -> OperatingPoint:
+        omega = peak.state.omega
+        solution, solves = self._walk(balance, omega, self.ratio * omega, peak.state.x)
+        return _point(balance, solution, self.peak.output, peak.solves + solves)
+
+    def _walk(self, balance: HarmonicBalance, start: float, stop: float, x: np.ndarray) -> tuple[Solution, int]:
+        """Natural steps of half a per cent from one frequency to another."""
+        count = max(1, int(np.ceil(abs(stop / start - 1) / 5e-3)))
+        for omega in np.linspace(start, stop, count + 1):
+            solution = newton.solve(balance, omega, x, self.peak.newton)
+            if solution.converged:
+                x = solution.state.x
+        return solution, count + 1
 
 
 @dataclass(frozen=True)
@@ -137,6 +181,7 @@ class _Slope:
     omega: float
     slope: float
     dx: np.ndarray
+    weight: float = 1.0
 
     @classmethod
     def of(cls, balance: HarmonicBalance, solution: Solution, output: str) -> _Slope:
@@ -160,4 +205,4 @@ def _point(balance: HarmonicBalance, solution: Solution, output: str, solves: in
     return OperatingPoint(solution, float(amplitude(response[row], balance.basis.has_static)), response, solves)
 
 
-Site = AtFrequency | AtPeak
+Site = AtFrequency | AtPeak | BesidePeak

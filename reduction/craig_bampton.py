@@ -33,6 +33,7 @@ def craig_bampton(
     n_modes: int | None = None,
     cutoff: float | None = None,
     extra_masters: Sequence[int] = (),
+    contact_stiffness: np.ndarray | None = None,
     solver: str | None = None,
 ) -> ReducedModel:
     """Reduce a full system to its contact DOFs, accessory DOFs and fixed-interface modes.
@@ -40,10 +41,11 @@ def craig_bampton(
     system : sparse, n_full DOFs; interface : B over the same DOFs
     n_modes : fixed-interface modes kept, or cutoff : all of them up to this frequency [Hz]; give one of the two
     extra_masters : DOFs of the system to keep besides those of the contact and of point loads and outputs
-    solver : see fem.factor.factorise
+    contact_stiffness : (n_pair, n_component) [N/m], for an estimate of the stuck state too; solver : see fem.factor
     Returns the model; coordinates are the masters in ascending order, then the modes; loads and outputs are projected.
         info: masters (DOFs of the system), n_full, n_masters, n_modes, factorisation, first_omitted_frequency [Hz],
-        free_frequency [Hz] of the first modes and free_frequency_error, their estimated relative error by truncation
+        free_frequency [Hz] of the first ten modes and free_frequency_error, their estimated relative error by
+        truncation; stuck_frequency and stuck_frequency_error likewise where contact_stiffness is given
     Raises  ValueError where n_modes and cutoff are both or neither given, too many modes are asked, or a body can move
         rigidly with its masters held
     """
@@ -73,19 +75,22 @@ def craig_bampton(
         {name: basis.T @ row for name, row in system.outputs.items()},
     )
     model = ReducedModel(reduced, replace(interface, B=np.asarray(interface.B @ basis)), basis)
-    frequency, q = linear_modes(model, n=min(REPORTED_MODES, reduced.n_dof))
-    # K R q vanishes at the slaves but for the modal part: K_ss psi + K_sm = 0
-    residual = K_ss @ (phi @ q[n_m:]) - (inertia @ q)[s] * (2 * np.pi * frequency) ** 2
-    info = {
+    info: dict[str, object] = {
         "masters": m,
         "n_full": system.n_dof,
         "n_masters": n_m,
         "n_modes": len(omega),
         "factorisation": factor.name,
         "first_omitted_frequency": omitted / (2 * np.pi),
-        "free_frequency": frequency,
-        "free_frequency_error": frequency_error(factor, residual, 2 * np.pi * frequency, omitted),
     }
+    states = {"free": None} if contact_stiffness is None else {"free": None, "stuck": contact_stiffness}
+    for state, springs in states.items():
+        frequency, q = linear_modes(model, springs, min(REPORTED_MODES, reduced.n_dof))
+        w = 2 * np.pi * frequency
+        # K R q vanishes at the slaves but for the modal part, as K_ss psi + K_sm = 0; springs act on masters only
+        residual = K_ss @ (phi @ q[n_m:]) - (inertia @ q)[s] * w**2
+        info[f"{state}_frequency"] = frequency
+        info[f"{state}_frequency_error"] = frequency_error(factor, residual, w, omitted)
     return replace(model, info=info)
 
 

@@ -66,13 +66,13 @@ def cycle(
     x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_component - 1) slider positions at the start [m]
     """
     n_pair, n_comp, n_coeff = x.shape
-    samples = x @ basis.synthesis.T
+    samples = basis.to_time(x)
     force = np.empty_like(samples)
     jac = np.zeros((n_pair, n_comp * n_coeff, n_comp * n_coeff)) if jacobian else np.zeros((0, 0, 0))
     status = np.empty(n_pair, np.int64)
     product, single = basis.prefix_sums
     _cycle(samples, parameters.packed(), memory, basis.synthesis, product, single, force, jac, status)
-    return ContactCycle(force @ basis.analysis, jac if jacobian else None, status)
+    return ContactCycle(basis.from_time(force), jac if jacobian else None, status)
 
 
 @numba.njit(cache=True)

@@ -12,7 +12,7 @@ from hbm.balance import HarmonicBalance
 from hbm.branch import Branch, BranchBuilder
 from hbm.newton import NewtonOptions, Solution
 
-DEGREE = 3  # of the extrapolating polynomial
+DEGREE = 2  # of the extrapolating polynomial
 
 
 @dataclass(frozen=True)

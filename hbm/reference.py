@@ -1,0 +1,118 @@
+"""The dense algorithm of the thesis and of public codes, kept as the reference that the compliance form must equal.
+
+Unknowns are all reduced coordinates times all harmonic coefficients; each Newton step assembles the full Jacobian,
+contact tangent included, and factorises it.
+Source  Tamatam 2021, eq. 3.6-3.7, 3.23 and figure 7.3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from time import perf_counter
+
+import numpy as np
+from scipy.sparse import csr_matrix, kron
+
+from hbm import law as contact_law
+from hbm.balance import HarmonicBalance
+from hbm.branch import CONVERGED
+
+
+@dataclass
+class Profile:
+    """Seconds by routine, named as in tables 7.1 to 7.3 of the thesis."""
+
+    contact: float = 0.0
+    balance: float = 0.0
+    inversion: float = 0.0
+    inversions: int = 0
+
+
+@dataclass(frozen=True)
+class DenseSolution:
+    """q : (n, n_coeff) reduced coordinates [m]; x : (n_pair, n_component, n_coeff) contact displacement [m]."""
+
+    omega: float
+    q: np.ndarray
+    x: np.ndarray
+    outcome: str
+    steps: int
+
+
+@dataclass
+class DenseBalance:
+    """The same problem as a HarmonicBalance, solved the dense way; real models whose harmonics share one system."""
+
+    problem: HarmonicBalance
+    profile: Profile = field(default_factory=Profile)
+
+    def __post_init__(self) -> None:
+        if self.problem.model.per_harmonic is not None:
+            raise ValueError("the dense reference serves models whose harmonics share one real system")
+        system, b = self.problem.model.at_harmonic(0)
+        basis, excitation = self.problem.basis, self.problem.excitation
+        self._b = b
+        self._spread = csr_matrix(kron(csr_matrix(b), np.eye(basis.n_coeff)))  # x = spread . q, coefficients innermost
+        amplitudes = np.zeros((system.n_dof, len(basis.harmonics)), complex)
+        for (h, name), value in excitation.loads.items():
+            if h in basis.harmonics:
+                amplitudes[:, basis.harmonics.index(h)] += system.loads[name] * value
+        self._force = basis.to_real(amplitudes)
+
+    def dynamic_stiffness(self, omega: float) -> np.ndarray:
+        """(n n_coeff, n n_coeff) linear part, coefficients innermost."""
+        system, basis = self.problem.model.system, self.problem.basis
+        n, m = system.n_dof, basis.n_coeff
+        damping = np.zeros_like(system.mass) if system.damping is None else system.damping
+        z = np.zeros((n, m, n, m))
+        for a in range(m):
+            h = basis.order[a]
+            z[:, a, :, a] = system.stiffness - (h * omega) ** 2 * system.mass
+        # velocity of a cos + b sin has cosine coefficient h w b and sine coefficient -h w a
+        for a in range(int(basis.has_static), m, 2):
+            h = basis.order[a]
+            z[:, a, :, a + 1] = h * omega * damping
+            z[:, a + 1, :, a] = -h * omega * damping
+        return z.reshape(n * m, n * m)
+
+    def solve(self, omega: float, start: np.ndarray, tolerance: float = 1e-8, max_steps: int = 40) -> DenseSolution:
+        """Full Newton from reduced coordinates `start` (n, n_coeff), residual relative to the excitation."""
+        p, basis = self.problem, self.problem.basis
+        clock = perf_counter()
+        linear = self.dynamic_stiffness(omega)
+        self.profile.balance += perf_counter() - clock
+        scale = np.linalg.norm(self._force)
+        q = start.ravel().copy()
+        outcome = f"not converged in {max_steps} steps"
+        step = 0
+        for step in range(max_steps + 1):
+            clock = perf_counter()
+            x = (self._spread @ q).reshape(p.parameters.n_pair, -1, basis.n_coeff)
+            cycle = contact_law.cycle(p.law, x, p.parameters, basis, p.memory)
+            tick = perf_counter()
+            self.profile.contact += tick - clock
+            residual = linear @ q - self._force.ravel() + self._spread.T @ cycle.force.ravel()
+            if np.linalg.norm(residual) <= tolerance * scale:
+                outcome = CONVERGED
+                self.profile.balance += perf_counter() - tick
+                break
+            assert cycle.jacobian is not None
+            jacobian = linear + (self._spread.T @ _block_diagonal(cycle.jacobian) @ self._spread).toarray()
+            clock = perf_counter()
+            self.profile.balance += clock - tick
+            q -= np.linalg.solve(jacobian, residual)
+            self.profile.inversion += perf_counter() - clock
+            self.profile.inversions += 1
+        return DenseSolution(omega, q.reshape(-1, basis.n_coeff), x, outcome, step)
+
+    def coordinates_of(self, omega: float, x: np.ndarray) -> np.ndarray:
+        """Reduced coordinates (n, n_coeff) in balance with the contact forces at x, to start or to check from."""
+        cycle = contact_law.cycle(self.problem.law, x, self.problem.parameters, self.problem.basis, self.problem.memory)
+        force = self._force.ravel() - self._spread.T @ cycle.force.ravel()
+        return np.linalg.lstsq(self.dynamic_stiffness(omega), force, rcond=None)[0].reshape(-1, self.problem.basis.n_coeff)
+
+
+def _block_diagonal(blocks: np.ndarray) -> csr_matrix:
+    n, m, _ = blocks.shape
+    columns = (np.arange(n)[:, None, None] * m + np.arange(m)[None, None, :]).repeat(m, axis=1)
+    return csr_matrix((blocks.ravel(), columns.ravel(), np.arange(0, n * m * m + 1, m)), shape=(n * m, n * m))
