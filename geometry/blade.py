@@ -6,8 +6,9 @@ blade stands: left faces turned back by one pitch are right faces. The dimension
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from math import pi
+from math import cos, pi
 from pathlib import Path
 
 import numpy as np
@@ -75,21 +76,25 @@ class Parameters:
         checks.positive(self, "hub_radius", "span", "root_chord", "tip_chord", "root_thickness", "tip_thickness")
         checks.positive(self, "contact_length", "contact_height", "shroud_length", "clearance")
         checks.positive(self, "root_height", "root_length")
-        checks.positive(self, "edge", "root_fill", "disk_taper", "couple_height", unit="a ratio")
+        checks.positive(self, "edge", "disk_taper", unit="a ratio")
+        checks.within(self, "camber", least=-0.5, most=0.5, unit="a ratio")
+        checks.within(self, "couple_height", least=0.0, most=1.0, unit="a fraction of the span")
+        checks.within(self, "root_fill", least=0.1, most=0.99, unit="a fraction of the pitch")
+        checks.within(self, "root_stagger", "tip_stagger", "shroud_angle", least=-1.3, most=1.3, unit="radians")
         checks.whole(self, "n_blades", least=3)
         checks.whole(self, "n_along", "n_up", least=2)
         checks.whole(self, "n_span", "n_through", "n_side", "n_end", "n_root", "n_disk", least=1)
-        if self.root_fill >= 1 or self.couple_height > 1:
-            raise ValueError("geometry.root_fill must stay below 1 and geometry.couple_height must not exceed 1")
-        if abs(self.shroud_angle) >= pi / 2 or self.contact_length * np.cos(self.shroud_angle) >= self.shroud_length:
+        along_axis = self.contact_length * cos(self.shroud_angle)
+        if along_axis >= self.shroud_length:
             raise ValueError(
-                f"geometry.contact_length is {self.contact_length}: at geometry.shroud_angle it must be shorter along "
-                f"the axis than geometry.shroud_length ({self.shroud_length})"
+                f"geometry.shroud_length is {self.shroud_length}: give more than {along_axis:.4g} m, what the contact "
+                "face takes along the axis"
             )
-        if not 0 <= self.disk_radius < self.hub_radius - self.root_height:
+        limit = self.hub_radius - self.root_height
+        if not 0 <= self.disk_radius < limit:
             raise ValueError(
-                f"geometry.disk_radius is {self.disk_radius}: give 0 for no disk, or a radius below "
-                f"hub_radius - root_height ({self.hub_radius - self.root_height:.6g})"
+                f"geometry.disk_radius is {self.disk_radius}: give 0 for no disk, or a radius below {limit:.4g} m, the "
+                "bottom of the root block"
             )
 
     @property
@@ -177,37 +182,35 @@ def _root(p: Parameters) -> Platform:
 
 
 def _disk(p: Parameters, root: Platform, rows: tuple[int, ...], columns: tuple[int, ...]) -> list[blocks.Block]:
-    """Disk sector under the root block: five columns, the outer two reach the cyclic faces."""
+    """Disk sector under the root block: five columns, of which the outer two end at the cyclic faces."""
     rim = root.corners[0]
-    radius = p.hub_radius - p.root_height
-    reach = {
-        side: _turned(np.column_stack([rim[:, j, 0], np.zeros(4), np.full(4, radius)]), angle)
-        for side, j, angle in ((-1, 0, p.pitch / 2), (3, 3, -p.pitch / 2))
-    }
+    columns = (1, *columns, 1)
+    edges = {}  # of the outer columns, from left to right: (corner of the root block, cyclic face)
+    for j, of_root, angle in ((0, 0, p.pitch / 2), (4, 3, -p.pitch / 2)):
+        axial = rim[:, of_root, 0]
+        face = np.column_stack([axial, np.zeros(4), np.full(4, p.hub_radius - p.root_height)])
+        edges[j] = [_turned(face, angle), rim[:, of_root]][:: 1 if j == 0 else -1]
 
-    def mapping(i: int, j: int):  # type: ignore[no-untyped-def]
+    def rim_at(i: int, j: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        if j not in edges:
+            return root.position(i, j - 1, np.column_stack([a, b, np.zeros_like(a)]))
+        left, right = ((1 - a[:, None]) * edge[i] + a[:, None] * edge[i + 1] for edge in edges[j])
+        return (1 - b[:, None]) * left + b[:, None] * right
+
+    def mapping(i: int, j: int) -> Callable[[np.ndarray], np.ndarray]:
         def place(q: np.ndarray) -> np.ndarray:
-            a, b, c = q.T[:, :, None]
-            if 0 <= j < 3:
-                top = root.position(i, j, np.column_stack([q[:, :2], np.zeros(len(q))]))
-            else:
-                inner, outer = rim[i : i + 2, 0 if j < 0 else 3], reach[j][i : i + 2]
-                first, last = (outer, inner) if j < 0 else (inner, outer)
-                top = (1 - b) * ((1 - a) * first[0] + a * first[1]) + b * ((1 - a) * last[0] + a * last[1])
+            top = rim_at(i, j, q[:, 0], q[:, 1])
             bore = top * (p.disk_radius / np.hypot(top[:, 1], top[:, 2]))[:, None]
             bore[:, 0] = p.disk_taper * top[:, 0]
-            return c * top + (1 - c) * bore
+            return bore + q[:, 2:] * (top - bore)
 
         return place
 
-    made = []
-    for i in range(3):
-        for j in range(-1, 4):
-            names = {"w-": "clamp"}
-            if j == -1:
-                names["v-"] = "cyclic_left"
-            if j == 3:
-                names["v+"] = "cyclic_right"
-            n_column = columns[j] if 0 <= j < 3 else 1
-            made.append(blocks.Block(unit(rows[i]), unit(n_column), unit(p.n_disk), "disk", names, mapping(i, j)))
-    return made
+    sides = {0: {"v-": "cyclic_left"}, 4: {"v+": "cyclic_right"}}
+    return [
+        blocks.Block(
+            unit(rows[i]), unit(columns[j]), unit(p.n_disk), "disk", {"w-": "clamp", **sides.get(j, {})}, mapping(i, j)
+        )
+        for i in range(3)
+        for j in range(5)
+    ]

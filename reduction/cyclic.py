@@ -44,7 +44,7 @@ def reduce_sector(sector: Sector, n_modes: int | None = None, cutoff: float | No
     """
     both = replace(sector.interface, B=vstack([sector.interface.B, sector.left], format="csr"))
     seams = np.concatenate([sector.seam_right.ravel(), sector.seam_left.ravel()])
-    model = craig_bampton(sector.system, both, n_modes, cutoff, extra_masters=seams)
+    model = craig_bampton(sector.system, both, n_modes, cutoff, extra_masters=seams.tolist())
     masters = np.asarray(model.info["masters"])
     right, left = np.split(np.asarray(model.interface.B), 2)
     small = replace(
