@@ -25,6 +25,7 @@ from hbm.harmonics import HarmonicBasis
 from reduction.model import ReducedModel
 
 RESOLUTION = 5e-10  # relative error allowed in the expansion at the highest frequency asked for
+ROUNDING = 1e-7  # largest error that may be rounding
 CANDIDATES = ((24, 4), (48, 4), (48, 6), (96, 6), (192, 6))  # modes and powers of s tried in turn
 ALL_MODES_BELOW = 1500  # coordinates up to which all modes are computed at once
 
@@ -61,11 +62,14 @@ class Expansion:
                 "or raise the contact stiffness"
             ) from None
         lam, phi = sla.eigh(stuck, mass, subset_by_index=None if n < ALL_MODES_BELOW else (0, CANDIDATES[-1][0] - 1))
+        before = np.inf
         for m, order in [*((m, order) for m, order in CANDIDATES if m < len(lam)), (len(lam), 1 if len(lam) == n else 8)]:
             self._build(lam[:m], phi[:, :m], factor, order)
             self.error = self._measure_error(1j * s_max)
-            if self.error <= RESOLUTION:
+            # near a resonance rounding of the direct solve itself is what remains: more modes would not help
+            if self.error <= RESOLUTION or 0.5 * before < self.error < ROUNDING:
                 break
+            before = self.error
 
     def _build(self, lam: np.ndarray, phi: np.ndarray, factor: tuple[np.ndarray, bool], order: int) -> None:
         mass, damping, _ = self._system

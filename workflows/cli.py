@@ -23,6 +23,7 @@ app = cyclopts.App(
     name="tribodyn",
     help="From geometry to worn surface: vibration, friction and fretting wear of jointed parts.",
     version_flags=["--version"],
+    suppress_keyboard_interrupt=False,
 )
 Overrides = Annotated[
     tuple[str, ...],
@@ -82,7 +83,7 @@ def run(
     progress = console_progress()
     path = folder / "result.h5"
     earlier = _earlier(path, file) if resume else None
-    if earlier is not None and earlier.state.startswith("complete"):
+    if earlier is not None and pipeline.is_complete(earlier, file.scene):
         progress.say(f"{path} is complete already")
         result = earlier
     else:
@@ -126,6 +127,28 @@ def list_() -> None:
     """List the scenes that come with the program."""
     for name in scene_file.names():
         print(f"{name:12} {scene_file.title(name)}")
+
+
+@app.command
+def bench(
+    *,
+    quick: Annotated[bool, Parameter(negative=())] = False,
+    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+) -> None:
+    """Measure the solver beside the dense algorithm of the thesis on the beam scene (tables 7.1 to 7.3).
+
+    Parameters
+    ----------
+    quick
+        Harmonics 0+1 and 0+3 on one thread, in under a minute.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import bench as benchmark
+    from workflows.progress import console_progress
+
+    rows = benchmark.run(quick, console_progress().say)
+    print(json.dumps(benchmark.as_records(rows), indent=2) if as_json else benchmark.as_text(rows))
 
 
 @app.command

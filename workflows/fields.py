@@ -15,7 +15,7 @@ from workflows.result import Fields, Loops
 def displacement_fields(balance: HarmonicBalance, part: Part, rows: list[WearRow], numbers: np.ndarray) -> Fields:
     """Displacement of every node at chosen rows of a wear history.
 
-    balance : the unworn problem that the rows come from; numbers : (n_field,) rows to take
+    balance : the unworn problem under the load that the rows come from; numbers : (n_field,) rows to take
     """
     chosen = [rows[i] for i in numbers]
     found = [part.field(full_displacement(balance, row.displacement, row.force, row.omega)) for row in chosen]

@@ -74,7 +74,10 @@ def cycles_per_step(result: Result) -> Figure:
         unit, scale = _cycles(count.max())
         axes.step(np.arange(1, len(count) + 1), scale * count, where="mid", color=BLUE)
         axes.set(xlabel="wear step", ylabel=f"cycles in the step{unit}", title="Cycles per wear step")
-        axes.set_ylim(bottom=0)
+        if count.max() > 30 * count.min():
+            axes.set_yscale("log")
+        else:
+            axes.set_ylim(bottom=0)
     return figure
 
 
@@ -136,47 +139,30 @@ def energy_against_cycles(result: Result) -> Figure:
 
 
 def hysteresis_loops(result: Result) -> Figure:
-    """Tangential loops of four nodes at the start, the middle and the end of the wear run."""
-    loops, patch = result.loops, result.patch
+    """Tangential loops at chosen wear steps (columns) of the pairs that dissipate most in one of them (rows)."""
+    loops, patch, wear = result.loops, result.patch, _wear(result)
     assert loops is not None
     assert patch is not None
-    chosen = chosen_pairs(result)
+    pairs = list(dict.fromkeys(int(np.argmax(wear.energy[row])) for row in loops.row))
     tangential = [c for c, name in enumerate(patch.components) if name != "n"]
-    # the direction in which these nodes move most
-    swing = [np.ptp(loops.displacement[:, chosen, c], axis=-1).max() for c in tangential]
-    component = tangential[int(np.argmax(swing))]
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.6, 6.4), layout="constrained")
-        grid = np.atleast_1d(figure.subplots(2, 2)).ravel()
-        unit_x, scale_x = _length(max(swing) / 2)
-        unit_f, scale_f = _force(np.abs(loops.force[:, chosen, component]).max())
-        colors = mpl.colormaps[WEAR_MAP](np.linspace(0, 0.9, len(loops.row)))
-        for axes, pair, label in zip(grid, chosen, CHOSEN, strict=True):
-            for color, row, x, force in zip(
-                colors, loops.row, loops.displacement[:, pair, component], loops.force[:, pair, component], strict=True
-            ):
-                closed = np.append(np.arange(len(x)), 0)
-                middle = (x.max() + x.min()) / 2  # the static offset says nothing about the loop
-                axes.plot(scale_x * (x - middle)[closed], scale_f * force[closed], color=color, label=f"step {row}")
-            axes.set_title(f"{label}: pair {pair}", fontsize=10)
-            axes.set(xlabel=f"displacement {patch.components[component]} / {unit_x}", ylabel=f"force / {unit_f}")
-        grid[0].legend(fontsize=8)
-        figure.suptitle("Friction hysteresis", x=0.01, ha="left", fontsize=11, fontweight="bold")
+        figure = Figure(figsize=(2.6 * len(loops.row) + 0.4, 2.2 * len(pairs) + 0.5), layout="constrained")
+        grid = figure.subplots(len(pairs), len(loops.row), squeeze=False)
+        for line, pair in enumerate(pairs):
+            # the direction in which this pair moves most
+            swing = [np.ptp(loops.displacement[:, pair, c], axis=-1).max() for c in tangential]
+            component = tangential[int(np.argmax(swing))]
+            for column, row in enumerate(loops.row):
+                axes = grid[line, column]
+                x, force = loops.displacement[column, pair, component], loops.force[column, pair, component]
+                x = x - (x.max() + x.min()) / 2  # the static offset says nothing about the loop
+                (unit_x, scale_x), (unit_f, scale_f) = _length(x.max()), _force(np.abs(force).max())
+                axes.plot(scale_x * np.append(x, x[0]), scale_f * np.append(force, force[0]), color=BLUE)
+                axes.set_xlabel(f"{patch.components[component]} / {unit_x}", fontsize=9)
+                axes.set_ylabel(f"pair {pair}: force / {unit_f}", fontsize=9)
+                if line == 0:
+                    axes.set_title(f"wear step {row + 1}", fontsize=10)
     return figure
-
-
-CHOSEN = ("middle", "most worn", "least worn", "most energy")
-
-
-def chosen_pairs(result: Result) -> list[int]:
-    """Pairs whose loops are shown, one for each name in CHOSEN."""
-    patch, wear = result.patch, result.wear
-    assert patch is not None
-    middle = int(np.argmin(np.linalg.norm(patch.points - patch.points.mean(0), axis=1)))
-    if wear is None or not len(wear.depth):
-        return [middle] * len(CHOSEN)
-    depth, energy = wear.depth[-1], wear.energy[: max(result.wear_steps, 1)].sum(0)
-    return [middle, int(np.argmax(depth)), int(np.argmin(depth)), int(np.argmax(energy))]
 
 
 @contextmanager
@@ -204,13 +190,13 @@ def _length(largest: float) -> tuple[str, float]:
     """Unit and factor in which lengths [m] of this size read well."""
     if largest >= 0.5e-3:
         return "mm", 1e3
-    return ("µm", 1e6) if largest >= 0.5e-6 else ("nm", 1e9)
+    return ("nm", 1e9) if 0 < largest < 0.5e-6 else ("µm", 1e6)
 
 
 def _force(largest: float) -> tuple[str, float]:
     if largest >= 1e3:
         return "kN", 1e-3
-    return ("N", 1.0) if largest >= 1 else ("mN", 1e3)
+    return ("mN", 1e3) if 0 < largest < 1 else ("N", 1.0)
 
 
 def _cycles(largest: float) -> tuple[str, float]:

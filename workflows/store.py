@@ -146,13 +146,12 @@ def _write_array(
 
 def _scale(file: h5py.File, dimension: str, size: int) -> h5py.Dataset:
     """The scale of a dimension: its index, shared by all arrays of the file."""
-    key = f"i_{dimension}"
-    if key not in file:
-        file.create_dataset(key, data=np.arange(size))
-        file[key].make_scale(key)
-    if len(file[key]) != size:
-        raise ValueError(f"dimension {dimension} has {len(file[key])} entries, an array has {size}")
-    return file[key]
+    if dimension not in file:
+        file.create_dataset(dimension, data=np.arange(size))
+        file[dimension].make_scale(dimension)
+    if len(file[dimension]) != size:
+        raise ValueError(f"dimension {dimension} has {len(file[dimension])} entries, an array has {size}")
+    return file[dimension]
 
 
 def load(path: Path) -> Result:
