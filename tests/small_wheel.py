@@ -26,6 +26,7 @@ STIFFNESS = (93e6, 113e6)  # tangential and normal, of a whole face
 CONTACT = Contact("shroud_right", (1, 0, 0), "shroud_left", vertices_only=True)
 LOADS = {"couple": Couple("couple_trailing", "couple_leading", AROUND), "shaker": NodalForce("excitation", AROUND)}
 OUTPUTS = {"tip": NodalForce("tip", AROUND), "driven": NodalForce("excitation", AROUND)}
+CLAMPS = (Clamp("clamp"),)
 SEAM = ("cyclic_right", "cyclic_left")
 
 
@@ -63,7 +64,7 @@ def read(path, disk_radius=0.0):
     return mesh_file.read(path)
 
 
-def full_sector(path, disk_radius=0.0, clamps=(Clamp("clamp"),), contact=CONTACT):
+def full_sector(path, disk_radius=0.0, clamps=CLAMPS, contact=CONTACT):
     """Part and sector of a blade on a rigid disk, or on a flexible one."""
     mesh, node_sets = read(path, disk_radius)
     seam = SEAM if disk_radius else None
