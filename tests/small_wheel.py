@@ -89,13 +89,10 @@ def wave_and_wheel(reduced, engine_order, harmonics=(0, 1, 2, 3), damping=0.01, 
     one = travelling_wave(reduced, engine_order, made)
     wheel = wheel_model(reduced, made, stiffness)
     k = reduced.sector.interface.stiffness(*STIFFNESS)
-    gap = np.linspace(0, 1e-4, len(k))
     highest = 2 * np.pi * 1000
 
     def balance(model, copies, loads):
-        contact = ContactParameters.of(
-            model.interface.components, np.tile(k, (copies, 1)), friction=0.3, gap=np.tile(gap, copies)
-        )
+        contact = ContactParameters.of(model.interface.components, np.tile(k, (copies, 1)), friction=0.3)
         return HarmonicBalance(model, "jenkins", contact, basis, loads, highest)
 
     return balance(one, 1, load), balance(wheel, N, waves.on_wheel(load, engine_order, N))

@@ -13,7 +13,7 @@ from reduction.model import ReducedModel
 
 N_PAIR, N = 4, 40
 HARMONICS = (0, 1, 2, 3, 5)
-SYSTEM_OF = {0: 0, 1: 1, 2: 2, 3: 1, 5: 0}  # harmonics 1 and 3 share a complex system, 0 and 5 a real one, 2 has its own
+SYSTEM_OF = {0: 0, 1: 1, 2: 2, 3: 1, 5: 0}  # 1 and 3 share a complex system, 0 and 5 a real one
 OMEGA = 40.0
 
 
@@ -64,7 +64,8 @@ def direct(balance, omega, force, loads):
     for position, h in enumerate(basis.harmonics):
         system, b = balance.model.at_harmonic(h)
         s = 1j * h * omega
-        D = system.stiffness + s * system.damping + s * s * system.mass + b.conj().T @ (balance.compliance.k[:, None] * b)
+        stuck = system.stiffness + b.conj().T @ (balance.compliance.k[:, None] * b)
+        D = stuck + s * system.damping + s * s * system.mass
         total = b.conj().T @ amplitudes[:, position]
         for (order, name), value in loads.items():
             if order == h:

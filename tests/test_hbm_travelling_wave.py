@@ -10,9 +10,9 @@ from hbm.branch import CONVERGED
 from hbm.continuation import natural
 from hbm.excitation import Excitation
 from hbm.harmonics import HarmonicBasis
-from hbm.law import SEPARATES, SLIPS, STICKS
+from hbm.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from hbm.recovery import coordinates, full_displacement
-from reduction.cyclic import nodal_diameters, relative_map, travelling_wave
+from reduction.cyclic import nodal_diameters, relative_map
 from tests import small_wheel as small
 
 EXACT = newton.NewtonOptions(tolerance=1e-11)
@@ -35,7 +35,7 @@ def solved(balance, frequency):
     [
         (0.0, 3, 310.0, {STICKS | SLIPS, STICKS | SLIPS | SEPARATES}),
         (0.0, 2, 250.0, {STICKS | SLIPS}),  # harmonic 2 is index 4, real; harmonic 3 is index -2
-        (0.02, 1, 310.0, {STICKS | SLIPS, STICKS | SLIPS | SEPARATES}),
+        (0.02, 1, 250.0, {STICKS | SLIPS, STICKS | SLIPS | SEPARATES}),
         (0.02, 4, 310.0, {STICKS | SLIPS, STICKS | SLIPS | SEPARATES}),  # harmonic 2 is index 0: all sectors in phase
         (0.02, 0, 250.0, None),  # everything in phase: every harmonic sees one real system
     ],
@@ -111,13 +111,14 @@ def test_left_face_gets_what_the_right_one_of_the_neighbour_gives(sectors):
     assert given["left"] == pytest.approx(on_left, abs=1e-7 * np.abs(force).max())
     # preload and dissipation do not know from which side they are seen
     x_left = waves.left_face(basis, flat, order, small.N)
-    assert basis.work_per_cycle(on_left, x_left) == pytest.approx(basis.work_per_cycle(force, flat), rel=1e-9, abs=1e-12)
+    work = basis.work_per_cycle(force, flat)
+    assert basis.work_per_cycle(on_left, x_left) == pytest.approx(work, rel=1e-9, abs=1e-12)
     assert on_left[:, 0] == pytest.approx(force[:, 0])
 
 
 def test_shear_and_pressure_over_the_wheel_balance(sectors):
     """Item 5: in space, the forces on all sectors and their moments about the axis add up to nothing."""
-    one, wheel = small.wave_and_wheel(sectors[0.0], 2)
+    one, _ = small.wave_and_wheel(sectors[0.0], 2)
     state = solved(one, 280.0)
     interface = sectors[0.0].sector.interface
     turn = sectors[0.0].sector.turn
@@ -126,9 +127,9 @@ def test_shear_and_pressure_over_the_wheel_balance(sectors):
     for n in range(small.N):
         R = np.linalg.matrix_power(turn, n)
         on_right = -np.einsum("pck,pcx->pxk", local[n], interface.frames @ R.T)
-        gives = waves.left_face(one.basis, state.cycle.force, 2, small.N)
         ahead = np.linalg.matrix_power(turn, n + 1)
-        on_left = np.einsum("pck,pcx->pxk", waves.at_sector(one.basis, gives, 2, small.N, n), interface.frames @ ahead.T)
+        from_left = waves.at_sector(one.basis, waves.left_face(one.basis, state.cycle.force, 2, small.N), 2, small.N, n)
+        on_left = np.einsum("pck,pcx->pxk", from_left, interface.frames @ ahead.T)
         for pushed, where in ((on_right, interface.points @ R.T), (on_left, interface.points @ ahead.T)):
             total = total + pushed.sum(axis=0)
             moment = moment + np.einsum("pk,px->xk", pushed[:, 2], where)
@@ -155,18 +156,17 @@ def test_full_field_of_a_sector_holds_its_outputs(sectors):
 
 
 def test_responses_to_several_engine_orders(sectors):
-    """Stuck under a small load, each engine order peaks at the frequency of its nodal diameter."""
+    """Pressed together and hardly shaken, each engine order peaks at the frequency of its nodal diameter."""
     reduced = sectors[0.0]
     k = reduced.sector.interface.stiffness(*small.STIFFNESS)
-    load = Excitation.of({}, {1: {"shaker": 1.0}})
+    pressed = ContactParameters.of(("t1", "t2", "n"), k, friction=10.0, gap=-1e-3)
+    load = Excitation.of({}, {1: {"couple": 1.0}})
 
     def problem(model):
-        made, _ = small.wave_and_wheel(reduced, 0, load=load)
-        parameters = made.parameters.__class__.of(made.parameters.components, k, friction=10.0, gap=-1e-3)
-        return HarmonicBalance(model, "jenkins", parameters, HarmonicBasis((0, 1), 32), load, 2 * np.pi * 1200)
+        return HarmonicBalance(model, "jenkins", pressed, HarmonicBasis((0, 1), 32), load, 2 * np.pi * 1100)
 
     def follow(balance):
-        return natural.follow(balance, 2 * np.pi * 900, 2 * np.pi * 1200, natural.Options(n_points=61))
+        return natural.follow(balance, 2 * np.pi * 1000, 2 * np.pi * 1100, natural.Options(n_points=51))
 
     orders = (1, 3, 7)
     found = waves.responses(reduced, orders, None, problem, follow)
@@ -174,8 +174,7 @@ def test_responses_to_several_engine_orders(sectors):
     expected = nodal_diameters(reduced.sector, orders, 1, k)[:, 0]
     for order, frequency in zip(orders, expected, strict=True):
         peak = found[order].omega[np.argmax(found[order].amplitude("tip"))] / (2 * np.pi)
-        assert peak == pytest.approx(frequency, abs=5.1)
-    assert travelling_wave(reduced, 9).info["engine_order"] == 9
+        assert peak == pytest.approx(frequency, abs=1.0)
 
 
 def test_mistuned_wheel_is_made_of_the_same_parts(sectors):
