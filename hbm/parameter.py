@@ -13,7 +13,7 @@ import numpy as np
 
 from hbm.balance import HarmonicBalance, State
 
-FREQUENCY = "frequency"
+FREQUENCY, LOAD = "frequency", "load factor"
 DIFFERENCE = 1e-6  # finite-difference step, in units of `Parameter.scale`
 
 
@@ -64,7 +64,7 @@ def of(problem: HarmonicBalance | Parameter) -> Parameter:
 def load(balance: HarmonicBalance, omega: float) -> Parameter:
     """Factor on the harmonics >= 1 of the excitation, at one frequency [rad/s]."""
     _keep(balance, omega)
-    return Parameter("load factor", balance.with_load, omega)
+    return Parameter(LOAD, balance.with_load, omega)
 
 
 def gap(balance: HarmonicBalance, omega: float) -> Parameter:

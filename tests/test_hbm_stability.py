@@ -122,7 +122,7 @@ def test_fold_of_a_lifting_mass_is_marked_where_the_branch_turns():
         x[0, 1] = guess[:-1] * lift
         state = balance.evaluate(guess[-1] * 200.0, x)
         assert np.abs(state.residual).max() < 1e-9 * lift
-        builder.add(Solution(state, "converged", 0, 0, ()))
+        builder.add(state.omega, Solution(state, "converged", 0, 0, ()))
     branch = builder.finish("reached the amplitude asked for")
     turn = int(np.argmax(branch.omega))
     assert 10 < turn < 70

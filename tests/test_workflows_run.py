@@ -126,7 +126,7 @@ def test_ctrl_c_keeps_what_was_computed_and_says_where(tmp_path: Path) -> None:
     assert process.returncode == 130
     assert err.count("\n") == 1
     assert str(tmp_path / "result.h5") in err
-    assert "--resume" in err
+    assert err.endswith("--set 'wear.step=30 %' --resume.\n")
     wear = store.load(tmp_path / "result.h5").wear
     assert wear is not None
     assert len(wear.cycles) >= 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import signal
 import sys
 from collections.abc import Sequence
@@ -91,7 +92,7 @@ def run(
         try:
             result = pipeline.run(file, folder, progress, earlier)
         except KeyboardInterrupt:
-            raise KeyboardInterrupt(_kept(path, scene, folder)) from None
+            raise KeyboardInterrupt(_kept(path, scene, overrides)) from None
         except pipeline.SolveFailed as failure:
             raise pipeline.SolveFailed(f"{failure}; what was computed before is kept in {path}") from None
     _print_summary(result)
@@ -114,12 +115,13 @@ def _earlier(path: Path, file: scene_file.SceneFile) -> Result | None:
     return result
 
 
-def _kept(path: Path, scene: str, folder: Path) -> str:
+def _kept(path: Path, scene: str, overrides: Sequence[str]) -> str:
     from workflows import store
 
     if not path.exists():
         return "stopped before anything was computed"
-    return f"stopped, {store.load(path).state}, kept in {path}: go on with tribodyn run {scene} --out {folder} --resume"
+    words = [scene, "--out", str(path.parent), *(word for text in overrides for word in ("--set", text))]
+    return f"stopped, {store.load(path).state}, kept in {path}: go on with tribodyn run {shlex.join(words)} --resume"
 
 
 @app.command(name="list")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +36,7 @@ from workflows.fields import displacement_fields, hysteresis_loops
 from workflows.progress import Progress
 from workflows.references import linear_references
 from workflows.result import Patch, Result
-from workflows.scene import Damping, HarmonicLoad, Place, Scene, StaticLoad
+from workflows.scene import Damping, HarmonicLoad, Place, Scene, StaticLoad, unknown_key
 from workflows.scene_file import SceneFile
 
 OUTPUT = "response"
@@ -112,7 +112,7 @@ def is_complete(result: Result, scene: Scene) -> bool:
 def check_names(scene: Scene) -> None:
     """Raise ValueError where a scene names a law or a method that does not exist, before anything is built."""
     law.check_components(law.load(scene.contact.law), scene.contact.components)
-    continuation.load(scene.response.method)
+    response_options(scene)
     if scene.wear is not None:
         wear_law.load(scene.wear.law)
 
@@ -184,13 +184,23 @@ def excite(scene: Scene) -> Excitation:
 
 def follow_response(scene: Scene, balance: HarmonicBalance, advance: Callable[[float, str], None]) -> Branch:
     """The response curve of the unworn contact by the scene's continuation method."""
-    method, response = continuation.load(scene.response.method), scene.response
-    options = {"n_points": response.points, "newton": newton_options(scene), **response.options}
-    try:
-        chosen = method.Options(**options)
-    except TypeError as error:
-        raise ValueError(f"response.options: method {response.method} does not take them ({error})") from None
-    return method.follow(balance, *response_range(scene), chosen, lambda done, wanted: advance(done / wanted, ""))
+    method, options = continuation.load(scene.response.method), response_options(scene)
+    return method.follow(balance, *response_range(scene), options, lambda done, wanted: advance(done / wanted, ""))
+
+
+def response_options(scene: Scene) -> Any:
+    """Options of the scene's continuation method; raises ValueError for one that it does not have."""
+    kind, given = continuation.load(scene.response.method).Options, scene.response.options
+    known = {option.name: option.type for option in fields(kind) if option.name not in ("newton", "guess", "bounds")}
+    for key, value in given.items():
+        if key not in known:
+            raise ValueError(unknown_key(f"response.options.{key}", list(known)))
+        whole = known[key] in (int, "int")
+        if type(value) not in ((int,) if whole else (int, float)):
+            expected = "a whole number" if whole else "a number"
+            raise ValueError(f"response.options.{key}: expected {expected}, got {value!r}")
+    points = {"n_points": scene.response.points} if "n_points" in known else {}
+    return kind(**{**points, "newton": newton_options(scene), **given})
 
 
 def response_range(scene: Scene) -> tuple[float, float]:
@@ -206,7 +216,7 @@ def newton_options(scene: Scene) -> NewtonOptions:
 
 def check_branch(branch: Branch | None) -> None:
     """Raise SolveFailed where a response curve did not come to its end."""
-    if branch is not None and branch.outcome[-1] != CONVERGED:
+    if branch is not None and (branch.outcome[-1] != CONVERGED or branch.end.startswith("ended at")):
         raise SolveFailed(f"the frequency response {branch.end}")
 
 

@@ -12,9 +12,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hbm.branch import CONVERGED
+from hbm.wear_history import WearHistory
 from workflows import maps
 from workflows.result import Result
 from workflows.style import BLUE, GREEN, GREY, INK, ORANGE, RED, STYLE, WEAR_MAP
+
+FAINT = 1e-3  # share of the first preload below which a touch is faint
 
 
 def draw(result: Result, folder: Path) -> list[Path]:
@@ -54,11 +57,11 @@ def frequency_response(result: Result) -> Figure:
         if result.wear is not None and result.wear_steps:
             wear = result.wear
             hertz = wear.omega / (2 * np.pi)
-            unit_cycles, scale_cycles = _cycles(wear.cycles[-1])
+            unit_cycles, scale_cycles = _cycles(shown_cycles(wear))
             axes.plot(hertz, scale * wear.amplitude, color=ORANGE, lw=1.0, zorder=3)
             dots = axes.scatter(
                 hertz, scale * wear.amplitude, 16, scale_cycles * wear.cycles, cmap=WEAR_MAP, zorder=4,
-                label="cycle at each wear step",
+                vmax=scale_cycles * shown_cycles(wear), label="cycle at each wear step",
             )  # fmt: skip
             figure.colorbar(dots, ax=axes, label=f"vibration cycles{unit_cycles}", pad=0.02)
         axes.set(yscale="log", xlabel="frequency / Hz", ylabel=f"amplitude / {unit}", title="Frequency response")
@@ -85,12 +88,12 @@ def amplitude_against_cycles(result: Result) -> Figure:
     """Amplitude and frequency of the cycle that wears, against cycles."""
     wear = _wear(result)
     with _axes(7.2, 5.6, rows=2) as (figure, (upper, lower)):
-        unit_cycles, scale_cycles = _cycles(wear.cycles[-1])
+        scale_cycles = _cycle_axis(lower, wear)
         unit, scale = _length(wear.amplitude.max())
         upper.plot(scale_cycles * wear.cycles, scale * wear.amplitude, ".-", color=BLUE, ms=4)
         upper.set(ylabel=f"amplitude / {unit}", title="Response under wear")
         lower.plot(scale_cycles * wear.cycles, wear.omega / (2 * np.pi), ".-", color=ORANGE, ms=4)
-        lower.set(ylabel="frequency / Hz", xlabel=f"vibration cycles{unit_cycles}")
+        lower.set(ylabel="frequency / Hz")
     return figure
 
 
@@ -98,10 +101,10 @@ def preload_against_cycles(result: Result) -> Figure:
     """Static normal force of the contact against cycles."""
     wear = _wear(result)
     with _axes() as (figure, axes):
-        unit_cycles, scale_cycles = _cycles(wear.cycles[-1])
+        scale_cycles = _cycle_axis(axes, wear)
         unit, scale = ("kN", 1e-3) if wear.preload.max() >= 1e3 else ("N", 1.0)
         axes.plot(scale_cycles * wear.cycles, scale * wear.preload, ".-", color=BLUE, ms=4)
-        axes.set(xlabel=f"vibration cycles{unit_cycles}", ylabel=f"preload / {unit}", title="Contact preload")
+        axes.set(ylabel=f"preload / {unit}", title="Contact preload")
         axes.set_ylim(bottom=0)
     return figure
 
@@ -111,7 +114,7 @@ def depth_against_cycles(result: Result) -> Figure:
     wear, patch = _wear(result), result.patch
     assert patch is not None
     with _axes() as (figure, axes):
-        unit_cycles, scale_cycles = _cycles(wear.cycles[-1])
+        scale_cycles = _cycle_axis(axes, wear)
         unit, scale = _length(wear.depth.max())
         x = scale_cycles * wear.cycles
         mean = wear.depth @ patch.area / patch.area.sum()
@@ -119,7 +122,7 @@ def depth_against_cycles(result: Result) -> Figure:
         axes.plot(x, scale * wear.depth.max(1), color=RED, label="largest")
         axes.plot(x, scale * mean, color=BLUE, label="mean over the area")
         axes.plot(x, scale * wear.depth.min(1), color=GREEN, label="smallest")
-        axes.set(xlabel=f"vibration cycles{unit_cycles}", ylabel=f"total wear depth / {unit}", title="Wear depth")
+        axes.set(ylabel=f"total wear depth / {unit}", title="Wear depth")
         axes.legend(loc="best", fontsize=9)
     return figure
 
@@ -129,9 +132,9 @@ def energy_against_cycles(result: Result) -> Figure:
     wear, patch = _wear(result), result.patch
     assert patch is not None
     with _axes(7.2, 5.6, rows=2, share=False) as (figure, (upper, lower)):
-        unit_cycles, scale_cycles = _cycles(wear.cycles[-1])
+        scale_cycles = _cycle_axis(upper, wear)
         upper.plot(scale_cycles * wear.cycles, wear.energy.sum(1), ".-", color=BLUE, ms=4)
-        upper.set(xlabel=f"vibration cycles{unit_cycles}", ylabel="energy per cycle / J", title="Dissipated energy")
+        upper.set(ylabel="energy per cycle / J", title="Dissipated energy")
         spent = np.concatenate([[0.0], np.cumsum(wear.work.sum(1))[:-1]])
         lower.plot(spent * 1e-6, 1e9 * wear.depth @ patch.area, ".-", color=ORANGE, ms=4)
         lower.set(xlabel="accumulated energy / MJ", ylabel="worn volume / mm³")
@@ -172,9 +175,29 @@ def _axes(width: float = 7.2, height: float = 4.2, rows: int = 1, share: bool = 
         yield figure, figure.subplots(rows, 1, sharex=share)
 
 
-def _wear(result: Result) -> Any:
+def _wear(result: Result) -> WearHistory:
     assert result.wear is not None
     return result.wear
+
+
+def shown_cycles(wear: WearHistory) -> float:
+    """Cycles up to which curves are drawn: all, unless a last faint touch takes more than half of them."""
+    last = float(wear.cycles[-1])
+    faint = np.flatnonzero(wear.preload < FAINT * wear.preload[0])
+    if len(faint) and 0 < wear.cycles[faint[0]] < 0.5 * last:
+        return 1.15 * float(wear.cycles[faint[0]])
+    return last
+
+
+def _cycle_axis(axes: Any, wear: WearHistory) -> float:
+    """Label the axis of cycles, and say where the run ends if that is not drawn; returns the factor of the axis."""
+    shown, last = shown_cycles(wear), float(wear.cycles[-1])
+    unit, scale = _cycles(shown)
+    if shown < last:
+        axes.set_xlim(-0.03 * scale * shown, scale * shown)
+    end = f" (the last touch ends at {scale * last:.3g})" if shown < last else ""
+    axes.set_xlabel(f"vibration cycles{unit}{end}")
+    return scale
 
 
 def _largest_amplitude(result: Result) -> float:

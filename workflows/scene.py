@@ -338,7 +338,7 @@ class Pictures(Table):
 class Solver(Table):
     """Newton's tolerance on the contact displacement relative to its size, and threads of the linear algebra."""
 
-    tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-9
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-8
     threads: Annotated[StrictInt, Field(ge=1)] = 1
 
 

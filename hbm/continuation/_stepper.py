@@ -60,12 +60,20 @@ class Options:
 class Stepper:
     """The point reached and the step to come.
 
-    first : the solution at `start`; the walk sets out in the direction of `stop`
+    first : the solution at `start`; the walk sets out in the direction of `stop`, or of the heading where one is given
     trouble : why the last step that failed did
     segments : the curve behind, without its solutions
     """
 
-    def __init__(self, path: Parameter, options: Options, first: Solution, start: float, stop: float):
+    def __init__(
+        self,
+        path: Parameter,
+        options: Options,
+        first: Solution,
+        start: float,
+        stop: float,
+        heading: Direction | None = None,
+    ):
         self._path, self._options = path, options
         self._newton = replace(options.newton, max_steps=min(options.newton_limit, options.newton.max_steps))
         self._width = options.width * abs(stop - start)
@@ -73,7 +81,8 @@ class Stepper:
         self._reference = first.state.flat
         self._length = 0.0
         self._metric = self._measure(self._reference)
-        forward = self._metric.unit(Direction(np.zeros_like(self._reference), float(np.sign(stop - start))))
+        onward = Direction(np.zeros_like(self._reference), float(np.sign(stop - start)))
+        forward = self._metric.unit(heading or onward)
         self._here = CurvePoint.of(start, first, self._tangent(start, first, forward) or forward)
         self._bend: Direction | None = None
         self._step, self._cap = options.step, options.max_step

@@ -11,6 +11,7 @@ Source  Keller 1977 (pseudo arc length); step control and kinks ours.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from hbm.balance import HarmonicBalance
 from hbm.branch import Branch, BranchBuilder
 from hbm.continuation._curve import CurvePoint, Segment
 from hbm.continuation._stepper import Options, Stepper
+from hbm.newton import Solution
 from hbm.parameter import Parameter
 
 __all__ = ["Options", "follow"]
@@ -47,10 +49,7 @@ def follow(
     bounds = options.bounds or (min(start, stop), max(start, stop))
     if not bounds[0] <= start <= bounds[1]:
         raise ValueError(f"the start, {path.say(start)}, lies outside of the bounds of the continuation")
-    if options.guess is None:
-        first = newton.solve_from_rest(*path.place(start), options.newton)
-    else:
-        first = newton.solve(*path.place(start), options.guess, options.newton)
+    first = _first(path, start, options)
     builder = BranchBuilder(path)
     builder.add(start, first)
     if not first.converged:
@@ -62,6 +61,21 @@ def follow(
             share = abs(builder.value[-1] - start) / abs(stop - start)
             on_point(done, max(done, min(options.max_points, round(done / max(share, 1e-3)))))
     return builder.finish(end)
+
+
+def _first(path: Parameter, start: float, options: Options) -> Solution:
+    """The first solution: from the guess, from rest, or along the curve in the load where that has folds of its own."""
+    balance, omega = path.place(start)
+    if options.guess is not None:
+        return newton.solve(balance, omega, options.guess, options.newton)
+    first = newton.solve_from_rest(balance, omega, options.newton)
+    if first.converged or path.name == parameter.LOAD:
+        return first
+    ramp = follow(parameter.load(balance, omega), 0.0, balance.load_factor, replace(options, bounds=None))
+    if ramp.parameter[-1] != balance.load_factor:
+        return first
+    last = newton.solve(balance, omega, ramp.contact[-1].reshape(first.state.x.shape), options.newton)
+    return replace(last, outcome=last.outcome if last.converged else first.outcome)
 
 
 class _Walk:
