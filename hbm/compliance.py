@@ -1,13 +1,14 @@
-"""Contact compliance: displacement of the contact and of the outputs under contact forces and loads, harmonic by harmonic.
+"""Contact compliance: displacement of contact and outputs under contact forces and loads, harmonic by harmonic.
 
 The contact springs, stuck and closed, are part of the linear system: K_s = K + B^T k B, so that it depends neither on
-the load nor on wear. Its lowest modes Phi carry the dynamics; the rest is expanded in powers of s = i h w around statics,
+the load nor on wear. Its lowest modes Phi carry the dynamics; the rest is expanded in powers of s = i h w:
 
     D(s)^-1 = W(s) + L(s) S(s)^-1 L'(s),   W(s) = sum_k s^k W_k,   W_0 = K_s^-1 - Phi Lambda^-1 Phi^H,
     W_k = -W_0 (C W_(k-1) + M W_(k-2)),    L(s) = (I - s W(s) C) Phi,
     S(s) = Lambda + s C_m + s^2 - s^2 Phi^H C W(s) C Phi,
 
-which holds for any damping matrix; the error falls like (|s| / omega_next)^order and is measured against a direct solve.
+which holds for any damping matrix; the error falls like (|s| / omega_next)^order and is measured against a direct
+solve.
 Source  block elimination of modal coordinates (ours); static correction of truncated modes as in MacNeal 1971.
 """
 
@@ -44,7 +45,9 @@ class Expansion:
     Raises  SingularStuckSystem
     """
 
-    def __init__(self, system: SecondOrderSystem, b: np.ndarray, stiffness: np.ndarray, ports: np.ndarray, s_max: float):
+    def __init__(
+        self, system: SecondOrderSystem, b: np.ndarray, stiffness: np.ndarray, ports: np.ndarray, s_max: float
+    ):
         self.n_port = len(ports)
         self._n_contact = len(b)
         mass = np.asarray(system.mass)
@@ -63,7 +66,8 @@ class Expansion:
             ) from None
         lam, phi = sla.eigh(stuck, mass, subset_by_index=None if n < ALL_MODES_BELOW else (0, CANDIDATES[-1][0] - 1))
         before = np.inf
-        for m, order in [*((m, order) for m, order in CANDIDATES if m < len(lam)), (len(lam), 1 if len(lam) == n else 8)]:
+        last = (len(lam), 1 if len(lam) == n else 8)
+        for m, order in (*(c for c in CANDIDATES if c[0] < len(lam)), last):
             self._build(lam[:m], phi[:, :m], factor, order)
             self.error = self._measure_error(1j * s_max)
             # near a resonance rounding of the direct solve itself is what remains: more modes would not help
@@ -235,7 +239,8 @@ class CompliancePoint:
         basis = compliance.basis
         self._harmonics = np.asarray(basis.harmonics, float)
         self._ports = [
-            [expansion.at(1j * basis.harmonics[p] * omega) for p in positions] for expansion, positions in compliance.groups
+            [expansion.at(1j * basis.harmonics[p] * omega) for p in positions]
+            for expansion, positions in compliance.groups
         ]
         n, stop = compliance.n_contact, compliance.n_contact + compliance.n_load
         excited = slice(n, stop) if compliance.base is None else slice(0, stop)
@@ -308,7 +313,7 @@ class CompliancePoint:
 
 
 class JacobianProduct:
-    """G restricted to active rows, to the accuracy of a Newton direction: W_0 and the lowest modes, single precision."""
+    """G restricted to active rows, as exact as a Newton direction needs: W_0 and the lowest modes, single precision."""
 
     def __init__(self, compliance: ContactCompliance, ports: list[list[PortCompliance]], rows: np.ndarray):
         self._basis = compliance.basis

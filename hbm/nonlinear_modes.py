@@ -294,7 +294,8 @@ class _Problem:
     def result(self, solved: list[_Solved]) -> Backbone:
         points = [p for p, _, _ in solved]
         amplitude = np.array([p.a for p in points]) * self.per_amplitude
-        work = [float(self.basis.work_per_cycle(p.cycle.force, p.x).sum()) for p in points]
+        t = self.balance.parameters.tangential
+        work = [float(self.basis.work_per_cycle(p.cycle.force[:, t], p.x[:, t]).sum()) for p in points]
         last = solved[-1][1]
         end = f"reached {amplitude[-1]:.6g} m" if last == CONVERGED else f"ended at {amplitude[-1]:.6g} m: {last}"
         return Backbone(

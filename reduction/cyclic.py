@@ -19,7 +19,7 @@ from fem import wheel
 from fem.cyclic import Sector, at_index, projected, seam_map
 from fem.hermitian import hermitian_modes
 from fem.system import SecondOrderSystem
-from reduction.craig_bampton import POINT_LOAD, craig_bampton
+from reduction.craig_bampton import POINT_LOAD, REPORTED_MODES, craig_bampton
 from reduction.linear import stuck_stiffness
 from reduction.model import ReducedModel
 
@@ -84,8 +84,8 @@ def travelling_wave(
     damping : makes the damping matrix of each small system, such as partial(modal_damping, ratio=0.01)
     cutoff : highest frequency [Hz] of the modes that then stand for seam, left shroud and fixed-interface modes (3.20);
         None keeps all these coordinates
-    Returns the model whose system, interface and basis are those of harmonic 1; coordinates are the relative
-        displacements, then accessories, then the rest. One object serves all harmonics of the same index
+    Returns the model whose system and interface are those of harmonic 1; coordinates are the relative displacements,
+        then accessories, then the rest; `reconstruct` takes the harmonic. One object serves all harmonics of one index
     """
     index_of = _Indices(reduced, damping, cutoff)
     n_sectors = reduced.sector.n_sectors
@@ -97,7 +97,8 @@ def travelling_wave(
         return reduced.basis @ index_of(h * engine_order % n_sectors)[2]
 
     system, B = per_harmonic(1)
-    info = {**reduced.info, "n_sectors": n_sectors, "engine_order": engine_order, "n_coordinates": system.n_dof}
+    omega, _ = hermitian_modes(system.stiffness, system.mass, min(REPORTED_MODES, system.n_dof))
+    info = {**_shared_info(reduced), "engine_order": engine_order, "free_frequency": omega / (2 * np.pi)}
     interface = replace(reduced.sector.interface, B=B)
     return ReducedModel(system, interface, None, info, per_harmonic, harmonic_basis)
 
@@ -113,7 +114,13 @@ def wheel_model(
     system, interface = wheel.assemble(reduced.sector, stiffness)
     if damping is not None:
         system = replace(system, damping=damping(system))
-    return ReducedModel(system, interface, None, {**reduced.info, "n_sectors": reduced.sector.n_sectors})
+    return ReducedModel(system, interface, None, _shared_info(reduced))
+
+
+def _shared_info(reduced: ReducedSector) -> dict[str, object]:
+    """Facts that hold for any model of the wheel; frequencies of a sector that is joined to nothing do not."""
+    kept = ("masters", "n_full", "n_masters", "n_modes", "factorisation", "first_omitted_frequency")
+    return {"n_sectors": reduced.sector.n_sectors, **{name: reduced.info[name] for name in kept}}
 
 
 class _Indices:

@@ -79,7 +79,7 @@ def test_excitation_pays_for_friction(sectors):
         force = one.basis.to_real(np.array([0, one.excitation.loads[1, "shaker"], 0, 0]))
         friction = one.energy(state).sum()
         assert friction > 1e-3
-        assert one.basis.work_per_cycle(force, driven) == pytest.approx(friction, rel=1e-7)
+        assert one.basis.work_per_cycle(force, driven) == pytest.approx(friction, rel=1e-5)
 
 
 def test_left_face_gets_what_the_right_one_of_the_neighbour_gives(sectors):

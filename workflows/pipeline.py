@@ -169,7 +169,7 @@ def make_model(scene: Scene, part: Part, reduced: ReducedModel) -> Model:
     parameters = law.ContactParameters.of(
         contact.components, stiffness, friction=contact.friction, gap=reduced.interface.gap
     )
-    basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples)
+    basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples, scene.harmonics.transitions)
     balance = HarmonicBalance(reduced, contact.law, parameters, basis, excite(scene), response_range(scene)[1])
     return Model(part, reduced, balance)
 

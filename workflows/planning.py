@@ -78,7 +78,7 @@ def plan(file: SceneFile) -> Plan:
     nodes = mesh.doflocs.shape[1]
     free = free_dofs(3 * nodes, [Clamp(group) for group in scene.geometry.fixed], node_sets)
     pairs, masters = _contact(scene, mesh, node_sets, free)
-    basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples)
+    basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples, scene.harmonics.transitions)
     contact = pairs * len(scene.contact.components)
     modes = scene.reduction.modes
     model = masters + (modes if modes is not None else 50)

@@ -222,6 +222,7 @@ class Harmonics(Table):
 
     kept: tuple[Annotated[StrictInt, Field(ge=0)], ...] = (0, 1)
     samples: Annotated[StrictInt, Field(ge=4, le=65536)] = 128
+    transitions: Literal["sampled", "located"] = "sampled"
 
     @model_validator(mode="after")
     def _resolved(self) -> Harmonics:
@@ -300,7 +301,7 @@ class Wear(Table):
     """Wear of the patch until contact is lost or max_steps are done.
 
     rule : "thesis" takes `step`, "error_controlled" takes `tolerance`, its local error as a share
-    lost_below : share of the first preload below which contact counts as lost; 0 waits until the last touch ends
+    lost_below : share of the first preload at which the run ends; 0 waits until the last touch ends
     at, mission : one place where all cycles are taken, or a list of duties that share them
     """
 
