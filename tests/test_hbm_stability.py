@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
-from hbm import newton, time_integration
+from hbm import newton, parameter, time_integration
 from hbm.balance import HarmonicBalance
 from hbm.branch import BranchBuilder
 from hbm.excitation import Excitation
@@ -107,7 +107,7 @@ def test_fold_of_a_lifting_mass_is_marked_where_the_branch_turns():
     basis = HarmonicBasis((0, 1, 2, 3, 4, 5), 512)
     balance = HarmonicBalance(oscillator(mass, stiffness, 0.01), "jenkins", parameters, basis, excitation, 300.0)
     lift = 50.0 / (stiffness + kn)  # amplitude at which contact is lost
-    builder = BranchBuilder(balance)
+    builder = BranchBuilder(parameter.of(balance))
 
     def equations(unknown, amplitude):
         x = np.zeros((1, 2, basis.n_coeff))
@@ -122,7 +122,7 @@ def test_fold_of_a_lifting_mass_is_marked_where_the_branch_turns():
         x[0, 1] = guess[:-1] * lift
         state = balance.evaluate(guess[-1] * 200.0, x)
         assert np.abs(state.residual).max() < 1e-9 * lift
-        builder.add(Solution(state, "converged", 0, 0, ()))
+        builder.add(state.omega, Solution(state, "converged", 0, 0, ()))
     branch = builder.finish("reached the amplitude asked for")
     turn = int(np.argmax(branch.omega))
     assert 10 < turn < 70
