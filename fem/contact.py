@@ -34,6 +34,33 @@ def ground_contact(
     return _interface(mesh, surface(mesh, facets, vertices_only), t1, components, gap)
 
 
+def plane_contact(
+    mesh: Any,
+    facets: np.ndarray,
+    towards: Sequence[float],
+    t1: Sequence[float],
+    components: Sequence[str] = COMPONENTS,
+    gap: float | np.ndarray = 0.0,
+    vertices_only: bool = False,
+    inclination: float = 0.0,
+) -> ContactInterface:
+    """Nodes of a face against a plane ground that touches the nearest of them, plus a gap.
+
+    towards : (3,) in which every pair closes, across the plane; inclination : of the plane about t1, by the right hand
+        [rad], so small that it does not change the direction. The gap of a pair is its distance from the plane along
+        that direction: what the face is bowed, and what the plane leans away.
+    Other arguments, returns and errors as ground_contact; ValueError too for an inclination of a quarter turn or more
+    """
+    if not abs(inclination) < np.pi / 2:
+        raise ValueError(f"the inclination of a contact is {inclination} rad; keep it far below a quarter turn")
+    face = surface(mesh, facets, vertices_only)
+    normal = unit(towards, "the direction in which a plane contact closes")
+    face = replace(face, normals=np.tile(normal, (len(face.nodes), 1)))
+    along = contact_frames(face.normals, t1)[0, 1]
+    away = np.tan(inclination) * (face.points @ along) - face.points @ normal
+    return _interface(mesh, face, t1, components, gap + away - away.min())
+
+
 def pair_contact(
     mesh: Any,
     facets_1: np.ndarray,

@@ -57,14 +57,18 @@ class Expansion:
         self._system = (mass, damping, stuck)
         self._ports = ports
         n = len(mass)
+        loose = SingularStuckSystem(
+            "the part can move as a rigid body even with all contacts stuck: clamp it, add a spring, "
+            "or raise the contact stiffness"
+        )
         try:
             factor = sla.cho_factor(stuck)
         except np.linalg.LinAlgError:
-            raise SingularStuckSystem(
-                "the part can move as a rigid body even with all contacts stuck: clamp it, add a spring, "
-                "or raise the contact stiffness"
-            ) from None
+            raise loose from None
         lam, phi = sla.eigh(stuck, mass, subset_by_index=None if n < ALL_MODES_BELOW else (0, CANDIDATES[-1][0] - 1))
+        # a rigid mode comes out of the eigenvalue problem as rounding of the stiffest ones, of either sign
+        if lam[0] <= n * np.finfo(float).eps * np.max(np.diag(stuck).real / np.diag(mass).real):
+            raise loose
         before = np.inf
         last = (len(lam), 1 if len(lam) == n else 8)
         for m, order in (*(c for c in CANDIDATES if c[0] < len(lam)), last):

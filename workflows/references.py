@@ -25,13 +25,20 @@ def linear_references(balance: HarmonicBalance, output: str, start: float, stop:
 
 
 def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: str, omega: np.ndarray) -> np.ndarray:
-    """Amplitude by the lowest modes and the static remainder of the others; off by (h w / w_omitted)^2 of that."""
+    """Amplitude by the lowest modes and the static remainder of the others; off by (h w / w_omitted)^2 of that.
+
+    springs : (n_pair, n_component) stuck contact [N/m], through which a moving body 2 pulls, or None for no contact
+    """
     basis = balance.basis
+    base = None if balance.excitation.base is None else basis.to_complex(balance.excitation.base)
     amplitudes = np.zeros((len(omega), len(basis.harmonics)), complex)
     for position, h in enumerate(basis.harmonics):
         system, B = balance.model.at_harmonic(h)
         loads = [value * system.loads[name] for (order, name), value in balance.excitation.loads.items() if order == h]
-        if not loads:
+        force = np.sum([np.zeros(system.n_dof), *loads], axis=0)
+        if springs is not None and base is not None:
+            force = force + B.conj().T @ (springs.ravel() * base[:, position])
+        if not force.any():
             continue
         stiffness = system.stiffness if springs is None else stuck_stiffness(system.stiffness, B, springs)
         try:
@@ -40,7 +47,7 @@ def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: st
             return np.full(len(omega), np.nan)
         lam, phi = sla.eigh(stiffness, system.mass, subset_by_index=(0, min(MODES, system.n_dof) - 1))
         damping = np.zeros((len(lam),) * 2) if system.damping is None else phi.conj().T @ system.damping @ phi
-        row, force = system.outputs[output], np.sum(loads, axis=0)
+        row = system.outputs[output]
         modal = phi.conj().T @ force
         remainder = row @ sla.cho_solve(factor, force) - (row @ phi) @ (modal / lam)
         for i, s in enumerate(1j * h * omega):
