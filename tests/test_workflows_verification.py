@@ -47,16 +47,16 @@ def test_the_command_compares_and_draws(folder: Path, capsys: pytest.CaptureFixt
 
 
 def test_more_harmonics_come_closer(folder: Path) -> None:
-    """The waveform's difference falls with the harmonics kept, and the amplitude agrees within 1 % in the end."""
+    """The differences fall with the harmonics kept: this beam lifts and slides, its third harmonic is near a mode."""
     result = store.load(folder / "result.h5")
     found = []
-    for kept in ("[0, 1]", "[0, 1, 2, 3]", "[0, 1, 2, 3, 4, 5, 6, 7, 8, 9]"):
-        override = [f"harmonics.kept={kept}"]
-        found.append(verification.compare(result, 2 * np.pi * 500, None, override, 512, Progress()).found)
-    waveform = [one.waveform["response"] for one in found]
-    assert waveform[0] > waveform[1] > waveform[2]
-    assert abs(found[2].amplitude["response"]) < 0.01
-    assert abs(found[2].preload) < 0.01
+    for highest in (3, 9, 15):
+        override = [f"harmonics.kept={list(range(highest + 1))}"]
+        found.append(verification.compare(result, 2 * np.pi * 700, None, override, 512, Progress()).found)
+    assert all(one.outcome == "converged" for one in found)
+    for values in zip(*((one.waveform["response"], abs(one.energy), one.largest) for one in found), strict=True):
+        assert values[0] > 2 * values[1] > 4 * values[2]
+    assert found[2].largest < 0.03
 
 
 def test_a_worn_row_is_compared_where_it_was_solved(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
