@@ -154,9 +154,8 @@ def _with_sliders_held(balance: HarmonicBalance, state: State) -> State:
 
 def _check(balance: HarmonicBalance) -> list[int]:
     """Positions of the components whose sliders are the memory of the law."""
-    components = balance.parameters.components
-    tangential = [i for i, c in enumerate(components) if c != "n"]
-    if balance.law.n_state(components) != len(tangential) or not tangential:
+    tangential = balance.parameters.tangential
+    if balance.law.n_state(balance.parameters.components) != len(tangential) or not tangential:
         raise ValueError(f"contact law '{balance.law_name}' keeps no slider: there is no residual shear to bound")
     if not balance.basis.has_static:
         raise ValueError("residual shear is a static force: keep harmonic 0 to bound the response")

@@ -70,7 +70,7 @@ class PeriodicMotion:
     omega : [rad/s]; time : (n_step,) instants from T / n_step to T [s]
     x, force : (n_pair, n_component, n_step) relative displacement [m] and contact force [N]
     outputs : (n_output, n_step) observed outputs [m]
-    energy : (n_pair,) work of the contact force over the period, integral of f dx [J]
+    energy : (n_pair,) work of the tangential contact force over the period, integral of f dx [J]
     preload : mean normal force of the whole contact [N], zero where the law has no normal component
     status : (n_pair,) bits of what happened: STICKS | SLIPS | SEPARATES
     drift : change of the state over the period, relative to the vibration (both as square roots of energy)
@@ -334,7 +334,8 @@ def _to_periodic(stepper: TimeStepper, motion: Motion, options: Options, with_sl
 def _result(stepper: TimeStepper, record: Record, drift: float, periods: int, outcome: str) -> PeriodicMotion:
     components = stepper.balance.parameters.components
     before = np.roll(record.xs, 1, axis=0), np.roll(record.fs, 1, axis=0)
-    work = 0.5 * ((record.fs + before[1]) * (record.xs - before[0])).sum(axis=(0, 2))
+    work = 0.5 * ((record.fs + before[1]) * (record.xs - before[0])).sum(axis=0)
+    work = work[:, stepper.balance.parameters.tangential].sum(axis=1)
     preload = float(record.fs[:, :, components.index("n")].mean(axis=0).sum()) if "n" in components else 0.0
     return PeriodicMotion(
         omega=stepper.omega,

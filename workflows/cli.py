@@ -9,7 +9,7 @@ import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import cyclopts
 from cyclopts import Parameter
@@ -130,6 +130,32 @@ def list_() -> None:
     """List the scenes that come with the program."""
     for name in scene_file.names():
         print(f"{name:12} {scene_file.title(name)}")
+
+
+@app.command
+def trade(
+    scene: str,
+    *,
+    knob: Literal["wear_step"] = "wear_step",
+    overrides: Overrides = (),
+    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+) -> None:
+    """Measure what a knob costs and what it is worth, against a finer reference on the same scene.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene or a .toml file.
+    knob
+        wear_step: table 4.2 of the thesis with life added, and the error-controlled rule.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import trade as trading
+    from workflows.progress import console_progress
+
+    table = trading.wear_step(scene, console_progress().say, overrides)
+    print(json.dumps(trading.as_records(table), indent=2) if as_json else trading.as_text(table))
 
 
 @app.command

@@ -12,10 +12,12 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 import fem.part
-from fem.constraints import Clamp
-from fem.loads import NodalForce
+from fem.constraints import Clamp, NoMeanRotation
+from fem.interface import COMPONENTS
+from fem.loads import Load, NodalForce, Pressure
 from fem.material import Material
 from fem.part import Part
+from fem.springs import Spring
 from geometry import mesh as mesh_reader
 from geometry import parts
 from hbm import continuation, error_controlled_rule, law, thesis_rule, wear_law
@@ -29,6 +31,8 @@ from hbm.operating_point import AtFrequency, AtPeak, BesidePeak
 from hbm.wear_history import WearRow, history
 from reduction.craig_bampton import craig_bampton
 from reduction.damping import modal_damping, rayleigh
+from reduction.held import hold
+from reduction.linear import stuck_stiffness
 from reduction.model import ReducedModel
 from workflows import store
 from workflows.description import described
@@ -36,7 +40,7 @@ from workflows.fields import displacement_fields, hysteresis_loops
 from workflows.progress import Progress
 from workflows.references import linear_references
 from workflows.result import Patch, Result
-from workflows.scene import Damping, HarmonicLoad, Place, Scene, StaticLoad, unknown_key
+from workflows.scene import Place, Scene, StaticLoad, unknown_key
 from workflows.scene_file import SceneFile
 
 OUTPUT = "response"
@@ -135,57 +139,112 @@ def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]
 
 
 def make_part(scene: Scene, mesh: Any, node_sets: dict[str, np.ndarray]) -> Part:
-    """Mass, stiffness, loads, output and contact of the mesh, held where the scene says."""
+    """Mass, stiffness, loads, outputs and contact of the mesh, held where the scene says."""
     contact, response = scene.contact, scene.response
-    loads: dict[str, StaticLoad | HarmonicLoad] = {**scene.loads.static, **scene.loads.harmonic}
     return fem.part.build(
         mesh,
         node_sets,
         Material(scene.material.young, scene.material.poisson, scene.material.density),
-        [Clamp(group) for group in scene.geometry.fixed],
+        clamps(scene),
         [
             fem.part.Contact(
-                contact.group, contact.t1, contact.opposite, contact.components, contact.gap, contact.vertices_only
+                face, contact.t1, contact.opposite, contact.components, contact.gap, contact.vertices_only,
+                contact.plane, contact.inclination,
             )
+            for face in contact.groups
         ],
-        {name: NodalForce(load.group, load.direction) for name, load in loads.items()},
-        {OUTPUT: NodalForce(response.group, response.direction)},
-    )
+        {name: make_load(load) for name, load in {**scene.loads.static, **scene.loads.harmonic}.items()},
+        {
+            name: NodalForce(output.group, output.direction)
+            for name, output in {OUTPUT: response, **response.others}.items()
+        },
+        springs=springs(scene),
+        held=[] if scene.geometry.no_turning is None else [NoMeanRotation(scene.geometry.no_turning)],
+    )  # fmt: skip
+
+
+def clamps(scene: Scene) -> list[Clamp]:
+    """What holds the part, whole groups or along some axes."""
+    geometry = scene.geometry
+    return [*(Clamp(group) for group in geometry.fixed), *(Clamp(*item) for item in geometry.fixed_axes.items())]
+
+
+def springs(scene: Scene) -> list[Spring]:
+    """Joints that give way."""
+    return [Spring(s.group, s.direction, s.stiffness, s.opposite) for s in scene.springs.values()]
+
+
+def make_load(load: StaticLoad) -> Load:
+    """A force at the nodes of a group, or a pressure on a face."""
+    return Pressure(load.group) if load.direction is None else NodalForce(load.group, load.direction)
 
 
 def reduce_part(scene: Scene, part: Part) -> ReducedModel:
     """The part on its contact and load nodes and a few modes, with the scene's damping."""
     reduced = craig_bampton(part.system, part.interface, scene.reduction.modes, scene.reduction.cutoff)
-    return reduced.with_damping(damping_matrix(scene.damping, reduced))
+    reduced = hold(reduced, part.held)
+    return reduced.with_damping(damping_matrix(scene, reduced))
 
 
-def damping_matrix(damping: Damping, reduced: ReducedModel) -> np.ndarray | None:
+def damping_matrix(scene: Scene, reduced: ReducedModel) -> np.ndarray | None:
     """Damping matrix (n, n) [N s/m] of the reduced model, None where the scene has no damping."""
+    damping, system = scene.damping, reduced.system
     if damping.modal is not None:
-        return modal_damping(reduced.system, damping.modal)
+        if damping.state == "stuck":
+            K = stuck_stiffness(system.stiffness, reduced.interface.B, contact_stiffness(scene, reduced))
+            system = replace(system, stiffness=K)
+        return modal_damping(system, damping.modal)
     if damping.mass is not None or damping.stiffness is not None:
-        return rayleigh(reduced.system, damping.mass or 0.0, damping.stiffness or 0.0)
+        return rayleigh(system, damping.mass or 0.0, damping.stiffness or 0.0)
     return None
+
+
+def contact_stiffness(scene: Scene, reduced: ReducedModel) -> np.ndarray:
+    """Contact springs (n_pair, n_component) [N/m]."""
+    return reduced.interface.stiffness(scene.contact.tangential_stiffness or 0.0, scene.contact.normal_stiffness or 0.0)
 
 
 def make_model(scene: Scene, part: Part, reduced: ReducedModel) -> Model:
     """The harmonic balance of the scene."""
     contact = scene.contact
-    stiffness = reduced.interface.stiffness(contact.tangential_stiffness, contact.normal_stiffness)
     parameters = law.ContactParameters.of(
-        contact.components, stiffness, friction=contact.friction, gap=reduced.interface.gap
+        contact.components,
+        contact_stiffness(scene, reduced),
+        friction=contact.friction or 0.0,
+        gap=reduced.interface.gap,
     )
     basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples, scene.harmonics.transitions)
-    balance = HarmonicBalance(reduced, contact.law, parameters, basis, excite(scene), response_range(scene)[1])
-    return Model(part, reduced, balance)
+    excitation, omega_max = excite(scene, part, basis), response_range(scene)[1]
+    return Model(part, reduced, HarmonicBalance(reduced, contact.law, parameters, basis, excitation, omega_max))
 
 
-def excite(scene: Scene) -> Excitation:
-    """The loads of the scene: F cos(h w t + phase) is the complex amplitude F exp(i phase)."""
-    loads: dict[tuple[int, str], complex] = {(0, name): load.value for name, load in scene.loads.static.items()}
+def excite(scene: Scene, part: Part, basis: HarmonicBasis) -> Excitation:
+    """The loads of the scene, F cos(h w t + phase) as amplitude F exp(i phase), and the motion of the ground."""
+    loads: dict[tuple[int, str], complex] = {(0, name): load.amplitude for name, load in scene.loads.static.items()}
     for name, load in scene.loads.harmonic.items():
-        loads[load.harmonic, name] = load.value * np.exp(1j * load.phase)
-    return Excitation(loads)
+        loads[load.harmonic, name] = load.amplitude * np.exp(1j * load.phase)
+    return Excitation(loads, ground_motion(scene, part, basis))
+
+
+def ground_motion(scene: Scene, part: Part, basis: HarmonicBasis) -> np.ndarray | None:
+    """Motion of the ground (n_pair * n_component, n_coeff) [m] along the contact components, None where it rests.
+
+    Raises  ValueError where a face has no contact or a harmonic is not kept
+    """
+    if not scene.motion:
+        return None
+    i = part.interface
+    amplitudes = np.zeros((i.n_pair, len(i.components), len(basis.harmonics)), complex)
+    for face, motion in scene.motion.items():
+        if face not in part.pairs:
+            raise ValueError(f'motion.{face}: "{face}" is no contact face, the contact has {", ".join(part.pairs)}')
+        rows = i.frames[part.pairs[face]][:, [COMPONENTS.index(c) for c in i.components]]
+        for h, value in ((0, motion.static), (1, motion.harmonic * np.exp(1j * motion.phase))):
+            if value != 0 and h not in basis.harmonics:
+                raise ValueError(f"motion.{face} moves in harmonic {h}: keep it in harmonics.kept")
+            if h in basis.harmonics:
+                amplitudes[part.pairs[face], :, basis.harmonics.index(h)] = value * (rows @ np.array(motion.direction))
+    return basis.to_real(amplitudes).reshape(-1, basis.n_coeff)
 
 
 def follow_response(scene: Scene, balance: HarmonicBalance, advance: Callable[[float, str], None]) -> Branch:

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from fem.constraints import Clamp, free_dofs, named
+from fem.constraints import free_dofs, named
 from hbm.harmonics import HarmonicBasis
 from reduction.craig_bampton import POINT_LOAD
-from workflows.pipeline import check_names, make_mesh
+from workflows.pipeline import check_names, clamps, make_mesh
 from workflows.scene import Scene
 from workflows.scene_file import SceneFile
 
@@ -76,7 +76,7 @@ def plan(file: SceneFile) -> Plan:
     with tempfile.TemporaryDirectory() as folder:
         mesh, node_sets = make_mesh(file, Path(folder))
     nodes = mesh.doflocs.shape[1]
-    free = free_dofs(3 * nodes, [Clamp(group) for group in scene.geometry.fixed], node_sets)
+    free = free_dofs(3 * nodes, clamps(scene), node_sets)
     pairs, masters = _contact(scene, mesh, node_sets, free)
     basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples, scene.harmonics.transitions)
     contact = pairs * len(scene.contact.components)
@@ -112,18 +112,23 @@ def plan(file: SceneFile) -> Plan:
 
 def _contact(scene: Scene, mesh: object, node_sets: dict[str, np.ndarray], free: np.ndarray) -> tuple[int, int]:
     """Number of node pairs, and of master DOFs that the contact, point loads and the output make."""
-    faces = [scene.contact.group, *([] if scene.contact.opposite is None else [scene.contact.opposite])]
-    points = [(load.group, load.direction) for load in scene.loads.static.values()]
-    points += [(load.group, load.direction) for load in scene.loads.harmonic.values()]
-    points += [(scene.response.group, scene.response.direction)]
+    contact = scene.contact
+    faces = [*contact.groups, *([] if contact.opposite is None else [contact.opposite])]
+    loads = [*scene.loads.static.values(), *scene.loads.harmonic.values()]
+    points = [(load.group, load.direction) for load in loads if load.direction is not None]
+    points += [(output.group, output.direction) for output in (scene.response, *scene.response.others.values())]
     nodes = [named(node_sets, name, "face") for name in faces]
     corners = np.arange(int(mesh.nvertices))  # type: ignore[attr-defined]
-    if scene.contact.vertices_only:
+    if contact.vertices_only:
         nodes = [np.intersect1d(side, corners) for side in nodes]
-    masters = [(side[:, None] * 3 + np.arange(3)).ravel() for side in nodes]
+    axes = np.arange(3)
+    if contact.plane is not None and contact.components == ("n",):
+        axes = np.flatnonzero(contact.plane)
+    masters = [(side[:, None] * 3 + axes).ravel() for side in nodes]
     touched = [(named(node_sets, group)[:, None] * 3 + np.flatnonzero(axis)).ravel() for group, axis in points]
     masters += [dofs for dofs in touched if len(dofs) <= POINT_LOAD]
-    return len(nodes[0]), len(np.intersect1d(np.concatenate(masters), free))
+    pairs = sum(len(side) for side in nodes[: len(contact.groups)])
+    return pairs, len(np.intersect1d(np.concatenate(masters), free))
 
 
 def _wear(scene: Scene) -> tuple[int | None, int]:
