@@ -77,7 +77,7 @@ def test_a_worn_row_is_compared_where_it_was_solved(folder: Path, capsys: pytest
     ("arguments", "words"),
     [
         (["--at", "410"], "--at: expected"),
-        (["--at", "-3 Hz"], "outside what the scene models"),
+        (["--at=-3 Hz"], "outside what the scene models"),
         (["--at", "5 kHz"], "change response.frequency"),
         (["--row", "9"], "no wear row 9: it has 0 to"),
         (["--at", "500 Hz", "--steps", "3"], "at least 8"),
