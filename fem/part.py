@@ -15,6 +15,7 @@ from fem.elements import coordinates
 from fem.interface import COMPONENTS, ContactInterface
 from fem.loads import Load, NodalForce
 from fem.material import Material
+from fem.springs import Spring
 from fem.system import SecondOrderSystem
 
 
@@ -72,14 +73,16 @@ def build(
     loads: Mapping[str, Load],
     outputs: Mapping[str, NodalForce],
     order: int | None = None,
+    springs: Sequence[Spring] = (),
 ) -> Part:
     """Assemble a part, hold it, and say where it touches, is loaded and is watched.
 
     mesh, node_sets : as geometry.mesh.read gives them; material : one, or subdomain name -> material
-    order : quadrature order, 5 unless told
+    order : quadrature order, 5 unless told; springs : joints that give way, to the ground or between sets
     Raises  ValueError where a name is unknown or a group is empty, one sentence
     """
     M, K = assemble(mesh, material, order)
+    K = sum((spring.matrix(mesh, node_sets) for spring in springs), start=K)
     free = free_dofs(K.shape[0], clamps, node_sets)
     interface = join([contact.build(mesh) for contact in contacts])
     system = SecondOrderSystem(
