@@ -24,7 +24,7 @@ class Spring:
 
     On a face of some extent it also resists tilting: a rotational stiffness follows from where its shares sit.
     nodes : name of a face or node set; direction : (3,), need not be a unit vector
-    stiffness : of the whole joint, >= 0 [N/m]; opposite : name of the matching set across the joint, None for the ground
+    stiffness : of the whole joint, >= 0 [N/m]; opposite : name of the matching set across the joint, else the ground
     """
 
     nodes: str
