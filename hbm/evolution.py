@@ -1,101 +1,127 @@
-"""Wear, step by step, until the contact is lost: the rule of the thesis.
-
-Each step takes the cycle at its operating point, wears every pair as if the cycle repeated Z times, and moves the gap;
-Z is what lets the deepest pair wear by the largest depth allowed for one step.
-Source  Tamatam 2021, eq. 3.29-3.31 and figure 3.6.
-"""
+"""What every wear run shares: the problem, the wear rate of one state, and when a run is over."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from hbm import law as contact_law
 from hbm import newton, wear_law
 from hbm.balance import HarmonicBalance
-from hbm.operating_point import AtFrequency, AtPeak, OperatingPoint
-from hbm.wear_history import WearHistory, WearRow, history
+from hbm.operating_point import OperatingPoint, Site
+from hbm.wear_history import WearRow
 
 LOST = "contact lost at every pair"
 
 
 @dataclass(frozen=True)
-class WearProblem:
-    """What wears, where the cycle is taken, and by which law.
+class Duty:
+    """A part of the mission: `share` of all cycles run at `site`, with the harmonic loads times `load`."""
 
-    balance : the unworn problem; site : where the cycle is taken
+    site: Site
+    share: float = 1.0
+    load: float = 1.0
+
+
+@dataclass(frozen=True)
+class WearProblem:
+    """What wears, where the cycles are taken, and by which law.
+
+    balance : the unworn problem; mission : its duties, whose shares sum to one
     law : name of a wear law; coefficient : (n_pair,) or scalar, in the unit the law states; area : (n_pair,) [m2]
+    lost_below : contact counts as lost when the preload falls below this share of its first value; the last touch
+        of a vibrating contact wears ever more slowly, so that the time until it ends has no limit (see README)
     """
 
     balance: HarmonicBalance
-    site: AtFrequency | AtPeak
+    mission: tuple[Duty, ...]
     law: str
     coefficient: np.ndarray | float
     area: np.ndarray
+    lost_below: float = 0.0
+    spread: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        shares = [duty.share for duty in self.mission]
+        if not self.mission or min(shares) < 0 or abs(sum(shares) - 1) > 1e-9:
+            raise ValueError(f"the shares of the mission's duties must be >= 0 and sum to 1, not {shares}")
+        coefficient = np.array(np.broadcast_to(np.asarray(self.coefficient, float), self.area.shape))
+        if not np.all(np.isfinite(coefficient)) or np.any(coefficient < 0):
+            raise ValueError("the wear coefficient must be finite and >= 0 at every pair")
+        object.__setattr__(self, "spread", coefficient)
+
+    def at_depth(self, depth: np.ndarray) -> HarmonicBalance:
+        """The balance with the gap that a wear depth (n_pair,) [m] has opened."""
+        return self.balance.with_gap(self.balance.parameters.gap + depth)
 
 
-def evolve(
-    problem: WearProblem,
-    step_depth: float,
-    max_steps: int = 10000,
-    on_row: Callable[[WearRow], None] | None = None,
-    resume: WearHistory | None = None,
-) -> WearHistory:
-    """Wear the contact by the thesis's rule until every pair is separated over the whole cycle.
+@dataclass(frozen=True)
+class WearState:
+    """A worn contact with its solved duties.
 
-    step_depth : largest depth that one step may wear, v_w,max [m]; Z is floored to whole cycles, but at least one
-    on_row : called with each finished row, for checkpoints and progress
-    resume : rows of an interrupted run of the same problem; the run goes on after them to the same numbers
-    Returns the history; its `end` says why it stopped, also where a solve failed
+    depth : (n_pair,) [m]; cycles : passed before; points : one per duty
+    rate : (n_pair,) wear depth per cycle [m]; work : (n_pair,) friction work per cycle [J], both averaged over the mission
     """
-    if not step_depth > 0:
-        raise ValueError("the wear step must be a positive depth")
+
+    depth: np.ndarray
+    cycles: float
+    points: tuple[OperatingPoint, ...]
+    rate: np.ndarray
+    work: np.ndarray
+    solves: int
+
+    @property
+    def failure(self) -> str:
+        """Sentence on the first duty that did not converge, empty where all did."""
+        for point in self.points:
+            if not point.solution.converged:
+                return f"solve failed at {point.state.omega / (2 * np.pi):.6g} Hz: {point.solution.outcome}"
+        return ""
+
+    @property
+    def separated(self) -> bool:
+        """Whether no pair touches at any moment of any duty."""
+        return all(bool(np.all(point.state.cycle.status == contact_law.SEPARATES)) for point in self.points)
+
+
+def assess(problem: WearProblem, depth: np.ndarray, cycles: float, before: WearState | None) -> WearState:
+    """Solve every duty at a wear depth, warm from a neighbouring state, and apply the wear law."""
     rate_of = wear_law.load(problem.law).depth_rate
-    coefficient = np.broadcast_to(np.asarray(problem.coefficient, float), problem.area.shape)
-    initial_gap = problem.balance.parameters.gap
-    rows: list[WearRow] = []
-    depth, cycles = np.zeros_like(problem.area), 0.0
-    if resume is not None and len(resume.cycles):
-        rows = resume.rows()
-        depth, cycles = rows[-1].depth + rows[-1].worn, rows[-1].cycles + rows[-1].cycles_in_step
-        if rows[-1].cycles_in_step == 0:
-            return resume
-    end = f"stopped after {max_steps} wear steps"
-    while len(rows) < max_steps:
-        balance = problem.balance.with_gap(initial_gap + depth)
-        point = _locate(problem, balance, rows)
-        exposure = wear_law.Exposure(balance, point.state, problem.area, coefficient, depth, cycles)
-        rate = rate_of(exposure)
-        fastest = float(rate.max())
-        reason = _reason_to_stop(point, fastest)
-        whole = 0.0 if reason else max(1.0, np.floor(step_depth / fastest))  # eq. 3.30
-        row = WearRow.of(balance, point, depth, cycles, whole, whole * rate)
-        rows.append(row)
-        if on_row is not None:
-            on_row(row)
-        if reason:
-            end = reason
-            break
-        depth = depth + row.worn  # eq. 3.31, total of both surfaces
-        cycles += whole
-    return history(rows, end)
+    unloaded = problem.at_depth(depth)
+    points, rate, work, solves = [], np.zeros_like(depth), np.zeros_like(depth), 0
+    for i, duty in enumerate(problem.mission):
+        balance = unloaded.with_load(duty.load)
+        if before is None:
+            point = duty.site.first(balance)
+        else:
+            point = _neighbour(problem, duty, balance, before.points[i], before.depth, depth)
+        exposure = wear_law.Exposure(balance, point.state, problem.area, problem.spread, depth, cycles)
+        rate += duty.share * rate_of(exposure)
+        work += duty.share * exposure.energy
+        solves += point.solves
+        points.append(point)
+    return WearState(depth, cycles, tuple(points), rate, work, solves)
 
 
-def _locate(problem: WearProblem, balance: HarmonicBalance, rows: list[WearRow]) -> OperatingPoint:
-    if not rows:
-        return problem.site.first(balance)
-    last = rows[-1]
-    x = last.displacement.reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
-    before = problem.balance.with_gap(balance.parameters.gap - last.worn)
-    guess = x + before.gap_response(before.evaluate(last.omega, x), last.worn)
-    point = problem.site.next(balance, last.omega, guess)
+def _neighbour(
+    problem: WearProblem,
+    duty: Duty,
+    balance: HarmonicBalance,
+    known: OperatingPoint,
+    known_depth: np.ndarray,
+    depth: np.ndarray,
+) -> OperatingPoint:
+    omega, opening = known.state.omega, depth - known_depth
+    before = problem.at_depth(known_depth).with_load(duty.load)
+    guess = known.state.x + before.gap_response(before.evaluate(omega, known.state.x), opening)
+    point = duty.site.next(balance, omega, guess)
     if point.solution.converged:
         return point
-    x, solves = _carry(before, last.omega, x, last.worn)
-    again = problem.site.next(balance, last.omega, x)
-    return replace(again, solves=again.solves + point.solves + solves)
+    x, solves = _carry(before, omega, known.state.x, opening)
+    again = duty.site.next(balance, omega, x)
+    return OperatingPoint(again.solution, again.amplitude, again.response, again.solves + point.solves + solves)
 
 
 def _carry(before: HarmonicBalance, omega: float, x: np.ndarray, opening: np.ndarray) -> tuple[np.ndarray, int]:
@@ -114,11 +140,54 @@ def _carry(before: HarmonicBalance, omega: float, x: np.ndarray, opening: np.nda
     return x, solves
 
 
-def _reason_to_stop(point: OperatingPoint, fastest: float) -> str:
-    if not point.solution.converged:
-        return f"solve failed at {point.state.omega / (2 * np.pi):.6g} Hz: {point.solution.outcome}"
-    if np.all(point.state.cycle.status == contact_law.SEPARATES):
+def reason_to_stop(problem: WearProblem, state: WearState, first_preload: float) -> str:
+    """Why a run ends at a state, as a sentence; empty where it goes on."""
+    if state.failure:
+        return state.failure
+    if state.separated:
         return LOST
-    if fastest <= 0.0:
+    preload = problem.balance.preload(state.points[0].state)
+    if preload < problem.lost_below * first_preload:
+        return f"preload fell below {problem.lost_below:.3g} of its first value"
+    if state.rate.max() <= 0.0:
         return "no pair slips any more: wear has stopped"
     return ""
+
+
+def row_of(
+    problem: WearProblem,
+    state: WearState,
+    cycles_in_step: float,
+    worn: np.ndarray,
+    work: np.ndarray,
+    step_error: float = 0.0,
+) -> WearRow:
+    """The history row of a state, with what its step wears [m] and dissipates [J]."""
+    balance = problem.at_depth(state.depth).with_load(problem.mission[0].load)
+    solves = state.solves
+    return WearRow.of(
+        balance, state.points, state.depth, state.cycles, cycles_in_step, worn, work, solves, step_error
+    )
+
+
+def state_of(problem: WearProblem, row: WearRow) -> WearState:
+    """The state that a row was made from, solved points included, so that a resumed run goes on bit for bit."""
+    points = []
+    rate, work = np.zeros_like(row.depth), np.zeros_like(row.depth)
+    rate_of = wear_law.load(problem.law).depth_rate
+    for i, duty in enumerate(problem.mission):
+        balance = problem.at_depth(row.depth).with_load(duty.load)
+        x = row.duty_displacement[i].reshape(len(row.depth), -1, balance.basis.n_coeff)
+        state = balance.evaluate(float(row.duty_omega[i]), x)
+        outcome = newton.Solution(state, newton.CONVERGED, 0, 0, ())
+        response = balance.outputs(state)
+        points.append(OperatingPoint(outcome, row.amplitude, response, 0))
+        exposure = wear_law.Exposure(balance, state, problem.area, problem.spread, row.depth, row.cycles)
+        rate += duty.share * rate_of(exposure)
+        work += duty.share * exposure.energy
+    return WearState(row.depth, row.cycles, tuple(points), rate, work, row.solves)
+
+
+def first_preload(problem: WearProblem, rows: Sequence[WearRow], state: WearState) -> float:
+    """Preload of the unworn contact [N]."""
+    return rows[0].preload if rows else problem.balance.preload(state.points[0].state)

@@ -141,6 +141,39 @@ def _zero(a: _Slope, b: _Slope) -> float:
 
 
 @dataclass(frozen=True)
+class BesidePeak:
+    """The cycle at a fixed ratio to the frequency of the resonance peak, which is tracked as `AtPeak` does."""
+
+    peak: AtPeak
+    ratio: float
+
+    def first(self, balance: HarmonicBalance) -> OperatingPoint:
+        """Find the peak, then go to the ratio."""
+        return self._beside(balance, self.peak.first(balance))
+
+    def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
+        """From a neighbouring x at the ratio: back to the peak, refine it, and to the ratio again."""
+        solution, solves = self._walk(balance, omega, omega / self.ratio, x)
+        at_peak = self.peak.next(balance, omega / self.ratio, solution.state.x)
+        found = self._beside(balance, at_peak)
+        return replace(found, solves=found.solves + solves)
+
+    def _beside(self, balance: HarmonicBalance, peak: OperatingPoint) -> OperatingPoint:
+        omega = peak.state.omega
+        solution, solves = self._walk(balance, omega, self.ratio * omega, peak.state.x)
+        return _point(balance, solution, self.peak.output, peak.solves + solves)
+
+    def _walk(self, balance: HarmonicBalance, start: float, stop: float, x: np.ndarray) -> tuple[Solution, int]:
+        """Natural steps of half a per cent from one frequency to another."""
+        count = max(1, int(np.ceil(abs(stop / start - 1) / 5e-3)))
+        for omega in np.linspace(start, stop, count + 1):
+            solution = newton.solve(balance, omega, x, self.peak.newton)
+            if solution.converged:
+                x = solution.state.x
+        return solution, count + 1
+
+
+@dataclass(frozen=True)
 class _Slope:
     """A solved point with d A^2 / d omega and d x / d omega."""
 
@@ -172,4 +205,4 @@ def _point(balance: HarmonicBalance, solution: Solution, output: str, solves: in
     return OperatingPoint(solution, float(amplitude(response[row], balance.basis.has_static)), response, solves)
 
 
-Site = AtFrequency | AtPeak
+Site = AtFrequency | AtPeak | BesidePeak

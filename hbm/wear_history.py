@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
@@ -33,18 +34,26 @@ class WearRow:
     force: np.ndarray
     response: np.ndarray
     solves: int
+    step_error: float
+    work: np.ndarray
+    duty_omega: np.ndarray
+    duty_displacement: np.ndarray
 
     @classmethod
     def of(
         cls,
         balance: HarmonicBalance,
-        point: OperatingPoint,
+        points: Sequence[OperatingPoint],
         depth: np.ndarray,
         cycles: float,
         cycles_in_step: float,
         worn: np.ndarray,
+        work: np.ndarray,
+        solves: int,
+        step_error: float = 0.0,
     ) -> WearRow:
-        """The row of a solved operating point."""
+        """The row of solved operating points, one per duty; the first one is what the row shows."""
+        point = points[0]
         state = point.state
         shape = (-1, state.x.shape[2])
         normal = np.zeros(len(depth))
@@ -64,7 +73,11 @@ class WearRow:
             displacement=state.x.reshape(shape),
             force=state.cycle.force.reshape(shape),
             response=point.response,
-            solves=point.solves,
+            solves=solves,
+            step_error=step_error,
+            work=work,
+            duty_omega=np.array([p.state.omega for p in points]),
+            duty_displacement=np.stack([p.state.x.reshape(shape) for p in points]),
         )
 
 
@@ -85,6 +98,10 @@ class WearHistory:
     displacement, force : (n_row, n_pair * n_component, n_coeff) Fourier coefficients at the contact [m], [N]
     response : (n_row, n_output, n_coeff) Fourier coefficients of the outputs [m]
     solves : (n_row,) harmonic balance solves spent on the row
+    step_error : (n_row,) estimated local error of the step over its tolerance; 0 where the rule has no estimate
+    work : (n_row, n_pair) friction work from this row to the next [J]
+    duty_omega, duty_displacement : (n_row, n_duty) [rad/s], (n_row, n_duty, n_contact, n_coeff) [m]: every duty of a
+        mission; the fields above show the first
     end : sentence that says why the run ended
     """
 
@@ -102,6 +119,10 @@ class WearHistory:
     force: np.ndarray
     response: np.ndarray
     solves: np.ndarray
+    step_error: np.ndarray
+    work: np.ndarray
+    duty_omega: np.ndarray
+    duty_displacement: np.ndarray
     end: str
 
     def rows(self) -> list[WearRow]:

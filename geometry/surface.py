@@ -1,0 +1,245 @@
+"""Measured height maps: is it plausible, mend it, level it, part waviness from roughness.
+
+`prepare` runs the steps in order: refuse what cannot be a machined face, take spikes out, close holes, level, filter.
+Each step that changes measured points says so in a sentence.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.ndimage import distance_transform_edt, median_filter
+from scipy.signal import fftconvolve
+from scipy.sparse.linalg import spsolve
+
+LARGEST_SIZE = 1.0
+SMALLEST_SIZE = 1e-6
+"""Sides of a face [m] beyond which the lateral unit must be wrong."""
+
+STEEPEST = 1.0
+"""Median slope [-] beyond which the height unit must be wrong; machined faces have some hundredths."""
+
+FLATTEST = 1e-10
+"""Peak to valley [m], about an atom, below which the height unit must be wrong."""
+
+GAUSS_CONSTANT = np.sqrt(np.log(2) / np.pi)
+"""alpha of ISO 16610-21: a wave as long as the cut-off passes with one half of its amplitude."""
+
+
+@dataclass(frozen=True)
+class HeightMap:
+    """Heights of a face over a regular grid.
+
+    x : (nx,) equally spaced, growing [m];  y : (ny,) [m]
+    z : (nx, ny) heights along the outward normal of the face [m], NaN where not measured
+    name : how messages call it
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    z: np.ndarray
+    name: str = "height map"
+
+    def __post_init__(self) -> None:
+        if self.z.shape != (len(self.x), len(self.y)):
+            raise ValueError(
+                f"{self.name}: heights have shape {self.z.shape} but the axes {len(self.x)} and {len(self.y)} points"
+            )
+        if min(self.z.shape) < 4:
+            raise ValueError(f"{self.name}: {self.z.shape[0]} x {self.z.shape[1]} points are too few for a face")
+        for axis, values in (("x", self.x), ("y", self.y)):
+            steps = np.diff(values)
+            if not (np.isfinite(values).all() and (steps > 0).all() and np.ptp(steps) <= 1e-3 * steps.mean()):
+                raise ValueError(f"{self.name}: {axis} is not growing in equal steps: resample it to a regular grid")
+
+    @property
+    def spacing(self) -> tuple[float, float]:
+        """Steps along x and y [m]."""
+        return float(np.ptp(self.x) / (len(self.x) - 1)), float(np.ptp(self.y) / (len(self.y) - 1))
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Sides [m]."""
+        return float(np.ptp(self.x)), float(np.ptp(self.y))
+
+    def with_heights(self, z: np.ndarray) -> HeightMap:
+        """The same grid with other heights (nx, ny) [m]."""
+        return replace(self, z=z)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A height map ready for contact.
+
+    waviness, roughness : levelled parts; their sum is the levelled surface
+    repairs : one sentence for each thing that was changed
+    """
+
+    waviness: HeightMap
+    roughness: HeightMap
+    repairs: tuple[str, ...]
+
+
+def prepare(surface: HeightMap, cutoff: float, expected_size: tuple[float, float] | None = None) -> Prepared:
+    """Check, mend, level and split a measured surface.
+
+    cutoff : wavelength that parts waviness from roughness [m]
+    expected_size : sides of the face it should cover [m]
+    Raises  ValueError: what the steps refuse
+    """
+    check(surface, expected_size)
+    without_spikes, spikes = remove_outliers(surface)
+    whole, holes = fill_holes(without_spikes)
+    waviness, roughness = split(level(whole), cutoff)
+    return Prepared(waviness, roughness, (*spikes, *holes))
+
+
+def check(surface: HeightMap, expected_size: tuple[float, float] | None = None) -> None:
+    """Raise ValueError for a map that cannot be a measured face in metres.
+
+    expected_size : sides it should cover [m]; up to five times as large is taken as a wider measurement
+    """
+    name = surface.name
+    if not np.isfinite(surface.z).any():
+        raise ValueError(f"{name}: no point has a height: check the file and its missing-value code")
+    for axis, side in zip("xy", surface.size, strict=True):
+        if not SMALLEST_SIZE <= side <= LARGEST_SIZE:
+            raise ValueError(f"{name}: it is {side:g} m long in {axis}: give the lateral unit, 1e-6 for micrometres")
+    if expected_size is not None:
+        for axis, side, wanted in zip("xy", surface.size, expected_size, strict=True):
+            if not 0.98 * wanted <= side <= 5 * wanted:
+                raise ValueError(
+                    f"{name}: it covers {side:g} m in {axis} but the contact {wanted:g} m: are map and unit right?"
+                )
+    slopes = [np.abs(np.diff(surface.z, axis=axis)) / step for axis, step in enumerate(surface.spacing)]
+    known = np.concatenate([slope[np.isfinite(slope)] for slope in slopes])
+    if known.size and np.median(known) > STEEPEST:
+        raise ValueError(
+            f"{name}: its median slope is {np.median(known):.3g}, steeper than any machined face: "
+            "give the height unit, such as 1e-6 for micrometres"
+        )
+    span = np.nanmax(surface.z) - np.nanmin(surface.z)
+    if 0 < span < FLATTEST:
+        raise ValueError(f"{name}: peak to valley is {span:.3g} m, less than an atom: give the height unit")
+
+
+def remove_outliers(
+    surface: HeightMap, factor: float = 8.0, largest_share: float = 0.05
+) -> tuple[HeightMap, list[str]]:
+    """Turn spikes into holes: points far off the median of the 5 x 5 points around them.
+
+    factor : distance in robust standard deviations (1.4826 times the median of all distances); a spike also stands out
+        by a tenth of the height that nine tenths of the levelled surface keep to, so that smooth maps lose no crests
+    largest_share : share of measured points beyond which the map is refused
+    Returns the map with NaN at spikes, and what was done
+    """
+    measured = np.isfinite(surface.z)
+    nearest = distance_transform_edt(~measured, return_distances=False, return_indices=True)
+    closed = surface.z[tuple(nearest)]
+    distance = np.abs(closed - median_filter(closed, size=5, mode="nearest"))
+    sigma = 1.4826 * np.median(distance[measured])
+    low, high = np.percentile(level(surface).z[measured], (5, 95))
+    spikes = measured & (distance > factor * sigma) & (distance > 0.1 * (high - low))
+    count = int(spikes.sum())
+    if count == 0:
+        return surface, []
+    if count > largest_share * measured.sum():
+        raise ValueError(
+            f"{surface.name}: {count} of {measured.sum()} points are spikes: this is noise, not a face with outliers"
+        )
+    largest = distance[spikes].max()
+    return surface.with_heights(np.where(spikes, np.nan, surface.z)), [
+        f"{surface.name}: {count} spikes up to {largest:.3g} m off their surroundings were taken out"
+    ]
+
+
+def fill_holes(surface: HeightMap, largest_share: float = 0.2) -> tuple[HeightMap, list[str]]:
+    """Close holes with the surface that has no curvature of its own there (Laplace), bounded by its rim.
+
+    largest_share : share of the map beyond which it is refused
+    Returns the map without NaN, and what was done
+    """
+    holes = ~np.isfinite(surface.z)
+    count = int(holes.sum())
+    if count == 0:
+        return surface, []
+    if count > largest_share * holes.size:
+        raise ValueError(
+            f"{surface.name}: {100 * count / holes.size:.0f} % of its points have no height, more than "
+            f"{100 * largest_share:.0f} %: measure again or crop it"
+        )
+    number = np.full(holes.shape, -1)
+    number[holes] = np.arange(count)
+    diagonal, known = np.zeros(count), np.zeros(count)
+    rows, columns, values = [], [], []
+    for axis, step in enumerate(surface.spacing):
+        for side in (1, -1):
+            middle = [slice(None), slice(None)]
+            beside = [slice(None), slice(None)]
+            middle[axis], beside[axis] = (slice(None, -1), slice(1, None))[::side]
+            inner = holes[tuple(middle)]
+            row, neighbour = number[tuple(middle)][inner], number[tuple(beside)][inner]
+            weight = 1 / step**2
+            diagonal[row] += weight
+            inside = neighbour >= 0
+            rows.append(row[inside])
+            columns.append(neighbour[inside])
+            values.append(np.full(inside.sum(), -weight))
+            known[row[~inside]] += weight * surface.z[tuple(beside)][inner][~inside]
+    at = (np.concatenate(rows), np.concatenate(columns))
+    laplace = sp.coo_matrix((np.concatenate(values), at), shape=(count, count))
+    z = surface.z.copy()
+    z[holes] = spsolve((laplace + sp.diags(diagonal)).tocsc(), known)
+    return surface.with_heights(z), [
+        f"{surface.name}: {count} points without height ({100 * count / holes.size:.2g} %) were filled from their rim"
+    ]
+
+
+def level(surface: HeightMap) -> HeightMap:
+    """Subtract the least-squares plane through the measured points."""
+    x, y = np.meshgrid(surface.x - surface.x.mean(), surface.y - surface.y.mean(), indexing="ij")
+    measured = np.isfinite(surface.z)
+    size = max(surface.size)
+    terms = np.stack([np.ones_like(x), x / size, y / size], axis=-1)
+    plane, *_ = np.linalg.lstsq(terms[measured], surface.z[measured], rcond=None)
+    return surface.with_heights(surface.z - terms @ plane)
+
+
+def split(surface: HeightMap, cutoff: float) -> tuple[HeightMap, HeightMap]:
+    """Part waviness from roughness by the areal Gaussian filter.
+
+    cutoff : wavelength [m] of which one half of the amplitude goes to either part
+    Returns (waviness, roughness), their sum is the surface
+    Raises  ValueError: holes, or a cut-off that the map cannot hold
+    Source  ISO 16610-61 (areal Gaussian, separable), weights of ISO 16610-21 out to one cut-off; at the edges the local
+        linear fit with the same weights, which keeps planes (moment criterion of ISO 16610-28)
+    """
+    if not np.isfinite(surface.z).all():
+        raise ValueError(f"{surface.name}: it has points without height: fill the holes before filtering")
+    if not 2 * max(surface.spacing) <= cutoff <= min(surface.size):
+        raise ValueError(
+            f"{surface.name}: cutoff {cutoff:g} m must lie between two steps of the grid "
+            f"({2 * max(surface.spacing):g} m) and the shorter side ({min(surface.size):g} m)"
+        )
+    smooth = surface.z
+    for axis, step in enumerate(surface.spacing):
+        smooth = _local_linear(smooth, axis, step, cutoff)
+    return surface.with_heights(smooth), surface.with_heights(surface.z - smooth)
+
+
+def _local_linear(z: np.ndarray, axis: int, step: float, cutoff: float) -> np.ndarray:
+    """Value at each point of the line fitted with Gaussian weights to the points around it, along one axis."""
+    reach = int(cutoff / step)
+    offset = np.arange(-reach, reach + 1) * (step / cutoff)
+    weight = np.exp(-np.pi * (offset / GAUSS_CONSTANT) ** 2)  # ISO 16610-21, eq. 1, up to its norm
+
+    def moment(values: np.ndarray, order: int) -> np.ndarray:
+        kernel = (weight * offset**order)[::-1]
+        return fftconvolve(values, kernel[:, None], "same", axes=0)
+
+    z = z if axis == 0 else z.T
+    s0, s1, s2 = (moment(np.ones((len(z), 1)), order) for order in (0, 1, 2))
+    fitted = (s2 * moment(z, 0) - s1 * moment(z, 1)) / (s0 * s2 - s1**2)
+    return fitted if axis == 0 else fitted.T

@@ -1,0 +1,76 @@
+"""Abaqus global matrices in text: *MATRIX GENERATE with *MATRIX OUTPUT.
+
+Two layouts, told apart by their columns: node, dof, node, dof, value (FORMAT=MATRIX INPUT and LABELS) and row, column,
+value with rows from 1 (FORMAT=COORDINATE). Nodes that Abaqus makes itself have negative numbers.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+
+Labels = tuple[tuple[int, int], ...]
+"""(node, component 1..6) of each row of a matrix."""
+
+
+def looks_like(lines: list[str]) -> bool:
+    """Whether the first line of data holds three or five numbers."""
+    for line in lines:
+        if line.strip() and not line.lstrip().startswith("*"):
+            words = line.replace(",", " ").split()
+            try:
+                return len([float(word) for word in words]) in (3, 5)
+            except ValueError:
+                return False
+    return False
+
+
+def read(path: Path) -> tuple[sp.csr_matrix, Labels | None]:
+    """Read a matrix and the labels of its rows (None in the layout without labels).
+
+    A single triangle is mirrored. Raises ValueError where lines are not numbers or indices not whole.
+    """
+    text = path.read_text(encoding="ascii", errors="replace").replace(",", " ")
+    rows = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("*")]
+    try:
+        table = np.loadtxt(rows, ndmin=2)
+    except ValueError:
+        raise ValueError(f"{path.name} has lines that are not numbers or not equally many: export it again") from None
+    if table.shape[1] not in (3, 5):
+        raise ValueError(f"{path.name} has {table.shape[1]} columns: node, dof, node, dof, value or row, column, value")
+    index = table[:, :-1].astype(np.int64)
+    if (index != table[:, :-1]).any():
+        raise ValueError(f"{path.name} has node, dof or row numbers that are not whole: is the last column the value?")
+    labels = None
+    if table.shape[1] == 5:
+        both = np.concatenate([index[:, :2], index[:, 2:]])
+        known, place = np.unique(both, axis=0, return_inverse=True)
+        labels = tuple((int(node), int(component)) for node, component in known)
+        row, column = place.reshape(2, -1)
+        size = len(labels)
+    else:
+        if index.min() < 1:
+            raise ValueError(f"{path.name} has row {index.min()}: rows count from 1 in FORMAT=COORDINATE")
+        row, column = index.T - 1
+        size = int(index.max())
+    below, above = (row > column).any(), (row < column).any()
+    matrix = sp.coo_matrix((table[:, -1], (row, column)), shape=(size, size)).tocsr()
+    if below != above:
+        matrix = (matrix + matrix.T - sp.diags(matrix.diagonal())).tocsr()
+    return matrix, labels
+
+
+def onto(matrix: sp.csr_matrix, labels: Labels, wanted: Labels, what: str) -> sp.csr_matrix:
+    """The matrix on the rows of another one; rows it lacks (a massless degree of freedom) are zero."""
+    if labels == wanted:
+        return matrix
+    place = {label: k for k, label in enumerate(wanted)}
+    unknown = [label for label in labels if label not in place]
+    if unknown:
+        node, component = unknown[0]
+        raise ValueError(f"the {what} has node {node} component {component}, which the stiffness matrix lacks")
+    to = np.array([place[label] for label in labels])
+    entries = matrix.tocoo()
+    return sp.coo_matrix((entries.data, (to[entries.row], to[entries.col])), shape=(len(wanted),) * 2).tocsr()

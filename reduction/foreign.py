@@ -1,0 +1,337 @@
+"""Bring your own matrices: M, K, C from another program, with the DOFs that touch, load and observe.
+
+    from reduction.foreign import read_matrices, reduced_model
+
+    matrices = read_matrices("blade.mat")                                  # or mass="M.mtx", stiffness="K.mtx"
+    system = matrices.system(loads={"shaker": 17}, outputs={"tip": 41})
+    contact = matrices.contact([[3, 4, 5], [6, 7, 8]], components=("t1", "t2", "n"), area=1e-5)
+    model = reduced_model(system, contact)                                 # dense, ready for hbm
+
+Units are SI after `scale`. A DOF is a number from 0, or (node, component) where the file carries labels (Abaqus text,
+ANSYS with its mapping file); the component is 1 to 6 or a name such as "UX" or "z".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from fem.interface import COMPONENTS, ContactInterface
+from fem.system import SecondOrderSystem
+from reduction import abaqus_matrix, harwell_boeing, matrix_files
+from reduction.abaqus_matrix import Labels
+from reduction.model import ReducedModel
+
+NAMES = {"mass": "M", "stiffness": "K", "damping": "C"}
+"""Variables looked for in a file that holds all matrices."""
+
+CONSTRAINED = 1e30
+"""Diagonal stiffness [N/m] that only Abaqus's penalty for a constrained DOF (1e36) reaches."""
+
+SYMMETRY = 1e-8
+"""Largest asymmetry, relative to the largest entry, that is taken as rounding of the file."""
+
+Dof = int | Sequence[int | str]
+"""A DOF: number from 0, or (node, component)."""
+
+Terms = Dof | Mapping[Any, float] | np.ndarray
+"""A load or output: one DOF, DOF -> factor, or the vector (n,) itself."""
+
+
+@dataclass(frozen=True)
+class ForeignMatrices:
+    """Matrices of one structure from files.
+
+    mass, stiffness, damping : (n, n) symmetric csr [kg], [N/m], [N s/m]; damping None where there is none
+    labels : (node, component 1..6) of each DOF, or None where the files carry none
+    notes : what was changed on reading, one sentence each
+    """
+
+    mass: sp.csr_matrix
+    stiffness: sp.csr_matrix
+    damping: sp.csr_matrix | None = None
+    labels: Labels | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def n_dof(self) -> int:
+        """Number of DOFs n."""
+        return int(self.stiffness.shape[0])
+
+    def dof(self, dof: Dof) -> int:
+        """Row of a DOF given by number or by (node, component)."""
+        if isinstance(dof, int | np.integer):
+            if not 0 <= dof < self.n_dof:
+                raise ValueError(f"DOF {dof} is outside 0 .. {self.n_dof - 1}: DOF numbers count from 0")
+            return int(dof)
+        if isinstance(dof, str) or len(dof) != 2:
+            raise ValueError(f"{dof!r} is no DOF: give a number from 0 or a pair (node, component)")
+        if self.labels is None:
+            raise ValueError(f"DOF {tuple(dof)} names a node but the files have no labels: give mapping= or numbers")
+        label = (int(dof[0]), _component(dof[1]))
+        if label not in self._rows:
+            raise ValueError(f"node {label[0]} has no free component {label[1]} in these matrices")
+        return self._rows[label]
+
+    @cached_property
+    def _rows(self) -> dict[tuple[int, int], int]:
+        return {label: row for row, label in enumerate(self.labels or ())}
+
+    def node_dofs(self, nodes: Sequence[int], components: Sequence[int | str] = (1, 2, 3)) -> np.ndarray:
+        """(n_node, n_component) rows of the components of nodes, for `contact`."""
+        return np.array([[self.dof((node, component)) for component in components] for node in nodes])
+
+    def system(self, loads: Mapping[str, Terms], outputs: Mapping[str, Terms]) -> SecondOrderSystem:
+        """The matrices with named unit loads and observed displacements, sparse: what Craig-Bampton takes."""
+        return SecondOrderSystem(
+            mass=self.mass,
+            stiffness=self.stiffness,
+            damping=self.damping,
+            loads={name: self._vector(terms, f"load {name}") for name, terms in loads.items()},
+            outputs={name: self._vector(terms, f"output {name}") for name, terms in outputs.items()},
+        )
+
+    def contact(
+        self,
+        body1: Sequence[Sequence[Dof]] | np.ndarray,
+        body2: Sequence[Sequence[Dof]] | np.ndarray | None = None,
+        *,
+        area: float | np.ndarray,
+        components: Sequence[str] = ("n",),
+        normal: Sequence[float] | np.ndarray | None = None,
+        t1: Sequence[float] | None = None,
+        signs: Sequence[float] | None = None,
+        gap: float | np.ndarray = 0.0,
+        points: np.ndarray | None = None,
+    ) -> ContactInterface:
+        """The DOFs that touch, pair by pair, against each other or against the ground (body2 None).
+
+        body1, body2 : (n_pair, n_component) DOFs that are themselves t1, t2, n as `components` says;
+            with `normal`, (n_pair, 3) DOFs along x, y, z, and every pair gets its own frame
+        area : whole area of the patch [m2], shared equally, or (n_pair,) tributary areas
+        components : subset of t1, t2, n in this order
+        normal : (3,) or (n_pair, 3) direction from body 1 into body 2
+        t1 : with `normal`, (3,) direction whose part along the face is t1; the axis least along the normal if not given
+        signs : without `normal`, +1 or -1 per component: -1 where body 1 closes the gap against the DOF's direction
+        gap : opening before loading [m], one for all or (n_pair,)
+        points : (n_pair, 3) positions for pictures [m]; all at the origin where unknown
+        """
+        kept = tuple(components)
+        if not kept or kept != tuple(name for name in COMPONENTS if name in kept):
+            raise ValueError(f"contact components are {kept}: give some of t1, t2, n in this order")
+        width = len(kept) if normal is None else 3
+        first = self._table(body1, width, "body1")
+        second = None if body2 is None else self._table(body2, width, "body2")
+        n_pair = len(first)
+        if second is not None and len(second) != n_pair:
+            raise ValueError(f"body1 has {n_pair} contact nodes but body2 has {len(second)}: they meet in pairs")
+        if normal is None:
+            frames = np.tile(np.eye(3), (n_pair, 1, 1))
+            weights = np.tile(np.diag(_signs(signs, len(kept))), (n_pair, 1, 1))
+        else:
+            if signs is not None:
+                raise ValueError("signs and normal are both given: the normal already says what closes the gap")
+            frames = _frames(normal, t1, n_pair)
+            weights = frames[:, [COMPONENTS.index(name) for name in kept]]
+        rows = np.repeat(np.arange(n_pair * len(kept)), width)
+        shape = (n_pair * len(kept), self.n_dof)
+
+        def one_body(dofs: np.ndarray) -> sp.csr_matrix:
+            columns = np.repeat(dofs[:, None], len(kept), axis=1)
+            return sp.coo_matrix((weights.ravel(), (rows, columns.ravel())), shape=shape).tocsr()
+
+        motion = one_body(first) if second is None else one_body(first) - one_body(second)
+        motion.eliminate_zeros()
+        if (np.diff(motion.indptr) == 0).any():
+            pair = int(np.flatnonzero(np.diff(motion.indptr) == 0)[0]) // len(kept)
+            raise ValueError(f"contact pair {pair} has the same DOF on both bodies: it can never move")
+        areas = np.broadcast_to(np.asarray(area, float) / (n_pair if np.ndim(area) == 0 else 1), n_pair).copy()
+        if not (areas > 0).all():
+            raise ValueError("a contact area is not positive: give the area of the patch, or one per pair, in m2")
+        return ContactInterface(
+            components=kept,
+            points=np.zeros((n_pair, 3)) if points is None else np.asarray(points, float).reshape(n_pair, 3),
+            frames=frames,
+            area=areas,
+            gap=np.broadcast_to(np.asarray(gap, float), n_pair).copy(),
+            B=motion,
+            faces=np.zeros((0, 4), int),
+        )
+
+    def _vector(self, terms: Terms, name: str) -> np.ndarray:
+        if isinstance(terms, np.ndarray):
+            if terms.shape != (self.n_dof,):
+                raise ValueError(f"{name} has shape {terms.shape}: a vector of {self.n_dof} numbers is needed")
+            return terms.astype(float)
+        vector = np.zeros(self.n_dof)
+        pairs = terms.items() if isinstance(terms, Mapping) else [(terms, 1.0)]
+        for dof, factor in pairs:
+            vector[self.dof(dof)] += factor
+        return vector
+
+    def _table(self, dofs: Any, width: int, name: str) -> np.ndarray:
+        rows = [[self.dof(dof) for dof in row] for row in dofs]
+        if not rows or any(len(row) != width for row in rows):
+            raise ValueError(f"{name} needs rows of {width} DOFs, one row for each contact node")
+        return np.array(rows)
+
+
+def read_matrices(
+    path: str | Path | None = None,
+    *,
+    mass: str | Path | None = None,
+    stiffness: str | Path | None = None,
+    damping: str | Path | None = None,
+    mapping: str | Path | None = None,
+    names: Mapping[str, str] | None = None,
+    scale: float = 1.0,
+) -> ForeignMatrices:
+    """Read the matrices of a structure.
+
+    path : one .npz or .mat that holds all of them, by default as M, K and, if present, C
+    mass, stiffness, damping : one file for each instead; formats as in matrix_files.read_matrix, mixed at will
+    mapping : ANSYS .mapping file that labels the rows
+    names : other variable names, such as {"mass": "Mred"}
+    scale : factor on all matrices to reach SI; 1e3 for N-mm-t-s (rotations then count in units of 1000 rad)
+    Raises  ValueError: not square, not symmetric, sizes that differ, a missing file or variable
+    """
+    wanted = {**NAMES, **(names or {})}
+    unknown = sorted(set(wanted) - set(NAMES))
+    if unknown:
+        raise ValueError(f"names has the key {unknown[0]}: the keys are mass, stiffness and damping")
+    files = {"mass": mass, "stiffness": stiffness, "damping": damping}
+    if path is not None:
+        whole = Path(path)
+        held = matrix_files.variables(whole)
+        if not held:
+            raise ValueError(f"{whole.name} does not hold several matrices: give mass= and stiffness= as one file each")
+        for part, variable in wanted.items():
+            optional = part == "damping" and "damping" not in (names or {})
+            if files[part] is None and (variable in held or not optional):
+                files[part] = whole
+    missing = [part for part in ("mass", "stiffness") if files[part] is None]
+    if missing:
+        raise ValueError(f"no {missing[0]} matrix is given: give path= or {missing[0]}=")
+    read: dict[str, sp.csr_matrix] = {}
+    labels: dict[str, Labels | None] = {}
+    for part, file in files.items():
+        if file is not None:
+            name = wanted[part] if matrix_files.variables(Path(file)) else None
+            matrix, labels[part] = matrix_files.read_matrix(Path(file), name)
+            read[part] = _symmetric(matrix * scale, f"{part} matrix")
+    rows = labels["stiffness"]
+    for part, own in labels.items():
+        if rows is not None and own is not None:
+            read[part] = abaqus_matrix.onto(read[part], own, rows, f"{part} matrix")
+    if mapping is not None:
+        rows = harwell_boeing.read_mapping(Path(mapping))
+    n = read["stiffness"].shape[0]
+    for part, matrix in read.items():
+        if matrix.shape[0] != n:
+            raise ValueError(f"the {part} matrix has {matrix.shape[0]} rows but the stiffness matrix has {n}")
+    if rows is not None and len(rows) != n:
+        raise ValueError(f"the mapping has {len(rows)} equations but the matrices have {n} rows: is it theirs?")
+    if (read["mass"].diagonal() < 0).any():
+        raise ValueError("the mass matrix has a negative diagonal entry: are mass and stiffness exchanged?")
+    return _without_constrained(ForeignMatrices(**read, labels=rows))
+
+
+def reduced_model(system: SecondOrderSystem, interface: ContactInterface) -> ReducedModel:
+    """The matrices as they are, dense, for hbm; meant for systems already reduced elsewhere (some thousand DOFs)."""
+
+    def dense(matrix: Any) -> np.ndarray:
+        return matrix.toarray() if sp.issparse(matrix) else np.asarray(matrix)
+
+    return ReducedModel(
+        system=SecondOrderSystem(
+            mass=dense(system.mass),
+            stiffness=dense(system.stiffness),
+            damping=None if system.damping is None else dense(system.damping),
+            loads=dict(system.loads),
+            outputs=dict(system.outputs),
+        ),
+        interface=ContactInterface(**{**vars(interface), "B": dense(interface.B)}),
+        basis=None,
+        info={"source": "matrices from files", "n_dof": system.n_dof},
+    )
+
+
+def _without_constrained(matrices: ForeignMatrices) -> ForeignMatrices:
+    """Leave out the DOFs that Abaqus holds by a penalty, and say so."""
+    held = matrices.stiffness.diagonal() >= CONSTRAINED
+    if not held.any():
+        return matrices
+    if matrices.labels is None:
+        raise ValueError(
+            f"{held.sum()} DOFs have a stiffness of {CONSTRAINED:g} N/m or more, which is how Abaqus constrains: "
+            "export with FORMAT=MATRIX INPUT, whose labels allow leaving them out"
+        )
+    free = np.flatnonzero(~held)
+    return ForeignMatrices(
+        mass=matrices.mass[free][:, free],
+        stiffness=matrices.stiffness[free][:, free],
+        damping=None if matrices.damping is None else matrices.damping[free][:, free],
+        labels=tuple(matrices.labels[k] for k in free),
+        notes=(*matrices.notes, f"{held.sum()} constrained DOFs (stiffness {CONSTRAINED:g} N/m or more) were left out"),
+    )
+
+
+def _symmetric(matrix: sp.csr_matrix, name: str) -> sp.csr_matrix:
+    """The matrix, made exactly symmetric, or a ValueError that shows the worst entry."""
+    if matrix.shape[0] != matrix.shape[1]:
+        raise ValueError(f"the {name} is {matrix.shape[0]} x {matrix.shape[1]}: it must be square")
+    largest = abs(matrix).max()
+    if largest == 0:
+        raise ValueError(f"the {name} is zero: is it the right variable?")
+    difference = abs(matrix - matrix.T).tocoo()
+    if difference.nnz and difference.data.max() > SYMMETRY * largest:
+        if not (sp.tril(matrix, -1).nnz and sp.triu(matrix, 1).nnz):
+            raise ValueError(f"the {name} holds one triangle only: mirror it before saving, A + tril(A, -1).T")
+        worst = int(difference.data.argmax())
+        row, column = int(difference.row[worst]), int(difference.col[worst])
+        raise ValueError(
+            f"the {name} is not symmetric: entry ({row}, {column}) is {matrix[row, column]:g} "
+            f"but ({column}, {row}) is {matrix[column, row]:g}"
+        )
+    return ((matrix + matrix.T) / 2).tocsr()
+
+
+def _component(component: int | str) -> int:
+    """Component 1..6 from a number, from UX .. ROTZ, or from x, y, z."""
+    if isinstance(component, str):
+        name = component.upper()
+        name = "U" + name if name in ("X", "Y", "Z") else name
+        if name in harwell_boeing.COMPONENT_NAMES:
+            return harwell_boeing.COMPONENT_NAMES.index(name) + 1
+    elif 1 <= component <= 6:
+        return int(component)
+    raise ValueError(f"component {component!r} is unknown: give 1 to 6, x, y, z or UX, UY, UZ, ROTX, ROTY, ROTZ")
+
+
+def _signs(signs: Sequence[float] | None, n_component: int) -> np.ndarray:
+    chosen = np.ones(n_component) if signs is None else np.asarray(signs, float)
+    if chosen.shape != (n_component,) or not (np.abs(chosen) == 1).all():
+        raise ValueError(f"signs is {signs}: give +1 or -1 for each of the {n_component} components")
+    return chosen
+
+
+def _frames(normal: Sequence[float] | np.ndarray, t1: Sequence[float] | None, n_pair: int) -> np.ndarray:
+    """(n_pair, 3, 3) rows t1, t2, n."""
+    direction = np.broadcast_to(np.asarray(normal, float), (n_pair, 3))
+    length = np.linalg.norm(direction, axis=1, keepdims=True)
+    if not (length > 0).all():
+        raise ValueError("a contact normal is zero: give a direction from body 1 into body 2")
+    n = direction / length
+    axis = np.eye(3)[np.abs(n).argmin(axis=1)] if t1 is None else np.asarray(t1, float) / np.linalg.norm(t1)
+    along = axis - n * (axis * n).sum(axis=1, keepdims=True)
+    size = np.linalg.norm(along, axis=1, keepdims=True)
+    if not (size > 1e-6).all():
+        raise ValueError(f"the contact direction t1 = {t1} is along the contact normal: give one along the face")
+    along /= size
+    return np.stack([along, np.cross(n, along), n], axis=1)

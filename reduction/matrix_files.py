@@ -1,0 +1,123 @@
+"""One matrix out of a file that another program wrote: the format is recognised by content."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import scipy.io
+import scipy.sparse as sp
+
+from reduction import abaqus_matrix, harwell_boeing
+from reduction.abaqus_matrix import Labels
+
+CONTAINERS = (".npz", ".mat")
+"""Files that can hold several matrices by name."""
+
+
+def variables(path: Path) -> list[str]:
+    """Names of what a container holds; an empty list for a file that is one matrix (also scipy.sparse.save_npz)."""
+    _require(path)
+    if path.suffix.lower() == ".npz":
+        with _opened_npz(path) as archive:
+            return [] if "format" in archive.files else sorted(archive.files)
+    if path.suffix.lower() == ".mat":
+        if h5py.is_hdf5(path):
+            with h5py.File(path, "r") as archive:
+                return sorted(name for name in archive if not name.startswith("#"))
+        return sorted(name for name, _, _ in _whosmat(path))
+    return []
+
+
+def read_matrix(path: Path, variable: str | None = None) -> tuple[sp.csr_matrix, Labels | None]:
+    """Read a real matrix, and the (node, component) labels of its rows where the file has them.
+
+    path : .npz (numpy or scipy.sparse), .mat (also version 7.3), Matrix Market, Harwell-Boeing, Abaqus text
+    variable : its name in a container
+    Raises  ValueError: no such file or variable, an unknown format, complex or non-finite entries
+    """
+    known = variables(path)
+    labels = None
+    if variable is not None and known and variable not in known:
+        raise ValueError(f"{path.name} has no variable '{variable}': it holds {', '.join(known)}")
+    if known and variable is None:
+        raise ValueError(f"{path.name} holds {', '.join(known)}: name the variable that is wanted")
+    if path.suffix.lower() == ".npz":
+        matrix = _from_npz(path, variable)
+    elif path.suffix.lower() == ".mat":
+        matrix = _from_mat(path, str(variable))
+    else:
+        matrix, labels = _from_text(path)
+    return _real(matrix, f"{path.name} {variable or ''}".strip()), labels
+
+
+def _from_npz(path: Path, variable: str | None) -> Any:
+    if variable is None or variable not in variables(path):
+        return sp.load_npz(path)
+    with _opened_npz(path) as archive:
+        return archive[variable]
+
+
+def _opened_npz(path: Path) -> Any:
+    if not zipfile.is_zipfile(path):
+        raise ValueError(f"{path.name} is not a numpy archive: write it with numpy.savez or scipy.sparse.save_npz")
+    return np.load(path)
+
+
+def _whosmat(path: Path) -> Any:
+    try:
+        return scipy.io.whosmat(path)
+    except (ValueError, TypeError, OSError):
+        raise ValueError(f"{path.name} is not a MATLAB file: write it with save") from None
+
+
+def _from_mat(path: Path, variable: str) -> Any:
+    if not h5py.is_hdf5(path):
+        return scipy.io.loadmat(path, variable_names=[variable])[variable]
+    with h5py.File(path, "r") as archive:
+        item = archive[variable]
+        if isinstance(item, h5py.Group):  # sparse in version 7.3: compressed columns, rows counted from 0
+            columns = np.asarray(item["jc"])
+            shape = (int(item.attrs["MATLAB_sparse"]), len(columns) - 1)
+            if "data" not in item:
+                return sp.csc_matrix(shape)
+            return sp.csc_matrix((np.asarray(item["data"]), np.asarray(item["ir"]), columns), shape=shape)
+        return np.asarray(item).T
+
+
+def _from_text(path: Path) -> tuple[Any, Labels | None]:
+    with path.open(encoding="ascii", errors="replace") as stream:
+        head = [line for _, line in zip(range(50), stream, strict=False)]
+    if head and head[0].startswith("%%MatrixMarket"):
+        try:
+            return scipy.io.mmread(path), None
+        except (ValueError, OverflowError) as problem:
+            raise ValueError(f"{path.name} is a broken Matrix Market file: {problem}") from None
+    if harwell_boeing.looks_like(head):
+        return harwell_boeing.read(path), None
+    if abaqus_matrix.looks_like(head):
+        return abaqus_matrix.read(path)
+    raise ValueError(
+        f"{path.name} is in no format known here: give .npz, .mat, Matrix Market, Harwell-Boeing (ASCII) or Abaqus text"
+    )
+
+
+def _require(path: Path) -> None:
+    if not path.is_file():
+        raise ValueError(f"there is no file {path}: check the name and the folder")
+
+
+def _real(matrix: Any, name: str) -> sp.csr_matrix:
+    """Double precision compressed rows, or a ValueError for entries that cannot belong to a structure."""
+    if not sp.issparse(matrix) and np.ndim(matrix) != 2:
+        raise ValueError(f"{name} has {np.ndim(matrix)} dimensions: a matrix has two")
+    rows = sp.csr_matrix(matrix)
+    if rows.dtype.kind not in "fiub":
+        raise ValueError(f"{name} has entries of type {rows.dtype}: real numbers are needed")
+    rows = rows.astype(float)
+    if not np.isfinite(rows.data).all():
+        raise ValueError(f"{name} has entries that are not finite: export it again")
+    return rows

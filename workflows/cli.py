@@ -1,0 +1,214 @@
+"""The command `tribodyn`: thin words around scene, pipeline, store and pictures."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import cyclopts
+from cyclopts import Parameter
+
+from workflows import scene_file
+
+if TYPE_CHECKING:
+    from workflows.result import Result
+
+BAD_INPUT, FAILED_SOLVE, INTERRUPTED = 2, 3, 130
+
+app = cyclopts.App(
+    name="tribodyn",
+    help="From geometry to worn surface: vibration, friction and fretting wear of jointed parts.",
+    version_flags=["--version"],
+)
+Overrides = Annotated[
+    tuple[str, ...],
+    Parameter(name="--set", negative=(), consume_multiple=False, help="Change a key of the scene: section.key=value."),
+]
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command and leave with its exit code: 2 after bad input, 3 after a failed solve, 130 after Ctrl-C."""
+    # a shell without job control starts background jobs with Ctrl-C ignored
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        app(arguments, exit_on_error=False, print_error=False)
+    except KeyboardInterrupt as stop:
+        _leave(INTERRUPTED, str(stop) or "stopped")
+    except cyclopts.CycloptsError as error:
+        _leave(BAD_INPUT, " ".join(str(error).split()))
+    except (ValueError, OSError) as error:
+        _leave(BAD_INPUT, str(error))
+    except (RuntimeError, MemoryError) as error:
+        _leave(FAILED_SOLVE, str(error) or "the memory of this machine is not enough for this scene")
+
+
+def _leave(code: int, sentence: str) -> None:
+    one_line = " ".join(sentence.split()).rstrip(".")
+    print(f"tribodyn: {one_line}.", file=sys.stderr)
+    sys.exit(code)
+
+
+@app.command
+def run(
+    scene: str,
+    *,
+    overrides: Overrides = (),
+    out: Path | None = None,
+    resume: Annotated[bool, Parameter(negative=())] = False,
+    pictures: Annotated[bool, Parameter(negative="--no-pictures")] = True,
+) -> None:
+    """Run a scene and leave its result and pictures in a folder.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene (see `tribodyn list`) or a .toml file.
+    out
+        Folder of the result; results/NAME unless told.
+    resume
+        Go on from an unfinished result in the folder.
+    pictures
+        Draw curves, maps and renders when done.
+    """
+    from workflows import pipeline
+    from workflows.progress import console_progress
+
+    file = scene_file.read(scene, overrides)
+    folder = out or Path("results") / file.name
+    progress = console_progress()
+    path = folder / "result.h5"
+    earlier = _earlier(path, file) if resume else None
+    if earlier is not None and earlier.state.startswith("complete"):
+        progress.say(f"{path} is complete already")
+        result = earlier
+    else:
+        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            result = pipeline.run(file, folder, progress, earlier)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(_kept(path, scene, folder)) from None
+        except pipeline.SolveFailed as failure:
+            raise pipeline.SolveFailed(f"{failure}; what was computed before is kept in {path}") from None
+    _print_summary(result)
+    progress.say(f"result: {path}")
+    if pictures:
+        _draw(result, folder / "pictures")
+
+
+def _earlier(path: Path, file: scene_file.SceneFile) -> Result | None:
+    """The unfinished result to go on from, None where there is none yet."""
+    from workflows import pipeline, store
+    from workflows.scene import Scene
+
+    if not path.exists():
+        return None
+    result = store.load(path)
+    key = pipeline.same_problem(Scene.model_validate_json(result.provenance["scene"]), file.scene)
+    if key:
+        raise ValueError(f"{path} is the result of another scene, {key} differs: run its scene, or without --resume")
+    return result
+
+
+def _kept(path: Path, scene: str, folder: Path) -> str:
+    from workflows import store
+
+    if not path.exists():
+        return "stopped before anything was computed"
+    return f"stopped, {store.load(path).state}, kept in {path}: go on with tribodyn run {scene} --out {folder} --resume"
+
+
+@app.command(name="list")
+def list_() -> None:
+    """List the scenes that come with the program."""
+    for name in scene_file.names():
+        print(f"{name:12} {scene_file.title(name)}")
+
+
+@app.command
+def show(result: Path, *, as_json: Annotated[bool, Parameter(name="--json", negative=())] = False) -> None:
+    """Say what a result holds.
+
+    Parameters
+    ----------
+    result
+        Folder or file of a result.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import store, summary
+
+    loaded = store.load(_result_file(result))
+    if as_json:
+        print(json.dumps(summary.summary(loaded), indent=2))
+    else:
+        _print_summary(loaded)
+
+
+@app.command
+def render(result: Path, *, out: Path | None = None) -> None:
+    """Draw the pictures of a result again.
+
+    Parameters
+    ----------
+    result
+        Folder or file of a result.
+    out
+        Folder of the pictures; beside the result unless told.
+    """
+    from workflows import store
+
+    path = _result_file(result)
+    _draw(store.load(path), out or path.parent / "pictures")
+
+
+@app.command
+def plan(scene: str, *, overrides: Overrides = ()) -> None:
+    """Say what a scene will model, and what it will cost, before running it.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene (see `tribodyn list`) or a .toml file.
+    """
+    from workflows import planning
+
+    for name, value in planning.plan(scene_file.read(scene, overrides)).lines():
+        print(f"{name:14} {value}")
+
+
+def _result_file(path: Path) -> Path:
+    return path / "result.h5" if path.is_dir() else path
+
+
+def _print_summary(result: Result) -> None:
+    from workflows import summary
+
+    for name, value in summary.lines(result):
+        print(f"{name:14} {value}")
+
+
+def _draw(result: Result, folder: Path) -> None:
+    """Draw what the scene of a result wants drawn; curves come first, they need no system libraries."""
+    from workflows import plots
+    from workflows.scene import Scene
+
+    wanted = Scene.model_validate_json(result.provenance["scene"]).pictures
+    folder.mkdir(parents=True, exist_ok=True)
+    written = plots.draw(result, folder) if wanted.plots else []
+    if wanted.renders:
+        from workflows import render as renders
+
+        try:
+            written += renders.draw(result, folder, wanted.deformation_scale, wanted.wear_scale)
+        except renders.RenderingUnavailable as missing:
+            print(f"no renders: {missing}")
+    for path in written:
+        print(path)
+
+
+if __name__ == "__main__":
+    main()

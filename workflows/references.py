@@ -1,0 +1,76 @@
+"""Linear references of a nonlinear response: the contact absent, and the contact closed and stuck."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as sla
+
+from fem.system import SecondOrderSystem
+from hbm.balance import HarmonicBalance
+from hbm.branch import amplitude
+from reduction.linear import stuck_stiffness
+from workflows.result import References
+
+POINTS = 401
+MODES = 100
+
+
+def linear_references(balance: HarmonicBalance, output: str, start: float, stop: float) -> References:
+    """Amplitudes of an output, free and stuck, from one frequency to another [rad/s].
+
+    The free amplitude is nan where the part is loose without its contact.
+    """
+    omega = np.linspace(start, stop, POINTS)
+    system, interface = balance.model.system, balance.model.interface
+    stuck = stuck_stiffness(system.stiffness, interface.B, balance.parameters.stiffness)
+    return References(
+        omega,
+        _amplitudes(balance, system, system.stiffness, output, omega),
+        _amplitudes(balance, system, stuck, output, omega),
+    )
+
+
+def _amplitudes(
+    balance: HarmonicBalance, system: SecondOrderSystem, stiffness: np.ndarray, output: str, omega: np.ndarray
+) -> np.ndarray:
+    """Amplitude by the lowest modes and the static remainder of the others; off by (h w / w_omitted)^2 of that."""
+    basis = balance.basis
+    try:
+        factor = sla.cho_factor(stiffness)
+    except np.linalg.LinAlgError:
+        return np.full(len(omega), np.nan)
+    lam, phi = sla.eigh(stiffness, system.mass, subset_by_index=(0, min(MODES, system.n_dof) - 1))
+    damping = np.zeros((len(lam), len(lam))) if system.damping is None else phi.T @ system.damping @ phi
+    row = system.outputs[output]
+    amplitudes = np.zeros((len(omega), len(basis.harmonics)), complex)
+    for position, h in enumerate(basis.harmonics):
+        loads = [value * system.loads[name] for (order, name), value in balance.excitation.loads.items() if order == h]
+        if not loads:
+            continue
+        force = np.sum(loads, axis=0)
+        modal = phi.T @ force
+        remainder = row @ sla.cho_solve(factor, force) - (row @ phi) @ (modal / lam)
+        for i, s in enumerate(1j * h * omega):
+            dynamic = np.diag(lam + s**2) + s * damping
+            amplitudes[i, position] = remainder + (row @ phi) @ np.linalg.solve(dynamic, modal)
+    return amplitude(basis.to_real(amplitudes), basis.has_static)
+
+
+def free_deflection(balance: HarmonicBalance) -> np.ndarray:
+    """Normal approach of the pairs (n_pair,) under the static loads with body 2 absent [m].
+
+    It is nan where the part is loose without its contact, or where the normal direction or harmonic 0 is not modelled.
+    """
+    system, interface = balance.model.system, balance.model.interface
+    missing = np.full(interface.n_pair, np.nan)
+    if "n" not in interface.components or not balance.basis.has_static:
+        return missing
+    force = np.zeros(system.n_dof)
+    for (harmonic, name), value in balance.excitation.loads.items():
+        if harmonic == 0:
+            force += np.real(value) * system.loads[name]
+    try:
+        q = sla.cho_solve(sla.cho_factor(system.stiffness), force)
+    except np.linalg.LinAlgError:
+        return missing
+    return np.asarray((interface.B @ q)[interface.components.index("n") :: len(interface.components)])

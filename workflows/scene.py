@@ -1,0 +1,315 @@
+"""The scene: what one TOML file asks for, checked and in SI units.
+
+Every key of the file is a field below; a key that is not here is an error. What a scene leaves out is not modelled.
+"""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import asdict, fields
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, StrictInt, model_validator
+
+from geometry import parts
+from workflows.units import to_si
+
+
+class Table(BaseModel):
+    """A table of the scene file: nothing may be added to it, nothing changed."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+def quantity(unit: str) -> BeforeValidator:
+    """Validator that turns a text with a unit, or a bare number, into a float counted in `unit`."""
+    return BeforeValidator(lambda value: to_si(value, unit))
+
+
+Length = Annotated[float, quantity("m")]
+Force = Annotated[float, quantity("N")]
+Stiffness = Annotated[float, quantity("N/m")]
+Frequency = Annotated[float, quantity("Hz")]
+Angle = Annotated[float, quantity("rad")]
+Number = Annotated[float, quantity("")]
+WearCoefficient = Annotated[float, quantity("m3/J")]
+
+
+def _direction(value: object) -> tuple[float, float, float]:
+    named = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+    if isinstance(value, str) and value.lstrip("+-") in named and len(value) <= 2:
+        x, y, z = named[value[-1]]
+        return (-x or 0.0, -y or 0.0, -z or 0.0) if value.startswith("-") else (x, y, z)
+    numbers = isinstance(value, (list, tuple)) and all(type(c) in (int, float) for c in value)
+    if isinstance(value, (list, tuple)) and numbers and len(value) == 3 and 0 < np.linalg.norm(value) < np.inf:
+        x, y, z = (float(component) for component in np.asarray(value) / np.linalg.norm(value))
+        return x, y, z
+    raise ValueError(f'expected an axis such as "x" or "-z", or three numbers that are not all zero, got {value!r}')
+
+
+Direction = Annotated[tuple[float, float, float], BeforeValidator(_direction)]
+
+
+class Heading(Table):
+    """What the scene is and where its numbers come from."""
+
+    title: str
+    source: str = ""
+    notes: str = ""
+
+
+class Geometry(Table):
+    """A part of geometry/ or a mesh file, and the groups that are held fixed.
+
+    All other keys of the table are parameters of the part; those left out have the part's own defaults.
+    """
+
+    part: str | None = None
+    mesh: str | None = None
+    fixed: tuple[str, ...] = ()
+    parameters: dict[str, int | float] = Field(default_factory=dict)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _gather_parameters(cls, table: Any) -> Any:
+        if not isinstance(table, dict) or "parameters" in table:
+            return table
+        own = {key: value for key, value in table.items() if key in cls.model_fields}
+        other = {key: value for key, value in table.items() if key not in cls.model_fields}
+        if ("part" in own) == ("mesh" in own):
+            raise ValueError('expected either part = "name" or mesh = "file.msh", and not both')
+        if not isinstance(own.get("part"), str):
+            return own | other  # a mesh file has no parameters: the other keys are unknown ones
+        return own | {"parameters": part_parameters(own["part"], other)}
+
+
+def part_parameters(part: str, given: dict[str, Any]) -> dict[str, int | float]:
+    """Parameters of a part of geometry/ in SI units, all of them.
+
+    given : key -> number or text with a unit (a length, an angle or a pure number)
+    Raises  ValueError: no such part, unknown key, or a value that the part refuses
+    """
+    kind = parts.load(part).Parameters
+    known = {item.name: item.type for item in fields(kind)}
+    values = {}
+    for key, value in given.items():
+        if key not in known:
+            raise ValueError(unknown_key(f"geometry.{key}", [*Geometry.model_fields, *known]))
+        values[key] = _parameter(key, value, whole=known[key] in (int, "int"))
+    return asdict(kind(**values))
+
+
+def _parameter(key: str, value: Any, whole: bool) -> int | float:
+    if whole:
+        if type(value) is not int:
+            raise ValueError(f"geometry.{key}: expected a whole number, got {value!r}")
+        return value
+    for unit in ("m", "rad", ""):
+        try:
+            return to_si(value, unit)
+        except ValueError:
+            continue
+    raise ValueError(f"geometry.{key}: expected a length, an angle or a number, got {value!r}")
+
+
+def unknown_key(key: str, known: list[str]) -> str:
+    """Clause about a key that does not exist, with the one that was probably meant and all that exist."""
+    names = [name for name in known if name != "parameters"]
+    close = difflib.get_close_matches(key.rpartition(".")[2], names, n=1)
+    hint = f" (did you mean {close[0]}?)" if close else ""
+    return f"unknown key {key}{hint}, known here: {', '.join(names)}"
+
+
+class Material(Table):
+    """Linear isotropic elasticity and density."""
+
+    young: Annotated[float, quantity("Pa"), Field(gt=0)]
+    density: Annotated[float, quantity("kg/m3"), Field(gt=0)]
+    poisson: Annotated[Number, Field(gt=-1, lt=0.5)]
+
+
+class Contact(Table):
+    """A face of the part against the ground or against another face of it, and the contact law of every node.
+
+    t1 is the direction that the first tangential component follows; vertices_only leaves the mid-side nodes out.
+    """
+
+    group: str
+    opposite: str | None = None
+    t1: Direction
+    components: tuple[Literal["t1", "t2", "n"], ...] = ("t1", "t2", "n")
+    vertices_only: StrictBool = False
+    law: str = "jenkins"
+    tangential_stiffness: Annotated[Stiffness, Field(gt=0)]
+    normal_stiffness: Annotated[Stiffness, Field(gt=0)]
+    friction: Annotated[Number, Field(ge=0)]
+    gap: Length = 0.0
+
+
+class StaticLoad(Table):
+    """A force that does not change, shared equally by the nodes of a group."""
+
+    group: str
+    direction: Direction
+    value: Force
+
+
+class HarmonicLoad(Table):
+    """A force value * cos(harmonic * w t + phase), shared equally by the nodes of a group."""
+
+    group: str
+    direction: Direction
+    value: Force
+    phase: Angle = 0.0
+    harmonic: Annotated[StrictInt, Field(ge=1)] = 1
+
+
+class Loads(Table):
+    """Named loads."""
+
+    static: dict[str, StaticLoad] = Field(default_factory=dict)
+    harmonic: dict[str, HarmonicLoad] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _distinct(self) -> Loads:
+        both = sorted(set(self.static) & set(self.harmonic))
+        if both:
+            raise ValueError(f'expected one load named "{both[0]}", found it under static and under harmonic')
+        if not self.harmonic:
+            raise ValueError("expected at least one harmonic load, for example [loads.harmonic.drive]")
+        return self
+
+
+class Response(Table):
+    """Which displacement is observed, and the frequency response that is computed."""
+
+    group: str
+    direction: Direction
+    frequency: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]]
+    points: Annotated[StrictInt, Field(ge=2)] = 60
+    method: str = "natural"
+    options: dict[str, Any] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _range(self) -> Response:
+        if self.frequency[0] >= self.frequency[1]:
+            low, high = self.frequency
+            raise ValueError(f"expected frequency = [low, high] with low below high, got {low:g} Hz and {high:g} Hz")
+        return self
+
+
+class Reduction(Table):
+    """Craig-Bampton: how many fixed-interface modes, or up to which frequency."""
+
+    method: Literal["craig_bampton"] = "craig_bampton"
+    modes: Annotated[StrictInt, Field(ge=0)] | None = None
+    cutoff: Annotated[Frequency, Field(gt=0)] | None = None
+
+    @model_validator(mode="after")
+    def _one_truncation(self) -> Reduction:
+        if (self.modes is None) == (self.cutoff is None):
+            raise ValueError("expected either modes = number or cutoff = frequency, and not both")
+        return self
+
+
+class Harmonics(Table):
+    """Harmonics of the response that are kept, and time samples of one cycle."""
+
+    kept: tuple[Annotated[StrictInt, Field(ge=0)], ...] = (0, 1)
+    samples: Annotated[StrictInt, Field(ge=4, le=65536)] = 128
+
+    @model_validator(mode="after")
+    def _resolved(self) -> Harmonics:
+        if not self.kept or list(self.kept) != sorted(set(self.kept)) or max(self.kept) < 1:
+            raise ValueError(f"expected kept as rising harmonic numbers up to 1 or more, got {list(self.kept)}")
+        if self.samples <= 2 * max(self.kept):
+            raise ValueError(
+                f"expected more than {2 * max(self.kept)} samples for harmonic {max(self.kept)}, got {self.samples}"
+            )
+        return self
+
+
+class Damping(Table):
+    """Structural damping: a ratio for every mode, or Rayleigh's two coefficients."""
+
+    modal: Annotated[Number, Field(ge=0, lt=1)] | None = None
+    mass: Annotated[float, quantity("1/s"), Field(ge=0)] | None = None
+    stiffness: Annotated[float, quantity("s"), Field(ge=0)] | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Damping:
+        if self.modal is not None and (self.mass is not None or self.stiffness is not None):
+            raise ValueError("expected either modal, or mass and stiffness, and not both")
+        return self
+
+
+class WearStep(Table):
+    """Largest depth that one wear step may add: a share of delta_max, or a depth [m]."""
+
+    share: Annotated[float, Field(gt=0)] | None = None
+    depth: Annotated[float, Field(gt=0)] | None = None
+
+
+def _step(value: object) -> object:
+    if isinstance(value, (WearStep, dict)):
+        return value
+    for unit, name in (("", "share"), ("m", "depth")):
+        try:
+            return WearStep(**{name: to_si(value, unit)})
+        except ValueError:
+            continue
+    raise ValueError(f'expected a share of delta_max such as "5 %" or a depth such as "50 um", above 0, got {value!r}')
+
+
+def _place(value: object) -> float | str:
+    if value == "peak":
+        return "peak"
+    try:
+        return to_si(value, "Hz")
+    except ValueError:
+        raise ValueError(f'expected "peak" or a frequency such as "410 Hz", got {value!r}') from None
+
+
+class Wear(Table):
+    """Wear of the patch until contact is lost or max_steps are done."""
+
+    law: str = "energy"
+    coefficient: Annotated[WearCoefficient, Field(ge=0)]
+    rule: str = "thesis"
+    step: Annotated[WearStep, BeforeValidator(_step)]
+    at: Annotated[float | str, BeforeValidator(_place)] = "peak"
+    max_steps: Annotated[StrictInt, Field(ge=0)] = 10_000
+
+
+class Pictures(Table):
+    """What is drawn after a run."""
+
+    plots: StrictBool = True
+    renders: StrictBool = True
+    deformation_scale: Annotated[Number, Field(gt=0)] | None = None
+    wear_scale: Annotated[Number, Field(gt=0)] | None = None
+
+
+class Solver(Table):
+    """Newton's tolerance on the contact displacement relative to its size, and threads of the linear algebra."""
+
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-9
+    threads: Annotated[StrictInt, Field(ge=1)] = 1
+
+
+class Scene(Table):
+    """Which geometry, material, contact, loads, reduction, response and wear are modelled."""
+
+    scene: Heading
+    geometry: Geometry
+    material: Material
+    contact: Contact
+    loads: Loads
+    response: Response
+    reduction: Reduction
+    harmonics: Harmonics = Harmonics()
+    damping: Damping = Damping()
+    wear: Wear | None = None
+    pictures: Pictures = Pictures()
+    solver: Solver = Solver()

@@ -1,0 +1,186 @@
+"""The result file: HDF5 with dimension scales, replaced as a whole at every checkpoint.
+
+Each save writes a new file beside the old one and renames it over it, which the operating system does at once or not at
+all: whoever opens the file, at any moment and after any kill, finds one complete checkpoint.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from hbm.branch import Branch
+from hbm.wear_history import WearHistory
+from workflows.result import Fields, Loops, PartMesh, Patch, References, Result
+
+FORMAT = "tribodyn result 1"
+
+# group -> (type, {array: (dimensions, unit)}); what is not an array is an attribute of the group
+SCHEMA: dict[str, tuple[type, dict[str, tuple[tuple[str, ...], str]]]] = {
+    "patch": (
+        Patch,
+        {
+            "nodes": (("pair",), ""),
+            "points": (("pair", "xyz"), "m"),
+            "frames": (("pair", "axis", "xyz"), ""),
+            "area": (("pair",), "m2"),
+            "gap": (("pair",), "m"),
+            "faces": (("face", "face_corner"), ""),
+            "free_deflection": (("pair",), "m"),
+        },
+    ),
+    "part": (PartMesh, {"points": (("node", "xyz"), "m"), "cells": (("cell", "cell_corner"), "")}),
+    "references": (
+        References,
+        {"omega": (("reference",), "rad/s"), "free": (("reference",), "m"), "stuck": (("reference",), "m")},
+    ),
+    "frf": (
+        Branch,
+        {
+            "omega": (("point",), "rad/s"),
+            "response": (("point", "output", "coefficient"), "m"),
+            "contact": (("point", "contact", "coefficient"), "m"),
+            "energy": (("point",), "J"),
+            "newton_steps": (("point",), ""),
+        },
+    ),
+    "wear": (
+        WearHistory,
+        {
+            "cycles": (("row",), ""),
+            "cycles_in_step": (("row",), ""),
+            "depth": (("row", "pair"), "m"),
+            "worn": (("row", "pair"), "m"),
+            "energy": (("row", "pair"), "J"),
+            "preload": (("row",), "N"),
+            "normal_force": (("row", "pair"), "N"),
+            "status": (("row", "pair"), ""),
+            "omega": (("row",), "rad/s"),
+            "amplitude": (("row",), "m"),
+            "displacement": (("row", "contact", "coefficient"), "m"),
+            "force": (("row", "contact", "coefficient"), "N"),
+            "response": (("row", "output", "coefficient"), "m"),
+            "solves": (("row",), ""),
+        },
+    ),
+    "fields": (
+        Fields,
+        {"row": (("field",), ""), "displacement": (("field", "node", "xyz", "coefficient"), "m")},
+    ),
+    "loops": (
+        Loops,
+        {
+            "row": (("field",), ""),
+            "displacement": (("field", "pair", "component", "sample"), "m"),
+            "force": (("field", "pair", "component", "sample"), "N"),
+        },
+    ),
+}
+
+
+class ResultError(ValueError):
+    """A result file cannot be used; the message is one sentence."""
+
+
+def save(path: Path, result: Result) -> None:
+    """Write a result so that `path` holds either the old or the new one, never a part of it."""
+    new = path.with_name(f"{path.name}.{os.getpid()}.new")
+    try:
+        with h5py.File(new, "w", libver="v110") as file:
+            _write(file, result)
+        os.replace(new, path)
+    finally:
+        with contextlib.suppress(FileNotFoundError):
+            new.unlink()
+
+
+def set_aside(path: Path) -> Path | None:
+    """Keep a result that is about to be replaced as result.previous.h5; returns where it is now, None if none was."""
+    if not path.exists():
+        return None
+    previous = path.with_name(f"{path.stem}.previous{path.suffix}")
+    os.replace(path, previous)
+    return previous
+
+
+def _write(file: h5py.File, result: Result) -> None:
+    file.attrs["format"] = FORMAT
+    file.attrs["state"] = result.state
+    for name in ("provenance", "facts"):
+        group = file.create_group(name)
+        for key, value in getattr(result, name).items():
+            group.attrs[key] = value
+    for name, (_, arrays) in SCHEMA.items():
+        part = getattr(result, name)
+        if part is None:
+            continue
+        group = file.create_group(name)
+        for item in fields(part):
+            value = getattr(part, item.name)
+            if item.name in arrays:
+                _write_array(file, group, item.name, np.asarray(value), *arrays[item.name])
+            else:
+                group.attrs[item.name] = value if isinstance(value, str) else np.array(value, dtype=h5py.string_dtype())
+
+
+def _write_array(
+    file: h5py.File, group: h5py.Group, name: str, value: np.ndarray, dimensions: tuple[str, ...], unit: str
+) -> None:
+    data = group.create_dataset(name, data=value)
+    if unit:
+        data.attrs["units"] = unit
+    for axis, (dimension, size) in enumerate(zip(dimensions, value.shape, strict=True)):
+        data.dims[axis].attach_scale(_scale(file, dimension, size))
+
+
+def _scale(file: h5py.File, dimension: str, size: int) -> h5py.Dataset:
+    """The scale of a dimension: its index, shared by all arrays of the file."""
+    key = f"i_{dimension}"
+    if key not in file:
+        file.create_dataset(key, data=np.arange(size))
+        file[key].make_scale(key)
+    if len(file[key]) != size:
+        raise ValueError(f"dimension {dimension} has {len(file[key])} entries, an array has {size}")
+    return file[key]
+
+
+def load(path: Path) -> Result:
+    """Read a result file; raises ResultError where there is none."""
+    try:
+        file = h5py.File(path, "r")
+    except FileNotFoundError:
+        raise ResultError(f'there is no result file "{path}"') from None
+    except OSError:
+        raise ResultError(f'"{path}" is not a result file of tribodyn') from None
+    with file:
+        if file.attrs.get("format") != FORMAT:
+            raise ResultError(f'"{path}" is not a result file of this version of tribodyn')
+        parts = {name: _read(file[name], kind, arrays) for name, (kind, arrays) in SCHEMA.items() if name in file}
+        return Result(
+            provenance=_attributes(file["provenance"].attrs),
+            facts=_attributes(file["facts"].attrs),
+            state=str(file.attrs["state"]),
+            **parts,
+        )
+
+
+def _read(group: h5py.Group, kind: type, arrays: Mapping[str, Any]) -> Any:
+    values: dict[str, Any] = {}
+    for item in fields(kind):
+        if item.name in arrays:
+            values[item.name] = group[item.name][()]
+        else:
+            value = group.attrs[item.name]
+            values[item.name] = value if isinstance(value, str) else tuple(str(entry) for entry in value)
+    return kind(**values)
+
+
+def _attributes(attributes: h5py.AttributeManager) -> dict[str, Any]:
+    return {key: value.item() if isinstance(value, np.generic) else value for key, value in attributes.items()}

@@ -1,0 +1,106 @@
+"""What a result says, in numbers: for `tribodyn show`, for machines and for people."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hbm.branch import CONVERGED
+from workflows.result import Result
+
+
+def summary(result: Result) -> dict[str, Any]:
+    """The numbers of a result; what was not computed is None.
+
+    depth_max_m, depth_mean_m : largest, and mean over the area of, the total wear depth
+    cycles : vibration cycles so far; life_cycles : the same if contact was lost, else None
+    energy_J, volume_m3 : friction work and worn volume, accumulated
+    wear_steps, hbm_solves : steps taken and balance solves spent on wear
+    peak_hz, peak_m, preload_N : [first, last] of the wear run, or the peak of the response curve without one
+    seconds : of computing, interrupted runs included
+    """
+    numbers: dict[str, Any] = {"state": result.state, "finished": result.state.startswith("complete")}
+    numbers |= {"seconds": result.facts.get("seconds"), "wear_steps": result.wear_steps}
+    numbers |= _wear(result) | _peak(result)
+    for name in ("full_dofs", "model_dofs", "contact_pairs", "unknowns", "delta_max_m"):
+        numbers[name] = result.facts.get(name)
+    free = result.facts.get("free_hz")
+    numbers["free_hz"] = None if free is None else [float(hertz) for hertz in np.atleast_1d(free)]
+    return {name: _finite(value) for name, value in numbers.items()}
+
+
+def _wear(result: Result) -> dict[str, Any]:
+    names = ("depth_max_m", "depth_mean_m", "cycles", "life_cycles", "energy_J", "volume_m3", "hbm_solves")
+    wear, patch = result.wear, result.patch
+    if wear is None or patch is None or not len(wear.cycles):
+        return dict.fromkeys(names)
+    depth, cycles = result.depth_after(-1), result.cycles_after(-1)
+    return {
+        "depth_max_m": float(depth.max()),
+        "depth_mean_m": float(depth @ patch.area / patch.area.sum()),
+        "cycles": cycles,
+        "life_cycles": cycles if result.contact_lost else None,
+        "energy_J": float(wear.cycles_in_step @ wear.energy.sum(1)),
+        "volume_m3": float(depth @ patch.area),
+        "hbm_solves": int(wear.solves.sum()),
+        "wear_end": wear.end,
+    }
+
+
+def _peak(result: Result) -> dict[str, Any]:
+    wear, frf = result.wear, result.frf
+    if wear is not None and len(wear.omega):
+        ends = [0, -1]
+        return {
+            "peak_hz": [float(w) for w in wear.omega[ends] / (2 * np.pi)],
+            "peak_m": [float(a) for a in wear.amplitude[ends]],
+            "preload_N": [float(n) for n in wear.preload[ends]],
+        }
+    if frf is not None:
+        amplitude = frf.amplitude(frf.output_names[0])
+        best = int(np.argmax(np.where([outcome == CONVERGED for outcome in frf.outcome], amplitude, -1.0)))
+        hertz, height = float(frf.frequency[best]), float(amplitude[best])
+        return {"peak_hz": [hertz, hertz], "peak_m": [height, height], "preload_N": None}
+    return {"peak_hz": None, "peak_m": None, "preload_N": None}
+
+
+def _finite(value: Any) -> Any:
+    """JSON has no nan."""
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def lines(result: Result) -> list[tuple[str, str]]:
+    """The summary as pairs of a name and a readable value."""
+    numbers = summary(result)
+
+    def pair(name: str, scale: float, unit: str) -> str:
+        first, last = (scale * value for value in numbers[name])
+        return f"{first:.5g} -> {last:.5g} {unit}"
+
+    shown = [
+        ("scene", result.provenance["scene_name"]),
+        ("state", result.state),
+        ("model", f"{numbers['full_dofs']} DOFs reduced to {numbers['model_dofs']}"),
+        ("contact", f"{numbers['contact_pairs']} node pairs, {numbers['unknowns']} unknowns"),
+    ]
+    if numbers["free_hz"]:
+        shown.append(("free modes", ", ".join(f"{hertz:.2f}" for hertz in numbers["free_hz"][:4]) + " Hz"))
+    if numbers["delta_max_m"] is not None:
+        shown.append(("delta_max", f"{1e3 * numbers['delta_max_m']:.4f} mm"))
+    if numbers["peak_hz"] is not None:
+        shown.append(("frequency", pair("peak_hz", 1, "Hz")))
+        shown.append(("amplitude", pair("peak_m", 1e3, "mm")))
+    if numbers["depth_max_m"] is not None:
+        deepest, mean = 1e3 * numbers["depth_max_m"], 1e3 * numbers["depth_mean_m"]
+        life = "contact not lost" if numbers["life_cycles"] is None else "contact lost"
+        shown += [
+            ("preload", pair("preload_N", 1, "N")),
+            ("cycles", f"{numbers['cycles']:.4g} ({life})"),
+            ("wear depth", f"{deepest:.4f} mm largest, {mean:.4f} mm mean"),
+            ("worn volume", f"{1e9 * numbers['volume_m3']:.5g} mm3"),
+            ("friction work", f"{numbers['energy_J']:.5g} J"),
+            ("wear steps", f"{numbers['wear_steps']} with {numbers['hbm_solves']} balance solves"),
+        ]
+    shown.append(("computing", f"{numbers['seconds']:.1f} s"))
+    return shown
