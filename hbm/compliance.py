@@ -187,17 +187,17 @@ class ContactCompliance:
                 self._load[load_names.index(name), basis.harmonics.index(h)] = value
         self.base = excitation.base
         self.groups: list[tuple[Expansion, list[int]]] = []
-        shared: dict[int, int] = {}
-        for position, h in enumerate(basis.harmonics):
-            system, b = model.at_harmonic(h)
-            if id(system) in shared:
-                self.groups[shared[id(system)]][1].append(position)
-                continue
-            rows = [b, *(np.conj(system.loads[n])[None] for n in load_names), *(system.outputs[n][None] for n in self.output_names)]
-            ports = np.concatenate([np.asarray(r) for r in rows])
-            shared[id(system)] = len(self.groups)
-            s_max = (basis.harmonics[-1] if model.per_harmonic is None else h) * omega_max
-            self.groups.append((Expansion(system, np.asarray(b), self.k, ports, s_max), [position]))
+        seen = [model.at_harmonic(h) for h in basis.harmonics]
+        sharing: dict[int, list[int]] = {}
+        for position, (system, _) in enumerate(seen):
+            sharing.setdefault(id(system), []).append(position)
+        for positions in sharing.values():
+            system, b = seen[positions[0]]
+            loads = [np.conj(system.loads[name])[None] for name in load_names]
+            outputs = [system.outputs[name][None] for name in self.output_names]
+            ports = np.concatenate([np.asarray(rows) for rows in (b, *loads, *outputs)])
+            s_max = basis.harmonics[positions[-1]] * omega_max
+            self.groups.append((Expansion(system, np.asarray(b), self.k, ports, s_max), positions))
         self.error = max(e.error for e, _ in self.groups)
         self.shared_real = len(self.groups) == 1 and not np.iscomplexobj(self.groups[0][0].w0)
 
@@ -311,24 +311,37 @@ class JacobianProduct:
             w0, b = expansion.w0_single, expansion.b_single
             if not everything:
                 w0, b = w0[np.ix_(rows, rows)], b[rows]
-            self._groups.append((w0, b, np.ascontiguousarray(b.conj().T), [p.core_single for p in at], positions))
+            columns = np.flatnonzero(np.isin(self._basis.order, np.take(self._basis.harmonics, positions)))
+            self._groups.append((w0, b, np.ascontiguousarray(b.conj().T), [p.core_single for p in at], columns))
 
     def __call__(self, d: np.ndarray) -> np.ndarray:
         """G d for d (n_active, n_coeff)."""
-        if self._shared_real:
-            w0, b, bt, cores, _ = self._groups[0]
-            single = d.astype(np.float32)
-            z = bt @ single
-            column = 0
-            for core in cores:  # on [a, b] of one harmonic, or on x_0
-                width = len(core) // len(z)
-                part = core @ z[:, column : column + width].T.ravel()
-                z[:, column : column + width] = part.reshape(width, -1).T
-                column += width
-            return w0 @ single + b @ z
-        force = self._basis.to_complex(d)
-        moved = np.empty_like(force)
-        for w0, b, bt, cores, positions in self._groups:
-            for core, p in zip(cores, positions, strict=True):
-                moved[:, p] = w0 @ force[:, p] + b @ (core @ (bt @ force[:, p]))
-        return self._basis.to_real(moved)
+        out = np.empty(d.shape)
+        for w0, b, bt, cores, columns in self._groups:
+            product = self._complex if np.iscomplexobj(w0) else self._real
+            out[:, columns] = product(d[:, columns], w0, b, bt, cores)
+        return out
+
+    @staticmethod
+    def _real(d: np.ndarray, w0: np.ndarray, b: np.ndarray, bt: np.ndarray, cores: list[np.ndarray]) -> np.ndarray:
+        """The product for the coefficients d of the harmonics that one real system serves."""
+        single = d.astype(np.float32)
+        z = bt @ single
+        column = 0
+        for core in cores:  # on [a, b] of one harmonic, or on x_0
+            width = len(core) // len(z)
+            part = core @ z[:, column : column + width].T.ravel()
+            z[:, column : column + width] = part.reshape(width, -1).T
+            column += width
+        return w0 @ single + b @ z
+
+    @staticmethod
+    def _complex(d: np.ndarray, w0: np.ndarray, b: np.ndarray, bt: np.ndarray, cores: list[np.ndarray]) -> np.ndarray:
+        """The same for a complex system; an odd number of coefficients begins with x_0."""
+        s = d.shape[1] % 2
+        f = np.concatenate([d[:, :s], d[:, s::2] - 1j * d[:, s + 1 :: 2]], axis=1).astype(w0.dtype)
+        z = np.stack([core @ part for core, part in zip(cores, (bt @ f).T, strict=True)], axis=1)
+        moved = w0 @ f + b @ z
+        out = np.empty(d.shape)
+        out[:, :s], out[:, s::2], out[:, s + 1 :: 2] = moved[:, :s].real, moved[:, s:].real, -moved[:, s:].imag
+        return out
