@@ -22,9 +22,10 @@ from fem.part import Part
 from geometry import mesh as mesh_reader
 from geometry import parts
 from geometry.numbering import REFERENCE_POINTS, permutation
-from hbm import continuation, evolution, law, wear_law
+from hbm import continuation, error_controlled_rule, law, thesis_rule, wear_law
 from hbm.balance import HarmonicBalance
 from hbm.branch import CONVERGED, Branch
+from hbm.evolution import Duty, WearProblem
 from hbm.excitation import Excitation
 from hbm.harmonics import HarmonicBasis
 from hbm.newton import NewtonOptions
@@ -220,8 +221,12 @@ def wear_down(
         done = float(patch.area @ (row.depth + row.worn)) / to_wear
         advance(done, f"step {len(rows)}, {row.cycles + row.cycles_in_step:.3g} cycles, {row.preload:.4g} N")
 
-    problem = evolution.WearProblem(balance, site, wear.law, wear.coefficient, patch.area)
-    worn = evolution.evolve(problem, step_depth(scene, patch), wear.max_steps, on_row, result.wear)
+    problem = WearProblem(balance, (Duty(site),), wear.law, wear.coefficient, patch.area, wear.lost_below)
+    if wear.rule == "thesis":
+        worn = thesis_rule.evolve(problem, step_depth(scene, patch), wear.max_steps, on_row, result.wear)
+    else:
+        tolerance = error_controlled_rule.Tolerance(wear.tolerance, depth_scale(patch))
+        worn = error_controlled_rule.evolve(problem, tolerance, wear.max_steps, on_row, result.wear)
     result = with_pictures_of(replace(result, wear=worn), model)
     if worn.end.startswith("solve failed"):
         keep(replace(result, state=worn.end))
@@ -236,13 +241,18 @@ def step_depth(scene: Scene, patch: Patch) -> float:
     if step.depth is not None:
         return step.depth
     assert step.share is not None
+    return step.share * depth_scale(patch)
+
+
+def depth_scale(patch: Patch) -> float:
+    """delta_max, the largest deflection of the patch without the contact [m]; raises ValueError where there is none."""
     delta_max = float(patch.free_deflection.max())
     if not (np.isfinite(delta_max) and delta_max > 0):
         raise ValueError(
-            "wear.step: a share of delta_max needs static loads that press the contact of a part held without it; "
-            'give a depth such as "50 um"'
+            "wear: a share of delta_max needs static loads that press the contact of a part held without it; "
+            'give wear.step as a depth such as "50 um"'
         )
-    return step.share * delta_max
+    return delta_max
 
 
 def with_pictures_of(result: Result, model: Model) -> Result:

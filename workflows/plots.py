@@ -129,7 +129,7 @@ def energy_against_cycles(result: Result) -> Figure:
         unit_cycles, scale_cycles = _cycles(wear.cycles[-1])
         upper.plot(scale_cycles * wear.cycles, wear.energy.sum(1), ".-", color=BLUE, ms=4)
         upper.set(xlabel=f"vibration cycles{unit_cycles}", ylabel="energy per cycle / J", title="Dissipated energy")
-        spent = np.concatenate([[0.0], np.cumsum(wear.cycles_in_step * wear.energy.sum(1))[:-1]])
+        spent = np.concatenate([[0.0], np.cumsum(wear.work.sum(1))[:-1]])
         lower.plot(spent * 1e-6, 1e9 * wear.depth @ patch.area, ".-", color=ORANGE, ms=4)
         lower.set(xlabel="accumulated energy / MJ", ylabel="worn volume / mm³")
     return figure

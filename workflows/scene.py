@@ -272,11 +272,17 @@ def _place(value: object) -> float | str:
 
 
 class Wear(Table):
-    """Wear of the patch until contact is lost or max_steps are done."""
+    """Wear of the patch until contact is lost or max_steps are done.
+
+    rule : "thesis" takes `step`, "error_controlled" takes `tolerance`, its local error as a share
+    lost_below : share of the first preload below which contact counts as lost; 0 waits until the last touch ends
+    """
 
     law: str = "energy"
     coefficient: Annotated[WearCoefficient, Field(ge=0)]
-    rule: str = "thesis"
+    rule: Literal["thesis", "error_controlled"] = "thesis"
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] = 0.01
+    lost_below: Annotated[Number, Field(ge=0, lt=1)] = 0.0
     step: Annotated[WearStep, BeforeValidator(_step)]
     at: Annotated[float | str, BeforeValidator(_place)] = "peak"
     max_steps: Annotated[StrictInt, Field(ge=0)] = 10_000

@@ -68,6 +68,10 @@ SCHEMA: dict[str, tuple[type, dict[str, tuple[tuple[str, ...], str]]]] = {
             "force": (("row", "contact", "coefficient"), "N"),
             "response": (("row", "output", "coefficient"), "m"),
             "solves": (("row",), ""),
+            "step_error": (("row",), ""),
+            "work": (("row", "pair"), "J"),
+            "duty_omega": (("row", "duty"), "rad/s"),
+            "duty_displacement": (("row", "duty", "contact", "coefficient"), "m"),
         },
     ),
     "fields": (

@@ -41,7 +41,7 @@ def _wear(result: Result) -> dict[str, Any]:
         "depth_mean_m": float(depth @ patch.area / patch.area.sum()),
         "cycles": cycles,
         "life_cycles": cycles if result.contact_lost else None,
-        "energy_J": float(wear.cycles_in_step @ wear.energy.sum(1)),
+        "energy_J": float(wear.work.sum()),
         "volume_m3": float(depth @ patch.area),
         "hbm_solves": int(wear.solves.sum()),
         "wear_end": wear.end,
