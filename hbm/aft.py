@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import ModuleType
 
 import numba
@@ -10,7 +11,14 @@ import numpy as np
 from hbm.harmonics import HarmonicBasis
 from hbm.law import ContactCycle, ContactParameters
 
-MAX_CYCLES = 32
+PERIODIC = 1e-13  # drift of the memory over a cycle, relative to its largest size in the cycle
+FIRST_CYCLES = 4  # marched before Newton is tried on the memory
+NEWTON_CYCLES = 30
+MAX_CYCLES = 500
+NEAR = 1e-6  # relative drift from which Newton only polishes
+ISOLATED = 1e-10  # least contraction per cycle of a memory that does not depend on its start
+
+Turn = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
 
 
 class CycleNotPeriodic(RuntimeError):
@@ -33,20 +41,17 @@ def march(
     Raises  CycleNotPeriodic
     Source  Cameron and Griffin 1989 (AFT); derivatives of the recursion as in Siewert et al. 2010
     """
-    n_pair, n_comp, n_coeff = x.shape
-    force = np.zeros((n_pair, n_comp, basis.n_samples))
-    jac = np.zeros((n_pair, n_comp * n_coeff, n_comp * n_coeff))
-    status = np.zeros(n_pair, np.int64)
-    late = _march(
-        law.step, basis.to_time(x), parameters.packed(), memory, basis.synthesis, basis.analysis, force, jac, status
-    )
-    if late >= 0:
-        raise CycleNotPeriodic(f"contact pair {late} did not settle to a periodic cycle within {MAX_CYCLES} cycles")
+    phi = basis.synthesis if jacobian else basis.synthesis[:, :0]
+    force, jac, status = _periodic(law, basis.to_time(x), parameters, memory, phi, basis.analysis)
     return ContactCycle(basis.from_time(force), jac if jacobian else None, status)
 
 
 def history(
-    law: ModuleType, x: np.ndarray, parameters: ContactParameters, basis: HarmonicBasis, memory: np.ndarray | None = None
+    law: ModuleType,
+    x: np.ndarray,
+    parameters: ContactParameters,
+    basis: HarmonicBasis,
+    memory: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Periodic displacement and force over one period, for loops and checks.
 
@@ -54,74 +59,179 @@ def history(
     """
     if memory is None:
         memory = np.zeros((parameters.n_pair, law.n_state(parameters.components)))
-    n_pair, n_comp, n_coeff = x.shape
-    force = np.zeros((n_pair, n_comp, basis.n_samples))
-    jac = np.zeros((n_pair, n_comp * n_coeff, n_comp * n_coeff))
     samples = basis.to_time(x)
+    return samples, _periodic(law, samples, parameters, memory, basis.synthesis[:, :0], basis.analysis)[0]
+
+
+def _periodic(
+    law: ModuleType,
+    samples: np.ndarray,
+    parameters: ContactParameters,
+    memory: np.ndarray,
+    phi: np.ndarray,
+    weight: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Force at the samples, Jacobian of its coefficients and status of the periodic cycle."""
+    p = parameters.packed()
+    n_pair, n_comp, _ = samples.shape
+    s, ds = settle(law, samples, p, memory, phi)
+    force = np.zeros(samples.shape)
+    jac = np.zeros((n_pair, n_comp * weight.shape[1], n_comp * phi.shape[1]))
     status = np.zeros(n_pair, np.int64)
-    _march(law.step, samples, parameters.packed(), memory, basis.synthesis, basis.analysis, force, jac, status)
-    return samples, force
+    rows, columns = np.ascontiguousarray(weight.T), np.ascontiguousarray(phi)
+    _record(law.step, samples, p, columns, rows, s, ds, force, jac, status)
+    return force, jac, status
+
+
+def settle(
+    law: ModuleType, samples: np.ndarray, p: np.ndarray, memory: np.ndarray, phi: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Memory at the start of the periodic cycle, and its derivative.
+
+    A Jenkins slider settles in one cycle. Planar friction contracts slowly where it slips little, so after a few cycles
+    Newton's step for the period map, s = P(s), takes over. P never widens a distance, so its fixed points are a convex
+    set. One that is isolated is the only one, and one on the rim of the set that still contracts is where marching ends
+    too (a pair that slips less and less): these are taken. Otherwise the answer depends on the path, and the pair,
+    which has come to stick, is marched on.
+
+    samples : (n_pair, n_component, n_samples) displacement [m]; p : packed parameters; memory : (n_pair, n_state)
+    phi : (n_samples, n_coeff) basis functions, no columns where no derivative is wanted
+    Returns (n_pair, n_state), (n_pair, n_state, n_component * n_coeff)
+    Raises  CycleNotPeriodic
+    """
+    phi = np.ascontiguousarray(phi)
+    s = memory.copy()
+    ds = np.zeros((*s.shape, samples.shape[1] * phi.shape[1]))
+    if s.shape[1] == 0:
+        return s, ds
+
+    def turn(i: np.ndarray, s: np.ndarray, ds: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """One cycle of the pairs i: memory after it, its two derivatives, and the relative drift."""
+        eye = np.broadcast_to(np.eye(s.shape[1]), (len(i), s.shape[1], s.shape[1]))
+        after, slopes, size = s.copy(), np.concatenate([ds, eye], axis=2), np.full(len(i), np.finfo(float).tiny)
+        _advance(law.step, samples[i], p[i], phi, after, slopes, size)
+        return after, slopes[..., : ds.shape[2]], slopes[..., ds.shape[2] :], np.abs(after - s).max(axis=1) / size
+
+    open_pairs = _repeat(turn, np.arange(len(s)), s, ds, FIRST_CYCLES)
+    open_pairs = _newton(turn, open_pairs, s, ds)
+    open_pairs = _repeat(turn, open_pairs, s, ds, MAX_CYCLES)
+    if len(open_pairs) > 0:
+        raise CycleNotPeriodic(
+            f"contact pair {open_pairs[0]} did not settle to a periodic cycle within {MAX_CYCLES} cycles"
+        )
+    return s, ds
+
+
+def _repeat(turn: Turn, i: np.ndarray, s: np.ndarray, ds: np.ndarray, n_cycles: int) -> np.ndarray:
+    """March the pairs i until they are periodic; s and ds are changed in place. Returns the pairs that are not."""
+    for _ in range(n_cycles):
+        if len(i) == 0:
+            break
+        s[i], ds[i], _, drift = turn(i, s[i], ds[i])
+        i = i[drift > PERIODIC]
+    return i
+
+
+def _newton(turn: Turn, i: np.ndarray, s: np.ndarray, ds: np.ndarray) -> np.ndarray:
+    """Solve s = P(s) for the pairs i, and ds = P' ds + dP/dX; s and ds change where marching would end there too.
+
+    Returns the pairs where it would not, or where Newton does not converge
+    """
+    rejected = []
+    trial, trial_ds = s[i], ds[i]
+    closing = np.zeros(len(i), bool)  # the step before was small and its cycle contracted
+    for _ in range(NEWTON_CYCLES):
+        if len(i) == 0:
+            break
+        after, after_ds, slope, drift = turn(i, trial, trial_ds)
+        left, size, right = np.linalg.svd(np.eye(s.shape[1]) - slope)
+        inverse = right.transpose(0, 2, 1) @ (left.transpose(0, 2, 1) / np.maximum(size, ISOLATED)[..., None])
+        trial_ds = trial_ds + inverse @ (after_ds - trial_ds)
+        done = drift <= PERIODIC
+        isolated = size[:, -1] > ISOLATED
+        good = done & (isolated | closing)
+        s[i[good]], ds[i[good]] = trial[good], trial_ds[good]
+        rejected.append(i[done & ~good])
+        closing = isolated & (drift < NEAR)
+        trial = trial + (inverse @ (after - trial)[..., None])[..., 0]
+        i, trial, trial_ds, closing = i[~done], trial[~done], trial_ds[~done], closing[~done]
+    return np.concatenate([i, *rejected])
 
 
 @numba.njit
-def _march(step, x, p, memory, phi, weight, force, jac, status):
-    """Return -1, or the first pair whose memory does not repeat. Not cached: `step` lives in another file."""
+def _advance(step, x, p, phi, s, ds, size):
+    """One cycle of every pair: s and ds to their values after it, `size` the largest |s| met.
+
+    Not cached, nor is `_record`: `step` lives in another file.
+    """
+    n_pair, n_comp, n_time = x.shape
+    n_state = s.shape[1]
+    f = np.zeros(n_comp)
+    dfx, dfs = np.zeros((n_comp, n_comp)), np.zeros((n_comp, n_state))
+    dsx, dss = np.zeros((n_state, n_comp)), np.zeros((n_state, n_state))
+    before = np.zeros((n_state, ds.shape[2]))
+    for i in range(n_pair):
+        for j in range(n_time):
+            dsx[:] = 0.0
+            dss[:] = 0.0
+            step(x[i, :, j], s[i], p[i], f, dfx, dfs, dsx, dss)
+            for r in range(n_state):
+                size[i] = max(size[i], abs(s[i, r]))
+            _chain(dsx, dss, phi[j], ds[i], before)
+
+
+@numba.njit
+def _record(step, x, p, phi, weight, s, ds, force, jac, status):
+    """The periodic cycle from memory s and its derivative ds: force samples, Jacobian, status bits."""
     n_pair, n_comp, n_time = x.shape
     n_coeff = phi.shape[1]
-    n_state = memory.shape[1]
+    n_state = s.shape[1]
     m = n_comp * n_coeff
     f = np.zeros(n_comp)
-    dfx = np.zeros((n_comp, n_comp))
-    dfs = np.zeros((n_comp, n_state))
-    dsx = np.zeros((n_state, n_comp))
-    dss = np.zeros((n_state, n_state))
+    dfx, dfs = np.zeros((n_comp, n_comp)), np.zeros((n_comp, n_state))
+    dsx, dss = np.zeros((n_state, n_comp)), np.zeros((n_state, n_state))
+    before = np.zeros((n_state, m))
+    slope = np.zeros((n_time, n_comp * m))  # d f / d X at each sample
     for i in range(n_pair):
-        s = memory[i].copy()
-        ds = np.zeros((n_state, m))  # d s / d X, carried through every cycle
-        settled = False
-        last = False
-        for _ in range(MAX_CYCLES):
-            before = s.copy()
-            if last:
-                jac[i] = 0.0
-                status[i] = 0
-            for j in range(n_time):
-                dfx[:] = 0.0
-                dfs[:] = 0.0
-                dsx[:] = 0.0
-                dss[:] = 0.0
-                bits = step(x[i, :, j], s, p[i], f, dfx, dfs, dsx, dss)
-                if last:
-                    status[i] |= bits
-                    for c in range(n_comp):
-                        force[i, c, j] = f[c]
-                        for d in range(n_comp):
-                            if dfx[c, d] != 0.0:
-                                for a in range(n_coeff):
-                                    wa = weight[j, a] * dfx[c, d]
-                                    for b in range(n_coeff):
-                                        jac[i, c * n_coeff + a, d * n_coeff + b] += wa * phi[j, b]
-                        for r in range(n_state):
-                            if dfs[c, r] != 0.0:
-                                for a in range(n_coeff):
-                                    wa = weight[j, a] * dfs[c, r]
-                                    for b in range(m):
-                                        jac[i, c * n_coeff + a, b] += wa * ds[r, b]
-                ds = dss @ ds
+        memory = s[i].copy()
+        memory_ds = ds[i].copy()
+        slope[:] = 0.0
+        for j in range(n_time):
+            dfx[:] = 0.0
+            dfs[:] = 0.0
+            dsx[:] = 0.0
+            dss[:] = 0.0
+            status[i] |= step(x[i, :, j], memory, p[i], f, dfx, dfs, dsx, dss)
+            for c in range(n_comp):
+                force[i, c, j] = f[c]
+                for d in range(n_comp):
+                    if dfx[c, d] != 0.0:
+                        for b in range(n_coeff):
+                            slope[j, c * m + d * n_coeff + b] += dfx[c, d] * phi[j, b]
                 for r in range(n_state):
-                    for d in range(n_comp):
-                        if dsx[r, d] != 0.0:
-                            for b in range(n_coeff):
-                                ds[r, d * n_coeff + b] += dsx[r, d] * phi[j, b]
-            if last:
-                settled = True
-                break
-            scale = 0.0
-            drift = 0.0
-            for r in range(n_state):
-                scale = max(scale, abs(s[r]), abs(before[r]))
-                drift = max(drift, abs(s[r] - before[r]))
-            last = n_state == 0 or drift <= 1e-14 * scale
-        if not settled:
-            return i
-    return -1
+                    if dfs[c, r] != 0.0:
+                        for b in range(m):
+                            slope[j, c * m + b] += dfs[c, r] * memory_ds[r, b]
+            _chain(dsx, dss, phi[j], memory_ds, before)
+        if m > 0:
+            product = weight @ slope
+            for c in range(n_comp):
+                jac[i, c * len(weight) : (c + 1) * len(weight)] = product[:, c * m : (c + 1) * m]
+
+
+@numba.njit
+def _chain(dsx, dss, phi, ds, before):
+    """ds <- dss ds + dsx phi, over the columns of ds; those beyond the coefficients carry dss alone."""
+    n_state, n_comp = dsx.shape
+    n_coeff = phi.size
+    before[:] = ds
+    for r in range(n_state):
+        ds[r] = 0.0
+        for q in range(n_state):
+            if dss[r, q] != 0.0:
+                for b in range(ds.shape[1]):
+                    ds[r, b] += dss[r, q] * before[q, b]
+        for d in range(n_comp):
+            if dsx[r, d] != 0.0:
+                for b in range(n_coeff):
+                    ds[r, d * n_coeff + b] += dsx[r, d] * phi[b]

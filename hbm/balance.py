@@ -111,7 +111,9 @@ class HarmonicBalance:
         return self._point
 
     def _loaded(self, coefficients: np.ndarray) -> np.ndarray:
-        return coefficients if self.load_factor == 1.0 else coefficients * np.where(self.basis.order, self.load_factor, 1.0)
+        if self.load_factor == 1.0:
+            return coefficients
+        return coefficients * np.where(self.basis.order, self.load_factor, 1.0)
 
     def x_lin(self, omega: float) -> np.ndarray:
         """(n_contact, n_coeff) response with every contact stuck and closed, the gap ignored [m]."""
@@ -194,7 +196,10 @@ class HarmonicBalance:
 
 
 class Linearisation:
-    """I - G dg/dx, with dg/dx block diagonal over pairs and zero where a pair stays stuck and closed."""
+    """I - G dg/dx, with dg/dx block diagonal over pairs and zero where a pair stays stuck and closed.
+
+    active : pairs with a derivative; rows : their contact rows
+    """
 
     def __init__(self, balance: HarmonicBalance, state: State):
         jac = state.cycle.jacobian
@@ -207,22 +212,38 @@ class Linearisation:
         k = balance.compliance.k.reshape(n_pair, n_comp)
         dg[:, np.arange(m), np.arange(m)] += np.repeat(k, n_coeff, axis=1)
         self.active = np.flatnonzero(np.abs(dg).max(axis=(1, 2)) > 1e-14 * k.max(axis=1))
-        self._rows = (self.active[:, None] * n_comp + np.arange(n_comp)).ravel()
+        self.rows = (self.active[:, None] * n_comp + np.arange(n_comp)).ravel()
         self._dg = np.ascontiguousarray(dg[self.active])
         self._shape = (n_pair * n_comp, n_coeff)
         self._balance = balance
         self._omega = state.omega
-        self._product = balance.at(state.omega).jacobian_product(self._rows)
+        self._product = balance.at(state.omega).jacobian_product(self.rows)
 
     def departure_slope(self, direction: np.ndarray) -> np.ndarray:
         """dg/dx . direction: (n_contact, n_coeff)."""
         out = np.zeros(self._shape)
-        out[self._rows] = self._g_slope(direction[self._rows])
+        out[self.rows] = self._g_slope(direction[self.rows])
         return out
 
     def _g_slope(self, active_direction: np.ndarray) -> np.ndarray:
         shape = active_direction.shape
         return np.matmul(self._dg, active_direction.reshape(len(self.active), -1, 1)).reshape(shape)
+
+    def product(self, d: np.ndarray) -> np.ndarray:
+        """(I - G dg/dx) d on the rows of active pairs, d (n_active_rows, n_coeff)."""
+        return d - self._product(self._g_slope(d))
+
+    def spread(self, d: np.ndarray, rhs: np.ndarray) -> np.ndarray:
+        """The solution of (I - G dg/dx) d = rhs in all rows (n_contact, n_coeff) from that in the active rows."""
+        if len(self.rows) == self._shape[0]:
+            return d
+        if len(self.rows) == 0:
+            return rhs.copy()
+        g = np.zeros(self._shape)
+        g[self.rows] = self._g_slope(d)
+        full = rhs + self._balance.at(self._omega).apply(g)
+        full[self.rows] = d
+        return full
 
     def solve(self, rhs: np.ndarray, tolerance: float, max_products: int = 200) -> tuple[np.ndarray, int, float]:
         """Solve (I - G dg/dx) d = rhs for rhs (n_contact, n_coeff).
@@ -231,21 +252,11 @@ class Linearisation:
         """
         if len(self.active) == 0:
             return rhs.copy(), 0, 0.0
-        n_coeff = self._shape[1]
-
-        def product(v: np.ndarray) -> np.ndarray:
-            d = v.reshape(-1, n_coeff)
-            return (d - self._product(self._g_slope(d))).ravel()
-
-        d, spent, reached = gmres(product, rhs[self._rows].ravel(), tolerance, max_products)
-        d = d.reshape(-1, n_coeff)
-        if len(self._rows) == self._shape[0]:
-            return d, spent, reached
-        g = np.zeros(self._shape)
-        g[self._rows] = self._g_slope(d)
-        full = rhs + self._balance.at(self._omega).apply(g)
-        full[self._rows] = d
-        return full, spent, reached
+        shape = (len(self.rows), self._shape[1])
+        d, spent, reached = gmres(
+            lambda v: self.product(v.reshape(shape)).ravel(), rhs[self.rows].ravel(), tolerance, max_products
+        )
+        return self.spread(d.reshape(shape), rhs), spent, reached
 
     def dense(self) -> np.ndarray:
         """The Jacobian as a matrix (n_contact * n_coeff, same), column by column; for checks and as fallback."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from hbm.balance import HarmonicBalance
     from hbm.newton import Solution
+    from hbm.parameter import Parameter
 
 CONVERGED = "converged"
 
@@ -26,6 +26,8 @@ class Branch:
     outcome : for each point "converged" or a sentence that says what went wrong
     newton_steps : (n_point,) Newton steps spent
     end : sentence that says where and why the branch ends
+    folds : indices of the points that are folds, where the branch turns back
+    parameter_name : what was stepped; parameter : (n_point,) its values, the same as omega where it is the frequency
     """
 
     omega: np.ndarray
@@ -36,6 +38,9 @@ class Branch:
     outcome: tuple[str, ...]
     newton_steps: np.ndarray
     end: str
+    folds: tuple[int, ...] = ()
+    parameter_name: str = "frequency"
+    parameter: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     @property
     def frequency(self) -> np.ndarray:
@@ -58,33 +63,55 @@ def amplitude(coefficients: np.ndarray, has_static: bool = True) -> np.ndarray:
 
 
 class BranchBuilder:
-    """Collects solutions into a Branch."""
+    """Collects solutions into a Branch.
 
-    def __init__(self, balance: HarmonicBalance):
-        self._balance = balance
-        self.omega: list[float] = []
+    parameter : what the continuation steps in
+    """
+
+    def __init__(self, parameter: Parameter):
+        self._parameter = parameter
+        self.value: list[float] = []
         self.x: list[np.ndarray] = []
-        self._rows: list[tuple[np.ndarray, float, str, int]] = []
+        self.folds: list[int] = []
+        self._rows: list[tuple[float, np.ndarray, float, str, int]] = []
+        self._output_names: tuple[str, ...] = ()
 
-    def add(self, solution: Solution) -> None:
-        """Append one solution, converged or not."""
+    def add(self, value: float, solution: Solution, fold: bool = False) -> None:
+        """Append one solution, converged or not, at a value of the parameter."""
         state = solution.state
-        self.omega.append(state.omega)
+        balance, _ = self._parameter.place(value)
+        self.value.append(value)
         self.x.append(state.x)
-        energy = float(self._balance.energy(state).sum())
-        self._rows.append((self._balance.outputs(state), energy, solution.outcome, solution.steps))
+        if fold:
+            self.mark_fold()
+        self._output_names = balance.compliance.output_names
+        energy = float(balance.energy(state).sum())
+        self._rows.append((state.omega, balance.outputs(state), energy, solution.outcome, solution.steps))
+
+    def mark_fold(self) -> None:
+        """Mark the last point as a fold."""
+        if len(self.value) - 1 not in self.folds:
+            self.folds.append(len(self.value) - 1)
+
+    def truncate(self, n_point: int) -> None:
+        """Keep the first points only."""
+        del self.value[n_point:], self.x[n_point:], self._rows[n_point:]
+        self.folds = [i for i in self.folds if i < n_point]
 
     def finish(self, end: str) -> Branch:
         """The branch; `end` says why it ends where it ends."""
-        response, energy, outcome, steps = zip(*self._rows, strict=True)
+        omega, response, energy, outcome, steps = zip(*self._rows, strict=True)
         x = np.stack(self.x)
         return Branch(
-            omega=np.array(self.omega),
-            output_names=self._balance.compliance.output_names,
+            omega=np.array(omega),
+            output_names=self._output_names,
             response=np.stack(response),
             contact=x.reshape(len(x), -1, x.shape[-1]),
             energy=np.array(energy),
             outcome=outcome,
             newton_steps=np.array(steps),
             end=end,
+            folds=tuple(self.folds),
+            parameter_name=self._parameter.name,
+            parameter=np.array(self.value),
         )

@@ -1,13 +1,14 @@
-"""Contact compliance: displacement of the contact and of the outputs under contact forces and loads, harmonic by harmonic.
+"""Contact compliance: displacement of contact and outputs under contact forces and loads, harmonic by harmonic.
 
 The contact springs, stuck and closed, are part of the linear system: K_s = K + B^T k B, so that it depends neither on
-the load nor on wear. Its lowest modes Phi carry the dynamics; the rest is expanded in powers of s = i h w around statics,
+the load nor on wear. Its lowest modes Phi carry the dynamics; the rest is expanded in powers of s = i h w:
 
     D(s)^-1 = W(s) + L(s) S(s)^-1 L'(s),   W(s) = sum_k s^k W_k,   W_0 = K_s^-1 - Phi Lambda^-1 Phi^H,
     W_k = -W_0 (C W_(k-1) + M W_(k-2)),    L(s) = (I - s W(s) C) Phi,
     S(s) = Lambda + s C_m + s^2 - s^2 Phi^H C W(s) C Phi,
 
-which holds for any damping matrix; the error falls like (|s| / omega_next)^order and is measured against a direct solve.
+which holds for any damping matrix; the error falls like (|s| / omega_next)^order and is measured against a direct
+solve.
 Source  block elimination of modal coordinates (ours); static correction of truncated modes as in MacNeal 1971.
 """
 
@@ -25,6 +26,7 @@ from hbm.harmonics import HarmonicBasis
 from reduction.model import ReducedModel
 
 RESOLUTION = 5e-10  # relative error allowed in the expansion at the highest frequency asked for
+ROUNDING = 1e-7  # largest error that may be rounding
 CANDIDATES = ((24, 4), (48, 4), (48, 6), (96, 6), (192, 6))  # modes and powers of s tried in turn
 ALL_MODES_BELOW = 1500  # coordinates up to which all modes are computed at once
 
@@ -43,7 +45,9 @@ class Expansion:
     Raises  SingularStuckSystem
     """
 
-    def __init__(self, system: SecondOrderSystem, b: np.ndarray, stiffness: np.ndarray, ports: np.ndarray, s_max: float):
+    def __init__(
+        self, system: SecondOrderSystem, b: np.ndarray, stiffness: np.ndarray, ports: np.ndarray, s_max: float
+    ):
         self.n_port = len(ports)
         self._n_contact = len(b)
         mass = np.asarray(system.mass)
@@ -61,11 +65,15 @@ class Expansion:
                 "or raise the contact stiffness"
             ) from None
         lam, phi = sla.eigh(stuck, mass, subset_by_index=None if n < ALL_MODES_BELOW else (0, CANDIDATES[-1][0] - 1))
-        for m, order in [*((m, order) for m, order in CANDIDATES if m < len(lam)), (len(lam), 1 if len(lam) == n else 8)]:
+        before = np.inf
+        last = (len(lam), 1 if len(lam) == n else 8)
+        for m, order in (*(c for c in CANDIDATES if c[0] < len(lam)), last):
             self._build(lam[:m], phi[:, :m], factor, order)
             self.error = self._measure_error(1j * s_max)
-            if self.error <= RESOLUTION:
+            # near a resonance rounding of the direct solve itself is what remains: more modes would not help
+            if self.error <= RESOLUTION or 0.5 * before < self.error < ROUNDING:
                 break
+            before = self.error
 
     def _build(self, lam: np.ndarray, phi: np.ndarray, factor: tuple[np.ndarray, bool], order: int) -> None:
         mass, damping, _ = self._system
@@ -199,7 +207,6 @@ class ContactCompliance:
             s_max = basis.harmonics[positions[-1]] * omega_max
             self.groups.append((Expansion(system, np.asarray(b), self.k, ports, s_max), positions))
         self.error = max(e.error for e, _ in self.groups)
-        self.shared_real = len(self.groups) == 1 and not np.iscomplexobj(self.groups[0][0].w0)
 
     def at(self, omega: float) -> CompliancePoint:
         """The compliance at one excitation frequency [rad/s]."""
@@ -228,7 +235,8 @@ class CompliancePoint:
         basis = compliance.basis
         self._harmonics = np.asarray(basis.harmonics, float)
         self._ports = [
-            [expansion.at(1j * basis.harmonics[p] * omega) for p in positions] for expansion, positions in compliance.groups
+            [expansion.at(1j * basis.harmonics[p] * omega) for p in positions]
+            for expansion, positions in compliance.groups
         ]
         n, stop = compliance.n_contact, compliance.n_contact + compliance.n_load
         excited = slice(n, stop) if compliance.base is None else slice(0, stop)
@@ -247,36 +255,22 @@ class CompliancePoint:
     def apply(self, g: np.ndarray) -> np.ndarray:
         """G g: (n_contact, n_coeff) relative displacement [m] under contact forces g (n_contact, n_coeff) [N]."""
         n, basis = self._c.n_contact, self._c.basis
-        if self._c.shared_real:
-            return self._apply_shared_real(g)
         force = basis.to_complex(g)
         out = np.zeros_like(force)
         for (expansion, positions), ports in zip(self._c.groups, self._ports, strict=True):
-            for p, port in zip(positions, ports, strict=True):
-                y = expansion.w0 @ force[:, p] + port.left[:n] @ (port.core @ (port.right[:, :n] @ force[:, p]))
-                for k, moment in enumerate(expansion.higher, start=1):
-                    y += port.power[k] * (moment @ force[:, p].astype(np.complex64))
-                out[:, p] = y
+            f = force[:, positions]
+            real = not np.iscomplexobj(expansion.w0)
+            columns = np.concatenate([f.real, f.imag], axis=1) if real else f
+            moved = [expansion.w0 @ columns]
+            if len(expansion.higher):  # every moment meets all harmonics of the system in one product
+                higher = expansion.higher.reshape(-1, n) @ columns.astype(expansion.higher.dtype)
+                moved += list(higher.reshape(-1, n, columns.shape[1]))
+            for k, y in enumerate(moved):
+                power = np.array([port.power[k] for port in ports])
+                out[:, positions] += power * (y[:, : len(ports)] + 1j * y[:, len(ports) :] if real else y)
+            for i, (p, port) in enumerate(zip(positions, ports, strict=True)):
+                out[:, p] += port.left[:n] @ (port.core @ (port.right[:, :n] @ f[:, i]))
         return basis.to_real(out)
-
-    def _apply_shared_real(self, g: np.ndarray) -> np.ndarray:
-        """The same for one real system: every moment meets all harmonics in one real product."""
-        n, basis = self._c.n_contact, self._c.basis
-        expansion, ports = self._c.groups[0][0], self._ports[0]
-        force = basis.to_complex(g)
-        moved = np.zeros_like(force)
-        for i, port in enumerate(ports):
-            moved[:, i] = port.left[:n] @ (port.core @ (port.right[:, :n] @ force[:, i]))
-        if len(expansion.higher):
-            dynamic = slice(int(basis.has_static), None)
-            f = force[:, dynamic]
-            columns = np.concatenate([f.real, f.imag], axis=1).astype(np.float32)
-            higher = (expansion.higher.reshape(-1, n) @ columns).reshape(len(expansion.higher), n, -1)
-            half = f.shape[1]
-            for k, z in enumerate(higher, start=1):
-                power = np.array([port.power[k] for port in ports[dynamic]])
-                moved[:, dynamic] += power * (z[:, :half] + 1j * z[:, half:])
-        return basis.to_real(moved) + expansion.w0 @ g
 
     def outputs(self, g: np.ndarray) -> np.ndarray:
         """(n_output, n_coeff) outputs under contact forces g alone [m]."""
@@ -300,11 +294,10 @@ class CompliancePoint:
 
 
 class JacobianProduct:
-    """G restricted to active rows, to the accuracy of a Newton direction: W_0 and the lowest modes, single precision."""
+    """G restricted to active rows, as exact as a Newton direction needs: W_0 and the lowest modes, single precision."""
 
     def __init__(self, compliance: ContactCompliance, ports: list[list[PortCompliance]], rows: np.ndarray):
         self._basis = compliance.basis
-        self._shared_real = compliance.shared_real
         self._groups = []
         everything = len(rows) == compliance.n_contact
         for (expansion, positions), at in zip(compliance.groups, ports, strict=True):

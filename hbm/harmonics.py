@@ -14,10 +14,13 @@ class HarmonicBasis:
 
     harmonics : kept harmonics, any strictly increasing set; x_0 is there only where 0 is among them
     n_samples : equidistant time samples of one period; more than twice the highest harmonic, so that none is aliased
+    transitions : contact forces are taken at the samples ("sampled"), or the instants of stick, slip, contact and
+        separation are located and the forces between them integrated in closed form ("located", see hbm.located)
     """
 
     harmonics: tuple[int, ...]
     n_samples: int = 128
+    transitions: str = "sampled"
 
     def __post_init__(self) -> None:
         if not self.harmonics or self.harmonics[0] < 0 or any(np.diff(self.harmonics) <= 0):
@@ -29,6 +32,8 @@ class HarmonicBasis:
                 f"{self.n_samples} time samples cannot carry harmonic {self.harmonics[-1]}: "
                 f"take at least {2 * self.harmonics[-1] + 1}"
             )
+        if self.transitions not in ("sampled", "located"):
+            raise ValueError(f"transitions must be 'sampled' or 'located', not '{self.transitions}'")
 
     @property
     def has_static(self) -> bool:

@@ -5,7 +5,8 @@ A law is a module `hbm/contact/<name>.py` with
 - `COMPONENTS` : the component tuples it accepts, such as (("t1", "t2", "n"),)
 - `n_state(components)` : number of memory variables of one pair
 - `step` : numba function that advances one pair by one time sample (see `hbm.aft.march`)
-- optionally `cycle(x, parameters, memory, basis)` : the same periodic cycle in closed form between transitions
+- optionally `cycle(x, parameters, memory, basis, jacobian)` : the same periodic cycle at the samples, faster
+- optionally `located(x, parameters, memory, basis, jacobian)` : the cycle with its transitions located between samples
 """
 
 from __future__ import annotations
@@ -129,11 +130,17 @@ def cycle(
 
     x : (n_pair, n_component, n_coeff) relative displacement [m]
     memory : (n_pair, n_state) memory at the start of the load path, zeros if None
+    Raises  ValueError where the basis asks for located transitions and the law does not locate them
     """
     from hbm import aft
 
     if memory is None:
         memory = np.zeros((parameters.n_pair, law.n_state(parameters.components)))
+    if basis.transitions == "located":
+        if not hasattr(law, "located"):
+            name = law.__name__.rsplit(".", 1)[-1]
+            raise ValueError(f"contact law '{name}' does not locate its transitions: take transitions = 'sampled'")
+        return law.located(x, parameters, memory, basis, jacobian)
     if hasattr(law, "cycle"):
         return law.cycle(x, parameters, memory, basis, jacobian)
     return aft.march(law, x, parameters, memory, basis, jacobian)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hbm.branch import CONVERGED, Branch
+from hbm.evolution import LOST
 from hbm.wear_history import WearHistory
 from workflows.result import Fields, Loops, PartMesh, Patch, References, Result
 from workflows.scene_file import read
@@ -54,29 +55,35 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
     response = np.stack([0 * omega, slipping.real, -slipping.imag], -1)[:, None]
     frf = Branch(
         omega, ("response",), response, np.zeros((61, 3 * n_pair, 3)), np.abs(slipping), (CONVERGED,) * 61,
-        np.full(61, 3), "the end of the frequency range was reached",
+        np.full(61, 3), "the end of the frequency range was reached", (20, 30), "frequency", omega,
     )  # fmt: skip
     rng = np.random.default_rng(1)
     row_response = np.stack([0 * t, 1e-3 * (1 + 4 * t), 1e-4 * t], -1)[:, None]
     displacement = 1e-4 * rng.standard_normal((n_row, 3 * n_pair, 3))
     depth = 5e-3 * t[:, None] * (1 + 0.1 * np.sin(300 * where.points[:, 0]))
     cycles_in_step = np.append(np.linspace(3e6, 1e6, n_row - 1), 0.0)
+    energy = np.tile(2 * np.sqrt(1 - t**2)[:, None], n_pair)
+    omega_row = 2 * np.pi * (500 - 85 * t)
     wear = WearHistory(
         cycles=np.concatenate([[0.0], np.cumsum(cycles_in_step)[:-1]]),
         cycles_in_step=cycles_in_step,
         depth=depth,
         worn=np.diff(depth, axis=0, append=depth[-1:]),
-        energy=np.tile(2 * np.sqrt(1 - t**2)[:, None], n_pair),
+        energy=energy,
         preload=6e3 * (1 - t),
         normal_force=np.outer(6e3 * (1 - t), where.area / where.area.sum()),
         status=np.where(t[:, None] * np.ones(n_pair) < 0.6, 3, 6).astype(np.int64),
-        omega=2 * np.pi * (500 - 85 * t),
+        omega=omega_row,
         amplitude=np.hypot(row_response[:, 0, 1], row_response[:, 0, 2]),
         displacement=displacement,
         force=1e6 * displacement,
         response=row_response,
         solves=np.full(n_row, 4),
-        end="contact is lost",
+        step_error=np.zeros(n_row),
+        work=cycles_in_step[:, None] * energy,
+        duty_omega=omega_row[:, None],
+        duty_displacement=displacement[:, None],
+        end=LOST,
     )
     rows = np.array([0, n_row // 2, n_row - 1])
     shape = (part.points[:, 0] / LENGTH) ** 2
@@ -88,7 +95,7 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
     return Result(
         provenance={"scene_name": "beam", "scene_text": file.text, "scene": file.scene.model_dump_json()},
         facts={"seconds": 12.5, "delta_max_m": 5e-3, "unknowns": 9 * n_pair, "model_dofs": 3 * n_pair + 17},
-        state="complete: contact is lost",
+        state=f"complete: {LOST}",
         patch=where,
         part=part,
         references=References(omega, np.abs(resonance(415, 0.01)), np.abs(resonance(530, 0.01))),

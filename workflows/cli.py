@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import signal
 import sys
 from collections.abc import Sequence
@@ -23,6 +24,7 @@ app = cyclopts.App(
     name="tribodyn",
     help="From geometry to worn surface: vibration, friction and fretting wear of jointed parts.",
     version_flags=["--version"],
+    suppress_keyboard_interrupt=False,
 )
 Overrides = Annotated[
     tuple[str, ...],
@@ -82,7 +84,7 @@ def run(
     progress = console_progress()
     path = folder / "result.h5"
     earlier = _earlier(path, file) if resume else None
-    if earlier is not None and earlier.state.startswith("complete"):
+    if earlier is not None and pipeline.is_complete(earlier, file.scene):
         progress.say(f"{path} is complete already")
         result = earlier
     else:
@@ -90,7 +92,7 @@ def run(
         try:
             result = pipeline.run(file, folder, progress, earlier)
         except KeyboardInterrupt:
-            raise KeyboardInterrupt(_kept(path, scene, folder)) from None
+            raise KeyboardInterrupt(_kept(path, scene, overrides)) from None
         except pipeline.SolveFailed as failure:
             raise pipeline.SolveFailed(f"{failure}; what was computed before is kept in {path}") from None
     _print_summary(result)
@@ -113,12 +115,13 @@ def _earlier(path: Path, file: scene_file.SceneFile) -> Result | None:
     return result
 
 
-def _kept(path: Path, scene: str, folder: Path) -> str:
+def _kept(path: Path, scene: str, overrides: Sequence[str]) -> str:
     from workflows import store
 
     if not path.exists():
         return "stopped before anything was computed"
-    return f"stopped, {store.load(path).state}, kept in {path}: go on with tribodyn run {scene} --out {folder} --resume"
+    words = [scene, "--out", str(path.parent), *(word for text in overrides for word in ("--set", text))]
+    return f"stopped, {store.load(path).state}, kept in {path}: go on with tribodyn run {shlex.join(words)} --resume"
 
 
 @app.command(name="list")
@@ -126,6 +129,28 @@ def list_() -> None:
     """List the scenes that come with the program."""
     for name in scene_file.names():
         print(f"{name:12} {scene_file.title(name)}")
+
+
+@app.command
+def bench(
+    *,
+    quick: Annotated[bool, Parameter(negative=())] = False,
+    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+) -> None:
+    """Measure the solver beside the dense algorithm of the thesis on the beam scene (tables 7.1 to 7.3).
+
+    Parameters
+    ----------
+    quick
+        Harmonics 0+1 and 0+3 on one thread, in under a minute.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import bench as benchmark
+    from workflows.progress import console_progress
+
+    rows = benchmark.run(quick, console_progress().say)
+    print(json.dumps(benchmark.as_records(rows), indent=2) if as_json else benchmark.as_text(rows))
 
 
 @app.command

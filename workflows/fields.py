@@ -14,7 +14,7 @@ from workflows.result import Fields, Loops
 def displacement_fields(balance: HarmonicBalance, part: Part, rows: list[WearRow], numbers: np.ndarray) -> Fields:
     """Displacement of every node at chosen rows of a wear history.
 
-    balance : the unworn problem that the rows come from; numbers : (n_field,) rows to take
+    balance : the unworn problem under the load that the rows come from; numbers : (n_field,) rows to take
     """
     found = [part.field(balance.model.reconstruct(coordinates(balance, rows[i]))) for i in numbers]
     return Fields(np.asarray(numbers), np.stack(found))
@@ -41,7 +41,7 @@ def coordinates(balance: HarmonicBalance, row: WearRow) -> np.ndarray:
         force = B.conj().T @ g[:, position]
         for (order, name), value in excitation.loads.items():
             if order == h:
-                force = force + value * system.loads[name]
+                force = force + value * (balance.load_factor if h else 1.0) * system.loads[name]
         amplitudes.append(np.linalg.solve(dynamic, force))
     return basis.to_real(np.stack(amplitudes, axis=-1))
 

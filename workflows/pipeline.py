@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 from threadpoolctl import threadpool_limits
 
 import fem.part
@@ -21,7 +18,6 @@ from fem.material import Material
 from fem.part import Part
 from geometry import mesh as mesh_reader
 from geometry import parts
-from geometry.numbering import REFERENCE_POINTS, permutation
 from hbm import continuation, error_controlled_rule, law, thesis_rule, wear_law
 from hbm.balance import HarmonicBalance
 from hbm.branch import CONVERGED, Branch
@@ -29,23 +25,21 @@ from hbm.evolution import Duty, WearProblem
 from hbm.excitation import Excitation
 from hbm.harmonics import HarmonicBasis
 from hbm.newton import NewtonOptions
-from hbm.operating_point import AtFrequency, AtPeak
+from hbm.operating_point import AtFrequency, AtPeak, BesidePeak
 from hbm.wear_history import WearRow, history
 from reduction.craig_bampton import craig_bampton
 from reduction.damping import modal_damping, rayleigh
 from reduction.model import ReducedModel
 from workflows import store
+from workflows.description import described
 from workflows.fields import displacement_fields, hysteresis_loops
 from workflows.progress import Progress
-from workflows.references import free_deflection, linear_references
-from workflows.result import PartMesh, Patch, Result
-from workflows.scene import Damping, HarmonicLoad, Scene, StaticLoad
+from workflows.references import linear_references
+from workflows.result import Patch, Result
+from workflows.scene import Damping, HarmonicLoad, Place, Scene, StaticLoad, unknown_key
 from workflows.scene_file import SceneFile
 
 OUTPUT = "response"
-VTK_KIND = {27: ("hexahedron27", "triquadratic_hexahedron"), 10: ("tetra10", "quadratic_tetra")}
-PACKAGES = ("tribodyn", "numpy", "scipy", "numba", "scikit-fem", "gmsh", "meshio", "h5py", "pydantic")
-SEED = 0  # of every random start vector and probe in the packages used
 
 
 class SolveFailed(RuntimeError):
@@ -79,7 +73,9 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
             reduced = reduce_part(scene, part)
         with progress.stage("contact compliance"):
             model = make_model(scene, part, reduced)
-        result = earlier or described(file, model)
+        result = earlier or described(file, part, model.balance)
+        if wears(scene) and result.patch is not None:
+            step_limit(scene, result.patch)  # raises before anything long is begun
         previous = None if earlier else store.set_aside(keep.path)
         if previous:
             progress.say(f"the result that was here is now {previous}")
@@ -88,20 +84,35 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
             with progress.track("frequency response") as advance:
                 frf = follow_response(scene, model.balance, advance)
             with progress.stage("linear references"):
-                references = linear_references(model.balance, OUTPUT, *response_range(scene))
+                low, high = scene.response.references or scene.response.frequency
+                references = linear_references(model.balance, OUTPUT, 2 * np.pi * low, 2 * np.pi * high)
             result = keep(replace(result, frf=frf, references=references, state="response computed"))
         check_branch(result.frf)
-        if scene.wear is not None:
+        if wears(scene):
             with progress.track("wear") as advance:
                 result = wear_down(scene, model, result, keep, advance)
         state = "complete" if result.wear is None else f"complete: {result.wear.end}"
         return keep(replace(result, state=state))
 
 
+def wears(scene: Scene) -> bool:
+    """Whether a scene asks for wear steps."""
+    return scene.wear is not None and scene.wear.max_steps > 0
+
+
+def is_complete(result: Result, scene: Scene) -> bool:
+    """Whether a result holds everything that a scene of the same problem asks for."""
+    if not result.state.startswith("complete") or not wears(scene):
+        return result.state.startswith("complete")
+    assert scene.wear is not None
+    stopped = result.wear is None or result.wear.end.startswith("stopped after")
+    return not stopped or result.wear_steps >= scene.wear.max_steps
+
+
 def check_names(scene: Scene) -> None:
     """Raise ValueError where a scene names a law or a method that does not exist, before anything is built."""
     law.check_components(law.load(scene.contact.law), scene.contact.components)
-    continuation.load(scene.response.method)
+    response_options(scene)
     if scene.wear is not None:
         wear_law.load(scene.wear.law)
 
@@ -158,7 +169,7 @@ def make_model(scene: Scene, part: Part, reduced: ReducedModel) -> Model:
     parameters = law.ContactParameters.of(
         contact.components, stiffness, friction=contact.friction, gap=reduced.interface.gap
     )
-    basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples)
+    basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples, scene.harmonics.transitions)
     balance = HarmonicBalance(reduced, contact.law, parameters, basis, excite(scene), response_range(scene)[1])
     return Model(part, reduced, balance)
 
@@ -173,13 +184,23 @@ def excite(scene: Scene) -> Excitation:
 
 def follow_response(scene: Scene, balance: HarmonicBalance, advance: Callable[[float, str], None]) -> Branch:
     """The response curve of the unworn contact by the scene's continuation method."""
-    method, response = continuation.load(scene.response.method), scene.response
-    options = {"n_points": response.points, "newton": newton_options(scene), **response.options}
-    try:
-        chosen = method.Options(**options)
-    except TypeError as error:
-        raise ValueError(f"response.options: method {response.method} does not take them ({error})") from None
-    return method.follow(balance, *response_range(scene), chosen, lambda done, wanted: advance(done / wanted, ""))
+    method, options = continuation.load(scene.response.method), response_options(scene)
+    return method.follow(balance, *response_range(scene), options, lambda done, wanted: advance(done / wanted, ""))
+
+
+def response_options(scene: Scene) -> Any:
+    """Options of the scene's continuation method; raises ValueError for one that it does not have."""
+    kind, given = continuation.load(scene.response.method).Options, scene.response.options
+    known = {option.name: option.type for option in fields(kind) if option.name not in ("newton", "guess", "bounds")}
+    for key, value in given.items():
+        if key not in known:
+            raise ValueError(unknown_key(f"response.options.{key}", list(known)))
+        whole = known[key] in (int, "int")
+        if type(value) not in ((int,) if whole else (int, float)):
+            expected = "a whole number" if whole else "a number"
+            raise ValueError(f"response.options.{key}: expected {expected}, got {value!r}")
+    points = {"n_points": scene.response.points} if "n_points" in known else {}
+    return kind(**{**points, "newton": newton_options(scene), **given})
 
 
 def response_range(scene: Scene) -> tuple[float, float]:
@@ -195,7 +216,7 @@ def newton_options(scene: Scene) -> NewtonOptions:
 
 def check_branch(branch: Branch | None) -> None:
     """Raise SolveFailed where a response curve did not come to its end."""
-    if branch is not None and branch.outcome[-1] != CONVERGED:
+    if branch is not None and (branch.outcome[-1] != CONVERGED or branch.end.startswith("ended at")):
         raise SolveFailed(f"the frequency response {branch.end}")
 
 
@@ -205,121 +226,79 @@ def wear_down(
     """Wear until contact is lost; every step is kept as soon as it is done."""
     assert scene.wear is not None
     assert result.patch is not None
-    balance, patch, wear = model.balance, result.patch, scene.wear
-    newton = newton_options(scene)
-    site = (
-        AtPeak(OUTPUT, *response_range(scene), scene.response.points, newton=newton)
-        if isinstance(wear.at, str)
-        else AtFrequency(OUTPUT, 2 * np.pi * wear.at, newton)
-    )
+    patch, wear = result.patch, scene.wear
     rows = [] if result.wear is None else result.wear.rows()
     to_wear = float(patch.area @ patch.free_deflection)
 
     def on_row(row: WearRow) -> None:
         rows.append(row)
         keep(replace(result, wear=history(rows, "unfinished"), state=f"unfinished: {len(rows)} wear steps are done"))
-        done = float(patch.area @ (row.depth + row.worn)) / to_wear
+        done = float(patch.area @ (row.depth + row.worn)) / to_wear if to_wear > 0 else 0.0
         advance(done, f"step {len(rows)}, {row.cycles + row.cycles_in_step:.3g} cycles, {row.preload:.4g} N")
 
-    problem = WearProblem(balance, (Duty(site),), wear.law, wear.coefficient, patch.area, wear.lost_below)
+    duties = mission(scene)
+    problem = WearProblem(model.balance, duties, wear.law, wear.coefficient, patch.area, wear.lost_below)
+    limit = step_limit(scene, patch)
     if wear.rule == "thesis":
-        worn = thesis_rule.evolve(problem, step_depth(scene, patch), wear.max_steps, on_row, result.wear)
+        worn = thesis_rule.evolve(problem, limit, wear.max_steps, on_row, result.wear)
     else:
-        tolerance = error_controlled_rule.Tolerance(wear.tolerance, depth_scale(patch))
+        tolerance = error_controlled_rule.Tolerance(wear.tolerance, limit)
         worn = error_controlled_rule.evolve(problem, tolerance, wear.max_steps, on_row, result.wear)
-    result = with_pictures_of(replace(result, wear=worn), model)
+    result = with_pictures_of(replace(result, wear=worn), model, duties[0])
     if worn.end.startswith("solve failed"):
         keep(replace(result, state=worn.end))
         raise SolveFailed(f"wear step {len(worn.cycles)}: {worn.end}")
     return result
 
 
-def step_depth(scene: Scene, patch: Patch) -> float:
-    """Largest depth of one wear step [m]; raises ValueError where it is a share of a deflection that is not finite."""
+def mission(scene: Scene) -> tuple[Duty, ...]:
+    """Where the cycles that wear are taken: the scene's one place, or the duties of its mission."""
+    assert scene.wear is not None
+    newton = newton_options(scene)
+    peak = AtPeak(OUTPUT, *response_range(scene), scene.response.points, newton=newton)
+
+    def site(place: Place) -> AtFrequency | AtPeak | BesidePeak:
+        if place.frequency is not None:
+            return AtFrequency(OUTPUT, 2 * np.pi * place.frequency, newton)
+        assert place.peak is not None
+        return peak if place.peak == 1.0 else BesidePeak(peak, place.peak)
+
+    if not scene.wear.mission:
+        return (Duty(site(scene.wear.at)),)
+    return tuple(Duty(site(duty.at), duty.share, duty.load) for duty in scene.wear.mission)
+
+
+def step_limit(scene: Scene, patch: Patch) -> float:
+    """Largest depth of one wear step by the thesis's rule, or delta_max that the other rule measures errors by [m].
+
+    Raises  ValueError where delta_max is needed and the scene has none
+    """
     assert scene.wear is not None
     step = scene.wear.step
-    if step.depth is not None:
+    if scene.wear.rule == "thesis" and step is not None and step.depth is not None:
         return step.depth
-    assert step.share is not None
-    return step.share * depth_scale(patch)
-
-
-def depth_scale(patch: Patch) -> float:
-    """delta_max, the largest deflection of the patch without the contact [m]; raises ValueError where there is none."""
     delta_max = float(patch.free_deflection.max())
     if not (np.isfinite(delta_max) and delta_max > 0):
         raise ValueError(
-            "wear: a share of delta_max needs static loads that press the contact of a part held without it; "
-            'give wear.step as a depth such as "50 um"'
+            "wear.step: a share of delta_max needs static loads that press the contact of a part held without it; "
+            'give a depth such as "50 um" and rule = "thesis"'
         )
-    return delta_max
+    share = step.share if scene.wear.rule == "thesis" and step is not None else None
+    return delta_max if share is None else share * delta_max
 
 
-def with_pictures_of(result: Result, model: Model) -> Result:
+def with_pictures_of(result: Result, model: Model, duty: Duty) -> Result:
     """The result with displacement fields and hysteresis loops of the rows that pictures show."""
     assert result.wear is not None
     if not result.wear_steps:
         return result
     rows, numbers = result.wear.rows(), replace(result, fields=None).shown_rows()
+    balance = model.balance.with_load(duty.load)
     return replace(
         result,
-        fields=displacement_fields(model.balance, model.part, rows, numbers),
-        loops=hysteresis_loops(model.balance, rows, numbers),
+        fields=displacement_fields(balance, model.part, rows, numbers),
+        loops=hysteresis_loops(balance, rows, numbers),
     )
-
-
-def described(file: SceneFile, model: Model) -> Result:
-    """The result before anything was solved: where it comes from and what is modelled."""
-    part, reduced = model.part, model.reduced
-    nodes = cKDTree(part.points).query(reduced.interface.points)[1]
-    i = reduced.interface
-    patch = Patch(i.components, nodes, i.points, i.frames, i.area, i.gap, i.faces, free_deflection(model.balance))
-    facts: dict[str, str | int | float | np.ndarray] = {
-        "elements": int(part.mesh.nelements),
-        "nodes": len(part.points),
-        "full_dofs": part.system.n_dof,
-        "model_dofs": reduced.system.n_dof,
-        "retained_modes": int(str(reduced.info["n_modes"])),
-        "first_omitted_hz": float(str(reduced.info["first_omitted_frequency"])),
-        "free_hz": np.asarray(reduced.info["free_frequency"]),
-        "contact_pairs": i.n_pair,
-        "unknowns": model.balance.n_unknown,
-        "delta_max_m": float(patch.free_deflection.max()),
-        "scaled_jacobian": mesh_reader.quality(part.mesh).scaled_jacobian,
-        "factorisation": str(reduced.info["factorisation"]),
-        "compliance_error": model.balance.compliance.error,
-    }
-    return Result(provenance(file), facts, "model built", patch=patch, part=part_mesh(part))
-
-
-def provenance(file: SceneFile) -> dict[str, str]:
-    """Where a result comes from, as texts."""
-    return {
-        "scene_name": file.name,
-        "scene_text": file.text,
-        "overrides": "\n".join(file.overrides),
-        "scene": file.scene.model_dump_json(),
-        "versions": ", ".join(f"{name} {package_version(name)}" for name in PACKAGES),
-        "seed": str(SEED),
-        "threads": str(file.scene.solver.threads),
-        "started": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
-
-
-def package_version(name: str) -> str:
-    """Version of an installed package; a source tree that is run without being installed has none."""
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "not installed"
-
-
-def part_mesh(part: Part) -> PartMesh:
-    """The mesh of a part in the node order of VTK."""
-    cells = part.mesh.dofs.element_dofs.T
-    reference, kind = VTK_KIND[cells.shape[1]]
-    to_vtk = permutation(part.mesh.elem.doflocs, REFERENCE_POINTS[reference])
-    return PartMesh(kind, part.points, cells[:, to_vtk])
 
 
 class Clock:

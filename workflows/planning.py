@@ -25,6 +25,7 @@ BACK_SUBSTITUTION_SECONDS = 1.5e-7  # for each DOF and right-hand side
 DENSE_SECONDS = 3e-9  # for each cubed coordinate of the reduced model, all eigenvalue problems together
 SOLVE_SECONDS = 6e-8  # of a balance solve, for each squared contact coordinate and harmonic coefficient
 SOLVES_AT_PEAK = 10
+EQUIVALENT_SHARE = 0.3  # the step of the thesis's rule that takes as many steps as the error-controlled one does
 STEPS_AT_ONE_PERCENT, STEPS_EXPONENT = 411, -0.5  # to loss of contact; Tamatam 2021, table 4.2
 
 
@@ -77,7 +78,7 @@ def plan(file: SceneFile) -> Plan:
     nodes = mesh.doflocs.shape[1]
     free = free_dofs(3 * nodes, [Clamp(group) for group in scene.geometry.fixed], node_sets)
     pairs, masters = _contact(scene, mesh, node_sets, free)
-    basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples)
+    basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples, scene.harmonics.transitions)
     contact = pairs * len(scene.contact.components)
     modes = scene.reduction.modes
     model = masters + (modes if modes is not None else 50)
@@ -112,15 +113,15 @@ def plan(file: SceneFile) -> Plan:
 def _contact(scene: Scene, mesh: object, node_sets: dict[str, np.ndarray], free: np.ndarray) -> tuple[int, int]:
     """Number of node pairs, and of master DOFs that the contact, point loads and the output make."""
     faces = [scene.contact.group, *([] if scene.contact.opposite is None else [scene.contact.opposite])]
-    points = [*scene.loads.static.values(), *scene.loads.harmonic.values(), scene.response]
+    points = [(load.group, load.direction) for load in scene.loads.static.values()]
+    points += [(load.group, load.direction) for load in scene.loads.harmonic.values()]
+    points += [(scene.response.group, scene.response.direction)]
     nodes = [named(node_sets, name, "face") for name in faces]
     corners = np.arange(int(mesh.nvertices))  # type: ignore[attr-defined]
     if scene.contact.vertices_only:
         nodes = [np.intersect1d(side, corners) for side in nodes]
     masters = [(side[:, None] * 3 + np.arange(3)).ravel() for side in nodes]
-    touched = [
-        (named(node_sets, point.group)[:, None] * 3 + np.flatnonzero(point.direction)).ravel() for point in points
-    ]
+    touched = [(named(node_sets, group)[:, None] * 3 + np.flatnonzero(axis)).ravel() for group, axis in points]
     masters += [dofs for dofs in touched if len(dofs) <= POINT_LOAD]
     return len(nodes[0]), len(np.intersect1d(np.concatenate(masters), free))
 
@@ -129,10 +130,14 @@ def _wear(scene: Scene) -> tuple[int | None, int]:
     """Wear steps and balance solves to expect."""
     if scene.wear is None or scene.wear.max_steps == 0:
         return 0, 0
-    share, most = scene.wear.step.share, scene.wear.max_steps
-    steps = most if share is None else min(most, round(STEPS_AT_ONE_PERCENT * (100 * share) ** STEPS_EXPONENT))
-    at_peak = isinstance(scene.wear.at, str)
-    solves = steps * SOLVES_AT_PEAK + scene.response.points if at_peak else steps
+    most, share = scene.wear.max_steps, None if scene.wear.step is None else scene.wear.step.share
+    if scene.wear.rule == "error_controlled":
+        share = EQUIVALENT_SHARE
+    likely = most if share is None else round(STEPS_AT_ONE_PERCENT * (100 * share) ** STEPS_EXPONENT)
+    steps = min(most, likely)
+    solves = 0
+    for place in [duty.at for duty in scene.wear.mission] or [scene.wear.at]:
+        solves += steps if place.peak is None else steps * SOLVES_AT_PEAK + scene.response.points
     return (None if share is None else steps), solves
 
 

@@ -12,9 +12,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hbm.branch import CONVERGED
+from hbm.wear_history import WearHistory
 from workflows import maps
 from workflows.result import Result
 from workflows.style import BLUE, GREEN, GREY, INK, ORANGE, RED, STYLE, WEAR_MAP
+
+FAINT = 1e-3  # share of the first preload below which a touch is faint
 
 
 def draw(result: Result, folder: Path) -> list[Path]:
@@ -54,11 +57,11 @@ def frequency_response(result: Result) -> Figure:
         if result.wear is not None and result.wear_steps:
             wear = result.wear
             hertz = wear.omega / (2 * np.pi)
-            unit_cycles, scale_cycles = _cycles(wear.cycles[-1])
+            unit_cycles, scale_cycles = _cycles(shown_cycles(wear))
             axes.plot(hertz, scale * wear.amplitude, color=ORANGE, lw=1.0, zorder=3)
             dots = axes.scatter(
                 hertz, scale * wear.amplitude, 16, scale_cycles * wear.cycles, cmap=WEAR_MAP, zorder=4,
-                label="cycle at each wear step",
+                vmax=scale_cycles * shown_cycles(wear), label="cycle at each wear step",
             )  # fmt: skip
             figure.colorbar(dots, ax=axes, label=f"vibration cycles{unit_cycles}", pad=0.02)
         axes.set(yscale="log", xlabel="frequency / Hz", ylabel=f"amplitude / {unit}", title="Frequency response")
@@ -74,7 +77,10 @@ def cycles_per_step(result: Result) -> Figure:
         unit, scale = _cycles(count.max())
         axes.step(np.arange(1, len(count) + 1), scale * count, where="mid", color=BLUE)
         axes.set(xlabel="wear step", ylabel=f"cycles in the step{unit}", title="Cycles per wear step")
-        axes.set_ylim(bottom=0)
+        if count.max() > 30 * count.min():
+            axes.set_yscale("log")
+        else:
+            axes.set_ylim(bottom=0)
     return figure
 
 
@@ -82,12 +88,12 @@ def amplitude_against_cycles(result: Result) -> Figure:
     """Amplitude and frequency of the cycle that wears, against cycles."""
     wear = _wear(result)
     with _axes(7.2, 5.6, rows=2) as (figure, (upper, lower)):
-        unit_cycles, scale_cycles = _cycles(wear.cycles[-1])
+        scale_cycles = _cycle_axis(lower, wear)
         unit, scale = _length(wear.amplitude.max())
         upper.plot(scale_cycles * wear.cycles, scale * wear.amplitude, ".-", color=BLUE, ms=4)
         upper.set(ylabel=f"amplitude / {unit}", title="Response under wear")
         lower.plot(scale_cycles * wear.cycles, wear.omega / (2 * np.pi), ".-", color=ORANGE, ms=4)
-        lower.set(ylabel="frequency / Hz", xlabel=f"vibration cycles{unit_cycles}")
+        lower.set(ylabel="frequency / Hz")
     return figure
 
 
@@ -95,10 +101,10 @@ def preload_against_cycles(result: Result) -> Figure:
     """Static normal force of the contact against cycles."""
     wear = _wear(result)
     with _axes() as (figure, axes):
-        unit_cycles, scale_cycles = _cycles(wear.cycles[-1])
+        scale_cycles = _cycle_axis(axes, wear)
         unit, scale = ("kN", 1e-3) if wear.preload.max() >= 1e3 else ("N", 1.0)
         axes.plot(scale_cycles * wear.cycles, scale * wear.preload, ".-", color=BLUE, ms=4)
-        axes.set(xlabel=f"vibration cycles{unit_cycles}", ylabel=f"preload / {unit}", title="Contact preload")
+        axes.set(ylabel=f"preload / {unit}", title="Contact preload")
         axes.set_ylim(bottom=0)
     return figure
 
@@ -108,7 +114,7 @@ def depth_against_cycles(result: Result) -> Figure:
     wear, patch = _wear(result), result.patch
     assert patch is not None
     with _axes() as (figure, axes):
-        unit_cycles, scale_cycles = _cycles(wear.cycles[-1])
+        scale_cycles = _cycle_axis(axes, wear)
         unit, scale = _length(wear.depth.max())
         x = scale_cycles * wear.cycles
         mean = wear.depth @ patch.area / patch.area.sum()
@@ -116,7 +122,7 @@ def depth_against_cycles(result: Result) -> Figure:
         axes.plot(x, scale * wear.depth.max(1), color=RED, label="largest")
         axes.plot(x, scale * mean, color=BLUE, label="mean over the area")
         axes.plot(x, scale * wear.depth.min(1), color=GREEN, label="smallest")
-        axes.set(xlabel=f"vibration cycles{unit_cycles}", ylabel=f"total wear depth / {unit}", title="Wear depth")
+        axes.set(ylabel=f"total wear depth / {unit}", title="Wear depth")
         axes.legend(loc="best", fontsize=9)
     return figure
 
@@ -126,9 +132,9 @@ def energy_against_cycles(result: Result) -> Figure:
     wear, patch = _wear(result), result.patch
     assert patch is not None
     with _axes(7.2, 5.6, rows=2, share=False) as (figure, (upper, lower)):
-        unit_cycles, scale_cycles = _cycles(wear.cycles[-1])
+        scale_cycles = _cycle_axis(upper, wear)
         upper.plot(scale_cycles * wear.cycles, wear.energy.sum(1), ".-", color=BLUE, ms=4)
-        upper.set(xlabel=f"vibration cycles{unit_cycles}", ylabel="energy per cycle / J", title="Dissipated energy")
+        upper.set(ylabel="energy per cycle / J", title="Dissipated energy")
         spent = np.concatenate([[0.0], np.cumsum(wear.work.sum(1))[:-1]])
         lower.plot(spent * 1e-6, 1e9 * wear.depth @ patch.area, ".-", color=ORANGE, ms=4)
         lower.set(xlabel="accumulated energy / MJ", ylabel="worn volume / mm³")
@@ -136,47 +142,30 @@ def energy_against_cycles(result: Result) -> Figure:
 
 
 def hysteresis_loops(result: Result) -> Figure:
-    """Tangential loops of four nodes at the start, the middle and the end of the wear run."""
-    loops, patch = result.loops, result.patch
+    """Tangential loops at chosen wear steps (columns) of the pairs that dissipate most in one of them (rows)."""
+    loops, patch, wear = result.loops, result.patch, _wear(result)
     assert loops is not None
     assert patch is not None
-    chosen = chosen_pairs(result)
+    pairs = list(dict.fromkeys(int(np.argmax(wear.energy[row])) for row in loops.row))
     tangential = [c for c, name in enumerate(patch.components) if name != "n"]
-    # the direction in which these nodes move most
-    swing = [np.ptp(loops.displacement[:, chosen, c], axis=-1).max() for c in tangential]
-    component = tangential[int(np.argmax(swing))]
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.6, 6.4), layout="constrained")
-        grid = np.atleast_1d(figure.subplots(2, 2)).ravel()
-        unit_x, scale_x = _length(max(swing) / 2)
-        unit_f, scale_f = _force(np.abs(loops.force[:, chosen, component]).max())
-        colors = mpl.colormaps[WEAR_MAP](np.linspace(0, 0.9, len(loops.row)))
-        for axes, pair, label in zip(grid, chosen, CHOSEN, strict=True):
-            for color, row, x, force in zip(
-                colors, loops.row, loops.displacement[:, pair, component], loops.force[:, pair, component], strict=True
-            ):
-                closed = np.append(np.arange(len(x)), 0)
-                middle = (x.max() + x.min()) / 2  # the static offset says nothing about the loop
-                axes.plot(scale_x * (x - middle)[closed], scale_f * force[closed], color=color, label=f"step {row}")
-            axes.set_title(f"{label}: pair {pair}", fontsize=10)
-            axes.set(xlabel=f"displacement {patch.components[component]} / {unit_x}", ylabel=f"force / {unit_f}")
-        grid[0].legend(fontsize=8)
-        figure.suptitle("Friction hysteresis", x=0.01, ha="left", fontsize=11, fontweight="bold")
+        figure = Figure(figsize=(2.6 * len(loops.row) + 0.4, 2.2 * len(pairs) + 0.5), layout="constrained")
+        grid = figure.subplots(len(pairs), len(loops.row), squeeze=False)
+        for line, pair in enumerate(pairs):
+            # the direction in which this pair moves most
+            swing = [np.ptp(loops.displacement[:, pair, c], axis=-1).max() for c in tangential]
+            component = tangential[int(np.argmax(swing))]
+            for column, row in enumerate(loops.row):
+                axes = grid[line, column]
+                x, force = loops.displacement[column, pair, component], loops.force[column, pair, component]
+                x = x - (x.max() + x.min()) / 2  # the static offset says nothing about the loop
+                (unit_x, scale_x), (unit_f, scale_f) = _length(x.max()), _force(np.abs(force).max())
+                axes.plot(scale_x * np.append(x, x[0]), scale_f * np.append(force, force[0]), color=BLUE)
+                axes.set_xlabel(f"{patch.components[component]} / {unit_x}", fontsize=9)
+                axes.set_ylabel(f"pair {pair}: force / {unit_f}", fontsize=9)
+                if line == 0:
+                    axes.set_title(f"wear step {row + 1}", fontsize=10)
     return figure
-
-
-CHOSEN = ("middle", "most worn", "least worn", "most energy")
-
-
-def chosen_pairs(result: Result) -> list[int]:
-    """Pairs whose loops are shown, one for each name in CHOSEN."""
-    patch, wear = result.patch, result.wear
-    assert patch is not None
-    middle = int(np.argmin(np.linalg.norm(patch.points - patch.points.mean(0), axis=1)))
-    if wear is None or not len(wear.depth):
-        return [middle] * len(CHOSEN)
-    depth, energy = wear.depth[-1], wear.energy[: max(result.wear_steps, 1)].sum(0)
-    return [middle, int(np.argmax(depth)), int(np.argmin(depth)), int(np.argmax(energy))]
 
 
 @contextmanager
@@ -186,9 +175,29 @@ def _axes(width: float = 7.2, height: float = 4.2, rows: int = 1, share: bool = 
         yield figure, figure.subplots(rows, 1, sharex=share)
 
 
-def _wear(result: Result) -> Any:
+def _wear(result: Result) -> WearHistory:
     assert result.wear is not None
     return result.wear
+
+
+def shown_cycles(wear: WearHistory) -> float:
+    """Cycles up to which curves are drawn: all, unless a last faint touch takes more than half of them."""
+    last = float(wear.cycles[-1])
+    faint = np.flatnonzero(wear.preload < FAINT * wear.preload[0])
+    if len(faint) and 0 < wear.cycles[faint[0]] < 0.5 * last:
+        return 1.15 * float(wear.cycles[faint[0]])
+    return last
+
+
+def _cycle_axis(axes: Any, wear: WearHistory) -> float:
+    """Label the axis of cycles, and say where the run ends if that is not drawn; returns the factor of the axis."""
+    shown, last = shown_cycles(wear), float(wear.cycles[-1])
+    unit, scale = _cycles(shown)
+    if shown < last:
+        axes.set_xlim(-0.03 * scale * shown, scale * shown)
+    end = f" (the last touch ends at {scale * last:.3g})" if shown < last else ""
+    axes.set_xlabel(f"vibration cycles{unit}{end}")
+    return scale
 
 
 def _largest_amplitude(result: Result) -> float:
@@ -204,13 +213,13 @@ def _length(largest: float) -> tuple[str, float]:
     """Unit and factor in which lengths [m] of this size read well."""
     if largest >= 0.5e-3:
         return "mm", 1e3
-    return ("µm", 1e6) if largest >= 0.5e-6 else ("nm", 1e9)
+    return ("nm", 1e9) if 0 < largest < 0.5e-6 else ("µm", 1e6)
 
 
 def _force(largest: float) -> tuple[str, float]:
     if largest >= 1e3:
         return "kN", 1e-3
-    return ("N", 1.0) if largest >= 1 else ("mN", 1e3)
+    return ("mN", 1e3) if 0 < largest < 1 else ("N", 1.0)
 
 
 def _cycles(largest: float) -> tuple[str, float]:

@@ -77,6 +77,7 @@ def worn_patch(result: Result, path: Path, wear: float | None = None) -> Path:
     pressure = history.normal_force[rows] / patch.area
     wear = wear or _wear_scale(patch, depth)
     flat = np.column_stack([patch.flat, np.zeros(len(patch.area))])
+    sink = -0.2 * float(np.sqrt(patch.area.sum()))  # room for the bars and legends below
     outline = pv.PolyData(flat, _polygons(patch.faces)).extract_feature_edges(40)
     view = _plotter((3, len(rows)))
     for column, row in enumerate(rows):
@@ -100,7 +101,8 @@ def worn_patch(result: Result, path: Path, wear: float | None = None) -> Path:
             view.camera.up = (0, 0, 1)
             view.camera.focal_point = (0, 0, 0)
             view.reset_camera()
-            view.camera.zoom(1.25)
+            view.camera.focal_point = np.array(view.camera.focal_point) + [0, 0, sink]
+            view.camera.position = np.array(view.camera.position) + [0, 0, sink]
         view.subplot(0, column)
         _title(view, result, row, f"depth on this body \u00d7 {wear:g}")
     return _save(view, path)
@@ -115,32 +117,34 @@ def worn_part(result: Result, path: Path, deformation: float | None = None, wear
     assert part is not None
     assert fields is not None
     size = float(np.ptp(part.points, axis=0).max())
-    shapes = [swing(displacement) for displacement in fields.displacement]
-    largest = max(float(np.linalg.norm(shape, axis=1).max()) for shape in shapes)
-    deformation = deformation or (_nice(0.1 * size / largest) if largest > 0 else 1.0)
+    static = fields.displacement[..., 0]
+    rest_scale = deformation or _deformation_scale(static, size)
     depth = np.stack([result.depth_after(row) for row in fields.row])
     wear = wear or _wear_scale(patch, depth)
     cell_type = getattr(pv.CellType, part.kind.upper())
     inward = patch.frames[:, 2]
     resting = _surface(part.points, part.cells, cell_type, 0).extract_feature_edges(40)
 
-    view = _plotter((1, len(shapes)))
-    for column, (row, shape) in enumerate(zip(fields.row, shapes, strict=True)):
+    view = _plotter((1, len(static)))
+    for column, row in enumerate(fields.row):
         view.subplot(0, column)
-        points = part.points + deformation * shape
+        vibration = swing(fields.displacement[column])
+        scale = deformation or _deformation_scale(vibration, size)
+        points = part.points + rest_scale * static[column] + scale * vibration
         points[patch.nodes] -= wear * 0.5 * depth[column][:, None] * inward  # half of the depth for each surface
         body = _surface(points, part.cells, cell_type, 2)
         view.add_mesh(body, color=BODY, **SHADE, smooth_shading=True, split_sharp_edges=True)
         view.add_mesh(resting, color="#9aa1ab", line_width=1)
         worn = pv.PolyData(points[patch.nodes] + 2e-3 * size * inward, _polygons(patch.faces))
         _add_field(view, worn, 1e3 * depth[column], 1e3 * depth.max(), "total wear depth / mm", WEAR_MAP, f"0 {column}")
-        _title(view, result, row, f"deformation \u00d7 {deformation:g}, depth on this body \u00d7 {wear:g}")
+        scales = f"static \u00d7 {rest_scale:g}, vibration \u00d7 {scale:g}, depth on this body \u00d7 {wear:g}"
+        _title(view, result, row, scales)
         _look_at_patch(view, part.points, patch)
     return _save(view, path)
 
 
 def swing(displacement: np.ndarray) -> np.ndarray:
-    """Displacement at the instant when the part is farthest from its mean position.
+    """Vibration at the instant when the part is farthest from its mean position.
 
     displacement : (n_node, 3, n_coeff), [x_0, a_1, b_1, ...] [m]
     Returns (n_node, 3) [m]
@@ -150,12 +154,19 @@ def swing(displacement: np.ndarray) -> np.ndarray:
     waves = [f(h * angle) for h in range(1, n_harmonic + 1) for f in (np.cos, np.sin)]
     dynamic = displacement[..., 1:] @ np.stack(waves)
     farthest = int(np.argmax(np.sum(dynamic**2, axis=(0, 1))))
-    return np.asarray(displacement[..., 0] + dynamic[..., farthest])
+    return np.asarray(dynamic[..., farthest])
+
+
+def _deformation_scale(displacement: np.ndarray, size: float) -> float:
+    """Factor that draws the largest of some displacements (..., 3) as a twelfth of the part."""
+    largest = float(np.linalg.norm(displacement, axis=-1).max())
+    return _nice(size / 12 / largest) if largest > 0 else 1.0
 
 
 def _wear_scale(patch: Patch, depth: np.ndarray) -> float:
-    """Factor that draws the largest depth on one body as a tenth of the patch."""
-    return _nice(0.1 * float(np.sqrt(patch.area.sum())) / (0.5 * depth.max())) if depth.max() > 0 else 1.0
+    """Factor, at least 1, that draws the largest depth on one body as a tenth of the patch."""
+    wanted = 0.1 * float(np.sqrt(patch.area.sum()))
+    return max(1.0, _nice(wanted / (0.5 * depth.max()))) if depth.max() > 0 else 1.0
 
 
 def _nice(value: float) -> float:
@@ -197,7 +208,7 @@ def _add_field(
     bar = {
         "title": label + " " * (1 + int(place.split()[1])),  # pyvista draws one bar for each title
         "vertical": False, "position_x": 0.2, "position_y": 0.02, "width": 0.6, "height": 0.13,
-        "title_font_size": 17, "label_font_size": 15, "color": INK, "fmt": "%.3g", "n_labels": 3,
+        "title_font_size": 17, "label_font_size": 15, "color": INK, "fmt": "%.3g", "n_labels": 2,
         "font_family": "arial",
     }  # fmt: skip
     view.add_mesh(

@@ -11,6 +11,8 @@ from hbm.branch import Branch
 from hbm.evolution import LOST
 from hbm.wear_history import WearHistory
 
+PRELOAD_LOST = "preload fell below"  # how hbm.evolution begins the other sentence for a lost contact
+
 
 @dataclass(frozen=True)
 class PartMesh:
@@ -131,7 +133,7 @@ class Result:
     @property
     def contact_lost(self) -> bool:
         """Whether wear went on until every pair was separated."""
-        return self.wear is not None and self.wear.end == LOST
+        return self.wear is not None and self.wear.end.startswith((LOST, PRELOAD_LOST))
 
     def shown_rows(self) -> np.ndarray:
         """Wear rows that pictures show: those of the fields, else the first, the middle and the last worn."""

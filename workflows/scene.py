@@ -182,20 +182,24 @@ class Loads(Table):
 
 
 class Response(Table):
-    """Which displacement is observed, and the frequency response that is computed."""
+    """Which displacement is observed, and the frequency response that is computed.
+
+    references is the range in which the linear references are drawn, the same as frequency unless told.
+    """
 
     group: str
     direction: Direction
     frequency: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]]
+    references: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]] | None = None
     points: Annotated[StrictInt, Field(ge=2)] = 60
     method: str = "natural"
     options: dict[str, Any] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _range(self) -> Response:
-        if self.frequency[0] >= self.frequency[1]:
-            low, high = self.frequency
-            raise ValueError(f"expected frequency = [low, high] with low below high, got {low:g} Hz and {high:g} Hz")
+        for key, (low, high) in (("frequency", self.frequency), ("references", self.references or self.frequency)):
+            if low >= high:
+                raise ValueError(f"expected {key} = [low, high] with low below high, got {low:g} Hz and {high:g} Hz")
         return self
 
 
@@ -218,6 +222,7 @@ class Harmonics(Table):
 
     kept: tuple[Annotated[StrictInt, Field(ge=0)], ...] = (0, 1)
     samples: Annotated[StrictInt, Field(ge=4, le=65536)] = 128
+    transitions: Literal["sampled", "located"] = "sampled"
 
     @model_validator(mode="after")
     def _resolved(self) -> Harmonics:
@@ -262,20 +267,42 @@ def _step(value: object) -> object:
     raise ValueError(f'expected a share of delta_max such as "5 %" or a depth such as "50 um", above 0, got {value!r}')
 
 
-def _place(value: object) -> float | str:
-    if value == "peak":
-        return "peak"
+class Place(Table):
+    """Where the cycle that wears is taken: a frequency [Hz], or a ratio to the frequency of the resonance peak."""
+
+    frequency: Annotated[float, Field(gt=0)] | None = None
+    peak: Annotated[float, Field(gt=0)] | None = None
+
+
+def _place(value: object) -> object:
+    if isinstance(value, (Place, dict)):
+        return value
+    share, of, peak = value.partition("of peak") if isinstance(value, str) else ("", "", "")
     try:
-        return to_si(value, "Hz")
+        if value == "peak":
+            return Place(peak=1.0)
+        return Place(peak=to_si(share, "")) if of and not peak else Place(frequency=to_si(value, "Hz"))
     except ValueError:
-        raise ValueError(f'expected "peak" or a frequency such as "410 Hz", got {value!r}') from None
+        raise ValueError(
+            f'expected "peak", a share of its frequency such as "98 % of peak", or a frequency such as "410 Hz", '
+            f"got {value!r}"
+        ) from None
+
+
+class MissionDuty(Table):
+    """A part of the mission: a share of all cycles at one place, with the harmonic loads times `load`."""
+
+    at: Annotated[Place, BeforeValidator(_place)]
+    share: Annotated[Number, Field(ge=0, le=1)]
+    load: Annotated[Number, Field(ge=0)] = 1.0
 
 
 class Wear(Table):
     """Wear of the patch until contact is lost or max_steps are done.
 
     rule : "thesis" takes `step`, "error_controlled" takes `tolerance`, its local error as a share
-    lost_below : share of the first preload below which contact counts as lost; 0 waits until the last touch ends
+    lost_below : share of the first preload at which the run ends; 0 waits until the last touch ends
+    at, mission : one place where all cycles are taken, or a list of duties that share them
     """
 
     law: str = "energy"
@@ -283,9 +310,21 @@ class Wear(Table):
     rule: Literal["thesis", "error_controlled"] = "thesis"
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 0.01
     lost_below: Annotated[Number, Field(ge=0, lt=1)] = 0.0
-    step: Annotated[WearStep, BeforeValidator(_step)]
-    at: Annotated[float | str, BeforeValidator(_place)] = "peak"
+    step: Annotated[WearStep, BeforeValidator(_step)] | None = None
+    at: Annotated[Place, BeforeValidator(_place)] = Place(peak=1.0)
+    mission: tuple[MissionDuty, ...] = ()
     max_steps: Annotated[StrictInt, Field(ge=0)] = 10_000
+
+    @model_validator(mode="after")
+    def _whole(self) -> Wear:
+        if self.rule == "thesis" and self.step is None:
+            raise ValueError('expected step, such as "5 %" of delta_max, for rule = "thesis"')
+        total = sum(duty.share for duty in self.mission)
+        if self.mission and abs(total - 1) > 1e-9:
+            raise ValueError(f"expected shares of the mission that sum to 1, got {total:g}")
+        if self.mission and "at" in self.model_fields_set:
+            raise ValueError("expected either at or mission, and not both")
+        return self
 
 
 class Pictures(Table):
@@ -300,7 +339,7 @@ class Pictures(Table):
 class Solver(Table):
     """Newton's tolerance on the contact displacement relative to its size, and threads of the linear algebra."""
 
-    tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-9
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-8
     threads: Annotated[StrictInt, Field(ge=1)] = 1
 
 

@@ -9,10 +9,13 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from hbm import located as transitions
 from hbm.harmonics import HarmonicBasis
 from hbm.law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
 
 COMPONENTS = (("t1", "t2", "n"), ("t1", "n"), ("t2", "n"))
+
+located = transitions.cycle
 
 
 def n_state(components: tuple[str, ...]) -> int:

@@ -1,0 +1,149 @@
+"""Pseudo arc length continuation: the solution curve in (x, parameter) is followed round its folds.
+
+One step: predict along the tangent (bent by the last change of the tangent), correct in the hyperplane normal to it.
+The step grows and shrinks with the Newton steps and the turn of the tangent. Kinks, as contact laws make them, are
+crossed where their two legs are straight and meet; behind one that turns by more than a right angle the curve is looked
+for in the directions that the derivative there offers. A walk that comes back onto its own way took a wrong turn: it is
+rewound and goes on in shorter steps.
+Source  Keller 1977 (pseudo arc length); step control and kinks ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from hbm import newton, parameter
+from hbm.balance import HarmonicBalance
+from hbm.branch import Branch, BranchBuilder
+from hbm.continuation._curve import CurvePoint, Segment
+from hbm.continuation._stepper import Options, Stepper
+from hbm.newton import Solution
+from hbm.parameter import Parameter
+
+__all__ = ["Options", "follow"]
+
+REWINDS = 4  # times that a walk which came back onto its own way goes back to where it went wrong
+
+
+def follow(
+    problem: HarmonicBalance | Parameter,
+    start: float,
+    stop: float,
+    options: Options | None = None,
+    on_point: Callable[[int, int], None] | None = None,
+) -> Branch:
+    """Follow the solution curve from `start` towards `stop`, folds included, until it leaves the bounds.
+
+    start, stop : [rad/s] or in the unit of the parameter, either order
+    on_point : called with points done and points expected at the present pace
+    Returns a Branch with its folds; its end says whether it reached the stop, came back, closed on itself or got stuck
+    Raises  ValueError where start and stop are the same or out of the bounds
+    """
+    options = options or Options()
+    path = parameter.of(problem)
+    if start == stop:
+        raise ValueError(f"start and stop are the same, {path.say(start)}: there is no curve to follow")
+    bounds = options.bounds or (min(start, stop), max(start, stop))
+    if not bounds[0] <= start <= bounds[1]:
+        raise ValueError(f"the start, {path.say(start)}, lies outside of the bounds of the continuation")
+    first = _first(path, start, options)
+    builder = BranchBuilder(path)
+    builder.add(start, first)
+    if not first.converged:
+        return builder.finish(f"ended at {path.say(start)}: {first.outcome}")
+    walk = _Walk(path, options, builder, Stepper(path, options, first, start, stop), bounds)
+    while (end := walk.go_on()) is None:
+        if on_point is not None:
+            done = len(builder.value)
+            share = abs(builder.value[-1] - start) / abs(stop - start)
+            on_point(done, max(done, min(options.max_points, round(done / max(share, 1e-3)))))
+    return builder.finish(end)
+
+
+def _first(path: Parameter, start: float, options: Options) -> Solution:
+    """The first solution: from the guess, from rest, or along the curve in the load where that has folds of its own."""
+    balance, omega = path.place(start)
+    if options.guess is not None:
+        return newton.solve(balance, omega, options.guess, options.newton)
+    first = newton.solve_from_rest(balance, omega, options.newton)
+    if first.converged or path.name == parameter.LOAD:
+        return first
+    ramp = follow(parameter.load(balance, omega), 0.0, balance.load_factor, replace(options, bounds=None))
+    if ramp.parameter[-1] != balance.load_factor:
+        return first
+    last = newton.solve(balance, omega, ramp.contact[-1].reshape(first.state.x.shape), options.newton)
+    return replace(last, outcome=last.outcome if last.converged else first.outcome)
+
+
+class _Walk:
+    """Steps taken into a branch, and the reasons to end it."""
+
+    def __init__(
+        self,
+        path: Parameter,
+        options: Options,
+        builder: BranchBuilder,
+        stepper: Stepper,
+        bounds: tuple[float, float],
+    ):
+        self._path, self._options, self._builder, self._stepper, self._bounds = path, options, builder, stepper, bounds
+        self._start = builder.value[0]
+        self._first: CurvePoint | None = None
+        self._size = float(np.linalg.norm(builder.x[0]))
+        self._rows = [1]  # points in the branch before each segment
+        self._rewinds = 0
+
+    def go_on(self) -> str | None:
+        """One step more; the sentence that ends the branch, or None."""
+        builder, path = self._builder, self._path
+        if len(builder.value) >= self._options.max_points:
+            return f"ended at {path.say(builder.value[-1])}: {self._options.max_points} points were allowed"
+        parts = self._stepper.advance()
+        if not parts:
+            return f"ended at {path.say(builder.value[-1])}: {self._stepper.trouble}"
+        self._first = self._first or parts[0].start.bare()
+        for part in parts:
+            bound = next((b for b in self._bounds if part.crosses(b)), None)
+            if bound is not None:
+                return self._land(part, bound)
+            if part.turns:  # a fold that is a kink, right behind the last point
+                builder.mark_fold()
+            assert part.end.solution is not None
+            builder.add(part.end.value, part.end.solution, fold=part.end.fold)
+        self._rows.append(len(builder.value))
+        return self._came_back(parts)
+
+    def _land(self, part: Segment, bound: float) -> str:
+        """Solve at the bound that the curve crosses."""
+        balance, omega = self._path.place(bound)
+        flat = part.guess_at(bound)
+        guess = flat.reshape(balance.parameters.n_pair, -1, flat.shape[-1])
+        last = newton.solve(balance, omega, guess, self._options.newton)
+        self._builder.add(bound, last)
+        if not last.converged:
+            return f"ended at {self._path.say(bound)}: {last.outcome}"
+        return f"{'turned back to' if bound == self._start else 'reached'} {self._path.say(bound)}"
+
+    def _came_back(self, parts: list[Segment]) -> str | None:
+        """Whether the curve is closed, or lost itself in infinity or in its own past."""
+        builder, here, newton_options = self._builder, self._path.say(self._builder.value[-1]), self._options.newton
+        growth = self._options.max_growth
+        if np.linalg.norm(builder.x[-1]) > growth * self._size > 0:
+            return f"ended at {here}: the response grows without bound, {growth:.0e} times that of the first point"
+        assert self._first is not None
+        old = self._stepper.segments
+        if len(old) > 3 and any(p.passes(self._path, self._first, 1.0, newton_options) for p in parts):
+            return f"closed curve: came back to its first point after {len(builder.value)} points"
+        for index in range(1, len(old) - 2):
+            if any(p.near(old[index]) and p.passes(self._path, old[index].start, -1.0, newton_options) for p in parts):
+                if self._rewinds == REWINDS:
+                    return f"ended at {here}: the curve turned back onto itself"
+                self._rewinds += 1
+                self._stepper.rewind(index)
+                builder.truncate(self._rows[index])
+                del self._rows[index + 1 :]
+                break
+        return None

@@ -1,0 +1,203 @@
+"""A whole run of a small beam: balances of the result, checkpoints, resuming after kills, Ctrl-C, failed solves."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from workflows import pipeline, store
+from workflows.progress import Progress
+from workflows.result import Result
+from workflows.scene_file import read
+
+ROOT = Path(__file__).parents[1]
+SMALL = [
+    "geometry.n_patch=5",
+    "geometry.n_length=4",
+    "geometry.n_height=1",
+    "reduction.modes=4",
+    "response.points=25",
+    "wear.step=30 %",
+]
+COMMAND = [sys.executable, "-m", "workflows.cli", "run", "beam", "--no-pictures"]
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Result:
+    return pipeline.run(read("beam", SMALL), tmp_path_factory.mktemp("run"), Progress())
+
+
+def start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
+    overrides = [word for override in SMALL for word in ("--set", override)]
+    command = [*COMMAND, "--out", str(folder), *overrides, *arguments]
+    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def wait_for_rows(process: subprocess.Popen[str], path: Path, count: int) -> None:
+    """Wait until a result file holds so many wear rows; reading it must work at every moment."""
+    while process.poll() is None:
+        if path.exists():
+            wear = store.load(path).wear
+            if wear is not None and len(wear.cycles) >= count:
+                return
+        time.sleep(0.02)
+
+
+def test_the_run_ends_with_contact_lost(finished: Result) -> None:
+    assert finished.state == "complete: contact lost at every pair"
+    assert finished.contact_lost
+    assert finished.wear is not None
+    assert finished.wear.preload[0] > 1e3
+    assert finished.wear.preload[-1] == 0.0
+    assert finished.wear.depth[-1].max() > float(finished.facts["delta_max_m"])
+
+
+def test_worn_volume_is_coefficient_times_energy(finished: Result) -> None:
+    wear, patch = finished.wear, finished.patch
+    assert wear is not None
+    assert patch is not None
+    assert wear.depth[-1] @ patch.area == pytest.approx(2e-15 * wear.work.sum(), rel=1e-12)
+
+
+def test_static_forces_balance_in_the_full_field(finished: Result) -> None:
+    """The displacement field of every node, projected on the contact, is what the balance solved for."""
+    wear, patch, fields = finished.wear, finished.patch, finished.fields
+    assert wear is not None
+    assert patch is not None
+    assert fields is not None
+    for row, field in zip(fields.row, fields.displacement, strict=True):
+        local = np.einsum("pij,pjc->pic", patch.frames, field[patch.nodes])
+        solved = wear.displacement[row].reshape(local.shape)
+        assert np.abs(local - solved).max() < 1e-7 * np.abs(solved).max()
+
+
+def test_loops_enclose_the_energy(finished: Result) -> None:
+    wear, loops = finished.wear, finished.loops
+    assert wear is not None
+    assert loops is not None
+    for row, x, force in zip(loops.row, loops.displacement, loops.force, strict=True):
+        following = np.roll(x, -1, -1) - np.roll(x, 1, -1)
+        area = 0.5 * np.sum(force * following, axis=(1, 2))
+        assert area.sum() == pytest.approx(wear.energy[row].sum(), rel=2e-2)  # 128 samples, polygons against harmonics
+
+
+def test_references_peak_where_the_modes_are(finished: Result) -> None:
+    references = finished.references
+    assert references is not None
+    hertz = references.omega / (2 * np.pi)
+    spacing = hertz[1] - hertz[0]
+    free = np.asarray(finished.facts["free_hz"])[0]
+    assert hertz[np.argmax(references.free)] == pytest.approx(free, abs=2 * spacing)
+    assert finished.wear is not None
+    # without contact the peak is the free one, 1 % damping: amplitudes agree where the grid of 5 Hz allows
+    assert finished.wear.amplitude[-1] >= 0.99 * references.free.max()
+
+
+def test_killed_runs_resume_to_the_same_bits(finished: Result, tmp_path: Path) -> None:
+    assert finished.wear is not None
+    path, total = tmp_path / "result.h5", len(finished.wear.cycles)
+    for count in (1, total // 3, 2 * total // 3):
+        process = start(tmp_path, "--resume")
+        wait_for_rows(process, path, count)
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+        assert store.load(path).state.startswith(("unfinished", "complete"))
+    process = start(tmp_path, "--resume")
+    _, err = process.communicate()
+    assert process.returncode == 0, err
+    resumed = store.load(path)
+    assert resumed.state == finished.state
+    assert resumed.wear is not None
+    for name in ("cycles", "depth", "energy", "preload", "omega", "displacement", "force", "solves"):
+        assert np.array_equal(getattr(resumed.wear, name), getattr(finished.wear, name)), name
+
+
+def test_ctrl_c_keeps_what_was_computed_and_says_where(tmp_path: Path) -> None:
+    process = start(tmp_path)
+    wait_for_rows(process, tmp_path / "result.h5", 2)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate()
+    assert process.returncode == 130
+    assert err.count("\n") == 1
+    assert str(tmp_path / "result.h5") in err
+    assert err.endswith("--set 'wear.step=30 %' --resume.\n")
+    wear = store.load(tmp_path / "result.h5").wear
+    assert wear is not None
+    assert len(wear.cycles) >= 2
+
+
+def test_a_failed_solve_says_where_and_leaves_with_3(tmp_path: Path) -> None:
+    process = start(tmp_path, "--set", "solver.tolerance=1e-300")
+    _, err = process.communicate()
+    assert process.returncode == 3
+    assert err.count("\n") == 1
+    assert "ended at 380 Hz" in err
+    assert store.load(tmp_path / "result.h5").frf is not None
+
+
+def test_resuming_another_scene_is_refused(finished: Result, tmp_path: Path) -> None:
+    store.save(tmp_path / "result.h5", finished)
+    process = start(tmp_path, "--resume", "--set", "contact.friction=0.4")
+    _, err = process.communicate()
+    assert process.returncode == 2
+    assert "contact.friction differs" in err
+
+
+def test_an_earlier_result_is_set_aside(finished: Result, tmp_path: Path) -> None:
+    store.save(tmp_path / "result.h5", finished)
+    pipeline.run(read("beam", [*SMALL, "wear.max_steps=0"]), tmp_path, Progress())
+    assert store.load(tmp_path / "result.previous.h5").contact_lost
+    assert store.load(tmp_path / "result.h5").wear_steps == 0
+
+
+def test_a_mesh_file_gives_what_its_part_gives(finished: Result, tmp_path: Path) -> None:
+    file = read("beam", SMALL)
+    pipeline.make_mesh(file, tmp_path)
+    text = file.text
+    begin, end = text.index("[geometry]"), text.index("[material]")
+    own = tmp_path / "own.toml"
+    own.write_text(text[:begin] + '[geometry]\nmesh = "mesh.msh"\nfixed = ["clamp"]\n' + text[end:])
+    overrides = [override for override in SMALL if not override.startswith("geometry.")]
+    result = pipeline.run(read(str(own), [*overrides, "wear="]), tmp_path, Progress())
+    assert result.frf is not None
+    assert finished.frf is not None
+    assert np.array_equal(result.frf.response, finished.frf.response)
+
+
+def test_more_steps_go_on_from_a_run_that_stopped(finished: Result, tmp_path: Path) -> None:
+    short, longer = read("beam", [*SMALL, "wear.max_steps=2"]), read("beam", [*SMALL, "wear.max_steps=4"])
+    stopped = pipeline.run(short, tmp_path, Progress())
+    assert stopped.state == "complete: stopped after 2 wear steps"
+    assert pipeline.is_complete(stopped, short.scene)
+    assert not pipeline.is_complete(stopped, longer.scene)
+    assert pipeline.same_problem(short.scene, longer.scene) == ""
+    more = pipeline.run(longer, tmp_path, Progress(), stopped)
+    assert more.wear is not None
+    assert finished.wear is not None
+    assert np.array_equal(more.wear.depth, finished.wear.depth[:4])
+
+
+def test_a_share_of_no_deflection_is_refused_before_long_work(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"wear\.step: a share of delta_max needs static loads"):
+        pipeline.run(read("beam", [*SMALL, "loads.static.press.value=0 N"]), tmp_path, Progress())
+    assert not (tmp_path / "result.h5").exists()
+
+
+def test_the_error_controlled_rule_runs_from_a_scene(tmp_path: Path) -> None:
+    mission = 'wear.mission=[{at = "peak", share = "60 %"}, {at = "98 % of peak", share = "40 %"}]'
+    overrides = [*SMALL, "wear.rule=error_controlled", "wear.step=", "wear.at=", "wear.max_steps=3", mission]
+    result = pipeline.run(read("beam", overrides), tmp_path, Progress())
+    wear, patch = result.wear, result.patch
+    assert wear is not None
+    assert patch is not None
+    assert result.state == "complete: stopped after 3 wear steps"
+    assert wear.duty_omega.shape == (3, 2)
+    assert wear.duty_omega[:, 1] == pytest.approx(0.98 * wear.duty_omega[:, 0], rel=1e-4)
+    assert wear.step_error.max() <= 1.0
+    assert wear.worn.sum(0) @ patch.area == pytest.approx(2e-15 * wear.work.sum(), rel=1e-12)

@@ -1,0 +1,78 @@
+"""What a result says about itself before anything is solved: provenance, sizes, patch and mesh."""
+
+from __future__ import annotations
+
+import platform
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fem.part import Part
+from geometry import mesh as mesh_reader
+from geometry.numbering import REFERENCE_POINTS, permutation
+from hbm.balance import HarmonicBalance
+from workflows.references import free_deflection
+from workflows.result import PartMesh, Patch, Result
+from workflows.scene_file import SceneFile
+
+VTK_KIND = {27: ("hexahedron27", "triquadratic_hexahedron"), 10: ("tetra10", "quadratic_tetra")}
+PACKAGES = ("tribodyn", "numpy", "scipy", "numba", "scikit-fem", "gmsh", "meshio", "h5py", "pydantic")
+SEED = 0  # of every random start vector and probe in the packages used
+
+
+def described(file: SceneFile, part: Part, balance: HarmonicBalance) -> Result:
+    """The result before anything was solved: where it comes from and what is modelled."""
+    reduced = balance.model
+    nodes = cKDTree(part.points).query(reduced.interface.points)[1]
+    i = reduced.interface
+    patch = Patch(i.components, nodes, i.points, i.frames, i.area, i.gap, i.faces, free_deflection(balance))
+    facts: dict[str, str | int | float | np.ndarray] = {
+        "elements": int(part.mesh.nelements),
+        "nodes": len(part.points),
+        "full_dofs": part.system.n_dof,
+        "model_dofs": reduced.system.n_dof,
+        "retained_modes": int(str(reduced.info["n_modes"])),
+        "first_omitted_hz": float(str(reduced.info["first_omitted_frequency"])),
+        "free_hz": np.asarray(reduced.info["free_frequency"]),
+        "contact_pairs": i.n_pair,
+        "unknowns": balance.n_unknown,
+        "delta_max_m": float(patch.free_deflection.max()),
+        "scaled_jacobian": mesh_reader.quality(part.mesh).scaled_jacobian,
+        "factorisation": str(reduced.info["factorisation"]),
+        "compliance_error": balance.compliance.error,
+    }
+    return Result(provenance(file), facts, "model built", patch=patch, part=part_mesh(part))
+
+
+def provenance(file: SceneFile) -> dict[str, str]:
+    """Where a result comes from, as texts."""
+    return {
+        "scene_name": file.name,
+        "scene_text": file.text,
+        "overrides": "\n".join(file.overrides),
+        "scene": file.scene.model_dump_json(),
+        "versions": ", ".join(f"{name} {package_version(name)}" for name in PACKAGES),
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "seed": str(SEED),
+        "threads": str(file.scene.solver.threads),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def package_version(name: str) -> str:
+    """Version of an installed package; a source tree that is run without being installed has none."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def part_mesh(part: Part) -> PartMesh:
+    """The mesh of a part in the node order of VTK."""
+    cells = part.mesh.dofs.element_dofs.T
+    reference, kind = VTK_KIND[cells.shape[1]]
+    to_vtk = permutation(part.mesh.elem.doflocs, REFERENCE_POINTS[reference])
+    return PartMesh(kind, part.points, cells[:, to_vtk])
