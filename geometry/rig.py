@@ -70,7 +70,8 @@ class Parameters:
     n_half: int = 2
 
     def __post_init__(self) -> None:
-        checks.positive(self, "free_length", "height", "thickness", "contact_length", "contact_width", "slot_length", "slot_height")
+        checks.positive(self, "free_length", "height", "thickness", "contact_length", "contact_width")
+        checks.positive(self, "slot_length", "slot_height")
         checks.positive(self, "protrusion", "foot", "root_length", "column_side", "column_height", "shaker_distance")
         checks.positive(self, "longest")
         checks.odd(self, "n_contact_length", "n_contact_width")
@@ -112,7 +113,8 @@ def build(parameters: Parameters, path: str | Path) -> None:
 
     Groups: volumes "column", "beam", "upper_specimen", "lower_specimen", "separator", "platform"; surfaces
     "column_base", "column_seat" and "beam_root" (matching), "upper_contact", "lower_contact" (larger, with the matching
-    grid in its middle); points "shaker", "accelerometer" (free end), "screws" (six below the platform), "pins" (two), and
+    grid in its middle); points "shaker", "accelerometer" (free end), "screws" (six below the platform), "pins" (two),
+    and
     "low", "middle", "high" followed by 1 to 4 at quarters of the length before the slot, for mode shapes
     """
     blocks.write(path, _column(parameters), _beam(parameters), _platform(parameters))

@@ -34,7 +34,8 @@ def part(tmp_path_factory):
         return np.column_stack([x, y, z + 0.2 * y])
 
     corner = tilt(np.array([[0.0, 0.0, 0.075]]))
-    upper = blocks.body([blocks.Block(line, line, tall, "upper", {"w-": "bottom", "w+": "lid"}, tilt)], {"point": corner})
+    block = blocks.Block(line, line, tall, "upper", {"w-": "bottom", "w+": "lid"}, tilt)
+    upper = blocks.body([block], {"point": corner})
     lower = blocks.body([blocks.Block(line, line, up, "lower", {"w+": "top", "w-": "base"}, tilt)])
     blocks.write(path, upper, lower)
     mesh, sets = mesh_file.read(path)
