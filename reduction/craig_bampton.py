@@ -94,7 +94,9 @@ def craig_bampton(
     return replace(model, info=info)
 
 
-def master_dofs(system: SecondOrderSystem, interface: ContactInterface, extra: Sequence[int] | np.ndarray = ()) -> np.ndarray:
+def master_dofs(
+    system: SecondOrderSystem, interface: ContactInterface, extra: Sequence[int] | np.ndarray = ()
+) -> np.ndarray:
     """DOFs that stay, in any order: those the contact map touches, those of point loads and outputs, and the extra."""
     touched = [np.flatnonzero(v) for v in (*system.loads.values(), *system.outputs.values())]
     points = [dofs for dofs in touched if len(dofs) <= POINT_LOAD]
