@@ -20,10 +20,10 @@ from hbm.balance import HarmonicBalance
 from hbm.branch import Branch, BranchBuilder
 from hbm.continuation._curve import CurvePoint, Segment
 from hbm.continuation._stepper import Options, Stepper
-from hbm.newton import Solution
+from hbm.newton import NewtonOptions, Solution
 from hbm.parameter import Parameter
 
-__all__ = ["Options", "follow"]
+__all__ = ["Options", "follow", "solve_along_load"]
 
 REWINDS = 4  # times that a walk which came back onto its own way goes back to where it went wrong
 
@@ -49,7 +49,13 @@ def follow(
     bounds = options.bounds or (min(start, stop), max(start, stop))
     if not bounds[0] <= start <= bounds[1]:
         raise ValueError(f"the start, {path.say(start)}, lies outside of the bounds of the continuation")
-    first = _first(path, start, options)
+    place = path.place(start)
+    if options.guess is not None:
+        first = newton.solve(*place, options.guess, options.newton)
+    elif path.name == parameter.LOAD:
+        first = newton.solve_from_rest(*place, options.newton)
+    else:
+        first = solve_along_load(*place, options.newton)
     builder = BranchBuilder(path)
     builder.add(start, first)
     if not first.converged:
@@ -63,18 +69,20 @@ def follow(
     return builder.finish(end)
 
 
-def _first(path: Parameter, start: float, options: Options) -> Solution:
-    """The first solution: from the guess, from rest, or along the curve in the load where that has folds of its own."""
-    balance, omega = path.place(start)
-    if options.guess is not None:
-        return newton.solve(balance, omega, options.guess, options.newton)
-    first = newton.solve_from_rest(balance, omega, options.newton)
-    if first.converged or path.name == parameter.LOAD:
+def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None) -> Solution:
+    """Solve at one frequency [rad/s] without a neighbouring solution, also where the curve in the load has folds.
+
+    Newton from rest and its load ramp are tried first; else the curve of solutions over the load is followed
+    Returns a Solution; its outcome is the one from rest where the curve does not reach the load either
+    """
+    options = options or NewtonOptions()
+    first = newton.solve_from_rest(balance, omega, options)
+    if first.converged:
         return first
-    ramp = follow(parameter.load(balance, omega), 0.0, balance.load_factor, replace(options, bounds=None))
+    ramp = follow(parameter.load(balance, omega), 0.0, balance.load_factor, Options(newton=options))
     if ramp.parameter[-1] != balance.load_factor:
         return first
-    last = newton.solve(balance, omega, ramp.contact[-1].reshape(first.state.x.shape), options.newton)
+    last = newton.solve(balance, omega, ramp.contact[-1].reshape(first.state.x.shape), options)
     return replace(last, outcome=last.outcome if last.converged else first.outcome)
 
 
