@@ -145,13 +145,25 @@ class _Walk:
         old = self._stepper.segments
         if len(old) > 3 and any(p.passes(self._path, self._first, 1.0, newton_options) for p in parts):
             return f"closed curve: came back to its first point after {len(builder.value)} points"
+        return self._lost(parts, here)
+
+    def _lost(self, parts: list[Segment], here: str) -> str | None:
+        """Whether the walk is back on its own way: then it went wrong there, is rewound and goes on in shorter steps.
+
+        Against its sense it turned where it should not; in its sense it left the curve for a closed one beside it.
+        """
+        old, newton_options = self._stepper.segments, self._options.newton
         for index in range(1, len(old) - 2):
-            if any(p.near(old[index]) and p.passes(self._path, old[index].start, -1.0, newton_options) for p in parts):
+            near = [p for p in parts if p.near(old[index])]
+            for sense in (-1.0, 1.0):
+                if not any(p.passes(self._path, old[index].start, sense, newton_options) for p in near):
+                    continue
                 if self._rewinds == REWINDS:
-                    return f"ended at {here}: the curve turned back onto itself"
+                    return f"ended at {here}: the curve came back onto itself"
                 self._rewinds += 1
+                index = index if sense < 0 else max(index - 2, 0)
                 self._stepper.rewind(index)
-                builder.truncate(self._rows[index])
+                self._builder.truncate(self._rows[index])
                 del self._rows[index + 1 :]
-                break
+                return None
         return None
