@@ -98,7 +98,7 @@ def interpolate(branch: Branch, values: np.ndarray) -> np.ndarray:
     window = min(DEGREE + 1, len(known))
     first = np.clip(np.searchsorted(known, values) - window // 2, 0, len(known) - window)
     pieces = [(slice(i, i + window), value) for i, value in zip(first, values, strict=True)]
-    return np.stack([extrapolate(known[piece], response[piece], value) for piece, value in pieces])
+    return np.stack([extrapolate(known[piece], list(response[piece]), value) for piece, value in pieces])
 
 
 class _Sweep:
