@@ -137,9 +137,12 @@ class PortCompliance:
 
     @cached_property
     def core_single(self) -> np.ndarray:
-        """The core in single precision; for a real system as the real matrix on [a, b] (on x_0 where s = 0)."""
-        if np.iscomplexobj(self.expansion.w0):
-            return self.core.astype(np.complex64)
+        """The core in single precision."""
+        return self.core.astype(np.complex64)
+
+    @cached_property
+    def core_on_pairs(self) -> np.ndarray:
+        """The same as a real matrix on [a, b], or on x_0 where s = 0."""
         re, im = self.core.real, self.core.imag
         return (re if self.s == 0 else np.block([[re, im], [-im, re]])).astype(np.float32)
 
@@ -199,20 +202,32 @@ class ContactCompliance:
                 self._load[load_names.index(name), basis.harmonics.index(h)] = value
         self.base = excitation.base
         self.groups: list[tuple[Expansion, list[int]]] = []
-        shared: dict[int, int] = {}
-        for position, h in enumerate(basis.harmonics):
-            system, b = model.at_harmonic(h)
-            if id(system) in shared:
-                self.groups[shared[id(system)]][1].append(position)
-                continue
-            loaded = [np.conj(system.loads[name])[None] for name in load_names]
-            rows = [b, *loaded, *(system.outputs[name][None] for name in self.output_names)]
-            ports = np.concatenate([np.asarray(r) for r in rows])
-            shared[id(system)] = len(self.groups)
-            s_max = (basis.harmonics[-1] if model.per_harmonic is None else h) * omega_max
-            self.groups.append((Expansion(system, np.asarray(b), self.k, ports, s_max), [position]))
+        seen = [model.at_harmonic(h) for h in basis.harmonics]
+        sharing: dict[int, list[int]] = {}
+        for position, (system, _) in enumerate(seen):
+            sharing.setdefault(id(system), []).append(position)
+        for positions in sharing.values():
+            system, b = seen[positions[0]]
+            loads = [np.conj(system.loads[name])[None] for name in load_names]
+            outputs = [system.outputs[name][None] for name in self.output_names]
+            ports = np.concatenate([np.asarray(rows) for rows in (b, *loads, *outputs)])
+            s_max = basis.harmonics[positions[-1]] * omega_max
+            self.groups.append((Expansion(system, np.asarray(b), self.k, ports, s_max), positions))
         self.error = max(e.error for e, _ in self.groups)
         self.shared_real = len(self.groups) == 1 and not np.iscomplexobj(self.groups[0][0].w0)
+
+    def restricted(self, basis: HarmonicBasis) -> ContactCompliance:
+        """The same for fewer of the harmonics; the expansions are shared."""
+        old = self.basis.harmonics
+        other = object.__new__(ContactCompliance)
+        other.__dict__.update(self.__dict__)
+        other.basis = basis
+        other._load = self._load[:, [old.index(h) for h in basis.harmonics]]
+        other.base = None if self.base is None else self.basis.transfer(self.base, basis)
+        kept = [(e, [basis.harmonics.index(old[p]) for p in ps if old[p] in basis.harmonics]) for e, ps in self.groups]
+        other.groups = [(expansion, positions) for expansion, positions in kept if positions]
+        other.shared_real = len(other.groups) == 1 and not np.iscomplexobj(other.groups[0][0].w0)
+        return other
 
     def at(self, omega: float) -> CompliancePoint:
         """The compliance at one excitation frequency [rad/s]."""
@@ -267,9 +282,10 @@ class CompliancePoint:
         out = np.zeros_like(force)
         for (expansion, positions), ports in zip(self._c.groups, self._ports, strict=True):
             for p, port in zip(positions, ports, strict=True):
-                y = expansion.w0 @ force[:, p] + port.left[:n] @ (port.core @ (port.right[:, :n] @ force[:, p]))
+                f = force[:, p]
+                y = _product(expansion.w0, f) + port.left[:n] @ (port.core @ (port.right[:, :n] @ f))
                 for k, moment in enumerate(expansion.higher, start=1):
-                    y += port.power[k] * (moment @ force[:, p].astype(np.complex64))
+                    y += port.power[k] * _product(moment, f.astype(np.complex64))
                 out[:, p] = y
         return basis.to_real(out)
 
@@ -325,7 +341,8 @@ class JacobianProduct:
             w0, b = expansion.w0_single, expansion.b_single
             if not everything:
                 w0, b = w0[np.ix_(rows, rows)], b[rows]
-            self._groups.append((w0, b, np.ascontiguousarray(b.conj().T), [p.core_single for p in at], positions))
+            cores = [p.core_on_pairs if self._shared_real else p.core_single for p in at]
+            self._groups.append((w0, b, np.ascontiguousarray(b.conj().T), cores, positions))
 
     def __call__(self, d: np.ndarray) -> np.ndarray:
         """G d for d (n_active, n_coeff)."""
@@ -340,9 +357,10 @@ class JacobianProduct:
                 z[:, column : column + width] = part.reshape(width, -1).T
                 column += width
             return w0 @ single + b @ z
-        force = self._basis.to_complex(d)
+        force = self._basis.to_complex(d).astype(np.complex64)
         moved = np.empty_like(force)
         for w0, b, bt, cores, positions in self._groups:
             for core, p in zip(cores, positions, strict=True):
-                moved[:, p] = w0 @ force[:, p] + b @ (core @ (bt @ force[:, p]))
+                f = force[:, p]
+                moved[:, p] = _product(w0, f) + _product(b, core @ _product(bt, f))
         return self._basis.to_real(moved)

@@ -28,7 +28,7 @@ from hbm.harmonics import HarmonicBasis
 from hbm.parameter import Parameter
 
 MARGIN = 1e-6  # real parts up to this times omega count as zero
-MOST_MODES = 30
+FEWEST_MODES, MOST_MODES = 20, 30  # friction makes modes far above the excitation flutter, too
 SAME = 0.02  # relative to omega: how far truncation may drive copies of one exponent apart
 
 
@@ -101,7 +101,8 @@ def stability(
     """Stability of one solution.
 
     state : converged; method : "hill", or "floquet" for small models, by time integration
-    n_modes : modes that move dynamically in Hill's method, by default those below three times the highest harmonic
+    n_modes : modes that move dynamically in Hill's method, by default those below three times the highest harmonic,
+        at least FEWEST_MODES and at most MOST_MODES of them
     top : highest harmonic of the perturbation in Hill's method, by default that of the balance
     Raises  ValueError for unknown methods and for models whose harmonics see different systems
     """
@@ -170,7 +171,7 @@ def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int 
     expansion = balance.compliance.groups[0][0]
     frequencies = np.sqrt(expansion.lam)
     if n_modes is None:
-        n_modes = int(np.clip(np.sum(frequencies < 3 * (top + 1) * state.omega), 6, MOST_MODES))
+        n_modes = int(np.clip(np.sum(frequencies < 3 * (top + 1) * state.omega), FEWEST_MODES, MOST_MODES))
     m = min(n_modes, len(frequencies))
     n_contact = balance.compliance.n_contact
     phi, rest = expansion.b[:n_contact, :m], expansion.b[:n_contact, m:]

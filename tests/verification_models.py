@@ -29,7 +29,7 @@ def modal_damping(mass: np.ndarray, stiffness: np.ndarray, ratio: float) -> np.n
 def oscillator(mass: float, stiffness: float, ratio: float, component: str = "t1") -> ReducedModel:
     """One moving mass whose tangential (with a second mass for the normal) or normal displacement meets the ground.
 
-    component : "t1" gives DOFs (t1, n), the normal one loaded by "normal"; "n" one DOF
+    component : "t1" gives DOFs (t1, n), the normal one loaded by "normal"; "n" gives one DOF, loaded by either name
     """
     n = 2 if component == "t1" else 1
     m, k = mass * np.eye(n), stiffness * np.eye(n)

@@ -52,6 +52,7 @@ def provenance(file: SceneFile) -> dict[str, str]:
         "scene_name": file.name,
         "scene_text": file.text,
         "overrides": "\n".join(file.overrides),
+        "folder": str(file.folder),
         "scene": file.scene.model_dump_json(),
         "versions": ", ".join(f"{name} {package_version(name)}" for name in PACKAGES),
         "python": platform.python_version(),

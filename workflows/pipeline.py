@@ -69,15 +69,8 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
     check_names(scene)
     keep = Keeper(folder / "result.h5", clock)
     with threadpool_limits(scene.solver.threads):
-        with progress.stage("mesh"):
-            mesh, node_sets = make_mesh(file, folder)
-        with progress.stage("mass and stiffness"):
-            part = make_part(scene, mesh, node_sets)
-        with progress.stage("reduction"):
-            reduced = reduce_part(scene, part)
-        with progress.stage("contact compliance"):
-            model = make_model(scene, part, reduced)
-        result = earlier or described(file, part, model.balance)
+        model = build(file, folder, progress)
+        result = earlier or described(file, model.part, model.balance)
         if wears(scene) and result.patch is not None:
             step_limit(scene, result.patch)  # raises before anything long is begun
         previous = None if earlier else store.set_aside(keep.path)
@@ -97,6 +90,19 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
                 result = wear_down(scene, model, result, keep, advance)
         state = "complete" if result.wear is None else f"complete: {result.wear.end}"
         return keep(replace(result, state=state))
+
+
+def build(file: SceneFile, folder: Path, progress: Progress) -> Model:
+    """The nonlinear problem of a scene, stage by stage; a mesh that is made is kept in `folder`."""
+    scene = file.scene
+    with progress.stage("mesh"):
+        mesh, node_sets = make_mesh(file, folder)
+    with progress.stage("mass and stiffness"):
+        part = make_part(scene, mesh, node_sets)
+    with progress.stage("reduction"):
+        reduced = reduce_part(scene, part)
+    with progress.stage("contact compliance"):
+        return make_model(scene, part, reduced)
 
 
 def wears(scene: Scene) -> bool:

@@ -44,8 +44,8 @@ def draw(result: Result, folder: Path) -> list[Path]:
 
 def frequency_response(result: Result) -> Figure:
     """Unworn response between its free and stuck references, and the path of the peak under wear."""
-    with _axes(7.2, 4.6) as (figure, axes):
-        unit, scale = _length(_largest_amplitude(result))
+    with axes_of(7.2, 4.6) as (figure, axes):
+        unit, scale = length_unit(_largest_amplitude(result))
         if result.references is not None:
             hertz = result.references.omega / (2 * np.pi)
             axes.plot(hertz, scale * result.references.free, "--", color=GREY, label="free (contact absent)")
@@ -72,7 +72,7 @@ def frequency_response(result: Result) -> Figure:
 def cycles_per_step(result: Result) -> Figure:
     """Cycles that each wear step stands for."""
     wear = _wear(result)
-    with _axes() as (figure, axes):
+    with axes_of() as (figure, axes):
         count = wear.cycles_in_step[: result.wear_steps]
         unit, scale = _cycles(count.max())
         axes.step(np.arange(1, len(count) + 1), scale * count, where="mid", color=BLUE)
@@ -87,9 +87,9 @@ def cycles_per_step(result: Result) -> Figure:
 def amplitude_against_cycles(result: Result) -> Figure:
     """Amplitude and frequency of the cycle that wears, against cycles."""
     wear = _wear(result)
-    with _axes(7.2, 5.6, rows=2) as (figure, (upper, lower)):
+    with axes_of(7.2, 5.6, rows=2) as (figure, (upper, lower)):
         scale_cycles = _cycle_axis(lower, wear)
-        unit, scale = _length(wear.amplitude.max())
+        unit, scale = length_unit(wear.amplitude.max())
         upper.plot(scale_cycles * wear.cycles, scale * wear.amplitude, ".-", color=BLUE, ms=4)
         upper.set(ylabel=f"amplitude / {unit}", title="Response under wear")
         lower.plot(scale_cycles * wear.cycles, wear.omega / (2 * np.pi), ".-", color=ORANGE, ms=4)
@@ -100,7 +100,7 @@ def amplitude_against_cycles(result: Result) -> Figure:
 def preload_against_cycles(result: Result) -> Figure:
     """Static normal force of the contact against cycles."""
     wear = _wear(result)
-    with _axes() as (figure, axes):
+    with axes_of() as (figure, axes):
         scale_cycles = _cycle_axis(axes, wear)
         unit, scale = ("kN", 1e-3) if wear.preload.max() >= 1e3 else ("N", 1.0)
         axes.plot(scale_cycles * wear.cycles, scale * wear.preload, ".-", color=BLUE, ms=4)
@@ -113,9 +113,9 @@ def depth_against_cycles(result: Result) -> Figure:
     """Largest, mean and smallest wear depth of the patch against cycles."""
     wear, patch = _wear(result), result.patch
     assert patch is not None
-    with _axes() as (figure, axes):
+    with axes_of() as (figure, axes):
         scale_cycles = _cycle_axis(axes, wear)
-        unit, scale = _length(wear.depth.max())
+        unit, scale = length_unit(wear.depth.max())
         x = scale_cycles * wear.cycles
         mean = wear.depth @ patch.area / patch.area.sum()
         axes.fill_between(x, scale * wear.depth.min(1), scale * wear.depth.max(1), color=BLUE, alpha=0.18, lw=0)
@@ -131,7 +131,7 @@ def energy_against_cycles(result: Result) -> Figure:
     """Energy per cycle against cycles, and worn volume against accumulated energy."""
     wear, patch = _wear(result), result.patch
     assert patch is not None
-    with _axes(7.2, 5.6, rows=2, share=False) as (figure, (upper, lower)):
+    with axes_of(7.2, 5.6, rows=2, share=False) as (figure, (upper, lower)):
         scale_cycles = _cycle_axis(upper, wear)
         upper.plot(scale_cycles * wear.cycles, wear.energy.sum(1), ".-", color=BLUE, ms=4)
         upper.set(ylabel="energy per cycle / J", title="Dissipated energy")
@@ -164,7 +164,7 @@ def hysteresis_loops(result: Result) -> Figure:
                 axes = grid[line, column]
                 x, force = loops.displacement[column, pair, component], loops.force[column, pair, component]
                 x = x - (x.max() + x.min()) / 2  # the static offset says nothing about the loop
-                (unit_x, scale_x), (unit_f, scale_f) = _length(x.max()), _force(np.abs(force).max())
+                (unit_x, scale_x), (unit_f, scale_f) = length_unit(x.max()), force_unit(np.abs(force).max())
                 axes.plot(scale_x * np.append(x, x[0]), scale_f * np.append(force, force[0]), color=BLUE)
                 axes.set_xlabel(f"{patch.components[component]} / {unit_x}", fontsize=9)
                 axes.set_ylabel(f"pair {pair}: force / {unit_f}", fontsize=9)
@@ -174,10 +174,13 @@ def hysteresis_loops(result: Result) -> Figure:
 
 
 @contextmanager
-def _axes(width: float = 7.2, height: float = 4.2, rows: int = 1, share: bool = True) -> Iterator[tuple[Figure, Any]]:
+def axes_of(
+    width: float = 7.2, height: float = 4.2, rows: int = 1, share: bool = True, columns: int = 1
+) -> Iterator[tuple[Figure, Any]]:
+    """A figure in the common style with its axes: one, or an array where there are several rows or columns."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(width, height), layout="constrained")
-        yield figure, figure.subplots(rows, 1, sharex=share)
+        yield figure, figure.subplots(rows, columns, sharex=share and columns == 1)
 
 
 def _wear(result: Result) -> WearHistory:
@@ -214,14 +217,15 @@ def _largest_amplitude(result: Result) -> float:
     return max(found)
 
 
-def _length(largest: float) -> tuple[str, float]:
+def length_unit(largest: float) -> tuple[str, float]:
     """Unit and factor in which lengths [m] of this size read well."""
     if largest >= 0.5e-3:
         return "mm", 1e3
     return ("nm", 1e9) if 0 < largest < 0.5e-6 else ("µm", 1e6)
 
 
-def _force(largest: float) -> tuple[str, float]:
+def force_unit(largest: float) -> tuple[str, float]:
+    """Unit and factor in which forces [N] of this size read well."""
     if largest >= 1e3:
         return "kN", 1e-3
     return ("mN", 1e3) if 0 < largest < 1 else ("N", 1.0)

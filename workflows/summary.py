@@ -33,8 +33,8 @@ def summary(result: Result) -> dict[str, Any]:
 
 
 def _wear(result: Result) -> dict[str, Any]:
-    names = ("depth_max_m", "depth_mean_m", "cycles", "separated_cycles", "life_cycles")
-    names += ("energy_J", "volume_m3", "hbm_solves")
+    names = ["depth_max_m", "depth_mean_m", "cycles", "separated_cycles", "life_cycles"]
+    names += ["energy_J", "volume_m3", "hbm_solves"]
     wear, patch = result.wear, result.patch
     if wear is None or patch is None or not len(wear.cycles):
         return dict.fromkeys(names)
