@@ -1,15 +1,15 @@
 """What harmonics buy on the leaf seal, beside time integration: python -m workflows.leaf_accuracy [folder].
 
-The two folds of the main resonance are found in time too, by bisection: the highest frequency at which the low motion
-stays, and the lowest at which the high one does. Where three solutions share a frequency, time integration is started
-at each of them.
+The two folds of the main resonance are found in time too, by bisection: the highest frequency at which there is a low
+periodic motion, and the lowest at which there is a high one. Where three solutions share a frequency, plain marches in
+time are started at each of them.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import matplotlib as mpl
@@ -19,6 +19,7 @@ from threadpoolctl import threadpool_limits
 
 from hbm import newton, stability, time_integration
 from hbm.balance import HarmonicBalance, State
+from hbm.branch import CONVERGED
 from hbm.time_integration import Options, PeriodicMotion
 from workflows import scene_file
 from workflows.leaf_figures import MICRO, draw_curve
@@ -27,14 +28,15 @@ from workflows.style import BLUE, GREEN, INK, ORANGE, RED, STYLE
 
 HARMONICS = (1, 3, 5, 9)
 HILL = 5  # harmonics of the solutions whose stability is compared with time integration
-MARCH = Options(steps=512, tolerance=1e-7, max_periods=400, accelerate=False)
+SEARCH = Options(steps=512, tolerance=1e-7, max_periods=400)
+MARCH = replace(SEARCH, accelerate=False, max_periods=800)
 LEFT = 0.3  # change of amplitude, relative, that means that a motion has left its branch
-BISECTIONS, BRACKET = 8, 0.03
+BISECTIONS, BRACKET = 8, 0.02
 
 
 @dataclass(frozen=True)
 class Edge:
-    """The end of a branch in time integration. omega : [rad/s]; amplitude : of the last motion that stayed [m]."""
+    """The end of a branch in time integration. omega : [rad/s]; amplitude : of the last motion on it [m]."""
 
     omega: float
     amplitude: float
@@ -66,9 +68,9 @@ def amplitude(balance: HarmonicBalance, motion: PeriodicMotion) -> float:
     return float(np.sqrt(2) * series.std())
 
 
-def march(balance: HarmonicBalance, state: State, omega: float) -> PeriodicMotion:
-    """Plain time integration from a balance state, at a frequency that may be another than its own."""
-    return time_integration.integrate(balance, omega, balance.evaluate(omega, state.x), MARCH)
+def march(balance: HarmonicBalance, state: State, omega: float, options: Options = MARCH) -> PeriodicMotion:
+    """Time integration from a balance state, at a frequency that may be another than its own."""
+    return time_integration.integrate(balance, omega, balance.evaluate(omega, state.x), options)
 
 
 def solutions_at(response: LeafResponse, omega: float) -> list[State]:
@@ -88,18 +90,21 @@ def solutions_at(response: LeafResponse, omega: float) -> list[State]:
 def edge(response: LeafResponse, fold: int, high: bool) -> Edge:
     """Where, in time, the low or the high branch ends that a fold of the balance ends."""
     balance, branch = response.balance, response.branch
-    at_fold, height = response.state(fold), float(branch.amplitude(LINER_NODE)[fold])
+    at_fold = response.state(fold)
     inside, outside = (branch.omega[fold] * (1 + side * BRACKET) for side in ((1, -1) if high else (-1, 1)))
-    last = height
+    last = float(branch.amplitude(LINER_NODE)[fold])
     for _ in range(BISECTIONS):
-        middle = 0.5 * (inside + outside)
-        there = solutions_at(response, middle)
-        start = there[-1 if high else 0] if len(there) > 1 else at_fold
-        reached = amplitude(balance, march(balance, start, middle))
-        if abs(reached / height - 1) < LEFT:
-            inside, last = middle, reached
+        omega = 0.5 * (inside + outside)
+        there = solutions_at(response, omega)
+        own, other = (there[-1], there[0]) if high else (there[0], there[-1])
+        if len(there) == 1:  # behind the fold
+            own = at_fold
+        motion = march(balance, own, omega, SEARCH)
+        moved = motion.coefficients(motion.x, balance.basis)
+        if motion.outcome == CONVERGED and np.linalg.norm(moved - own.x) < np.linalg.norm(moved - other.x):
+            inside, last = omega, amplitude(balance, motion)
         else:
-            outside = middle
+            outside = omega
     return Edge(inside, last)
 
 

@@ -23,9 +23,10 @@ from workflows.leaf_response import LINER_NODE, LeafResponse, respond
 COLUMNS = (
     "group", "value", "points", "folds", "fold_hz", "unstable_points", "peak_hz", "peak_um",
     "stick", "stick_separation", "separation", "impact_velocity_mm_s", "least_touching",
-    "impact_work_mJ", "pin_work_mJ", "newton_steps", "seconds",
+    "impact_work_mJ", "pin_work_mJ", "patch_wear_um", "pin_wear_um", "newton_steps", "seconds",
 )  # fmt: skip
 MAPS = ("inclination", "bow")  # parameters whose contact is drawn
+WEAR_CYCLES = 1e9  # that the depths in the table stand for: some 2000 hours
 STRUCK_POINT = 2  # of the chosen five, where the leaf moves most
 
 
@@ -35,6 +36,7 @@ def row(case: Case, response: LeafResponse) -> dict[str, object]:
     chattering, status = response.chatter(point), response.state(point).cycle.status
     height = branch.amplitude(LINER_NODE)
     folds = [f"{branch.frequency[i]:.2f}" for i in branch.folds]
+    patches, pins = (1e6 * WEAR_CYCLES * rates.max() for rates in response.wear_rates(point))
     count = {kind: int(np.sum(status == kind)) for kind in (STICKS, STICKS | SEPARATES, SEPARATES)}
     return dict(
         zip(
@@ -53,6 +55,8 @@ def row(case: Case, response: LeafResponse) -> dict[str, object]:
                 round(float(chattering.touching.min()), 3),
                 round(1e3 * float(response.impact_work(point).sum()), 4),
                 round(1e3 * sum(response.pin_work(point).values()), 4),
+                round(float(patches), 3),
+                round(float(pins), 3),
                 int(branch.newton_steps.sum()),
                 round(response.seconds, 2),
             ),
