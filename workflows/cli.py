@@ -105,12 +105,11 @@ def run(
 def _earlier(path: Path, file: scene_file.SceneFile) -> Result | None:
     """The unfinished result to go on from, None where there is none yet."""
     from workflows import pipeline, store
-    from workflows.scene import Scene
 
     if not path.exists():
         return None
     result = store.load(path)
-    key = pipeline.same_problem(Scene.model_validate_json(result.provenance["scene"]), file.scene)
+    key = pipeline.same_problem(scene_file.from_json(result.provenance["scene"]), file.scene)
     if key:
         raise ValueError(f"{path} is the result of another scene, {key} differs: run its scene, or without --resume")
     return result
@@ -306,9 +305,8 @@ def _print_lines(lines: list[tuple[str, str]]) -> None:
 def _draw(result: Result, folder: Path) -> None:
     """Draw what the scene of a result wants drawn; curves come first, they need no system libraries."""
     from workflows import plots
-    from workflows.scene import Scene
 
-    wanted = Scene.model_validate_json(result.provenance["scene"]).pictures
+    wanted = scene_file.from_json(result.provenance["scene"]).pictures
     folder.mkdir(parents=True, exist_ok=True)
     written = plots.draw(result, folder) if wanted.plots else []
     if wanted.renders:

@@ -34,13 +34,14 @@ from reduction.damping import modal_damping, rayleigh
 from reduction.held import hold
 from reduction.linear import stuck_stiffness
 from reduction.model import ReducedModel
-from workflows import store
+from workflows import matrix_model, store
 from workflows.description import described
 from workflows.fields import displacement_fields, hysteresis_loops
+from workflows.matrix_scene import MatrixScene
 from workflows.progress import Progress
 from workflows.references import linear_references
 from workflows.result import Patch, Result
-from workflows.scene import Place, Scene, StaticLoad, unknown_key
+from workflows.scene import PartScene, Place, Scene, StaticLoad, unknown_key
 from workflows.scene_file import SceneFile
 
 OUTPUT = "response"
@@ -52,9 +53,9 @@ class SolveFailed(RuntimeError):
 
 @dataclass(frozen=True)
 class Model:
-    """The nonlinear problem of a scene with what it was made from."""
+    """The nonlinear problem of a scene with what it was made from; no part where it came as matrices."""
 
-    part: Part
+    part: Part | None
     reduced: ReducedModel
     balance: HarmonicBalance
 
@@ -95,12 +96,17 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
 def build(file: SceneFile, folder: Path, progress: Progress) -> Model:
     """The nonlinear problem of a scene, stage by stage; a mesh that is made is kept in `folder`."""
     scene = file.scene
+    if isinstance(scene, MatrixScene):
+        with progress.stage("matrices"):
+            reduced = damped(scene, matrix_model.make(scene, file.folder))
+        with progress.stage("contact compliance"):
+            return make_model(scene, None, reduced)
     with progress.stage("mesh"):
         mesh, node_sets = make_mesh(file, folder)
     with progress.stage("mass and stiffness"):
-        part = make_part(scene, mesh, node_sets)
+        part = make_part(file.part_scene, mesh, node_sets)
     with progress.stage("reduction"):
-        reduced = reduce_part(scene, part)
+        reduced = reduce_part(file.part_scene, part)
     with progress.stage("contact compliance"):
         return make_model(scene, part, reduced)
 
@@ -129,7 +135,7 @@ def check_names(scene: Scene) -> None:
 
 def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]]:
     """The mesh with its node sets: read from the scene's file, or built from the part and kept in `folder`."""
-    geometry = file.scene.geometry
+    geometry = file.part_scene.geometry
     if geometry.mesh is not None:
         return mesh_reader.read(file.folder / geometry.mesh)
     assert geometry.part is not None
@@ -138,7 +144,7 @@ def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]
     return mesh_reader.read(path)
 
 
-def make_part(scene: Scene, mesh: Any, node_sets: dict[str, np.ndarray]) -> Part:
+def make_part(scene: PartScene, mesh: Any, node_sets: dict[str, np.ndarray]) -> Part:
     """Mass, stiffness, loads, outputs and contact of the mesh, held where the scene says."""
     contact, response = scene.contact, scene.response
     return fem.part.build(
@@ -163,13 +169,13 @@ def make_part(scene: Scene, mesh: Any, node_sets: dict[str, np.ndarray]) -> Part
     )  # fmt: skip
 
 
-def clamps(scene: Scene) -> list[Clamp]:
+def clamps(scene: PartScene) -> list[Clamp]:
     """What holds the part, whole groups or along some axes."""
     geometry = scene.geometry
     return [*(Clamp(group) for group in geometry.fixed), *(Clamp(*item) for item in geometry.fixed_axes.items())]
 
 
-def springs(scene: Scene) -> list[Spring]:
+def springs(scene: PartScene) -> list[Spring]:
     """Joints that give way."""
     return [Spring(s.group, s.direction, s.stiffness, s.opposite) for s in scene.springs.values()]
 
@@ -179,11 +185,20 @@ def make_load(load: StaticLoad) -> Load:
     return Pressure(load.group) if load.direction is None else NodalForce(load.group, load.direction)
 
 
-def reduce_part(scene: Scene, part: Part) -> ReducedModel:
+def reduce_part(scene: PartScene, part: Part) -> ReducedModel:
     """The part on its contact and load nodes and a few modes, with the scene's damping."""
     reduced = craig_bampton(part.system, part.interface, scene.reduction.modes, scene.reduction.cutoff)
-    reduced = hold(reduced, part.held)
-    return reduced.with_damping(damping_matrix(scene, reduced))
+    return damped(scene, hold(reduced, part.held))
+
+
+def damped(scene: Scene, reduced: ReducedModel) -> ReducedModel:
+    """The model with the scene's damping; raises ValueError where its files hold another one."""
+    damping = damping_matrix(scene, reduced)
+    if reduced.system.damping is None:
+        return reduced.with_damping(damping)
+    if damping is not None:
+        raise ValueError("the files of the model hold a damping matrix: leave [damping] out, or the matrix")
+    return reduced
 
 
 def damping_matrix(scene: Scene, reduced: ReducedModel) -> np.ndarray | None:
@@ -204,7 +219,7 @@ def contact_stiffness(scene: Scene, reduced: ReducedModel) -> np.ndarray:
     return reduced.interface.stiffness(scene.contact.tangential_stiffness or 0.0, scene.contact.normal_stiffness or 0.0)
 
 
-def make_model(scene: Scene, part: Part, reduced: ReducedModel) -> Model:
+def make_model(scene: Scene, part: Part | None, reduced: ReducedModel) -> Model:
     """The harmonic balance of the scene."""
     contact = scene.contact
     parameters = law.ContactParameters.of(
@@ -214,19 +229,20 @@ def make_model(scene: Scene, part: Part, reduced: ReducedModel) -> Model:
         gap=reduced.interface.gap,
     )
     basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples, scene.harmonics.transitions)
-    excitation, omega_max = excite(scene, part, basis), response_range(scene)[1]
+    base = ground_motion(scene, part, basis) if isinstance(scene, PartScene) and part is not None else None
+    excitation, omega_max = excite(scene, base), response_range(scene)[1]
     return Model(part, reduced, HarmonicBalance(reduced, contact.law, parameters, basis, excitation, omega_max))
 
 
-def excite(scene: Scene, part: Part, basis: HarmonicBasis) -> Excitation:
+def excite(scene: Scene, base: np.ndarray | None) -> Excitation:
     """The loads of the scene, F cos(h w t + phase) as amplitude F exp(i phase), and the motion of the ground."""
     loads: dict[tuple[int, str], complex] = {(0, name): load.amplitude for name, load in scene.loads.static.items()}
     for name, load in scene.loads.harmonic.items():
         loads[load.harmonic, name] = load.amplitude * np.exp(1j * load.phase)
-    return Excitation(loads, ground_motion(scene, part, basis))
+    return Excitation(loads, base)
 
 
-def ground_motion(scene: Scene, part: Part, basis: HarmonicBasis) -> np.ndarray | None:
+def ground_motion(scene: PartScene, part: Part, basis: HarmonicBasis) -> np.ndarray | None:
     """Motion of the ground (n_pair * n_component, n_coeff) [m] along the contact components, None where it rests.
 
     Raises  ValueError where a face has no contact or a harmonic is not kept
@@ -361,7 +377,7 @@ def with_pictures_of(result: Result, model: Model, duty: Duty) -> Result:
     balance = model.balance.with_load(duty.load)
     return replace(
         result,
-        fields=displacement_fields(balance, model.part, rows, numbers),
+        fields=None if model.part is None else displacement_fields(balance, model.part, rows, numbers),
         loops=hysteresis_loops(balance, rows, numbers),
     )
 

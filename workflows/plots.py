@@ -30,7 +30,7 @@ def draw(result: Result, folder: Path) -> list[Path]:
         ("depth", depth_against_cycles, result.wear_steps > 0),
         ("energy", energy_against_cycles, result.wear_steps > 0),
         ("hysteresis", hysteresis_loops, result.loops is not None),
-        ("patch", maps.patch_maps, result.wear_steps > 0),
+        ("patch", maps.patch_maps, result.wear_steps > 0 and result.patch is not None and len(result.patch.faces) > 0),
     ]
     written = []
     for name, function, possible in figures:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 from dataclasses import asdict, fields
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, StrictInt, model_validator
@@ -144,26 +144,13 @@ class Spring(Table):
 
 
 class Contact(Table):
-    """Faces of the part against the ground or a face against another one, and the contact law of every node.
+    """The contact law of every node pair; stiffness is that of all pairs together, shared by their area."""
 
-    group : one face, or a list of faces; stiffness is that of all of them together
-    t1 is the direction that the first tangential component follows; vertices_only leaves the mid-side nodes out.
-    plane : direction towards a ground that is a plane, which each face touches with its nearest node
-    inclination : of that plane about t1, by the right hand
-    """
-
-    group: str | tuple[str, ...]
-    opposite: str | None = None
-    t1: Direction
     components: tuple[Literal["t1", "t2", "n"], ...] = ("t1", "t2", "n")
-    vertices_only: StrictBool = False
     law: str = "jenkins"
     tangential_stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
     normal_stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
     friction: Annotated[Number, Field(ge=0)] | None = None
-    gap: Length = 0.0
-    plane: Direction | None = None
-    inclination: Angle = 0.0
 
     @model_validator(mode="after")
     def _only_what_the_components_need(self) -> Contact:
@@ -173,6 +160,24 @@ class Contact(Table):
                 verb = "is missing" if need else "has no meaning"
                 raise ValueError(f"contact.{name} {verb} for the components {', '.join(self.components)}")
         return self
+
+
+class FaceContact(Contact):
+    """Faces of the part against the ground or a face against another one.
+
+    group : one face, or a list of faces
+    t1 is the direction that the first tangential component follows; vertices_only leaves the mid-side nodes out.
+    plane : direction towards a ground that is a plane, which each face touches with its nearest node
+    inclination : of that plane about t1, by the right hand
+    """
+
+    group: str | tuple[str, ...]
+    opposite: str | None = None
+    t1: Direction
+    vertices_only: StrictBool = False
+    gap: Length = 0.0
+    plane: Direction | None = None
+    inclination: Angle = 0.0
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -216,14 +221,18 @@ class Motion(Table):
     phase: Angle = 0.0
 
 
-class Loads(Table):
+Static = TypeVar("Static")
+Harmonic = TypeVar("Harmonic")
+
+
+class Loads(Table, Generic[Static, Harmonic]):
     """Named loads."""
 
-    static: dict[str, StaticLoad] = Field(default_factory=dict)
-    harmonic: dict[str, HarmonicLoad] = Field(default_factory=dict)
+    static: dict[str, Static] = Field(default_factory=dict)
+    harmonic: dict[str, Harmonic] = Field(default_factory=dict)
 
     @model_validator(mode="after")
-    def _distinct(self) -> Loads:
+    def _distinct(self) -> Loads[Static, Harmonic]:
         both = sorted(set(self.static) & set(self.harmonic))
         if both:
             raise ValueError(f'expected one load named "{both[0]}", found it under static and under harmonic')
@@ -239,14 +248,12 @@ class Output(Table):
     direction: Direction
 
 
-class Response(Output):
-    """Which displacement is observed, and the frequency response that is computed.
+class Response(Table):
+    """The frequency response that is computed.
 
-    others : displacements observed besides, by name
     references : the range in which the linear references are drawn, the same as frequency unless told
     """
 
-    others: dict[str, Output] = Field(default_factory=dict)
     frequency: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]]
     references: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]] | None = None
     points: Annotated[StrictInt, Field(ge=2)] = 60
@@ -259,6 +266,12 @@ class Response(Output):
             if low >= high:
                 raise ValueError(f"expected {key} = [low, high] with low below high, got {low:g} Hz and {high:g} Hz")
         return self
+
+
+class PartResponse(Response, Output):
+    """The displacement whose response is computed; others : displacements observed besides, by name."""
+
+    others: dict[str, Output] = Field(default_factory=dict)
 
 
 class Reduction(Table):
@@ -406,19 +419,27 @@ class Solver(Table):
 
 
 class Scene(Table):
-    """Which geometry, material, contact, loads, reduction, response and wear are modelled."""
+    """What every scene says, whatever its model is made from; see PartScene, and MatrixScene in matrix_scene."""
 
     scene: Heading
-    geometry: Geometry
-    material: Material
     contact: Contact
-    springs: dict[str, Spring] = Field(default_factory=dict)
-    motion: dict[str, Motion] = Field(default_factory=dict)
-    loads: Loads
+    loads: Loads[Any, Any]
     response: Response
-    reduction: Reduction
     harmonics: Harmonics = Harmonics()
     damping: Damping = Damping()
     wear: Wear | None = None
     pictures: Pictures = Pictures()
     solver: Solver = Solver()
+
+
+class PartScene(Scene):
+    """Which geometry, material, contact, loads, reduction, response and wear are modelled."""
+
+    geometry: Geometry
+    material: Material
+    contact: FaceContact
+    springs: dict[str, Spring] = Field(default_factory=dict)
+    motion: dict[str, Motion] = Field(default_factory=dict)
+    loads: Loads[StaticLoad, HarmonicLoad]
+    response: PartResponse
+    reduction: Reduction

@@ -85,7 +85,7 @@ def lines(result: Result) -> list[tuple[str, str]]:
     shown = [
         ("scene", result.provenance["scene_name"]),
         ("state", result.state),
-        ("model", f"{numbers['full_dofs']} DOFs reduced to {numbers['model_dofs']}"),
+        ("model", _sizes(numbers["full_dofs"], numbers["model_dofs"])),
         ("contact", f"{numbers['contact_pairs']} node pairs, {numbers['unknowns']} unknowns"),
     ]
     if numbers["free_hz"]:
@@ -110,3 +110,7 @@ def lines(result: Result) -> list[tuple[str, str]]:
         ]
     shown.append(("computing", f"{numbers['seconds']:.1f} s"))
     return shown
+
+
+def _sizes(full: int | None, model: int | None) -> str:
+    return f"{full} DOFs, as they came" if full == model else f"{full} DOFs reduced to {model}"

@@ -171,7 +171,7 @@ def _start(
     result: Result, scene: Scene, unworn: HarmonicBalance, at: float | None, row: int | None
 ) -> tuple[HarmonicBalance, float, np.ndarray]:
     """The problem, and the known solution to begin at: its frequency and x on the harmonics of the problem."""
-    kept = Scene.model_validate_json(result.provenance["scene"]).harmonics
+    kept = scene_file.from_json(result.provenance["scene"]).harmonics
     basis = HarmonicBasis(kept.kept, kept.samples)
     if row is not None:
         held = 0 if result.wear is None else len(result.wear.cycles)
