@@ -98,6 +98,15 @@ class HarmonicBalance:
         """The same problem with the harmonics >= 1 of the excitation times a factor."""
         return self._changed(load_factor=factor)
 
+    def with_harmonics(self, harmonics: tuple[int, ...]) -> HarmonicBalance:
+        """The same problem with fewer of its harmonics; raises ValueError for unknown ones and ones a load needs."""
+        lacking = [h for h in harmonics if h not in self.basis.harmonics]
+        if lacking:
+            raise ValueError(f"harmonics {lacking} are not among those of the balance, {self.basis.harmonics}")
+        basis = replace(self.basis, harmonics=tuple(harmonics))
+        self.excitation.check(basis, {name: None for _, name in self.excitation.loads})
+        return self._changed(basis=basis, compliance=self.compliance.restricted(basis), _point=None)
+
     def _changed(self, **changes: object) -> HarmonicBalance:
         other = object.__new__(HarmonicBalance)
         other.__dict__.update(self.__dict__)
@@ -226,7 +235,8 @@ class Linearisation:
     def departure_slope(self, direction: np.ndarray) -> np.ndarray:
         """dg/dx . direction: (n_contact, n_coeff)."""
         out = np.zeros(self._shape)
-        out[self.rows] = self._g_slope(direction[self.rows])
+        if len(self.rows):
+            out[self.rows] = self._g_slope(direction[self.rows])
         return out
 
     def _g_slope(self, active_direction: np.ndarray) -> np.ndarray:

@@ -216,6 +216,19 @@ class ContactCompliance:
         self.error = max(e.error for e, _ in self.groups)
         self.shared_real = len(self.groups) == 1 and not np.iscomplexobj(self.groups[0][0].w0)
 
+    def restricted(self, basis: HarmonicBasis) -> ContactCompliance:
+        """The same for fewer of the harmonics; the expansions are shared."""
+        old = self.basis.harmonics
+        other = object.__new__(ContactCompliance)
+        other.__dict__.update(self.__dict__)
+        other.basis = basis
+        other._load = self._load[:, [old.index(h) for h in basis.harmonics]]
+        other.base = None if self.base is None else self.basis.transfer(self.base, basis)
+        kept = [(e, [basis.harmonics.index(old[p]) for p in ps if old[p] in basis.harmonics]) for e, ps in self.groups]
+        other.groups = [(expansion, positions) for expansion, positions in kept if positions]
+        other.shared_real = len(other.groups) == 1 and not np.iscomplexobj(other.groups[0][0].w0)
+        return other
+
     def at(self, omega: float) -> CompliancePoint:
         """The compliance at one excitation frequency [rad/s]."""
         return CompliancePoint(self, omega)

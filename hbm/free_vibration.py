@@ -83,7 +83,7 @@ class FreeVibration:
         squares, shapes = np.linalg.eigh(np.diag(self.lam) - self.U[apart].T @ (self.k[apart, None] * self.U[apart]))
         if not 0 <= mode < self.n:
             raise ValueError(f"there is no mode {mode}: the model has modes 0 to {self.n - 1}")
-        if squares[mode] <= 1e-8 * squares[-1]:
+        if squares[mode] <= 1e-13 * squares[-1]:
             raise ValueError(f"mode {mode} is a rigid-body motion at rest: choose one that vibrates")
         self.reference, self.reference_omega = shapes[:, mode], float(np.sqrt(squares[mode]))
         moved = self.O @ self.reference

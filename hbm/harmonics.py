@@ -122,6 +122,13 @@ class HarmonicBasis:
         out[..., s + 1 :: 2] = -amplitudes[..., s:].imag
         return out
 
+    def transfer(self, coefficients: np.ndarray, to: HarmonicBasis) -> np.ndarray:
+        """Coefficients (..., n_coeff) in another basis: harmonics that it lacks are dropped, new ones are zero."""
+        out = np.zeros((*coefficients.shape[:-1], to.n_coeff))
+        for h in set(self.harmonics) & set(to.harmonics):
+            out[..., to.order == h] = coefficients[..., self.order == h]
+        return out
+
     def shift(self, coefficients: np.ndarray, angle: float) -> np.ndarray:
         """Coefficients of x(t + angle / w)."""
         amplitudes = self.to_complex(coefficients)

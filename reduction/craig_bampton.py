@@ -32,7 +32,7 @@ def craig_bampton(
     interface: ContactInterface,
     n_modes: int | None = None,
     cutoff: float | None = None,
-    extra_masters: Sequence[int] = (),
+    extra_masters: Sequence[int] | np.ndarray = (),
     contact_stiffness: np.ndarray | None = None,
     solver: str | None = None,
 ) -> ReducedModel:
@@ -96,7 +96,9 @@ def craig_bampton(
     return replace(model, info=info)
 
 
-def master_dofs(system: SecondOrderSystem, interface: ContactInterface, extra: Sequence[int] = ()) -> np.ndarray:
+def master_dofs(
+    system: SecondOrderSystem, interface: ContactInterface, extra: Sequence[int] | np.ndarray = ()
+) -> np.ndarray:
     """DOFs that stay, in any order: those the contact map touches, those of point loads and outputs, and the extra."""
     touched = [np.flatnonzero(v) for v in (*system.loads.values(), *system.outputs.values())]
     points = [dofs for dofs in touched if len(dofs) <= POINT_LOAD]

@@ -1,4 +1,4 @@
-"""Unilateral contact alone: nothing but normal unknowns, rigid-body modes, moving ground, chattering and impact wear."""
+"""Unilateral contact alone: only normal unknowns, rigid-body modes, moving ground, chattering and impact wear."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The configurations of the leaf seal's parameter study: what the thesis varies, one thing at a time (sections 6.3, 6.6).
+"""The configurations of the leaf seal's study: what the thesis varies, one thing at a time (sections 6.3, 6.6).
 
 Published are normalised values; their units are ours and stand here and in the scene: 1 unit of force is 1 kPa of
 pressure, 1 unit of liner displacement is 20 um, K_n = 25 and K_spring = 1 are the stiffnesses that the fit found.

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any, cast
 
 import numpy as np
 from scipy.linalg import eigh
@@ -156,7 +157,7 @@ def reduced_leaf(scene: PartScene, parameters: leaf_seal.Parameters) -> Leaf:
 
 def of_scene(scene: PartScene) -> Fit:
     """The leaf as a scene has it, beside the published ratios; its unit is the best one."""
-    parameters = leaf_seal.Parameters(**scene.geometry.parameters)
+    parameters = leaf_seal.Parameters(**cast("dict[str, Any]", scene.geometry.parameters))
     spring = next(iter(scene.springs.values())).stiffness
     contact = scene.contact.normal_stiffness or 0.0
     columns = reduced_leaf(scene, parameters).columns(spring, contact)
@@ -189,7 +190,7 @@ def fit(scene: PartScene, pin_column: int, max_steps: int = 20) -> Fit:
 
     Every shape gets its own best unit and stiffnesses, so that only the shape is searched for.
     """
-    first = leaf_seal.Parameters(**scene.geometry.parameters)
+    first = leaf_seal.Parameters(**cast("dict[str, Any]", scene.geometry.parameters))
     lower, start, upper, scale = (np.array(column) for column in zip(*SHAPE.values(), strict=True))
 
     def parameters(shape: np.ndarray) -> leaf_seal.Parameters:

@@ -21,7 +21,7 @@ from hbm.wear_law import Exposure
 from workflows import pipeline
 from workflows.scene_file import SceneFile
 
-LINEAR, APART = 0.85, 1.12  # frequencies of the points in the linear regime, over those where separation begins and ends
+LINEAR, APART = 0.85, 1.12  # frequencies of the linear regime over those where separation begins and ends
 LINER_NODE = "lower_corner"  # the output that moves most where the leaf chatters
 
 

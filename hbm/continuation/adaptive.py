@@ -2,8 +2,8 @@
 
 After each step the response extrapolated through the last four points is compared with the solved one. The difference
 tells the fourth derivative, hence the error of a cubic interpolation between the points; the step is chosen so that
-this error stays at the tolerance. A step that was too long is kept as a point further on. At a fold the sweep jumps, as a
-measured one does, and says where.
+this error stays at the tolerance. A step that was too long is kept as a point further on. At a fold the sweep jumps,
+as a measured one does, and says where.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def interpolate(branch: Branch, values: np.ndarray) -> np.ndarray:
     window = min(DEGREE + 1, len(known))
     first = np.clip(np.searchsorted(known, values) - window // 2, 0, len(known) - window)
     pieces = [(slice(i, i + window), value) for i, value in zip(first, values, strict=True)]
-    return np.stack([extrapolate(known[piece], response[piece], value) for piece, value in pieces])
+    return np.stack([extrapolate(known[piece], list(response[piece]), value) for piece, value in pieces])
 
 
 class _Sweep:

@@ -20,10 +20,10 @@ from hbm.balance import HarmonicBalance
 from hbm.branch import Branch, BranchBuilder
 from hbm.continuation._curve import CurvePoint, Segment
 from hbm.continuation._stepper import Options, Stepper
-from hbm.newton import Solution
+from hbm.newton import NewtonOptions, Solution
 from hbm.parameter import Parameter
 
-__all__ = ["Options", "follow"]
+__all__ = ["Options", "follow", "solve_along_load"]
 
 REWINDS = 4  # times that a walk which came back onto its own way goes back to where it went wrong
 
@@ -49,7 +49,13 @@ def follow(
     bounds = options.bounds or (min(start, stop), max(start, stop))
     if not bounds[0] <= start <= bounds[1]:
         raise ValueError(f"the start, {path.say(start)}, lies outside of the bounds of the continuation")
-    first = _first(path, start, options)
+    place = path.place(start)
+    if options.guess is not None:
+        first = newton.solve(*place, options.guess, options.newton)
+    elif path.name == parameter.LOAD:
+        first = newton.solve_from_rest(*place, options.newton)
+    else:
+        first = solve_along_load(*place, options.newton)
     builder = BranchBuilder(path)
     builder.add(start, first)
     if not first.converged:
@@ -63,18 +69,20 @@ def follow(
     return builder.finish(end)
 
 
-def _first(path: Parameter, start: float, options: Options) -> Solution:
-    """The first solution: from the guess, from rest, or along the curve in the load where that has folds of its own."""
-    balance, omega = path.place(start)
-    if options.guess is not None:
-        return newton.solve(balance, omega, options.guess, options.newton)
-    first = newton.solve_from_rest(balance, omega, options.newton)
-    if first.converged or path.name == parameter.LOAD:
+def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None) -> Solution:
+    """Solve at one frequency [rad/s] without a neighbouring solution, also where the curve in the load has folds.
+
+    Newton from rest and its load ramp are tried first; else the curve of solutions over the load is followed
+    Returns a Solution; its outcome is the one from rest where the curve does not reach the load either
+    """
+    options = options or NewtonOptions()
+    first = newton.solve_from_rest(balance, omega, options)
+    if first.converged:
         return first
-    ramp = follow(parameter.load(balance, omega), 0.0, balance.load_factor, replace(options, bounds=None))
+    ramp = follow(parameter.load(balance, omega), 0.0, balance.load_factor, Options(newton=options))
     if ramp.parameter[-1] != balance.load_factor:
         return first
-    last = newton.solve(balance, omega, ramp.contact[-1].reshape(first.state.x.shape), options.newton)
+    last = newton.solve(balance, omega, ramp.contact[-1].reshape(first.state.x.shape), options)
     return replace(last, outcome=last.outcome if last.converged else first.outcome)
 
 
@@ -137,13 +145,25 @@ class _Walk:
         old = self._stepper.segments
         if len(old) > 3 and any(p.passes(self._path, self._first, 1.0, newton_options) for p in parts):
             return f"closed curve: came back to its first point after {len(builder.value)} points"
+        return self._lost(parts, here)
+
+    def _lost(self, parts: list[Segment], here: str) -> str | None:
+        """Whether the walk is back on its own way: then it went wrong there, is rewound and goes on in shorter steps.
+
+        Against its sense it turned where it should not; in its sense it left the curve for a closed one beside it.
+        """
+        old, newton_options = self._stepper.segments, self._options.newton
         for index in range(1, len(old) - 2):
-            if any(p.near(old[index]) and p.passes(self._path, old[index].start, -1.0, newton_options) for p in parts):
+            near = [p for p in parts if p.near(old[index])]
+            for sense in (-1.0, 1.0):
+                if not any(p.passes(self._path, old[index].start, sense, newton_options) for p in near):
+                    continue
                 if self._rewinds == REWINDS:
-                    return f"ended at {here}: the curve turned back onto itself"
+                    return f"ended at {here}: the curve came back onto itself"
                 self._rewinds += 1
+                index = index if sense < 0 else max(index - 2, 0)
                 self._stepper.rewind(index)
-                builder.truncate(self._rows[index])
+                self._builder.truncate(self._rows[index])
                 del self._rows[index + 1 :]
-                break
+                return None
         return None
