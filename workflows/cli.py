@@ -102,6 +102,11 @@ def run(
         _draw(result, folder / "pictures")
 
 
+def _aside(sentence: str) -> None:
+    """Progress of a study, beside what it prints."""
+    print(sentence, file=sys.stderr, flush=True)
+
+
 def _earlier(path: Path, file: scene_file.SceneFile) -> Result | None:
     """The unfinished result to go on from, None where there is none yet."""
     from workflows import pipeline, store
@@ -151,9 +156,8 @@ def trade(
         Print JSON for machines.
     """
     from workflows import trade as trading
-    from workflows.progress import console_progress
 
-    table = trading.wear_step(scene, console_progress().say, overrides)
+    table = trading.wear_step(scene, _aside, overrides)
     print(json.dumps(trading.as_records(table), indent=2) if as_json else trading.as_text(table))
 
 
@@ -173,9 +177,8 @@ def bench(
         Print JSON for machines.
     """
     from workflows import bench as benchmark
-    from workflows.progress import console_progress
 
-    rows = benchmark.run(quick, console_progress().say)
+    rows = benchmark.run(quick, _aside)
     print(json.dumps(benchmark.as_records(rows), indent=2) if as_json else benchmark.as_text(rows))
 
 
