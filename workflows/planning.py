@@ -27,6 +27,7 @@ BACK_SUBSTITUTION_SECONDS = 1.5e-7  # for each DOF and right-hand side
 DENSE_SECONDS = 3e-9  # for each cubed coordinate of the reduced model, all eigenvalue problems together
 SOLVE_SECONDS = 6e-8  # of a balance solve, for each squared contact coordinate and harmonic coefficient
 SOLVES_AT_PEAK = 10
+LIKELY = tuple(range(8))  # harmonics where a scene leaves the choice
 EQUIVALENT_SHARE = 0.3  # the step of the thesis's rule that takes as many steps as the error-controlled one does
 STEPS_AT_ONE_PERCENT, STEPS_EXPONENT = 411, -0.5  # to loss of contact; Tamatam 2021, table 4.2
 
@@ -88,7 +89,7 @@ def plan(file: SceneFile) -> Plan:
         full = len(free)
         pairs, masters = _contact(file.part_scene, mesh, node_sets, free)
         modes, cutoff = file.part_scene.reduction.modes, file.part_scene.reduction.cutoff
-    basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples, scene.harmonics.transitions)
+    basis = HarmonicBasis(scene.harmonics.kept or LIKELY, scene.harmonics.samples, scene.harmonics.transitions)
     contact = pairs * len(scene.contact.components)
     model = masters + (modes if modes is not None else 50)
     memory = (

@@ -10,10 +10,23 @@ from dataclasses import asdict, fields
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, StrictInt, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StrictBool,
+    StrictInt,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+    field_serializer,
+    model_validator,
+)
 
 from geometry import parts
 from workflows.units import to_si
+
+HIGHEST = 15  # harmonic that kept = "auto" may keep
 
 
 class Table(BaseModel):
@@ -252,12 +265,16 @@ class Response(Table):
     """The frequency response that is computed.
 
     references : the range in which the linear references are drawn, the same as frequency unless told
+    stability : mark where the curve is stable and where it bifurcates
+    bounds : at every point, how far the response depends on the load path of pairs that stick all the time
     """
 
     frequency: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]]
     references: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]] | None = None
     points: Annotated[StrictInt, Field(ge=2)] = 60
     method: str = "natural"
+    stability: StrictBool = False
+    bounds: StrictBool = False
     options: dict[str, Any] = Field(default_factory=dict)
 
     @model_validator(mode="after")
@@ -288,21 +305,45 @@ class Reduction(Table):
         return self
 
 
-class Harmonics(Table):
-    """Harmonics of the response that are kept, and time samples of one cycle."""
+def _kept(value: object, check: ValidatorFunctionWrapHandler) -> tuple[int, ...]:
+    if value == "auto":
+        return ()
+    kept: tuple[int, ...] = check(value)
+    if not kept or list(kept) != sorted(set(kept)) or max(kept) < 1:
+        raise ValueError(f'expected kept as rising harmonic numbers up to 1 or more, or "auto", got {list(kept)}')
+    return kept
 
-    kept: tuple[Annotated[StrictInt, Field(ge=0)], ...] = (0, 1)
+
+class Harmonics(Table):
+    """Harmonics of the response that are kept, and time samples of one cycle.
+
+    kept : harmonic numbers, or "auto" (then empty here): as many as the response needs at the peak of the unworn
+        contact, so that what is left out changes it by less than `tolerance`, up to `highest`
+    """
+
+    kept: Annotated[tuple[Annotated[StrictInt, Field(ge=0)], ...], WrapValidator(_kept)] = (0, 1)
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] | None = None
+    highest: Annotated[StrictInt, Field(ge=1)] | None = None
     samples: Annotated[StrictInt, Field(ge=4, le=65536)] = 128
     transitions: Literal["sampled", "located"] = "sampled"
 
+    @property
+    def automatic(self) -> bool:
+        """Whether harmonics are chosen."""
+        return not self.kept
+
+    @field_serializer("kept")
+    def _auto(self, kept: tuple[int, ...]) -> tuple[int, ...] | str:
+        return kept or "auto"
+
     @model_validator(mode="after")
     def _resolved(self) -> Harmonics:
-        if not self.kept or list(self.kept) != sorted(set(self.kept)) or max(self.kept) < 1:
-            raise ValueError(f"expected kept as rising harmonic numbers up to 1 or more, got {list(self.kept)}")
-        if self.samples <= 2 * max(self.kept):
-            raise ValueError(
-                f"expected more than {2 * max(self.kept)} samples for harmonic {max(self.kept)}, got {self.samples}"
-            )
+        for name in ("tolerance", "highest"):
+            if not self.automatic and getattr(self, name) is not None:
+                raise ValueError(f'expected {name} only with kept = "auto"')
+        top = 3 * ((self.highest or HIGHEST) + 1) // 2 if self.automatic else max(self.kept)
+        if self.samples <= 2 * top:
+            raise ValueError(f"expected more than {2 * top} samples for harmonic {top}, got {self.samples}")
         return self
 
 
