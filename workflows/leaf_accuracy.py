@@ -1,4 +1,4 @@
-"""What harmonics buy on the leaf seal, beside time integration: python -m workflows.leaf_accuracy [folder].
+"""What harmonics buy on the leaf seal, beside time integration: tribodyn leaf accuracy.
 
 The two folds of the main resonance are found in time too, by bisection: the highest frequency at which there is a low
 periodic motion, and the lowest at which there is a high one. Where three solutions share a frequency, plain marches in
@@ -7,7 +7,6 @@ time are started at each of them.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -185,10 +184,8 @@ def figure_of(responses: dict[int, LeafResponse], marks: Sequence[tuple[float, f
     return figure
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Print the table and draw the curves into a folder, results/leaf_accuracy unless told."""
-    words = sys.argv[1:] if arguments is None else list(arguments)
-    folder = Path(words[0]) if words else Path("results") / "leaf_accuracy"
+def run(folder: Path) -> None:
+    """Print the table and draw the curves into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     with threadpool_limits(1):
         responses = {top: with_harmonics(top) for top in HARMONICS}
@@ -211,7 +208,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
         path = folder / "harmonics.png"
         figure_of(responses, marks).savefig(path)
         print(path)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""Dimensions of the leaf seal from its published frequency ratios: run with python -m workflows.leaf_fit.
+"""Dimensions of the leaf seal from its published frequency ratios: tribodyn leaf fit.
 
 Published are ten normalised frequencies of the leaf alone, on its pin springs, and on springs with every contact stuck
 (Tamatam 2021, table 6.2), but no dimension. Radius and thickness set the scale and stay as the scene has them; angle,
@@ -10,8 +10,6 @@ numbers count alike; what remains is what the table allows.
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -28,7 +26,7 @@ from geometry import mesh as mesh_reader
 from reduction.craig_bampton import craig_bampton
 from reduction.held import hold
 from workflows import pipeline, scene_file
-from workflows.scene import Scene
+from workflows.scene import PartScene
 
 PUBLISHED = {
     "leaf alone": (0.00, 0.00, 1.00, 1.71, 2.44, 3.96, 4.78, 5.73, 6.00, 7.11),
@@ -137,7 +135,7 @@ def relative_errors(ratios: np.ndarray) -> np.ndarray:
     return (ratios - _RATIOS) / np.maximum(_RATIOS, FLOOR)
 
 
-def reduced_leaf(scene: Scene, parameters: leaf_seal.Parameters) -> Leaf:
+def reduced_leaf(scene: PartScene, parameters: leaf_seal.Parameters) -> Leaf:
     """The leaf of a scene with other dimensions, by the same chain as a run of the scene, its springs left out."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "leaf.msh"
@@ -155,13 +153,13 @@ def reduced_leaf(scene: Scene, parameters: leaf_seal.Parameters) -> Leaf:
     return Leaf(system.mass, system.stiffness, model.interface, seat_rows, np.concatenate(shares))
 
 
-def dimensions(scene: Scene) -> leaf_seal.Parameters:
+def dimensions(scene: PartScene) -> leaf_seal.Parameters:
     """The leaf of a scene."""
     parameters: dict[str, Any] = scene.geometry.parameters
     return leaf_seal.Parameters(**parameters)
 
 
-def of_scene(scene: Scene) -> Fit:
+def of_scene(scene: PartScene) -> Fit:
     """The leaf as a scene has it, beside the published ratios; its unit is the best one."""
     parameters = dimensions(scene)
     spring = next(iter(scene.springs.values())).stiffness
@@ -191,7 +189,7 @@ def _counted(ratios: np.ndarray) -> np.ndarray:
     return relative_errors(ratios)[COUNTED]
 
 
-def fit(scene: Scene, pin_column: int, max_steps: int = 20) -> Fit:
+def fit(scene: PartScene, pin_column: int, max_steps: int = 20) -> Fit:
     """Fit the shape of the leaf by least squares over all ratios; the same numbers at every run.
 
     Every shape gets its own best unit and stiffnesses, so that only the shape is searched for.
@@ -220,12 +218,11 @@ def fit(scene: Scene, pin_column: int, max_steps: int = 20) -> Fit:
     return Fit(p, spring, contact, unit, leaf.columns(spring, contact))
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Fit for every column the pins may stand in and print the best; with "check", the leaf as the scene has it."""
-    words = sys.argv[1:] if arguments is None else list(arguments)
-    scene = scene_file.read("leaf_seal").scene
+def run(check_only: bool) -> None:
+    """Fit for every column the pins may stand in and print the best; or just print the leaf as the scene has it."""
+    scene = scene_file.read("leaf_seal").part_scene
     with threadpool_limits(1):
-        if words == ["check"]:
+        if check_only:
             found = of_scene(scene)
         else:
             fits = [fit(scene, column) for column in PIN_COLUMNS]
@@ -236,7 +233,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print(f"error {100 * found.rms:.2f} % r.m.s.; 1.00 is {found.unit:.4g} Hz")
     print(f"contact of both patches over spring of one pin: {found.contact / found.spring:.3g}")
     print(found.toml())
-
-
-if __name__ == "__main__":
-    main()

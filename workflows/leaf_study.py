@@ -1,4 +1,4 @@
-"""The parameter study of the leaf seal: run with python -m workflows.leaf_study [folder].
+"""The parameter study of the leaf seal: tribodyn leaf study.
 
 Some thirty configurations, one response curve each, with folds, stability and chattering; a table, the summary of all
 curves, and for the scene itself the pictures of the thesis.
@@ -7,7 +7,6 @@ curves, and for the scene itself the pictures of the thesis.
 from __future__ import annotations
 
 import csv
-import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -128,19 +127,13 @@ def draw(studied: dict[str, list[tuple[Case, LeafResponse]]], folder: Path) -> l
     return paths
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the whole study into a folder, results/leaf_study unless told."""
-    words = sys.argv[1:] if arguments is None else list(arguments)
-    folder = Path(words[0]) if words else Path("results") / "leaf_study"
+def run(folder: Path) -> None:
+    """Run the whole study into a folder."""
     started, clock = time.perf_counter(), time.process_time()
     print("  ".join(f"{name:{_width(name)}}" for name in COLUMNS))
     with threadpool_limits(1):
-        studied = study(cases(scene_file.read("leaf_seal").scene), folder)
+        studied = study(cases(scene_file.read("leaf_seal").part_scene), folder)
         print(sizes(studied["liner"][0][1]))
         for path in draw(studied, folder):
             print(path)
     print(f"{time.perf_counter() - started:.0f} s, of which {time.process_time() - clock:.0f} s of processor time")
-
-
-if __name__ == "__main__":
-    main()
