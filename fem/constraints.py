@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -37,6 +38,29 @@ class Clamp:
         """DOFs that are held."""
         nodes = named(node_sets, self.nodes)
         return (nodes[:, None] * 3 + [AXES.index(a) for a in self.axes]).ravel()
+
+
+@dataclass(frozen=True)
+class NoMeanRotation:
+    """Hold the mean rotation about an axis through the centre of mass: c q = 0, c = (M psi)^T, psi the rotation.
+
+    Every elastic mode of a free part is orthogonal to psi in this sense and stays as it is; only the rotation is lost.
+    axis : (3,)
+    """
+
+    axis: Sequence[float]
+
+    def row(self, points: np.ndarray, mass: Any) -> np.ndarray:
+        """c (3 n_node,) [kg], for nodes at points (n_node, 3) and the mass over all DOFs.
+
+        Raises  ValueError for an axis that is none
+        """
+        axis = np.asarray(self.axis, dtype=float)
+        if axis.shape != (3,) or not np.isfinite(axis).all() or not axis.any():
+            raise ValueError(f"the axis {list(np.ravel(axis))} of a held rotation must be three numbers, not all zero")
+        share = np.asarray(mass @ np.tile([1.0, 0.0, 0.0], len(points)))[::3]
+        arm = points - share @ points / share.sum()
+        return np.asarray(mass @ np.cross(axis / np.linalg.norm(axis), arm).ravel())
 
 
 def free_dofs(n_dof: int, clamps: Iterable[Clamp], node_sets: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_matrix, vstack
-from scipy.spatial import cKDTree
 
 from fem.interface import COMPONENTS, ContactInterface
 from fem.loads import unit
+from fem.matching import TOLERANCE, partners
 from fem.surface import Surface, surface
 
 
@@ -34,6 +34,33 @@ def ground_contact(
     return _interface(mesh, surface(mesh, facets, vertices_only), t1, components, gap)
 
 
+def plane_contact(
+    mesh: Any,
+    facets: np.ndarray,
+    towards: Sequence[float],
+    t1: Sequence[float],
+    components: Sequence[str] = COMPONENTS,
+    gap: float | np.ndarray = 0.0,
+    vertices_only: bool = False,
+    inclination: float = 0.0,
+) -> ContactInterface:
+    """Nodes of a face against a plane ground that touches the nearest of them, plus a gap.
+
+    towards : (3,) in which every pair closes, across the plane; inclination : of the plane about t1, by the right hand
+        [rad], so small that it does not change the direction. The gap of a pair is its distance from the plane along
+        that direction: what the face is bowed, and what the plane leans away.
+    Other arguments, returns and errors as ground_contact; ValueError too for an inclination of a quarter turn or more
+    """
+    if not abs(inclination) < np.pi / 2:
+        raise ValueError(f"the inclination of a contact is {inclination} rad; keep it far below a quarter turn")
+    face = surface(mesh, facets, vertices_only)
+    normal = unit(towards, "the direction in which a plane contact closes")
+    face = replace(face, normals=np.tile(normal, (len(face.nodes), 1)))
+    along = contact_frames(face.normals, t1)[0, 1]
+    away = np.tan(inclination) * (face.points @ along) - face.points @ normal
+    return _interface(mesh, face, t1, components, gap + away - away.min())
+
+
 def pair_contact(
     mesh: Any,
     facets_1: np.ndarray,
@@ -42,7 +69,7 @@ def pair_contact(
     components: Sequence[str] = COMPONENTS,
     gap: float | np.ndarray = 0.0,
     vertices_only: bool = False,
-    tolerance: float = 1e-4,
+    tolerance: float = TOLERANCE,
 ) -> ContactInterface:
     """Nodes of face 1 against the matching nodes of face 2, which may be larger.
 
@@ -61,7 +88,7 @@ def pair_halves(
     components: Sequence[str] = COMPONENTS,
     gap: float | np.ndarray = 0.0,
     vertices_only: bool = False,
-    tolerance: float = 1e-4,
+    tolerance: float = TOLERANCE,
     rotation: np.ndarray | None = None,
 ) -> tuple[ContactInterface, csr_matrix]:
     """Both halves of a contact whose second body is the copy of this mesh turned by a rotation.
@@ -73,16 +100,7 @@ def pair_halves(
     rotation = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
     face_1 = surface(mesh, facets_1, vertices_only)
     face_2 = surface(mesh, facets_2, vertices_only)
-    length = float(np.linalg.norm(np.ptp(face_1.points, axis=0)))
-    distance, partner = cKDTree(face_2.points @ rotation.T).query(face_1.points)
-    lost = distance > tolerance * length
-    if lost.any() or len(np.unique(partner)) < len(partner):
-        worst = face_1.points[distance.argmax()]
-        raise ValueError(
-            f"the two contact faces do not match: {lost.sum()} of {len(partner)} nodes of the first have no partner on "
-            f"the second, the farthest at ({worst[0]:.4g}, {worst[1]:.4g}, {worst[2]:.4g}) m is {distance.max():.3g} m "
-            "away; mesh both with the same grid"
-        )
+    partner = partners(face_1.points, face_2.points @ rotation.T, "the two contact faces", tolerance)
     interface = _interface(mesh, face_1, t1, components, gap)
     turned = _rows(interface.frames, components) @ rotation
     return interface, _map(turned, face_2.nodes[partner], mesh)

@@ -39,6 +39,23 @@ class NodalForce:
 
 
 @dataclass(frozen=True)
+class Couple:
+    """1 N in a direction on one node set and 1 N against it on another, each shared evenly: a torque without resultant.
+
+    nodes, opposite : names of the node sets; direction : (3,), need not be a unit vector
+    """
+
+    nodes: str
+    opposite: str
+    direction: Sequence[float]
+
+    def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any = None) -> np.ndarray:
+        """Force vector (3 n_node,) [N/N]."""
+        pair = [NodalForce(name, self.direction).vector(mesh, node_sets) for name in (self.nodes, self.opposite)]
+        return pair[0] - pair[1]
+
+
+@dataclass(frozen=True)
 class Pressure:
     """1 Pa on a face of the mesh, pushing into the body; consistent nodal forces. face : its boundary name."""
 

@@ -65,6 +65,6 @@ def _dense(matrix: Any) -> np.ndarray:
 
 
 def _signs(phi: np.ndarray) -> np.ndarray:
-    """+1 or -1 per column: the first entry close to the largest one becomes positive, whatever the rounding."""
+    """Factor of modulus 1 per column: the first entry close to the largest becomes positive, whatever the rounding."""
     large = np.abs(phi) >= (1 - 1e-6) * np.abs(phi).max(axis=0)
-    return np.sign(phi[large.argmax(axis=0), np.arange(phi.shape[1])])
+    return np.sign(phi[large.argmax(axis=0), np.arange(phi.shape[1])].conj())

@@ -13,7 +13,7 @@ import numpy as np
 class SecondOrderSystem:
     """A linear structure in n coordinates, with the vectors that load and observe it.
 
-    mass, stiffness : (n, n) symmetric (Hermitian for one harmonic index of a cyclic part), scipy.sparse or ndarray [kg], [N/m]
+    mass, stiffness : (n, n) symmetric (Hermitian for one harmonic index of a cyclic part), sparse or dense [kg], [N/m]
     damping : (n, n) like stiffness, or None for none [N s/m]
     loads : name -> (n,) force per unit of the named load [N/N]
     outputs : name -> (n,) row that observes a displacement, output = row . q [m/m]

@@ -14,6 +14,14 @@ def positive(parameters: Any, *names: str, unit: str = "metres") -> None:
             raise ValueError(f"geometry.{name} is {value!r}: give a number above zero ({unit})")
 
 
+def within(parameters: Any, *names: str, least: float, most: float, unit: str) -> None:
+    """Refuse parameters that are not numbers from `least` to `most`."""
+    for name in names:
+        value = getattr(parameters, name)
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
+            raise ValueError(f"geometry.{name} is {value!r}: give a number from {least:g} to {most:g} ({unit})")
+
+
 def whole(parameters: Any, *names: str, least: int) -> None:
     """Refuse parameters that are not whole numbers of at least `least`."""
     for name in names:

@@ -15,6 +15,7 @@ PERIODIC = 1e-13  # drift of the memory over a cycle, relative to its largest si
 FIRST_CYCLES = 4  # marched before Newton is tried on the memory
 NEWTON_CYCLES = 30
 MAX_CYCLES = 500
+FINE = 1024  # samples that stand for located transitions where a force over time is asked for
 NEAR = 1e-6  # relative drift from which Newton only polishes
 ISOLATED = 1e-10  # least contraction per cycle of a memory that does not depend on its start
 
@@ -55,12 +56,16 @@ def history(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Periodic displacement and force over one period, for loops and checks.
 
+    Where the basis locates transitions the cycle is marched on at least FINE samples, of which every n-th is given.
     Returns (n_pair, n_component, n_samples) displacement [m] and force [N]
     """
     if memory is None:
         memory = np.zeros((parameters.n_pair, law.n_state(parameters.components)))
-    samples = basis.to_time(x)
-    return samples, _periodic(law, samples, parameters, memory, basis.synthesis[:, :0], basis.analysis)[0]
+    every = 1 if basis.transitions == "sampled" else -(-FINE // basis.n_samples)
+    fine = HarmonicBasis(basis.harmonics, every * basis.n_samples)
+    samples = fine.to_time(x)
+    force = _periodic(law, samples, parameters, memory, fine.synthesis[:, :0], fine.analysis)[0]
+    return samples[..., ::every], force[..., ::every]
 
 
 def _periodic(

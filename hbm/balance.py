@@ -120,7 +120,9 @@ class HarmonicBalance:
         return self._point
 
     def _loaded(self, coefficients: np.ndarray) -> np.ndarray:
-        return coefficients if self.load_factor == 1.0 else coefficients * np.where(self.basis.order, self.load_factor, 1.0)
+        if self.load_factor == 1.0:
+            return coefficients
+        return coefficients * np.where(self.basis.order, self.load_factor, 1.0)
 
     def x_lin(self, omega: float) -> np.ndarray:
         """(n_contact, n_coeff) response with every contact stuck and closed, the gap ignored [m]."""
@@ -182,7 +184,7 @@ class HarmonicBalance:
             df = np.matmul(jac, dx.reshape(n_pair, -1, 1)).reshape(dx.shape)
             df[j] -= column[j]
             work = self.basis.work_per_cycle(df, state.x) + self.basis.work_per_cycle(state.cycle.force, dx)
-            slope[:, j] = work.sum(axis=1)
+            slope[:, j] = work[:, self.parameters.tangential].sum(axis=1)
         return slope
 
     def outputs(self, state: State) -> np.ndarray:
@@ -191,8 +193,12 @@ class HarmonicBalance:
         return self._loaded(point.outputs_lin) + point.outputs(state.g)
 
     def energy(self, state: State) -> np.ndarray:
-        """(n_pair,) friction work per cycle, all components [J]."""
-        return self.basis.work_per_cycle(state.cycle.force, state.x).sum(axis=1)
+        """(n_pair,) friction work per cycle, both tangential components [J].
+
+        The normal spring is elastic: what work its sampled force does when a pair lifts is an error of sampling.
+        """
+        t = self.parameters.tangential
+        return self.basis.work_per_cycle(state.cycle.force[:, t], state.x[:, t]).sum(axis=1)
 
     def preload(self, state: State) -> float:
         """Static normal force of the whole contact [N]; zero where the law has no normal component."""

@@ -1,13 +1,14 @@
-"""Contact compliance: displacement of the contact and of the outputs under contact forces and loads, harmonic by harmonic.
+"""Contact compliance: displacement of contact and outputs under contact forces and loads, harmonic by harmonic.
 
 The contact springs, stuck and closed, are part of the linear system: K_s = K + B^T k B, so that it depends neither on
-the load nor on wear. Its lowest modes Phi carry the dynamics; the rest is expanded in powers of s = i h w around statics,
+the load nor on wear. Its lowest modes Phi carry the dynamics; the rest is expanded in powers of s = i h w:
 
     D(s)^-1 = W(s) + L(s) S(s)^-1 L'(s),   W(s) = sum_k s^k W_k,   W_0 = K_s^-1 - Phi Lambda^-1 Phi^H,
     W_k = -W_0 (C W_(k-1) + M W_(k-2)),    L(s) = (I - s W(s) C) Phi,
     S(s) = Lambda + s C_m + s^2 - s^2 Phi^H C W(s) C Phi,
 
-which holds for any damping matrix; the error falls like (|s| / omega_next)^order and is measured against a direct solve.
+which holds for any damping matrix; the error falls like (|s| / omega_next)^order and is measured against a direct
+solve.
 Source  block elimination of modal coordinates (ours); static correction of truncated modes as in MacNeal 1971.
 """
 
@@ -44,7 +45,9 @@ class Expansion:
     Raises  SingularStuckSystem
     """
 
-    def __init__(self, system: SecondOrderSystem, b: np.ndarray, stiffness: np.ndarray, ports: np.ndarray, s_max: float):
+    def __init__(
+        self, system: SecondOrderSystem, b: np.ndarray, stiffness: np.ndarray, ports: np.ndarray, s_max: float
+    ):
         self.n_port = len(ports)
         self._n_contact = len(b)
         mass = np.asarray(system.mass)
@@ -54,16 +57,21 @@ class Expansion:
         self._system = (mass, damping, stuck)
         self._ports = ports
         n = len(mass)
+        loose = SingularStuckSystem(
+            "the part can move as a rigid body even with all contacts stuck: clamp it, add a spring, "
+            "or raise the contact stiffness"
+        )
         try:
             factor = sla.cho_factor(stuck)
         except np.linalg.LinAlgError:
-            raise SingularStuckSystem(
-                "the part can move as a rigid body even with all contacts stuck: clamp it, add a spring, "
-                "or raise the contact stiffness"
-            ) from None
+            raise loose from None
         lam, phi = sla.eigh(stuck, mass, subset_by_index=None if n < ALL_MODES_BELOW else (0, CANDIDATES[-1][0] - 1))
+        # a rigid mode comes out of the eigenvalue problem as rounding of the stiffest ones, of either sign
+        if lam[0] <= n * np.finfo(float).eps * np.max(np.diag(stuck).real / np.diag(mass).real):
+            raise loose
         before = np.inf
-        for m, order in [*((m, order) for m, order in CANDIDATES if m < len(lam)), (len(lam), 1 if len(lam) == n else 8)]:
+        last = (len(lam), 1 if len(lam) == n else 8)
+        for m, order in (*(c for c in CANDIDATES if c[0] < len(lam)), last):
             self._build(lam[:m], phi[:, :m], factor, order)
             self.error = self._measure_error(1j * s_max)
             # near a resonance rounding of the direct solve itself is what remains: more modes would not help
@@ -129,9 +137,12 @@ class PortCompliance:
 
     @cached_property
     def core_single(self) -> np.ndarray:
-        """The core in single precision; for a real system as the real matrix on [a, b] (on x_0 where s = 0)."""
-        if np.iscomplexobj(self.expansion.w0):
-            return self.core.astype(np.complex64)
+        """The core in single precision."""
+        return self.core.astype(np.complex64)
+
+    @cached_property
+    def core_on_pairs(self) -> np.ndarray:
+        """The same as a real matrix on [a, b], or on x_0 where s = 0."""
         re, im = self.core.real, self.core.imag
         return (re if self.s == 0 else np.block([[re, im], [-im, re]])).astype(np.float32)
 
@@ -191,17 +202,17 @@ class ContactCompliance:
                 self._load[load_names.index(name), basis.harmonics.index(h)] = value
         self.base = excitation.base
         self.groups: list[tuple[Expansion, list[int]]] = []
-        shared: dict[int, int] = {}
-        for position, h in enumerate(basis.harmonics):
-            system, b = model.at_harmonic(h)
-            if id(system) in shared:
-                self.groups[shared[id(system)]][1].append(position)
-                continue
-            rows = [b, *(np.conj(system.loads[n])[None] for n in load_names), *(system.outputs[n][None] for n in self.output_names)]
-            ports = np.concatenate([np.asarray(r) for r in rows])
-            shared[id(system)] = len(self.groups)
-            s_max = (basis.harmonics[-1] if model.per_harmonic is None else h) * omega_max
-            self.groups.append((Expansion(system, np.asarray(b), self.k, ports, s_max), [position]))
+        seen = [model.at_harmonic(h) for h in basis.harmonics]
+        sharing: dict[int, list[int]] = {}
+        for position, (system, _) in enumerate(seen):
+            sharing.setdefault(id(system), []).append(position)
+        for positions in sharing.values():
+            system, b = seen[positions[0]]
+            loads = [np.conj(system.loads[name])[None] for name in load_names]
+            outputs = [system.outputs[name][None] for name in self.output_names]
+            ports = np.concatenate([np.asarray(rows) for rows in (b, *loads, *outputs)])
+            s_max = basis.harmonics[positions[-1]] * omega_max
+            self.groups.append((Expansion(system, np.asarray(b), self.k, ports, s_max), positions))
         self.error = max(e.error for e, _ in self.groups)
         self.shared_real = len(self.groups) == 1 and not np.iscomplexobj(self.groups[0][0].w0)
 
@@ -245,7 +256,8 @@ class CompliancePoint:
         basis = compliance.basis
         self._harmonics = np.asarray(basis.harmonics, float)
         self._ports = [
-            [expansion.at(1j * basis.harmonics[p] * omega) for p in positions] for expansion, positions in compliance.groups
+            [expansion.at(1j * basis.harmonics[p] * omega) for p in positions]
+            for expansion, positions in compliance.groups
         ]
         n, stop = compliance.n_contact, compliance.n_contact + compliance.n_load
         excited = slice(n, stop) if compliance.base is None else slice(0, stop)
@@ -270,9 +282,10 @@ class CompliancePoint:
         out = np.zeros_like(force)
         for (expansion, positions), ports in zip(self._c.groups, self._ports, strict=True):
             for p, port in zip(positions, ports, strict=True):
-                y = expansion.w0 @ force[:, p] + port.left[:n] @ (port.core @ (port.right[:, :n] @ force[:, p]))
+                f = force[:, p]
+                y = _product(expansion.w0, f) + port.left[:n] @ (port.core @ (port.right[:, :n] @ f))
                 for k, moment in enumerate(expansion.higher, start=1):
-                    y += port.power[k] * (moment @ force[:, p].astype(np.complex64))
+                    y += port.power[k] * _product(moment, f.astype(np.complex64))
                 out[:, p] = y
         return basis.to_real(out)
 
@@ -317,7 +330,7 @@ class CompliancePoint:
 
 
 class JacobianProduct:
-    """G restricted to active rows, to the accuracy of a Newton direction: W_0 and the lowest modes, single precision."""
+    """G restricted to active rows, as exact as a Newton direction needs: W_0 and the lowest modes, single precision."""
 
     def __init__(self, compliance: ContactCompliance, ports: list[list[PortCompliance]], rows: np.ndarray):
         self._basis = compliance.basis
@@ -328,7 +341,8 @@ class JacobianProduct:
             w0, b = expansion.w0_single, expansion.b_single
             if not everything:
                 w0, b = w0[np.ix_(rows, rows)], b[rows]
-            self._groups.append((w0, b, np.ascontiguousarray(b.conj().T), [p.core_single for p in at], positions))
+            cores = [p.core_on_pairs if self._shared_real else p.core_single for p in at]
+            self._groups.append((w0, b, np.ascontiguousarray(b.conj().T), cores, positions))
 
     def __call__(self, d: np.ndarray) -> np.ndarray:
         """G d for d (n_active, n_coeff)."""
@@ -343,9 +357,10 @@ class JacobianProduct:
                 z[:, column : column + width] = part.reshape(width, -1).T
                 column += width
             return w0 @ single + b @ z
-        force = self._basis.to_complex(d)
+        force = self._basis.to_complex(d).astype(np.complex64)
         moved = np.empty_like(force)
         for w0, b, bt, cores, positions in self._groups:
             for core, p in zip(cores, positions, strict=True):
-                moved[:, p] = w0 @ force[:, p] + b @ (core @ (bt @ force[:, p]))
+                f = force[:, p]
+                moved[:, p] = _product(w0, f) + _product(b, core @ _product(bt, f))
         return self._basis.to_real(moved)

@@ -1,9 +1,9 @@
 """Error-controlled wear steps, stable for the stiff coupling of pressure and depth.
 
 dw/dZ = r(w) relaxes a pressure peak thousands of times faster than the contact as a whole wears: explicit steps must
-resolve the former or oscillate from node to node. Here a Rosenbrock step of second order is taken with the contact's own
-wear Jacobian; it is L-stable, keeps its order with an approximate Jacobian, and brings a first-order companion as error
-estimate.
+resolve the former or oscillate from node to node. Here a Rosenbrock step of second order is taken with the contact's
+own wear Jacobian; it is L-stable, keeps its order with an approximate Jacobian, and brings a first-order companion as
+error estimate.
 Source  ROS2: Verwer, Spee, Blom, Hundsdorfer 1999, SIAM J. Sci. Comput. 20(4), with gamma = 1 - 1/sqrt(2).
 """
 
@@ -87,7 +87,8 @@ def _step(
 ) -> tuple[WearState, WearRow, float]:
     """One accepted step from a state: the state after it, its row, and the cycles to try next."""
     slope = wear_jacobian(problem, state)
-    work_slope = np.divide(slope * state.work[:, None], state.rate[:, None], out=np.zeros_like(slope), where=state.rate[:, None] > 0)
+    share = np.divide(state.work, state.rate, out=np.zeros_like(state.work), where=state.rate > 0)
+    work_slope = share[:, None] * slope
     solves = state.solves
     while True:
         factor = sla.lu_factor(np.eye(len(slope)) - GAMMA * stride * slope)

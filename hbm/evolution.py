@@ -62,7 +62,7 @@ class WearState:
     """A worn contact with its solved duties.
 
     depth : (n_pair,) [m]; cycles : passed before; points : one per duty
-    rate : (n_pair,) wear depth per cycle [m]; work : (n_pair,) friction work per cycle [J], both averaged over the mission
+    rate : (n_pair,) wear depth per cycle [m], work : (n_pair,) friction work per cycle [J]; averages over the mission
     """
 
     depth: np.ndarray

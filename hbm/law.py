@@ -74,6 +74,11 @@ class ContactParameters:
         """Number of node pairs."""
         return len(self.stiffness)
 
+    @property
+    def tangential(self) -> list[int]:
+        """Positions of the tangential components, the ones in which friction works."""
+        return [i for i, c in enumerate(self.components) if c != "n"]
+
     def packed(self) -> np.ndarray:
         """(n_pair, 7) rows [k of the up to three components, mu, gap, N0, cubic] as the kernels read them."""
         rows = np.zeros((self.n_pair, 7))

@@ -8,7 +8,10 @@ functions and 1, whose products are integrated exactly. T and N are continuous a
 nothing to the Jacobian but the derivative of the slider position at which a stick began.
 
 The result does not depend on the number of time samples: it is the Fourier integral itself, to rounding. Roots are
-isolated by Taylor bounds, so no number of events in one sample interval, nor a grazing one, is missed.
+isolated by Taylor bounds, so no number of events in one sample interval, nor a grazing one, is missed. Samples are of
+second order, of first order for friction that lifts, where the sampled Jacobian does not converge at all (measured in
+test_contact_located). Cost, measured: as 128 samples where most pairs stick; where all slip, twice that at H = 3, eight
+times at H = 15. A response curve with lifting pairs took as long either way: Newton needed 15 % fewer steps.
 Source  Petrov and Ewins 2003 (friction element exact between transitions); moving walls and root isolation ours.
 """
 
@@ -218,8 +221,8 @@ def _contact(load, grid, hs, contact, closed):
     n = _roots(load, hs, grid[0], grid[1], grid[3], contact, 1)
     contact[n] = TURN
     n_closed = 0
-    for j in range(n):
-        closed[j] = _at(load, hs, 0.5 * (contact[j] + contact[j + 1]))[0] > 0.0
+    for j in range(n):  # without a change of sign the mean tells it, else the signs alternate
+        closed[j] = load[0] > 0.0 if n == 1 else (grid[3, -1] >= 0.0) == (j % 2 == 0)
         n_closed += closed[j]
     return n, n_closed
 

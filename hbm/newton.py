@@ -12,7 +12,7 @@ from hbm.branch import CONVERGED
 
 @dataclass(frozen=True)
 class NewtonOptions:
-    """tolerance : on the residual relative to the displacement; max_steps : Newton steps; max_products : per direction."""
+    """tolerance : of the residual over the displacement; max_steps : Newton steps; max_products : per direction."""
 
     tolerance: float = 1e-8
     max_steps: int = 40

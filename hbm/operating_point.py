@@ -1,7 +1,7 @@
 """Where the cycle is taken: at a fixed frequency, or at the resonance peak, which is tracked directly.
 
-The peak is the zero of d A^2 / d omega along the branch, with dx/d omega from the linearised balance; no sweep is needed
-once a neighbouring peak is known.
+The peak is the zero of d A^2 / d omega along the branch, with dx/d omega from the linearised balance; no sweep is
+needed once a neighbouring peak is known.
 """
 
 from __future__ import annotations

@@ -84,8 +84,8 @@ class DenseBalance:
         scale = np.linalg.norm(self._force)
         q = start.ravel().copy()
         outcome = f"not converged in {max_steps} steps"
-        step = 0
-        for step in range(max_steps + 1):
+        steps = 0
+        while True:
             clock = perf_counter()
             x = (self._spread @ q).reshape(p.parameters.n_pair, -1, basis.n_coeff)
             cycle = contact_law.cycle(p.law, x, p.parameters, basis, p.memory)
@@ -96,6 +96,9 @@ class DenseBalance:
                 outcome = CONVERGED
                 self.profile.balance += perf_counter() - tick
                 break
+            if steps == max_steps:
+                break
+            steps += 1
             assert cycle.jacobian is not None
             jacobian = linear + (self._spread.T @ _block_diagonal(cycle.jacobian) @ self._spread).toarray()
             clock = perf_counter()
@@ -103,13 +106,13 @@ class DenseBalance:
             q -= np.linalg.solve(jacobian, residual)
             self.profile.inversion += perf_counter() - clock
             self.profile.inversions += 1
-        return DenseSolution(omega, q.reshape(-1, basis.n_coeff), x, outcome, step)
+        return DenseSolution(omega, q.reshape(-1, basis.n_coeff), x, outcome, steps)
 
     def coordinates_of(self, omega: float, x: np.ndarray) -> np.ndarray:
         """Reduced coordinates (n, n_coeff) in balance with the contact forces at x, to start or to check from."""
         cycle = contact_law.cycle(self.problem.law, x, self.problem.parameters, self.problem.basis, self.problem.memory)
         force = self._force.ravel() - self._spread.T @ cycle.force.ravel()
-        return np.linalg.lstsq(self.dynamic_stiffness(omega), force, rcond=None)[0].reshape(-1, self.problem.basis.n_coeff)
+        return np.linalg.solve(self.dynamic_stiffness(omega), force).reshape(-1, self.problem.basis.n_coeff)
 
 
 def _block_diagonal(blocks: np.ndarray) -> csr_matrix:

@@ -16,17 +16,19 @@ elimination of the contact is ours
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
-from hbm import floquet
+from hbm import floquet, parameter
 from hbm import law as contact_law
 from hbm.balance import HarmonicBalance, State
 from hbm.branch import CONVERGED, Branch
 from hbm.harmonics import HarmonicBasis
+from hbm.parameter import Parameter
 
 MARGIN = 1e-6  # real parts up to this times omega count as zero
-MOST_MODES = 30
+FEWEST_MODES, MOST_MODES = 20, 30  # friction makes modes far above the excitation flutter, too
 SAME = 0.02  # relative to omega: how far truncation may drive copies of one exponent apart
 
 
@@ -70,12 +72,12 @@ class Bifurcation:
     """A change of stability between two points of a branch.
 
     position : between the points, counted from 0: 3.4 is 40 % of the way from point 3 to point 4
-    omega : there, by linear interpolation [rad/s]
+    value : of the parameter there, by linear interpolation: [rad/s] where the branch was followed in frequency
     kind : "fold" (multiplier +1), "flip" (-1) or "Neimark-Sacker" (a complex pair)
     """
 
     position: float
-    omega: float
+    value: float
     kind: str
 
 
@@ -99,7 +101,8 @@ def stability(
     """Stability of one solution.
 
     state : converged; method : "hill", or "floquet" for small models, by time integration
-    n_modes : modes that move dynamically in Hill's method, by default those below three times the highest harmonic
+    n_modes : modes that move dynamically in Hill's method, by default those below three times the highest harmonic,
+        at least FEWEST_MODES and at most MOST_MODES of them
     top : highest harmonic of the perturbation in Hill's method, by default that of the balance
     Raises  ValueError for unknown methods and for models whose harmonics see different systems
     """
@@ -115,22 +118,28 @@ def stability(
     return Stability(state.omega, _sorted(_hill(balance, state, n_modes, top), state.omega), method)
 
 
-def mark(balance: HarmonicBalance, branch: Branch, method: str = "hill", n_modes: int | None = None) -> BranchStability:
-    """Stability of every converged point of a branch, and the bifurcations between neighbouring points."""
-    n = len(branch.omega)
+def mark(
+    problem: HarmonicBalance | Parameter, branch: Branch, method: str = "hill", n_modes: int | None = None
+) -> BranchStability:
+    """Stability of every converged point of a branch, and the bifurcations between neighbouring points.
+
+    problem : what the branch was followed with: the balance, or the parameter it was stepped in
+    """
+    path = parameter.of(problem)
+    if path.name != branch.parameter_name:
+        raise ValueError(f"the branch was followed in the {branch.parameter_name}, not in the {path.name}")
     found: list[Stability | None] = []
-    for i in range(n):
-        if branch.outcome[i] != CONVERGED:
+    for value, flat, outcome in zip(branch.parameter, branch.contact, branch.outcome, strict=True):
+        if outcome != CONVERGED:
             found.append(None)
             continue
-        x = branch.contact[i].reshape(balance.parameters.n_pair, -1, branch.contact.shape[2])
-        state = balance.evaluate(branch.omega[i], x)
+        balance, omega = path.place(value)
+        state = balance.evaluate(omega, flat.reshape(balance.parameters.n_pair, -1, flat.shape[1]))
         found.append(stability(balance, state, method, n_modes))
     changes = []
-    for i in range(n - 1):
-        before, after = found[i], found[i + 1]
+    for i, (before, after) in enumerate(pairwise(found)):
         if before is not None and after is not None and before.n_unstable != after.n_unstable:
-            changes.append(_locate(i, before, after))
+            changes.append(_locate(i, before, after, float(branch.parameter[i]), float(branch.parameter[i + 1])))
     return BranchStability(
         stable=np.array([s is not None and s.stable for s in found]),
         leading=np.array([np.nan if s is None else s.exponents[0] for s in found], complex),
@@ -138,14 +147,14 @@ def mark(balance: HarmonicBalance, branch: Branch, method: str = "hill", n_modes
     )
 
 
-def _locate(i: int, before: Stability, after: Stability) -> Bifurcation:
+def _locate(i: int, before: Stability, after: Stability, first: float, second: float) -> Bifurcation:
     """Where the exponents that change sides have, on average, a real part of zero."""
     low, high = sorted((before.n_unstable, after.n_unstable))
     r0, r1 = (s.exponents.real[low:high].mean() for s in (before, after))
     share = float(np.clip(r0 / (r0 - r1), 0.0, 1.0)) if r0 != r1 else 0.5
     unstable = before if before.n_unstable > after.n_unstable else after
     crossing = replace(unstable, exponents=unstable.exponents[low:])
-    return Bifurcation(i + share, before.omega + share * (after.omega - before.omega), crossing.crossing)
+    return Bifurcation(i + share, first + share * (second - first), crossing.crossing)
 
 
 def _sorted(exponents: np.ndarray, omega: float) -> np.ndarray:
@@ -157,11 +166,12 @@ def _sorted(exponents: np.ndarray, omega: float) -> np.ndarray:
 
 def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int | None) -> np.ndarray:
     top = balance.basis.harmonics[-1] if top is None else top
-    basis = HarmonicBasis(tuple(range(top + 1)), max(balance.basis.n_samples, 4 * top + 1))
+    n_samples = max(balance.basis.n_samples, 4 * top + 1)
+    basis = HarmonicBasis(tuple(range(top + 1)), n_samples, balance.basis.transitions)
     expansion = balance.compliance.groups[0][0]
     frequencies = np.sqrt(expansion.lam)
     if n_modes is None:
-        n_modes = int(np.clip(np.sum(frequencies < 3 * (top + 1) * state.omega), 6, MOST_MODES))
+        n_modes = int(np.clip(np.sum(frequencies < 3 * (top + 1) * state.omega), FEWEST_MODES, MOST_MODES))
     m = min(n_modes, len(frequencies))
     n_contact = balance.compliance.n_contact
     phi, rest = expansion.b[:n_contact, :m], expansion.b[:n_contact, m:]

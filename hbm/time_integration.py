@@ -30,7 +30,7 @@ class Options:
     steps : time steps per period; the error falls with its square
     spectral_radius : of the method at infinite frequency, 1 for the trapezoidal rule, less damps what is not resolved
     tolerance : periodic when the state changes by less than this over one period, relative to its vibration
-    max_periods : periods after which to give up
+    max_periods : periods after which to give up; patience : periods without a smaller drift after which to give up
     accelerate : mix the states of past periods (Anderson) instead of waiting for the transient to decay; finds
         unstable periodic motions, too, from which a plain march would leave
     """
@@ -39,6 +39,7 @@ class Options:
     spectral_radius: float = 0.8
     tolerance: float = 1e-8
     max_periods: int = 2000
+    patience: int = 80
     accelerate: bool = True
 
     def __post_init__(self) -> None:
@@ -69,7 +70,7 @@ class PeriodicMotion:
     omega : [rad/s]; time : (n_step,) instants from T / n_step to T [s]
     x, force : (n_pair, n_component, n_step) relative displacement [m] and contact force [N]
     outputs : (n_output, n_step) observed outputs [m]
-    energy : (n_pair,) work of the contact force over the period, integral of f dx [J]
+    energy : (n_pair,) work of the tangential contact force over the period, integral of f dx [J]
     preload : mean normal force of the whole contact [N], zero where the law has no normal component
     status : (n_pair,) bits of what happened: STICKS | SLIPS | SEPARATES
     drift : change of the state over the period, relative to the vibration (both as square roots of energy)
@@ -310,7 +311,7 @@ def _rest(stepper: TimeStepper) -> Motion:
 def _to_periodic(stepper: TimeStepper, motion: Motion, options: Options, with_slopes: bool) -> PeriodicMotion:
     vector = _StateVector(stepper)
     mixing = Anderson(depth=40)
-    best = np.inf
+    best, best_at = np.inf, 0
     for periods in range(1, options.max_periods + 1):
         end, record = stepper.period(motion, with_slopes)
         z, image = vector.pack(motion), vector.pack(end)
@@ -320,15 +321,21 @@ def _to_periodic(stepper: TimeStepper, motion: Motion, options: Options, with_sl
             return _result(stepper, record, drift, periods, CONVERGED)
         if drift > 4 * best:
             mixing.forget()
-        best = min(best, drift)
+        if drift < 0.9 * best:
+            best, best_at = drift, periods
+        if periods - best_at >= options.patience:
+            break
         motion = vector.unpack(mixing.propose(z, image)) if options.accelerate else end
-    return _result(stepper, record, drift, periods, f"not periodic after {periods} periods: drift {drift:.1e}")
+    hint = "; is the motion stable there (hbm.stability)?" if periods < options.max_periods else ""
+    outcome = f"not periodic after {periods} periods: drift {drift:.1e}, smallest {best:.1e}{hint}"
+    return _result(stepper, record, drift, periods, outcome)
 
 
 def _result(stepper: TimeStepper, record: Record, drift: float, periods: int, outcome: str) -> PeriodicMotion:
     components = stepper.balance.parameters.components
     before = np.roll(record.xs, 1, axis=0), np.roll(record.fs, 1, axis=0)
-    work = 0.5 * ((record.fs + before[1]) * (record.xs - before[0])).sum(axis=(0, 2))
+    work = 0.5 * ((record.fs + before[1]) * (record.xs - before[0])).sum(axis=0)
+    work = work[:, stepper.balance.parameters.tangential].sum(axis=1)
     preload = float(record.fs[:, :, components.index("n")].mean(axis=0).sum()) if "n" in components else 0.0
     return PeriodicMotion(
         omega=stepper.omega,

@@ -8,6 +8,7 @@ import numpy as np
 
 from hbm import time_integration
 from hbm.balance import HarmonicBalance, State
+from hbm.branch import CONVERGED
 from hbm.time_integration import Options, PeriodicMotion
 
 ENERGY_FLOOR = (
@@ -26,7 +27,8 @@ class Verification:
     contact : largest difference over pairs and time of the vibration of x, over its largest deflection
     energy : dissipated energy of the whole contact; energy_pairs : largest difference of one pair over the whole energy
     preload : static normal force of the whole contact; zero where the law has none
-    step_error : of the time integration itself, in amplitude and energy, estimated with half the steps (Richardson)
+    step_error : of the time integration itself, in amplitude and energy, estimated with half the steps (Richardson);
+        nan where no periodic motion was found
     drift, periods : how periodic the time integration is, and after how many periods
     outcome : "converged" or the sentence of the time integration
     motion : the last period
@@ -60,7 +62,6 @@ def verify(balance: HarmonicBalance, state: State, options: Options | None = Non
     """
     options = options or Options()
     motion = time_integration.integrate(balance, state.omega, state, options)
-    coarse = time_integration.integrate(balance, state.omega, state, replace(options, steps=options.steps // 2))
     functions = balance.basis.functions(state.omega * motion.time)
     outputs = balance.outputs(state) @ functions.T
     names = balance.compliance.output_names
@@ -70,7 +71,6 @@ def verify(balance: HarmonicBalance, state: State, options: Options | None = Non
     energy = balance.energy(state)
     whole = max(abs(motion.energy.sum()), floor)
     amplitude = np.array([_relative(a, b) for a, b in zip(_rms(ours), _rms(theirs), strict=True)])
-    half = [_relative(a, b) / 3 for a, b in zip(_rms(_vibration(coarse.outputs)), _rms(theirs), strict=True)]
     means = [
         _relative(a, b, scale or abs(b))
         for a, b, scale in zip(
@@ -88,14 +88,22 @@ def verify(balance: HarmonicBalance, state: State, options: Options | None = Non
         energy=float((energy.sum() - motion.energy.sum()) / whole) if whole > 0 else 0.0,
         energy_pairs=float(np.abs(energy - motion.energy).max() / whole) if whole > 0 else 0.0,
         preload=_relative(balance.preload(state), motion.preload),
-        step_error=max(
-            abs(v) for v in (*half, (coarse.energy.sum() - motion.energy.sum()) / whole / 3 if whole > 0 else 0.0)
-        ),
+        step_error=_step_error(balance, state, options, motion, whole) if motion.outcome == CONVERGED else float("nan"),
         drift=motion.drift,
         periods=motion.periods,
         outcome=motion.outcome,
         motion=motion,
     )
+
+
+def _step_error(
+    balance: HarmonicBalance, state: State, options: Options, motion: PeriodicMotion, whole: float
+) -> float:
+    """Error of the time steps in amplitude and energy, from half as many."""
+    coarse = time_integration.integrate(balance, state.omega, state, replace(options, steps=options.steps // 2))
+    rms = zip(_rms(_vibration(coarse.outputs)), _rms(_vibration(motion.outputs)), strict=True)
+    energy = (coarse.energy.sum() - motion.energy.sum()) / whole if whole > 0 else 0.0
+    return float(max(abs(v) / 3 for v in (*(_relative(a, b) for a, b in rms), energy)))
 
 
 def energy_floor(motion: PeriodicMotion) -> float:

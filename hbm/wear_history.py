@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from hbm.operating_point import OperatingPoint
 
 
+LIFE_SHARE = 1e-3  # of the first preload, where the life that is stated ends
+
+
 @dataclass(frozen=True)
 class WearRow:
     """One wear step; the fields are those of WearHistory, without the row axis.
@@ -129,6 +132,21 @@ class WearHistory:
         """The rows one by one."""
         names = [f.name for f in fields(WearRow)]
         return [WearRow(**{name: getattr(self, name)[i] for name in names}) for i in range(len(self.cycles))]
+
+
+def cycles_to_preload(history: WearHistory, share: float = LIFE_SHARE) -> float | None:
+    """Cycles after which the preload has fallen to a share of its first value, along log preload; None if it has not.
+
+    This is the life that converges with the wear step. The last touch of a vibrating contact does not end in finite
+    time: near it the work falls with the power 3/2 of what is left to wear.
+    """
+    below = np.flatnonzero(history.preload < share * history.preload[0])
+    if len(below) == 0 or below[0] == 0:
+        return None
+    i = int(below[0])
+    high, low = history.preload[i - 1], max(float(history.preload[i]), 1e-3 * share * float(history.preload[0]))
+    part = np.log(high / (share * history.preload[0])) / np.log(high / low)
+    return float(history.cycles[i - 1] + part * (history.cycles[i] - history.cycles[i - 1]))
 
 
 def history(rows: list[WearRow], end: str) -> WearHistory:

@@ -32,7 +32,7 @@ def craig_bampton(
     interface: ContactInterface,
     n_modes: int | None = None,
     cutoff: float | None = None,
-    extra_masters: Sequence[int] = (),
+    extra_masters: Sequence[int] | np.ndarray = (),
     contact_stiffness: np.ndarray | None = None,
     solver: str | None = None,
 ) -> ReducedModel:
@@ -51,6 +51,8 @@ def craig_bampton(
     """
     K, M = csr_matrix(system.stiffness), csr_matrix(system.mass)
     s, m = partition(system.n_dof, master_dofs(system, interface, extra_masters), "master")
+    if not len(s):
+        raise ValueError("Craig-Bampton: every DOF is a master, nothing is left to reduce; use the matrices as they are")
     K_ss, M_ss = K[s][:, s], M[s][:, s]
     factor = factorise(K_ss, solver=solver)
     psi = constraint_modes(factor, csc_matrix(K[s][:, m]))
@@ -94,7 +96,9 @@ def craig_bampton(
     return replace(model, info=info)
 
 
-def master_dofs(system: SecondOrderSystem, interface: ContactInterface, extra: Sequence[int] = ()) -> np.ndarray:
+def master_dofs(
+    system: SecondOrderSystem, interface: ContactInterface, extra: Sequence[int] | np.ndarray = ()
+) -> np.ndarray:
     """DOFs that stay, in any order: those the contact map touches, those of point loads and outputs, and the extra."""
     touched = [np.flatnonzero(v) for v in (*system.loads.values(), *system.outputs.values())]
     points = [dofs for dofs in touched if len(dofs) <= POINT_LOAD]

@@ -11,7 +11,7 @@ from fem.system import SecondOrderSystem
 def modal_damping(system: SecondOrderSystem, ratio: float) -> np.ndarray:
     """The same damping ratio in every mode of the free system, none for rigid-body modes.
 
-    C = M Phi diag(2 zeta omega) Phi^T M over all modes of the dense system without contact
+    C = M Phi diag(2 zeta omega) Phi^H M over all modes of the dense system without contact
     Returns C (n, n) [N s/m]
     Raises  ValueError for a ratio below 0
     """
@@ -21,7 +21,7 @@ def modal_damping(system: SecondOrderSystem, ratio: float) -> np.ndarray:
     # below this an eigenvalue is rounding of a rigid-body mode
     values[values < len(values) * np.finfo(float).eps * values[-1]] = 0.0
     weighted = system.mass @ phi
-    return (weighted * (2 * ratio * np.sqrt(values))) @ weighted.T
+    return (weighted * (2 * ratio * np.sqrt(values))) @ weighted.conj().T
 
 
 def rayleigh(system: SecondOrderSystem, alpha: float, beta: float) -> np.ndarray:

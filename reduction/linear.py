@@ -34,8 +34,8 @@ def system_modes(
 
 
 def stuck_stiffness(K: Any, B: Any, stiffness: np.ndarray) -> Any:
-    """K + B^T k B (n, n) [N/m], sparse or dense like K; stiffness k : (n_pair, n_component) [N/m]."""
+    """K + B^H k B (n, n) [N/m], sparse or dense like K; stiffness k : (n_pair, n_component) [N/m]."""
     if issparse(K):
         B = csr_matrix(B)
-        return csr_matrix(K + B.T @ diags_array(np.ravel(stiffness)) @ B)
-    return K + B.T @ (np.ravel(stiffness)[:, None] * B)
+        return csr_matrix(K + B.conj().T @ diags_array(np.ravel(stiffness)) @ B)
+    return K + B.conj().T @ (np.ravel(stiffness)[:, None] * B)

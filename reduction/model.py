@@ -21,6 +21,7 @@ class ReducedModel:
     info : facts for reports, such as the number of masters, modes, the truncation frequency and solver names
     per_harmonic : harmonic -> (system, B) where a harmonic sees another system than `system`
         (cyclic harmonic index, displacement prescribed in harmonic 0); complex Hermitian where cyclic
+    harmonic_basis : harmonic -> (n_full, n) basis where the coordinates of a harmonic are its own
     """
 
     system: SecondOrderSystem
@@ -28,6 +29,7 @@ class ReducedModel:
     basis: np.ndarray | None = None
     info: Mapping[str, object] = field(default_factory=dict)
     per_harmonic: Callable[[int], tuple[SecondOrderSystem, np.ndarray]] | None = None
+    harmonic_basis: Callable[[int], np.ndarray] | None = None
 
     def at_harmonic(self, h: int) -> tuple[SecondOrderSystem, np.ndarray]:
         """System and contact map (n_pair * n_component, n) that harmonic h sees."""
@@ -35,11 +37,12 @@ class ReducedModel:
             return self.per_harmonic(h)
         return self.system, np.asarray(self.interface.B)
 
-    def reconstruct(self, q: np.ndarray) -> np.ndarray:
-        """Full displacement (n_full, ...) [m] of reduced coordinates q (n, ...)."""
-        if self.basis is None:
+    def reconstruct(self, q: np.ndarray, h: int = 1) -> np.ndarray:
+        """Full displacement (n_full, ...) [m] of reduced coordinates q (n, ...) of harmonic h."""
+        basis = self.basis if self.harmonic_basis is None else self.harmonic_basis(h)
+        if basis is None:
             raise ValueError("this model came as matrices: it has no full field to reconstruct")
-        return np.tensordot(self.basis, q, axes=1)
+        return np.tensordot(basis, q, axes=1)
 
     def with_damping(self, damping: np.ndarray | None) -> ReducedModel:
         """The same model with another damping matrix (n, n) [N s/m]."""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import scipy.linalg as sla
+from scipy.special import ellipk
 
 from hbm import newton
 from hbm.balance import HarmonicBalance
@@ -47,10 +50,41 @@ def test_frequency_and_damping_of_a_jenkins_element_are_the_closed_form():
     assert found.damping.max() > 9 * RATIO
 
 
+def duffing(harmonics: tuple[int, ...], ratio: float) -> HarmonicBalance:
+    parameters = ContactParameters.of(("n",), [[KT]], cubic=2e9)
+    basis = HarmonicBasis(harmonics, 256)
+    return HarmonicBalance(
+        oscillator(MASS, STIFFNESS, ratio, "n"), "cubic_spring", parameters, basis, Excitation(), 1e4
+    )
+
+
+def test_backbone_of_a_duffing_oscillator_with_one_harmonic_is_the_closed_form():
+    found = backbone(duffing((1,), RATIO), 1e-5, 1e-1)
+    assert found.end.startswith("reached")
+    omega = np.sqrt((STIFFNESS + KT + 0.75 * 2e9 * found.amplitude**2) / MASS)
+    np.testing.assert_allclose(found.omega, omega, rtol=1e-8)
+    np.testing.assert_allclose(found.damping, RATIO * np.sqrt(STIFFNESS / MASS) / omega, rtol=1e-7)
+    assert omega[-1] > 10 * omega[0]
+    assert np.all(np.abs(found.energy) < 1e-9 * KT * found.amplitude**2)
+
+
+def test_backbone_of_a_duffing_oscillator_converges_to_the_exact_period():
+    errors = []
+    for top in (1, 3, 5, 7, 9):
+        found = backbone(duffing(tuple(range(1, top + 1, 2)), 0.0), 1e-4, 1e-2)
+        peak = found.response[:, 0, 0::2].sum(axis=1)
+        stiff = STIFFNESS + KT + 2e9 * peak**2
+        exact = np.pi * np.sqrt(stiff / MASS) / (2 * ellipk(2e9 * peak**2 / (2 * stiff)))
+        errors.append(np.abs(found.omega / exact - 1).max())
+        np.testing.assert_allclose(found.damping, 0.0, atol=1e-9)
+    assert all(b < 0.1 * a for a, b in pairwise(errors))
+    assert errors[-1] < 1e-6
+
+
 def structure(ratio: float, friction: float = 0.3) -> HarmonicBalance:
     model = random_structure(3, ratio=ratio)
     parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(3e6, 5e6), friction=friction)
-    basis = HarmonicBasis((0, 1, 2, 3), 512)
+    basis = HarmonicBasis((0, 1, 2, 3), 512, "located")  # the normal spring then does no work, not even by sampling
     excitation = Excitation.of({"static": 30.0})
     return HarmonicBalance(model, "jenkins", parameters, basis, excitation, 600.0).with_gap(np.full(3, -5e-5))
 

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.optimize import fsolve
 
 from hbm import newton, parameter, time_integration
 from hbm.balance import HarmonicBalance
-from hbm.branch import BranchBuilder
+from hbm.continuation import arc_length
 from hbm.excitation import Excitation
 from hbm.floquet import monodromy
 from hbm.harmonics import HarmonicBasis
 from hbm.law import ContactParameters
-from hbm.newton import Solution
 from hbm.stability import Stability, mark, stability
 from hbm.time_integration import Options, TimeStepper
 from reduction.model import ReducedModel
@@ -100,44 +98,44 @@ def test_hill_and_floquet_agree_on_a_flip_from_which_a_plain_march_departs():
     assert mixed.outcome == "converged"
 
 
-def test_fold_of_a_lifting_mass_is_marked_where_the_branch_turns():
-    mass, stiffness, kn = 1.0, 1e4, 4e4
-    parameters = ContactParameters.of(("t1", "n"), [[1.0, kn]], friction=0.0)
+def lifting_mass() -> HarmonicBalance:
+    """A pressed mass on a unilateral spring: it softens where it lifts, and its resonance bends over."""
+    parameters = ContactParameters.of(("n",), [[4e4]])
     excitation = Excitation.of({"normal": 50.0}, {1: {"normal": 3.0}})
-    basis = HarmonicBasis((0, 1, 2, 3, 4, 5), 512)
-    balance = HarmonicBalance(oscillator(mass, stiffness, 0.01), "jenkins", parameters, basis, excitation, 300.0)
-    lift = 50.0 / (stiffness + kn)  # amplitude at which contact is lost
-    builder = BranchBuilder(parameter.of(balance))
+    basis = HarmonicBasis((0, 1, 2, 3, 4, 5), 256, "located")
+    return HarmonicBalance(oscillator(1.0, 1e4, 0.01, "n"), "unilateral", parameters, basis, excitation, 300.0)
 
-    def equations(unknown, amplitude):
-        x = np.zeros((1, 2, basis.n_coeff))
-        x[0, 1] = unknown[:-1] * lift
-        state = balance.evaluate(unknown[-1] * 200.0, x, jacobian=False)
-        return np.r_[state.residual[1] / lift, np.hypot(*unknown[1:3]) - amplitude]
 
-    guess = np.r_[1.0, 0.5, 0, np.zeros(8), 0.9]
-    for amplitude in np.linspace(0.4, 2.4, 81):  # up the left flank, through the fold
-        guess, *_ = fsolve(equations, guess, args=(amplitude,), xtol=1e-12, full_output=True)
-        x = np.zeros((1, 2, basis.n_coeff))
-        x[0, 1] = guess[:-1] * lift
-        state = balance.evaluate(guess[-1] * 200.0, x)
-        assert np.abs(state.residual).max() < 1e-9 * lift
-        builder.add(state.omega, Solution(state, "converged", 0, 0, ()))
-    branch = builder.finish("reached the amplitude asked for")
-    turn = int(np.argmax(branch.omega))
-    assert 10 < turn < 70
-    a, b, c = np.polyfit(np.arange(-2, 3), branch.omega[turn - 2 : turn + 3], 2)
+def test_folds_of_a_lifting_mass_are_marked_where_the_branch_turns():
+    balance = lifting_mass()
+    branch = arc_length.follow(balance, 150.0, 260.0)
+    assert branch.end.startswith("reached")
+    assert len(branch.folds) == 2
     marks = mark(balance, branch)
-    assert [m.kind for m in marks.bifurcations] == ["fold"]
-    assert marks.bifurcations[0].position == pytest.approx(turn - b / (2 * a), abs=0.5)
-    assert marks.bifurcations[0].omega == pytest.approx(c - b * b / (4 * a), rel=1e-4)
-    assert np.all(marks.stable[: turn - 1])
-    assert not np.any(marks.stable[turn + 2 :])
-    assert np.all(marks.leading[turn + 2 :].imag == pytest.approx(0.0, abs=1e-3))
-    x = branch.contact[turn + 16].reshape(1, 2, -1)
-    unstable = balance.evaluate(branch.omega[turn + 16], x)
+    assert [m.kind for m in marks.bifurcations] == ["fold", "fold"]
+    for found, turn in zip(marks.bifurcations, branch.folds, strict=True):
+        assert found.position == pytest.approx(turn, abs=1.0)
+        assert found.value == pytest.approx(branch.omega[turn], rel=1e-3)
+    first, second = branch.folds
+    assert np.all(marks.stable[: first - 1])
+    assert not np.any(marks.stable[first + 2 : second - 1])
+    assert np.all(marks.stable[second + 2 :])
+    between = (first + second) // 2
+    unstable = balance.evaluate(branch.omega[between], branch.contact[between].reshape(1, 1, -1))
     by_time, by_hill = stability(balance, unstable, "floquet"), stability(balance, unstable)
+    assert by_time.multipliers[0].real > 1
     assert by_time.multipliers[0] == pytest.approx(by_hill.multipliers[0], rel=0.02)
+
+
+def test_a_branch_in_another_parameter_is_marked_with_it():
+    balance = lifting_mass()
+    load = parameter.load(balance, 200.0)
+    branch = arc_length.follow(load, 0.2, 1.5)
+    marks = mark(load, branch)
+    assert len(marks.stable) == len(branch.omega)
+    assert len(marks.bifurcations) == len(branch.folds)
+    with pytest.raises(ValueError, match="followed in the load factor"):
+        mark(balance, branch)
 
 
 def test_names_and_refusals():

@@ -98,6 +98,31 @@ def test_friction_is_that_of_a_general_integrator():
     np.testing.assert_allclose(motion.force[0, 0, 1023::1024], reference.y[4], atol=2e-3 * np.abs(reference.y[4]).max())
 
 
+@pytest.mark.parametrize("radius", [1.0, 0.8, 0.0])
+def test_order_is_two_for_a_smooth_law(radius):
+    mass, stiffness, k, cubic = 1.0, 3e4, 2e4, 5e9
+    parameters = ContactParameters.of(("n",), [[k]], cubic=cubic)
+    excitation = Excitation.of({"normal": 10.0}, {1: {"force": 40.0}, 3: {"force": 15.0j}})
+    model = oscillator(mass, stiffness, 0.02, "n")
+    balance = HarmonicBalance(model, "cubic_spring", parameters, HarmonicBasis((0, 1, 2, 3), 64), excitation, OMEGA)
+    damping = 2 * 0.02 * np.sqrt(mass * stiffness)
+
+    def rate(t, y):
+        load = 10 + 40 * np.cos(OMEGA * t) - 15 * np.sin(3 * OMEGA * t)
+        return [y[1], (load - (stiffness + k) * y[0] - cubic * y[0] ** 3 - damping * y[1]) / mass]
+
+    start = np.roots([cubic, 0.0, stiffness + k, -10.0])
+    start = float(start[np.abs(start.imag) < 1e-12].real[0])
+    end = 3 * 2 * np.pi / OMEGA
+    reference = solve_ivp(rate, (0, end), [start, 0.0], method="DOP853", rtol=1e-12, atol=1e-18).y[0, -1]
+    errors = []
+    for steps in (256, 512, 1024):
+        options = Options(steps=steps, spectral_radius=radius, max_periods=3, accelerate=False)
+        motion = time_integration.integrate(balance, OMEGA, None, options)
+        errors.append(abs(motion.x[0, 0, -1] - reference))
+    np.testing.assert_allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 2.0, atol=0.1)
+
+
 @pytest.mark.parametrize("radius", [1.0, 0.8, 0.3])
 def test_error_falls_with_the_square_of_the_step_even_with_stick_slip_and_separation(radius):
     balance = random_balance(friction=0.3, second=0.0)

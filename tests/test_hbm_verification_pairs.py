@@ -56,7 +56,8 @@ def test_55_pairs_keep_converging(top, bound):
     assert max(result.largest, result.waveform["edge"], result.contact) < bound
 
 
-def test_coupled_structure_near_resonance_approaches_time_integration():
+@pytest.mark.parametrize("law", ["jenkins", "coulomb_planar"])
+def test_coupled_structure_near_resonance_approaches_time_integration(law):
     omega = 305.3  # 3 % below the first mode without contact
     errors = []
     for top in (1, 3, 7, 15):
@@ -64,7 +65,7 @@ def test_coupled_structure_near_resonance_approaches_time_integration():
         parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(3e6, 5e6), friction=0.3)
         excitation = Excitation.of({"static": 30.0}, {1: {"shaker": 60.0}})
         basis = HarmonicBasis(tuple(range(top + 1)), 1024)
-        balance = HarmonicBalance(model, "jenkins", parameters, basis, excitation, omega)
+        balance = HarmonicBalance(model, law, parameters, basis, excitation, omega)
         solution = newton.solve_from_rest(balance, omega)
         assert solution.converged
         result = verify(balance, solution.state, Options(steps=2048))

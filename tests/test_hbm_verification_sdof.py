@@ -72,16 +72,33 @@ def test_jenkins_element_approaches_time_integration_with_more_harmonics():
     assert result.step_error < 1e-5
 
 
+@pytest.mark.parametrize("ratio", [0.5, 1.2, 4.0])
+def test_law_with_constant_normal_load_is_the_closed_form_to_rounding_where_its_transitions_are_located(ratio):
+    x = ratio * SLIP
+    omega = np.sqrt((STIFFNESS + closed_form_force(x).real) / MASS)
+    damping = 2 * RATIO * np.sqrt(MASS * STIFFNESS)
+    force = x * (STIFFNESS - MASS * omega**2 + 1j * omega * damping + closed_form_force(x))
+    parameters = ContactParameters.of(("t1",), [[KT]], friction=MU, normal_load=NORMAL_FORCE)
+    model = oscillator(MASS, STIFFNESS, RATIO, "n")
+    basis = HarmonicBasis((1,), 16, "located")
+    balance = HarmonicBalance(
+        model, "jenkins_constant", parameters, basis, Excitation.of({}, {1: {"force": force}}), omega
+    )
+    solution = newton.solve_from_rest(balance, omega, NewtonOptions(tolerance=1e-12))
+    assert solution.converged
+    np.testing.assert_allclose(balance.outputs(solution.state)[0] / x, [1.0, 0.0], atol=1e-9)
+
+
 @pytest.mark.parametrize("press", [30.0, 0.0])
 def test_unilateral_contact_with_preload_approaches_time_integration(press):
     omega = 0.8 * np.sqrt((STIFFNESS + 0.5 * KN / 100) / MASS)
     errors = []
     for top in (1, 3, 5, 9, 15):
-        model = oscillator(MASS, STIFFNESS, 0.05)
-        parameters = ContactParameters.of(("t1", "n"), [[KT, KN / 100]], friction=0.0)
+        model = oscillator(MASS, STIFFNESS, 0.05, "n")
+        parameters = ContactParameters.of(("n",), [[KN / 100]])
         excitation = Excitation.of({"normal": press}, {1: {"normal": 40.0}})
         basis = HarmonicBasis(tuple(range(top + 1)), 2048)
-        balance = HarmonicBalance(model, "jenkins", parameters, basis, excitation, omega)
+        balance = HarmonicBalance(model, "unilateral", parameters, basis, excitation, omega)
         solution = newton.solve_from_rest(balance, omega)
         assert solution.converged
         result = verify(balance, solution.state, Options(steps=2048))

@@ -26,6 +26,8 @@ BAD = {
     "negative stiffness": (["run", "beam", "--set", "contact.normal_stiffness=-1"], "contact.normal_stiffness"),
     "no law": (["run", "beam", "--set", "contact.law=glue"], "no contact law 'glue'"),
     "no wear law": (["run", "beam", "--set", "wear.law=rust"], "no wear law 'rust'"),
+    "no option of a method": (["run", "beam", "--set", "response.options.points=9"], "did you mean n_points?"),
+    "no number": (["run", "beam", "--set", "response.options.refinements=x"], "expected a whole number, got 'x'"),
     "no method": (["run", "beam", "--set", "response.method=guess"], "no continuation 'guess'"),
     "no face": (["run", "beam", "--set", "contact.group=foot"], "no face 'foot'"),
     "a patch with no nodes": (["run", "beam", "--set", "contact.group=response"], "no face 'response'"),
@@ -96,7 +98,8 @@ def test_show_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Non
     assert patch is not None
     assert numbers["depth_max_m"] == wear.depth[-1].max()
     assert numbers["depth_mean_m"] == pytest.approx(wear.depth[-1].mean())
-    assert numbers["life_cycles"] == wear.cycles[-1]
+    assert numbers["separated_cycles"] == wear.cycles[-1]
+    assert wear.cycles[-2] < numbers["life_cycles"] < wear.cycles[-1]
     assert numbers["energy_J"] == pytest.approx(wear.work.sum())
     assert numbers["volume_m3"] == pytest.approx(wear.depth[-1] @ patch.area)
     assert numbers["wear_steps"] == 8
@@ -115,12 +118,12 @@ def test_show_for_people(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
         assert words in out
 
 
-def test_a_life_is_told_only_where_contact_was_lost() -> None:
+def test_separation_is_told_only_where_contact_was_lost() -> None:
     made = result()
     assert made.wear is not None
     unfinished = replace(made, wear=replace(made.wear, end="stopped after 8 wear steps"))
     numbers = summary.summary(unfinished)
-    assert numbers["life_cycles"] is None
+    assert numbers["separated_cycles"] is None
     assert numbers["cycles"] == made.wear.cycles[-1]
 
 

@@ -84,7 +84,7 @@ def test_loops_enclose_the_energy(finished: Result) -> None:
     for row, x, force in zip(loops.row, loops.displacement, loops.force, strict=True):
         following = np.roll(x, -1, -1) - np.roll(x, 1, -1)
         area = 0.5 * np.sum(force * following, axis=(1, 2))
-        assert area.sum() == pytest.approx(wear.energy[row].sum(), rel=2e-2)  # 128 samples, polygons against harmonics
+        assert area.sum() == pytest.approx(wear.energy[row].sum(), rel=4e-2)  # polygons of 64 samples
 
 
 def test_references_peak_where_the_modes_are(finished: Result) -> None:
@@ -126,7 +126,7 @@ def test_ctrl_c_keeps_what_was_computed_and_says_where(tmp_path: Path) -> None:
     assert process.returncode == 130
     assert err.count("\n") == 1
     assert str(tmp_path / "result.h5") in err
-    assert "--resume" in err
+    assert err.endswith("--set 'wear.step=30 %' --resume.\n")
     wear = store.load(tmp_path / "result.h5").wear
     assert wear is not None
     assert len(wear.cycles) >= 2

@@ -29,7 +29,7 @@ def modal_damping(mass: np.ndarray, stiffness: np.ndarray, ratio: float) -> np.n
 def oscillator(mass: float, stiffness: float, ratio: float, component: str = "t1") -> ReducedModel:
     """One moving mass whose tangential (with a second mass for the normal) or normal displacement meets the ground.
 
-    component : "t1" gives DOFs (t1, n), the normal one loaded by "normal"; "n" one DOF
+    component : "t1" gives DOFs (t1, n), the normal one loaded by "normal"; "n" gives one DOF, loaded by either name
     """
     n = 2 if component == "t1" else 1
     m, k = mass * np.eye(n), stiffness * np.eye(n)
@@ -94,3 +94,20 @@ def slab(nx: int, ny: int, ratio: float = 0.02) -> ReducedModel:
     loads = {"press": press, "shake": shake, "rock": rock}
     system = SecondOrderSystem(mass, stiffness, modal_damping(mass, stiffness, ratio), loads, {"edge": edge})
     return ReducedModel(system, interface(b, ("t1", "t2", "n"), points[:upper]))
+
+
+def floating_beam(n_node: int = 9, ratio: float = 0.02) -> ReducedModel:
+    """An elastic beam that nothing but unilateral contact along its underside holds: it lifts, pitches and bends.
+
+    Coordinates are the heights of its nodes; two of its modes are rigid. Loads: "press" (down, spread evenly),
+    "shake" (up, at one end); output: "end", height of the other end. Contact pairs: component n, closing downwards
+    """
+    stations = np.linspace(0.0, 1.0, n_node)
+    bend = np.diff(np.eye(n_node), 2, axis=0) / np.diff(stations)[0] ** 2
+    stiffness = 3.0 * bend.T @ bend / n_node
+    mass = np.diag(np.where(np.isin(np.arange(n_node), (0, n_node - 1)), 0.5, 1.0)) / (n_node - 1)
+    loads = {"press": -mass.diagonal(), "shake": np.eye(n_node)[0]}
+    points = np.stack([stations, 0 * stations, 0 * stations], axis=1)
+    stuck = modal_damping(mass, stiffness + 50.0 / n_node * np.eye(n_node), ratio)
+    system = SecondOrderSystem(mass, stiffness, stuck, loads, {"end": np.eye(n_node)[-1]})
+    return ReducedModel(system, interface(-np.eye(n_node), ("n",), points))

@@ -25,6 +25,7 @@ from hbm.harmonics import HarmonicBasis
 from hbm.newton import NewtonOptions
 from hbm.reference import DenseBalance
 from workflows import pipeline, scene_file
+from workflows.progress import Progress
 
 POINTS, SAMPLES, TOLERANCE = 200, 100, 1e-8  # thesis 7.6
 THESIS_SECONDS = {"0+1": 150.0, "0+3": 1002.0}  # tables 7.1 and 7.2, one core
@@ -83,10 +84,8 @@ def _problem() -> Callable[[str], HarmonicBalance]:
     """The beam scene's balance for chosen harmonics; mesh and reduction are made once."""
     file = scene_file.read("beam", ())
     with TemporaryDirectory() as folder, threadpool_limits(1):
-        mesh, node_sets = pipeline.make_mesh(file, Path(folder))
-        part = pipeline.make_part(file.scene, mesh, node_sets)
-        reduced = pipeline.reduce_part(file.scene, part)
-        unworn = pipeline.make_model(file.scene, part, reduced).balance
+        model = pipeline.build(file, Path(folder), Progress())
+    reduced, unworn = model.reduced, model.balance
 
     def of(harmonics: str) -> HarmonicBalance:
         basis = HarmonicBasis(tuple(range(int(harmonics[2:]) + 1)), SAMPLES)

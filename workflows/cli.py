@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
+import shlex
 import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import cyclopts
 from cyclopts import Parameter
@@ -91,7 +93,7 @@ def run(
         try:
             result = pipeline.run(file, folder, progress, earlier)
         except KeyboardInterrupt:
-            raise KeyboardInterrupt(_kept(path, scene, folder)) from None
+            raise KeyboardInterrupt(_kept(path, scene, overrides)) from None
         except pipeline.SolveFailed as failure:
             raise pipeline.SolveFailed(f"{failure}; what was computed before is kept in {path}") from None
     _print_summary(result)
@@ -103,23 +105,23 @@ def run(
 def _earlier(path: Path, file: scene_file.SceneFile) -> Result | None:
     """The unfinished result to go on from, None where there is none yet."""
     from workflows import pipeline, store
-    from workflows.scene import Scene
 
     if not path.exists():
         return None
     result = store.load(path)
-    key = pipeline.same_problem(Scene.model_validate_json(result.provenance["scene"]), file.scene)
+    key = pipeline.same_problem(scene_file.from_json(result.provenance["scene"]), file.scene)
     if key:
         raise ValueError(f"{path} is the result of another scene, {key} differs: run its scene, or without --resume")
     return result
 
 
-def _kept(path: Path, scene: str, folder: Path) -> str:
+def _kept(path: Path, scene: str, overrides: Sequence[str]) -> str:
     from workflows import store
 
     if not path.exists():
         return "stopped before anything was computed"
-    return f"stopped, {store.load(path).state}, kept in {path}: go on with tribodyn run {scene} --out {folder} --resume"
+    words = [scene, "--out", str(path.parent), *(word for text in overrides for word in ("--set", text))]
+    return f"stopped, {store.load(path).state}, kept in {path}: go on with tribodyn run {shlex.join(words)} --resume"
 
 
 @app.command(name="list")
@@ -127,6 +129,32 @@ def list_() -> None:
     """List the scenes that come with the program."""
     for name in scene_file.names():
         print(f"{name:12} {scene_file.title(name)}")
+
+
+@app.command
+def trade(
+    scene: str,
+    *,
+    knob: Literal["wear_step"] = "wear_step",
+    overrides: Overrides = (),
+    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+) -> None:
+    """Measure what a knob costs and what it is worth, against a finer reference on the same scene.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene or a .toml file.
+    knob
+        wear_step: table 4.2 of the thesis with life added, and the error-controlled rule.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import trade as trading
+    from workflows.progress import console_progress
+
+    table = trading.wear_step(scene, console_progress().say, overrides)
+    print(json.dumps(trading.as_records(table), indent=2) if as_json else trading.as_text(table))
 
 
 @app.command
@@ -189,6 +217,54 @@ def render(result: Path, *, out: Path | None = None) -> None:
 
 
 @app.command
+def verify(
+    result: Path,
+    *,
+    at: str | None = None,
+    row: int | None = None,
+    steps: int | None = None,
+    overrides: Overrides = (),
+    out: Path | None = None,
+    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+) -> None:
+    """Check a result against direct time integration of the same model with the same contact law.
+
+    Parameters
+    ----------
+    result
+        Folder or file of a result.
+    at
+        Frequency such as 410Hz; the peak of the response, or the frequency of the row, unless told.
+    row
+        Wear row whose depth the contact has; unworn unless told.
+    steps
+        Time steps per period; 256 or 32 for each harmonic unless told.
+    out
+        Folder of the picture; beside the result unless told.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import pipeline, store, verification
+    from workflows.progress import Progress, console_progress
+
+    path = _result_file(result)
+    omega = None if at is None else 2 * math.pi * _option("--at", at, "Hz")
+    progress = Progress() if as_json else console_progress()
+    found = verification.compare(store.load(path), omega, row, overrides, steps, progress)
+    folder = out or path.parent / "pictures"
+    folder.mkdir(parents=True, exist_ok=True)
+    picture = folder / f"verify_{found.hertz:.6g}Hz{'' if row is None else f'_row{row}'}.png"
+    verification.picture(found).savefig(picture)
+    if as_json:
+        print(json.dumps({**found.record(), "picture": str(picture)}, indent=2))
+    else:
+        _print_lines(found.lines())
+        print(picture)
+    if found.found.outcome != "converged":
+        raise pipeline.SolveFailed(f"the time integration found no periodic motion: {found.found.outcome}")
+
+
+@app.command
 def plan(scene: str, *, overrides: Overrides = ()) -> None:
     """Say what a scene will model, and what it will cost, before running it.
 
@@ -199,8 +275,16 @@ def plan(scene: str, *, overrides: Overrides = ()) -> None:
     """
     from workflows import planning
 
-    for name, value in planning.plan(scene_file.read(scene, overrides)).lines():
-        print(f"{name:14} {value}")
+    _print_lines(planning.plan(scene_file.read(scene, overrides)).lines())
+
+
+def _option(name: str, text: str, unit: str) -> float:
+    from workflows.units import to_si
+
+    try:
+        return to_si(text, unit)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
 
 
 def _result_file(path: Path) -> Path:
@@ -210,16 +294,19 @@ def _result_file(path: Path) -> Path:
 def _print_summary(result: Result) -> None:
     from workflows import summary
 
-    for name, value in summary.lines(result):
+    _print_lines(summary.lines(result))
+
+
+def _print_lines(lines: list[tuple[str, str]]) -> None:
+    for name, value in lines:
         print(f"{name:14} {value}")
 
 
 def _draw(result: Result, folder: Path) -> None:
     """Draw what the scene of a result wants drawn; curves come first, they need no system libraries."""
     from workflows import plots
-    from workflows.scene import Scene
 
-    wanted = Scene.model_validate_json(result.provenance["scene"]).pictures
+    wanted = scene_file.from_json(result.provenance["scene"]).pictures
     folder.mkdir(parents=True, exist_ok=True)
     written = plots.draw(result, folder) if wanted.plots else []
     if wanted.renders:

@@ -22,28 +22,34 @@ PACKAGES = ("tribodyn", "numpy", "scipy", "numba", "scikit-fem", "gmsh", "meshio
 SEED = 0  # of every random start vector and probe in the packages used
 
 
-def described(file: SceneFile, part: Part, balance: HarmonicBalance) -> Result:
-    """The result before anything was solved: where it comes from and what is modelled."""
-    reduced = balance.model
-    nodes = cKDTree(part.points).query(reduced.interface.points)[1]
-    i = reduced.interface
+def described(file: SceneFile, part: Part | None, balance: HarmonicBalance) -> Result:
+    """The result before anything was solved: where it comes from and what is modelled; part None for matrices."""
+    reduced, i = balance.model, balance.model.interface
+    nodes = np.full(i.n_pair, -1) if part is None else cKDTree(part.points).query(i.points)[1]
     patch = Patch(i.components, nodes, i.points, i.frames, i.area, i.gap, i.faces, free_deflection(balance))
     facts: dict[str, str | int | float | np.ndarray] = {
-        "elements": int(part.mesh.nelements),
-        "nodes": len(part.points),
-        "full_dofs": part.system.n_dof,
+        "full_dofs": int(str(reduced.info["n_full"])),
         "model_dofs": reduced.system.n_dof,
-        "retained_modes": int(str(reduced.info["n_modes"])),
-        "first_omitted_hz": float(str(reduced.info["first_omitted_frequency"])),
         "free_hz": np.asarray(reduced.info["free_frequency"]),
         "contact_pairs": i.n_pair,
         "unknowns": balance.n_unknown,
         "delta_max_m": float(patch.free_deflection.max()),
-        "scaled_jacobian": mesh_reader.quality(part.mesh).scaled_jacobian,
-        "factorisation": str(reduced.info["factorisation"]),
         "compliance_error": balance.compliance.error,
     }
-    return Result(provenance(file), facts, "model built", patch=patch, part=part_mesh(part))
+    if part is not None:
+        facts |= {
+            "elements": int(part.mesh.nelements),
+            "nodes": len(part.points),
+            "scaled_jacobian": mesh_reader.quality(part.mesh).scaled_jacobian,
+        }
+    if "factorisation" in reduced.info:  # reduced here, not as the matrices came
+        facts |= {
+            "retained_modes": int(str(reduced.info["n_modes"])),
+            "first_omitted_hz": float(str(reduced.info["first_omitted_frequency"])),
+            "factorisation": str(reduced.info["factorisation"]),
+        }
+    mesh = None if part is None else part_mesh(part)
+    return Result(provenance(file), facts, "model built", patch=patch, part=mesh)
 
 
 def provenance(file: SceneFile) -> dict[str, str]:
@@ -52,6 +58,7 @@ def provenance(file: SceneFile) -> dict[str, str]:
         "scene_name": file.name,
         "scene_text": file.text,
         "overrides": "\n".join(file.overrides),
+        "folder": str(file.folder),
         "scene": file.scene.model_dump_json(),
         "versions": ", ".join(f"{name} {package_version(name)}" for name in PACKAGES),
         "python": platform.python_version(),

@@ -7,6 +7,7 @@ import numpy as np
 from fem.part import Part
 from hbm import aft
 from hbm.balance import HarmonicBalance
+from hbm.recovery import full_displacement
 from hbm.wear_history import WearRow
 from workflows.result import Fields, Loops
 
@@ -16,34 +17,9 @@ def displacement_fields(balance: HarmonicBalance, part: Part, rows: list[WearRow
 
     balance : the unworn problem under the load that the rows come from; numbers : (n_field,) rows to take
     """
-    found = [part.field(balance.model.reconstruct(coordinates(balance, rows[i]))) for i in numbers]
+    chosen = [rows[i] for i in numbers]
+    found = [part.field(full_displacement(balance, row.displacement, row.force, row.omega)) for row in chosen]
     return Fields(np.asarray(numbers), np.stack(found))
-
-
-def coordinates(balance: HarmonicBalance, row: WearRow) -> np.ndarray:
-    """Coordinates of the reduced model (n, n_coeff) [m], from the contact displacement and force of a row.
-
-    Solves D_h q_h = F_h + B^T (k x - f), where the contact springs k, stuck and closed, are part of D_h so that a
-    structure held by its contact alone is no exception.
-    """
-    basis, excitation = balance.basis, balance.excitation
-    k = balance.parameters.stiffness.ravel()
-    g = basis.to_complex(k[:, None] * row.displacement - row.force)
-    if excitation.base is not None:
-        g = g + basis.to_complex(k[:, None] * excitation.base)
-    amplitudes = []
-    for position, h in enumerate(basis.harmonics):
-        system, B = balance.model.at_harmonic(h)
-        s = 1j * h * row.omega
-        dynamic = system.stiffness + B.conj().T @ (k[:, None] * B) + s**2 * system.mass
-        if system.damping is not None:
-            dynamic = dynamic + s * system.damping
-        force = B.conj().T @ g[:, position]
-        for (order, name), value in excitation.loads.items():
-            if order == h:
-                force = force + value * (balance.load_factor if h else 1.0) * system.loads[name]
-        amplitudes.append(np.linalg.solve(dynamic, force))
-    return basis.to_real(np.stack(amplitudes, axis=-1))
 
 
 def hysteresis_loops(balance: HarmonicBalance, rows: list[WearRow], numbers: np.ndarray) -> Loops:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,12 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 import fem.part
-from fem.constraints import Clamp
-from fem.loads import NodalForce
+from fem.constraints import Clamp, NoMeanRotation
+from fem.interface import COMPONENTS
+from fem.loads import Load, NodalForce, Pressure
 from fem.material import Material
 from fem.part import Part
+from fem.springs import Spring
 from geometry import mesh as mesh_reader
 from geometry import parts
 from hbm import continuation, error_controlled_rule, law, thesis_rule, wear_law
@@ -29,14 +31,17 @@ from hbm.operating_point import AtFrequency, AtPeak, BesidePeak
 from hbm.wear_history import WearRow, history
 from reduction.craig_bampton import craig_bampton
 from reduction.damping import modal_damping, rayleigh
+from reduction.held import hold
+from reduction.linear import stuck_stiffness
 from reduction.model import ReducedModel
-from workflows import store
+from workflows import matrix_model, store
 from workflows.description import described
 from workflows.fields import displacement_fields, hysteresis_loops
+from workflows.matrix_scene import MatrixScene
 from workflows.progress import Progress
 from workflows.references import linear_references
 from workflows.result import Patch, Result
-from workflows.scene import Damping, HarmonicLoad, Place, Scene, StaticLoad
+from workflows.scene import PartScene, Place, Scene, StaticLoad, unknown_key
 from workflows.scene_file import SceneFile
 
 OUTPUT = "response"
@@ -48,9 +53,9 @@ class SolveFailed(RuntimeError):
 
 @dataclass(frozen=True)
 class Model:
-    """The nonlinear problem of a scene with what it was made from."""
+    """The nonlinear problem of a scene with what it was made from; no part where it came as matrices."""
 
-    part: Part
+    part: Part | None
     reduced: ReducedModel
     balance: HarmonicBalance
 
@@ -65,15 +70,8 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
     check_names(scene)
     keep = Keeper(folder / "result.h5", clock)
     with threadpool_limits(scene.solver.threads):
-        with progress.stage("mesh"):
-            mesh, node_sets = make_mesh(file, folder)
-        with progress.stage("mass and stiffness"):
-            part = make_part(scene, mesh, node_sets)
-        with progress.stage("reduction"):
-            reduced = reduce_part(scene, part)
-        with progress.stage("contact compliance"):
-            model = make_model(scene, part, reduced)
-        result = earlier or described(file, part, model.balance)
+        model = build(file, folder, progress)
+        result = earlier or described(file, model.part, model.balance)
         if wears(scene) and result.patch is not None:
             step_limit(scene, result.patch)  # raises before anything long is begun
         previous = None if earlier else store.set_aside(keep.path)
@@ -95,6 +93,24 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
         return keep(replace(result, state=state))
 
 
+def build(file: SceneFile, folder: Path, progress: Progress) -> Model:
+    """The nonlinear problem of a scene, stage by stage; a mesh that is made is kept in `folder`."""
+    scene = file.scene
+    if isinstance(scene, MatrixScene):
+        with progress.stage("matrices"):
+            reduced = damped(scene, matrix_model.make(scene, file.folder))
+        with progress.stage("contact compliance"):
+            return make_model(scene, None, reduced)
+    with progress.stage("mesh"):
+        mesh, node_sets = make_mesh(file, folder)
+    with progress.stage("mass and stiffness"):
+        part = make_part(file.part_scene, mesh, node_sets)
+    with progress.stage("reduction"):
+        reduced = reduce_part(file.part_scene, part)
+    with progress.stage("contact compliance"):
+        return make_model(scene, part, reduced)
+
+
 def wears(scene: Scene) -> bool:
     """Whether a scene asks for wear steps."""
     return scene.wear is not None and scene.wear.max_steps > 0
@@ -112,14 +128,14 @@ def is_complete(result: Result, scene: Scene) -> bool:
 def check_names(scene: Scene) -> None:
     """Raise ValueError where a scene names a law or a method that does not exist, before anything is built."""
     law.check_components(law.load(scene.contact.law), scene.contact.components)
-    continuation.load(scene.response.method)
+    response_options(scene)
     if scene.wear is not None:
         wear_law.load(scene.wear.law)
 
 
 def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]]:
     """The mesh with its node sets: read from the scene's file, or built from the part and kept in `folder`."""
-    geometry = file.scene.geometry
+    geometry = file.part_scene.geometry
     if geometry.mesh is not None:
         return mesh_reader.read(file.folder / geometry.mesh)
     assert geometry.part is not None
@@ -128,69 +144,144 @@ def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]
     return mesh_reader.read(path)
 
 
-def make_part(scene: Scene, mesh: Any, node_sets: dict[str, np.ndarray]) -> Part:
-    """Mass, stiffness, loads, output and contact of the mesh, held where the scene says."""
+def make_part(scene: PartScene, mesh: Any, node_sets: dict[str, np.ndarray]) -> Part:
+    """Mass, stiffness, loads, outputs and contact of the mesh, held where the scene says."""
     contact, response = scene.contact, scene.response
-    loads: dict[str, StaticLoad | HarmonicLoad] = {**scene.loads.static, **scene.loads.harmonic}
     return fem.part.build(
         mesh,
         node_sets,
         Material(scene.material.young, scene.material.poisson, scene.material.density),
-        [Clamp(group) for group in scene.geometry.fixed],
+        clamps(scene),
         [
             fem.part.Contact(
-                contact.group, contact.t1, contact.opposite, contact.components, contact.gap, contact.vertices_only
+                face, contact.t1, contact.opposite, contact.components, contact.gap, contact.vertices_only,
+                contact.plane, contact.inclination,
             )
+            for face in contact.groups
         ],
-        {name: NodalForce(load.group, load.direction) for name, load in loads.items()},
-        {OUTPUT: NodalForce(response.group, response.direction)},
-    )
+        {name: make_load(load) for name, load in {**scene.loads.static, **scene.loads.harmonic}.items()},
+        {
+            name: NodalForce(output.group, output.direction)
+            for name, output in {OUTPUT: response, **response.others}.items()
+        },
+        springs=springs(scene),
+        held=[] if scene.geometry.no_turning is None else [NoMeanRotation(scene.geometry.no_turning)],
+    )  # fmt: skip
 
 
-def reduce_part(scene: Scene, part: Part) -> ReducedModel:
+def clamps(scene: PartScene) -> list[Clamp]:
+    """What holds the part, whole groups or along some axes."""
+    geometry = scene.geometry
+    return [*(Clamp(group) for group in geometry.fixed), *(Clamp(*item) for item in geometry.fixed_axes.items())]
+
+
+def springs(scene: PartScene) -> list[Spring]:
+    """Joints that give way."""
+    return [Spring(s.group, s.direction, s.stiffness, s.opposite) for s in scene.springs.values()]
+
+
+def make_load(load: StaticLoad) -> Load:
+    """A force at the nodes of a group, or a pressure on a face."""
+    return Pressure(load.group) if load.direction is None else NodalForce(load.group, load.direction)
+
+
+def reduce_part(scene: PartScene, part: Part) -> ReducedModel:
     """The part on its contact and load nodes and a few modes, with the scene's damping."""
     reduced = craig_bampton(part.system, part.interface, scene.reduction.modes, scene.reduction.cutoff)
-    return reduced.with_damping(damping_matrix(scene.damping, reduced))
+    return damped(scene, hold(reduced, part.held))
 
 
-def damping_matrix(damping: Damping, reduced: ReducedModel) -> np.ndarray | None:
+def damped(scene: Scene, reduced: ReducedModel) -> ReducedModel:
+    """The model with the scene's damping; raises ValueError where its files hold another one."""
+    damping = damping_matrix(scene, reduced)
+    if reduced.system.damping is None:
+        return reduced.with_damping(damping)
+    if damping is not None:
+        raise ValueError("the files of the model hold a damping matrix: leave [damping] out, or the matrix")
+    return reduced
+
+
+def damping_matrix(scene: Scene, reduced: ReducedModel) -> np.ndarray | None:
     """Damping matrix (n, n) [N s/m] of the reduced model, None where the scene has no damping."""
+    damping, system = scene.damping, reduced.system
     if damping.modal is not None:
-        return modal_damping(reduced.system, damping.modal)
+        if damping.state == "stuck":
+            K = stuck_stiffness(system.stiffness, reduced.interface.B, contact_stiffness(scene, reduced))
+            system = replace(system, stiffness=K)
+        return modal_damping(system, damping.modal)
     if damping.mass is not None or damping.stiffness is not None:
-        return rayleigh(reduced.system, damping.mass or 0.0, damping.stiffness or 0.0)
+        return rayleigh(system, damping.mass or 0.0, damping.stiffness or 0.0)
     return None
 
 
-def make_model(scene: Scene, part: Part, reduced: ReducedModel) -> Model:
+def contact_stiffness(scene: Scene, reduced: ReducedModel) -> np.ndarray:
+    """Contact springs (n_pair, n_component) [N/m]."""
+    return reduced.interface.stiffness(scene.contact.tangential_stiffness or 0.0, scene.contact.normal_stiffness or 0.0)
+
+
+def make_model(scene: Scene, part: Part | None, reduced: ReducedModel) -> Model:
     """The harmonic balance of the scene."""
     contact = scene.contact
-    stiffness = reduced.interface.stiffness(contact.tangential_stiffness, contact.normal_stiffness)
     parameters = law.ContactParameters.of(
-        contact.components, stiffness, friction=contact.friction, gap=reduced.interface.gap
+        contact.components,
+        contact_stiffness(scene, reduced),
+        friction=contact.friction or 0.0,
+        gap=reduced.interface.gap,
     )
-    basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples)
-    balance = HarmonicBalance(reduced, contact.law, parameters, basis, excite(scene), response_range(scene)[1])
-    return Model(part, reduced, balance)
+    basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples, scene.harmonics.transitions)
+    base = ground_motion(scene, part, basis) if isinstance(scene, PartScene) and part is not None else None
+    excitation, omega_max = excite(scene, base), response_range(scene)[1]
+    return Model(part, reduced, HarmonicBalance(reduced, contact.law, parameters, basis, excitation, omega_max))
 
 
-def excite(scene: Scene) -> Excitation:
-    """The loads of the scene: F cos(h w t + phase) is the complex amplitude F exp(i phase)."""
-    loads: dict[tuple[int, str], complex] = {(0, name): load.value for name, load in scene.loads.static.items()}
+def excite(scene: Scene, base: np.ndarray | None) -> Excitation:
+    """The loads of the scene, F cos(h w t + phase) as amplitude F exp(i phase), and the motion of the ground."""
+    loads: dict[tuple[int, str], complex] = {(0, name): load.amplitude for name, load in scene.loads.static.items()}
     for name, load in scene.loads.harmonic.items():
-        loads[load.harmonic, name] = load.value * np.exp(1j * load.phase)
-    return Excitation(loads)
+        loads[load.harmonic, name] = load.amplitude * np.exp(1j * load.phase)
+    return Excitation(loads, base)
+
+
+def ground_motion(scene: PartScene, part: Part, basis: HarmonicBasis) -> np.ndarray | None:
+    """Motion of the ground (n_pair * n_component, n_coeff) [m] along the contact components, None where it rests.
+
+    Raises  ValueError where a face has no contact or a harmonic is not kept
+    """
+    if not scene.motion:
+        return None
+    i = part.interface
+    amplitudes = np.zeros((i.n_pair, len(i.components), len(basis.harmonics)), complex)
+    for face, motion in scene.motion.items():
+        if face not in part.pairs:
+            raise ValueError(f'motion.{face}: "{face}" is no contact face, the contact has {", ".join(part.pairs)}')
+        rows = i.frames[part.pairs[face]][:, [COMPONENTS.index(c) for c in i.components]]
+        for h, value in ((0, motion.static), (1, motion.harmonic * np.exp(1j * motion.phase))):
+            if value != 0 and h not in basis.harmonics:
+                raise ValueError(f"motion.{face} moves in harmonic {h}: keep it in harmonics.kept")
+            if h in basis.harmonics:
+                amplitudes[part.pairs[face], :, basis.harmonics.index(h)] = value * (rows @ np.array(motion.direction))
+    return basis.to_real(amplitudes).reshape(-1, basis.n_coeff)
 
 
 def follow_response(scene: Scene, balance: HarmonicBalance, advance: Callable[[float, str], None]) -> Branch:
     """The response curve of the unworn contact by the scene's continuation method."""
-    method, response = continuation.load(scene.response.method), scene.response
-    options = {"n_points": response.points, "newton": newton_options(scene), **response.options}
-    try:
-        chosen = method.Options(**options)
-    except TypeError as error:
-        raise ValueError(f"response.options: method {response.method} does not take them ({error})") from None
-    return method.follow(balance, *response_range(scene), chosen, lambda done, wanted: advance(done / wanted, ""))
+    method, options = continuation.load(scene.response.method), response_options(scene)
+    return method.follow(balance, *response_range(scene), options, lambda done, wanted: advance(done / wanted, ""))
+
+
+def response_options(scene: Scene) -> Any:
+    """Options of the scene's continuation method; raises ValueError for one that it does not have."""
+    kind, given = continuation.load(scene.response.method).Options, scene.response.options
+    known = {option.name: option.type for option in fields(kind) if option.name not in ("newton", "guess", "bounds")}
+    for key, value in given.items():
+        if key not in known:
+            raise ValueError(unknown_key(f"response.options.{key}", list(known)))
+        whole = known[key] in (int, "int")
+        if type(value) not in ((int,) if whole else (int, float)):
+            expected = "a whole number" if whole else "a number"
+            raise ValueError(f"response.options.{key}: expected {expected}, got {value!r}")
+    points = {"n_points": scene.response.points} if "n_points" in known else {}
+    return kind(**{**points, "newton": newton_options(scene), **given})
 
 
 def response_range(scene: Scene) -> tuple[float, float]:
@@ -206,7 +297,7 @@ def newton_options(scene: Scene) -> NewtonOptions:
 
 def check_branch(branch: Branch | None) -> None:
     """Raise SolveFailed where a response curve did not come to its end."""
-    if branch is not None and branch.outcome[-1] != CONVERGED:
+    if branch is not None and (branch.outcome[-1] != CONVERGED or branch.end.startswith("ended at")):
         raise SolveFailed(f"the frequency response {branch.end}")
 
 
@@ -286,7 +377,7 @@ def with_pictures_of(result: Result, model: Model, duty: Duty) -> Result:
     balance = model.balance.with_load(duty.load)
     return replace(
         result,
-        fields=displacement_fields(balance, model.part, rows, numbers),
+        fields=None if model.part is None else displacement_fields(balance, model.part, rows, numbers),
         loops=hysteresis_loops(balance, rows, numbers),
     )
 

@@ -12,11 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from fem.constraints import Clamp, free_dofs, named
+from fem.constraints import free_dofs, named
 from hbm.harmonics import HarmonicBasis
 from reduction.craig_bampton import POINT_LOAD
-from workflows.pipeline import check_names, make_mesh
-from workflows.scene import Scene
+from workflows import matrix_model
+from workflows.matrix_scene import MatrixScene
+from workflows.pipeline import check_names, clamps, make_mesh
+from workflows.scene import PartScene, Scene
 from workflows.scene_file import SceneFile
 
 FACTOR_BYTES = 15e3  # of a sparse Cholesky factor, for each DOF
@@ -56,7 +58,7 @@ class Plan:
         steps = "as many as it takes" if self.wear_steps is None else f"about {self.wear_steps}"
         response, wear = (_time(count * self.solve_seconds) for count in (self.response_solves, self.wear_solves))
         return [
-            ("mesh", f"{self.elements} elements, {self.nodes} nodes"),
+            ("mesh", f"{self.elements} elements, {self.nodes} nodes" if self.elements else "none: matrices"),
             ("full model", f"{self.full_dofs} DOFs"),
             ("contact", f"{self.contact_pairs} node pairs"),
             ("reduced model", f"{self.model_dofs} DOFs"),
@@ -73,33 +75,40 @@ def plan(file: SceneFile) -> Plan:
     """Plan a scene; raises ValueError for what the run would refuse after reading the mesh."""
     scene = file.scene
     check_names(scene)
-    with tempfile.TemporaryDirectory() as folder:
-        mesh, node_sets = make_mesh(file, Path(folder))
-    nodes = mesh.doflocs.shape[1]
-    free = free_dofs(3 * nodes, [Clamp(group) for group in scene.geometry.fixed], node_sets)
-    pairs, masters = _contact(scene, mesh, node_sets, free)
-    basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples)
+    elements = nodes = 0
+    if isinstance(scene, MatrixScene):
+        reduced = matrix_model.make(scene, file.folder)
+        full, pairs, masters = int(str(reduced.info["n_full"])), reduced.interface.n_pair, reduced.system.n_dof
+        modes: int | None = 0
+    else:
+        with tempfile.TemporaryDirectory() as folder:
+            mesh, node_sets = make_mesh(file, Path(folder))
+        elements, nodes = int(mesh.nelements), mesh.doflocs.shape[1]
+        free = free_dofs(3 * nodes, clamps(file.part_scene), node_sets)
+        full = len(free)
+        pairs, masters = _contact(file.part_scene, mesh, node_sets, free)
+        modes, cutoff = file.part_scene.reduction.modes, file.part_scene.reduction.cutoff
+    basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples, scene.harmonics.transitions)
     contact = pairs * len(scene.contact.components)
-    modes = scene.reduction.modes
     model = masters + (modes if modes is not None else 50)
     memory = (
         200e6  # the program itself
-        + FACTOR_BYTES * len(free)
-        + 3 * 8.0 * len(free) * model
+        + FACTOR_BYTES * full
+        + 3 * 8.0 * full * model
         + 10 * 8.0 * model**2
         + 8 * 8.0 * contact**2
         + 4 * 8.0 * pairs * (len(scene.contact.components) * basis.n_coeff) ** 2
     )
     reduction = (
-        FACTOR_SECONDS * len(free) ** 1.5 + BACK_SUBSTITUTION_SECONDS * len(free) * model + 4 * DENSE_SECONDS * model**3
+        FACTOR_SECONDS * full**1.5 + BACK_SUBSTITUTION_SECONDS * full * model + 4 * DENSE_SECONDS * model**3
     )
     steps, solves = _wear(scene)
     return Plan(
-        elements=int(mesh.nelements),
+        elements=elements,
         nodes=nodes,
-        full_dofs=len(free),
+        full_dofs=full,
         contact_pairs=pairs,
-        model_dofs=str(model) if modes is not None else f"{masters} and the modes up to {scene.reduction.cutoff:g} Hz",
+        model_dofs=str(model) if modes is not None else f"{masters} and the modes up to {cutoff:g} Hz",
         unknowns=contact * basis.n_coeff,
         memory=memory,
         reduction_seconds=1.0 + reduction,
@@ -110,20 +119,25 @@ def plan(file: SceneFile) -> Plan:
     )
 
 
-def _contact(scene: Scene, mesh: object, node_sets: dict[str, np.ndarray], free: np.ndarray) -> tuple[int, int]:
+def _contact(scene: PartScene, mesh: object, node_sets: dict[str, np.ndarray], free: np.ndarray) -> tuple[int, int]:
     """Number of node pairs, and of master DOFs that the contact, point loads and the output make."""
-    faces = [scene.contact.group, *([] if scene.contact.opposite is None else [scene.contact.opposite])]
-    points = [(load.group, load.direction) for load in scene.loads.static.values()]
-    points += [(load.group, load.direction) for load in scene.loads.harmonic.values()]
-    points += [(scene.response.group, scene.response.direction)]
+    contact = scene.contact
+    faces = [*contact.groups, *([] if contact.opposite is None else [contact.opposite])]
+    loads = [*scene.loads.static.values(), *scene.loads.harmonic.values()]
+    points = [(load.group, load.direction) for load in loads if load.direction is not None]
+    points += [(output.group, output.direction) for output in (scene.response, *scene.response.others.values())]
     nodes = [named(node_sets, name, "face") for name in faces]
     corners = np.arange(int(mesh.nvertices))  # type: ignore[attr-defined]
-    if scene.contact.vertices_only:
+    if contact.vertices_only:
         nodes = [np.intersect1d(side, corners) for side in nodes]
-    masters = [(side[:, None] * 3 + np.arange(3)).ravel() for side in nodes]
+    axes = np.arange(3)
+    if contact.plane is not None and contact.components == ("n",):
+        axes = np.flatnonzero(contact.plane)
+    masters = [(side[:, None] * 3 + axes).ravel() for side in nodes]
     touched = [(named(node_sets, group)[:, None] * 3 + np.flatnonzero(axis)).ravel() for group, axis in points]
     masters += [dofs for dofs in touched if len(dofs) <= POINT_LOAD]
-    return len(nodes[0]), len(np.intersect1d(np.concatenate(masters), free))
+    pairs = sum(len(side) for side in nodes[: len(contact.groups)])
+    return pairs, len(np.intersect1d(np.concatenate(masters), free))
 
 
 def _wear(scene: Scene) -> tuple[int | None, int]:

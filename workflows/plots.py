@@ -12,9 +12,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hbm.branch import CONVERGED
+from hbm.wear_history import WearHistory
 from workflows import maps
 from workflows.result import Result
 from workflows.style import BLUE, GREEN, GREY, INK, ORANGE, RED, STYLE, WEAR_MAP
+
+FAINT = 1e-3  # share of the first preload below which a touch is faint
 
 
 def draw(result: Result, folder: Path) -> list[Path]:
@@ -27,7 +30,7 @@ def draw(result: Result, folder: Path) -> list[Path]:
         ("depth", depth_against_cycles, result.wear_steps > 0),
         ("energy", energy_against_cycles, result.wear_steps > 0),
         ("hysteresis", hysteresis_loops, result.loops is not None),
-        ("patch", maps.patch_maps, result.wear_steps > 0),
+        ("patch", maps.patch_maps, result.wear_steps > 0 and result.patch is not None and len(result.patch.faces) > 0),
     ]
     written = []
     for name, function, possible in figures:
@@ -41,8 +44,8 @@ def draw(result: Result, folder: Path) -> list[Path]:
 
 def frequency_response(result: Result) -> Figure:
     """Unworn response between its free and stuck references, and the path of the peak under wear."""
-    with _axes(7.2, 4.6) as (figure, axes):
-        unit, scale = _length(_largest_amplitude(result))
+    with axes_of(7.2, 4.6) as (figure, axes):
+        unit, scale = length_unit(_largest_amplitude(result))
         if result.references is not None:
             hertz = result.references.omega / (2 * np.pi)
             axes.plot(hertz, scale * result.references.free, "--", color=GREY, label="free (contact absent)")
@@ -54,11 +57,11 @@ def frequency_response(result: Result) -> Figure:
         if result.wear is not None and result.wear_steps:
             wear = result.wear
             hertz = wear.omega / (2 * np.pi)
-            unit_cycles, scale_cycles = _cycles(wear.cycles[-1])
+            unit_cycles, scale_cycles = _cycles(shown_cycles(wear))
             axes.plot(hertz, scale * wear.amplitude, color=ORANGE, lw=1.0, zorder=3)
             dots = axes.scatter(
                 hertz, scale * wear.amplitude, 16, scale_cycles * wear.cycles, cmap=WEAR_MAP, zorder=4,
-                label="cycle at each wear step",
+                vmax=scale_cycles * shown_cycles(wear), label="cycle at each wear step",
             )  # fmt: skip
             figure.colorbar(dots, ax=axes, label=f"vibration cycles{unit_cycles}", pad=0.02)
         axes.set(yscale="log", xlabel="frequency / Hz", ylabel=f"amplitude / {unit}", title="Frequency response")
@@ -69,7 +72,7 @@ def frequency_response(result: Result) -> Figure:
 def cycles_per_step(result: Result) -> Figure:
     """Cycles that each wear step stands for."""
     wear = _wear(result)
-    with _axes() as (figure, axes):
+    with axes_of() as (figure, axes):
         count = wear.cycles_in_step[: result.wear_steps]
         unit, scale = _cycles(count.max())
         axes.step(np.arange(1, len(count) + 1), scale * count, where="mid", color=BLUE)
@@ -84,24 +87,24 @@ def cycles_per_step(result: Result) -> Figure:
 def amplitude_against_cycles(result: Result) -> Figure:
     """Amplitude and frequency of the cycle that wears, against cycles."""
     wear = _wear(result)
-    with _axes(7.2, 5.6, rows=2) as (figure, (upper, lower)):
-        unit_cycles, scale_cycles = _cycles(wear.cycles[-1])
-        unit, scale = _length(wear.amplitude.max())
+    with axes_of(7.2, 5.6, rows=2) as (figure, (upper, lower)):
+        scale_cycles = _cycle_axis(lower, wear)
+        unit, scale = length_unit(wear.amplitude.max())
         upper.plot(scale_cycles * wear.cycles, scale * wear.amplitude, ".-", color=BLUE, ms=4)
         upper.set(ylabel=f"amplitude / {unit}", title="Response under wear")
         lower.plot(scale_cycles * wear.cycles, wear.omega / (2 * np.pi), ".-", color=ORANGE, ms=4)
-        lower.set(ylabel="frequency / Hz", xlabel=f"vibration cycles{unit_cycles}")
+        lower.set(ylabel="frequency / Hz")
     return figure
 
 
 def preload_against_cycles(result: Result) -> Figure:
     """Static normal force of the contact against cycles."""
     wear = _wear(result)
-    with _axes() as (figure, axes):
-        unit_cycles, scale_cycles = _cycles(wear.cycles[-1])
+    with axes_of() as (figure, axes):
+        scale_cycles = _cycle_axis(axes, wear)
         unit, scale = ("kN", 1e-3) if wear.preload.max() >= 1e3 else ("N", 1.0)
         axes.plot(scale_cycles * wear.cycles, scale * wear.preload, ".-", color=BLUE, ms=4)
-        axes.set(xlabel=f"vibration cycles{unit_cycles}", ylabel=f"preload / {unit}", title="Contact preload")
+        axes.set(ylabel=f"preload / {unit}", title="Contact preload")
         axes.set_ylim(bottom=0)
     return figure
 
@@ -110,16 +113,16 @@ def depth_against_cycles(result: Result) -> Figure:
     """Largest, mean and smallest wear depth of the patch against cycles."""
     wear, patch = _wear(result), result.patch
     assert patch is not None
-    with _axes() as (figure, axes):
-        unit_cycles, scale_cycles = _cycles(wear.cycles[-1])
-        unit, scale = _length(wear.depth.max())
+    with axes_of() as (figure, axes):
+        scale_cycles = _cycle_axis(axes, wear)
+        unit, scale = length_unit(wear.depth.max())
         x = scale_cycles * wear.cycles
         mean = wear.depth @ patch.area / patch.area.sum()
         axes.fill_between(x, scale * wear.depth.min(1), scale * wear.depth.max(1), color=BLUE, alpha=0.18, lw=0)
         axes.plot(x, scale * wear.depth.max(1), color=RED, label="largest")
         axes.plot(x, scale * mean, color=BLUE, label="mean over the area")
         axes.plot(x, scale * wear.depth.min(1), color=GREEN, label="smallest")
-        axes.set(xlabel=f"vibration cycles{unit_cycles}", ylabel=f"total wear depth / {unit}", title="Wear depth")
+        axes.set(ylabel=f"total wear depth / {unit}", title="Wear depth")
         axes.legend(loc="best", fontsize=9)
     return figure
 
@@ -128,10 +131,10 @@ def energy_against_cycles(result: Result) -> Figure:
     """Energy per cycle against cycles, and worn volume against accumulated energy."""
     wear, patch = _wear(result), result.patch
     assert patch is not None
-    with _axes(7.2, 5.6, rows=2, share=False) as (figure, (upper, lower)):
-        unit_cycles, scale_cycles = _cycles(wear.cycles[-1])
+    with axes_of(7.2, 5.6, rows=2, share=False) as (figure, (upper, lower)):
+        scale_cycles = _cycle_axis(upper, wear)
         upper.plot(scale_cycles * wear.cycles, wear.energy.sum(1), ".-", color=BLUE, ms=4)
-        upper.set(xlabel=f"vibration cycles{unit_cycles}", ylabel="energy per cycle / J", title="Dissipated energy")
+        upper.set(ylabel="energy per cycle / J", title="Dissipated energy")
         spent = np.concatenate([[0.0], np.cumsum(wear.work.sum(1))[:-1]])
         lower.plot(spent * 1e-6, 1e9 * wear.depth @ patch.area, ".-", color=ORANGE, ms=4)
         lower.set(xlabel="accumulated energy / MJ", ylabel="worn volume / mm³")
@@ -156,7 +159,7 @@ def hysteresis_loops(result: Result) -> Figure:
                 axes = grid[line, column]
                 x, force = loops.displacement[column, pair, component], loops.force[column, pair, component]
                 x = x - (x.max() + x.min()) / 2  # the static offset says nothing about the loop
-                (unit_x, scale_x), (unit_f, scale_f) = _length(x.max()), _force(np.abs(force).max())
+                (unit_x, scale_x), (unit_f, scale_f) = length_unit(x.max()), force_unit(np.abs(force).max())
                 axes.plot(scale_x * np.append(x, x[0]), scale_f * np.append(force, force[0]), color=BLUE)
                 axes.set_xlabel(f"{patch.components[component]} / {unit_x}", fontsize=9)
                 axes.set_ylabel(f"pair {pair}: force / {unit_f}", fontsize=9)
@@ -166,15 +169,38 @@ def hysteresis_loops(result: Result) -> Figure:
 
 
 @contextmanager
-def _axes(width: float = 7.2, height: float = 4.2, rows: int = 1, share: bool = True) -> Iterator[tuple[Figure, Any]]:
+def axes_of(
+    width: float = 7.2, height: float = 4.2, rows: int = 1, share: bool = True, columns: int = 1
+) -> Iterator[tuple[Figure, Any]]:
+    """A figure in the common style with its axes: one, or an array where there are several rows or columns."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(width, height), layout="constrained")
-        yield figure, figure.subplots(rows, 1, sharex=share)
+        yield figure, figure.subplots(rows, columns, sharex=share and columns == 1)
 
 
-def _wear(result: Result) -> Any:
+def _wear(result: Result) -> WearHistory:
     assert result.wear is not None
     return result.wear
+
+
+def shown_cycles(wear: WearHistory) -> float:
+    """Cycles up to which curves are drawn: all, unless a last faint touch takes more than half of them."""
+    last = float(wear.cycles[-1])
+    faint = np.flatnonzero(wear.preload < FAINT * wear.preload[0])
+    if len(faint) and 0 < wear.cycles[faint[0]] < 0.5 * last:
+        return 1.15 * float(wear.cycles[faint[0]])
+    return last
+
+
+def _cycle_axis(axes: Any, wear: WearHistory) -> float:
+    """Label the axis of cycles, and say where the run ends if that is not drawn; returns the factor of the axis."""
+    shown, last = shown_cycles(wear), float(wear.cycles[-1])
+    unit, scale = _cycles(shown)
+    if shown < last:
+        axes.set_xlim(-0.03 * scale * shown, scale * shown)
+    end = f" (the last touch ends at {scale * last:.3g})" if shown < last else ""
+    axes.set_xlabel(f"vibration cycles{unit}{end}")
+    return scale
 
 
 def _largest_amplitude(result: Result) -> float:
@@ -186,14 +212,15 @@ def _largest_amplitude(result: Result) -> float:
     return max(found)
 
 
-def _length(largest: float) -> tuple[str, float]:
+def length_unit(largest: float) -> tuple[str, float]:
     """Unit and factor in which lengths [m] of this size read well."""
     if largest >= 0.5e-3:
         return "mm", 1e3
     return ("nm", 1e9) if 0 < largest < 0.5e-6 else ("µm", 1e6)
 
 
-def _force(largest: float) -> tuple[str, float]:
+def force_unit(largest: float) -> tuple[str, float]:
+    """Unit and factor in which forces [N] of this size read well."""
     if largest >= 1e3:
         return "kN", 1e-3
     return ("mN", 1e3) if 0 < largest < 1 else ("N", 1.0)

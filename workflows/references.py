@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as sla
 
-from fem.system import SecondOrderSystem
 from hbm.balance import HarmonicBalance
 from hbm.branch import amplitude
 from reduction.linear import stuck_stiffness
@@ -21,34 +20,35 @@ def linear_references(balance: HarmonicBalance, output: str, start: float, stop:
     The free amplitude is nan where the part is loose without its contact.
     """
     omega = np.linspace(start, stop, POINTS)
-    system, interface = balance.model.system, balance.model.interface
-    stuck = stuck_stiffness(system.stiffness, interface.B, balance.parameters.stiffness)
-    return References(
-        omega,
-        _amplitudes(balance, system, system.stiffness, output, omega),
-        _amplitudes(balance, system, stuck, output, omega),
-    )
+    stuck = _amplitudes(balance, balance.parameters.stiffness, output, omega)
+    return References(omega, _amplitudes(balance, None, output, omega), stuck)
 
 
-def _amplitudes(
-    balance: HarmonicBalance, system: SecondOrderSystem, stiffness: np.ndarray, output: str, omega: np.ndarray
-) -> np.ndarray:
-    """Amplitude by the lowest modes and the static remainder of the others; off by (h w / w_omitted)^2 of that."""
+def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: str, omega: np.ndarray) -> np.ndarray:
+    """Amplitude by the lowest modes and the static remainder of the others; off by (h w / w_omitted)^2 of that.
+
+    springs : (n_pair, n_component) stuck contact [N/m], through which a moving body 2 pulls, or None for no contact
+    """
     basis = balance.basis
-    try:
-        factor = sla.cho_factor(stiffness)
-    except np.linalg.LinAlgError:
-        return np.full(len(omega), np.nan)
-    lam, phi = sla.eigh(stiffness, system.mass, subset_by_index=(0, min(MODES, system.n_dof) - 1))
-    damping = np.zeros((len(lam), len(lam))) if system.damping is None else phi.T @ system.damping @ phi
-    row = system.outputs[output]
+    base = None if balance.excitation.base is None else basis.to_complex(balance.excitation.base)
     amplitudes = np.zeros((len(omega), len(basis.harmonics)), complex)
     for position, h in enumerate(basis.harmonics):
+        system, B = balance.model.at_harmonic(h)
         loads = [value * system.loads[name] for (order, name), value in balance.excitation.loads.items() if order == h]
-        if not loads:
+        force = np.sum([np.zeros(system.n_dof), *loads], axis=0)
+        if springs is not None and base is not None:
+            force = force + B.conj().T @ (springs.ravel() * base[:, position])
+        if not force.any():
             continue
-        force = np.sum(loads, axis=0)
-        modal = phi.T @ force
+        stiffness = system.stiffness if springs is None else stuck_stiffness(system.stiffness, B, springs)
+        try:
+            factor = sla.cho_factor(stiffness)
+        except np.linalg.LinAlgError:
+            return np.full(len(omega), np.nan)
+        lam, phi = sla.eigh(stiffness, system.mass, subset_by_index=(0, min(MODES, system.n_dof) - 1))
+        damping = np.zeros((len(lam),) * 2) if system.damping is None else phi.conj().T @ system.damping @ phi
+        row = system.outputs[output]
+        modal = phi.conj().T @ force
         remainder = row @ sla.cho_solve(factor, force) - (row @ phi) @ (modal / lam)
         for i, s in enumerate(1j * h * omega):
             dynamic = np.diag(lam + s**2) + s * damping
@@ -59,12 +59,14 @@ def _amplitudes(
 def free_deflection(balance: HarmonicBalance) -> np.ndarray:
     """Normal approach of the pairs (n_pair,) under the static loads with body 2 absent [m].
 
-    It is nan where the part is loose without its contact, or where the normal direction or harmonic 0 is not modelled.
+    Of a cyclic part: approach of neighbours. It is nan where the part is loose without its contact, or where the normal
+    direction or harmonic 0 is not modelled.
     """
-    system, interface = balance.model.system, balance.model.interface
+    interface = balance.model.interface
     missing = np.full(interface.n_pair, np.nan)
     if "n" not in interface.components or not balance.basis.has_static:
         return missing
+    system, B = balance.model.at_harmonic(0)
     force = np.zeros(system.n_dof)
     for (harmonic, name), value in balance.excitation.loads.items():
         if harmonic == 0:
@@ -73,4 +75,4 @@ def free_deflection(balance: HarmonicBalance) -> np.ndarray:
         q = sla.cho_solve(sla.cho_factor(system.stiffness), force)
     except np.linalg.LinAlgError:
         return missing
-    return np.asarray((interface.B @ q)[interface.components.index("n") :: len(interface.components)])
+    return np.asarray((B @ q)[interface.components.index("n") :: len(interface.components)])

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 from dataclasses import asdict, fields
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, StrictInt, model_validator
@@ -29,6 +29,7 @@ def quantity(unit: str) -> BeforeValidator:
 
 Length = Annotated[float, quantity("m")]
 Force = Annotated[float, quantity("N")]
+Pressure = Annotated[float, quantity("Pa")]
 Stiffness = Annotated[float, quantity("N/m")]
 Frequency = Annotated[float, quantity("Hz")]
 Angle = Annotated[float, quantity("rad")]
@@ -62,12 +63,16 @@ class Heading(Table):
 class Geometry(Table):
     """A part of geometry/ or a mesh file, and the groups that are held fixed.
 
+    fixed_axes : groups held along some axes only, group -> letters out of "xyz"
+    no_turning : axis about which the part as a whole cannot turn
     All other keys of the table are parameters of the part; those left out have the part's own defaults.
     """
 
     part: str | None = None
     mesh: str | None = None
     fixed: tuple[str, ...] = ()
+    fixed_axes: dict[str, str] = Field(default_factory=dict)
+    no_turning: Direction | None = None
     parameters: dict[str, int | float] = Field(default_factory=dict)
 
     @model_validator(mode="before")
@@ -129,50 +134,105 @@ class Material(Table):
     poisson: Annotated[Number, Field(gt=-1, lt=0.5)]
 
 
-class Contact(Table):
-    """A face of the part against the ground or against another face of it, and the contact law of every node.
-
-    t1 is the direction that the first tangential component follows; vertices_only leaves the mid-side nodes out.
-    """
+class Spring(Table):
+    """A spring from a group to the ground, or to the matching nodes of another group, that acts in one direction."""
 
     group: str
+    direction: Direction
+    stiffness: Annotated[Stiffness, Field(ge=0)]
+    opposite: str | None = None
+
+
+class Contact(Table):
+    """The contact law of every node pair; stiffness is that of all pairs together, shared by their area."""
+
+    components: tuple[Literal["t1", "t2", "n"], ...] = ("t1", "t2", "n")
+    law: str = "jenkins"
+    tangential_stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
+    normal_stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
+    friction: Annotated[Number, Field(ge=0)] | None = None
+
+    @model_validator(mode="after")
+    def _only_what_the_components_need(self) -> Contact:
+        along, across = any(c != "n" for c in self.components), "n" in self.components
+        for name, need in (("tangential_stiffness", along), ("friction", along), ("normal_stiffness", across)):
+            if need != (getattr(self, name) is not None):
+                verb = "is missing" if need else "has no meaning"
+                raise ValueError(f"contact.{name} {verb} for the components {', '.join(self.components)}")
+        return self
+
+
+class FaceContact(Contact):
+    """Faces of the part against the ground or a face against another one.
+
+    group : one face, or a list of faces
+    t1 is the direction that the first tangential component follows; vertices_only leaves the mid-side nodes out.
+    plane : direction towards a ground that is a plane, which each face touches with its nearest node
+    inclination : of that plane about t1, by the right hand
+    """
+
+    group: str | tuple[str, ...]
     opposite: str | None = None
     t1: Direction
-    components: tuple[Literal["t1", "t2", "n"], ...] = ("t1", "t2", "n")
     vertices_only: StrictBool = False
-    law: str = "jenkins"
-    tangential_stiffness: Annotated[Stiffness, Field(gt=0)]
-    normal_stiffness: Annotated[Stiffness, Field(gt=0)]
-    friction: Annotated[Number, Field(ge=0)]
     gap: Length = 0.0
+    plane: Direction | None = None
+    inclination: Angle = 0.0
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """The faces."""
+        return (self.group,) if isinstance(self.group, str) else self.group
 
 
 class StaticLoad(Table):
-    """A force that does not change, shared equally by the nodes of a group."""
+    """A load that does not change: a force shared equally by the nodes of a group, or a pressure into a face."""
 
     group: str
-    direction: Direction
-    value: Force
+    direction: Direction | None = None
+    value: Force | None = None
+    pressure: Pressure | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> StaticLoad:
+        if (self.pressure is None) == (self.value is None) or (self.value is None) != (self.direction is None):
+            raise ValueError("expected either value and direction, for a force, or pressure alone")
+        return self
+
+    @property
+    def amplitude(self) -> float:
+        """Its size [N] or [Pa]."""
+        return self.pressure or self.value or 0.0
 
 
-class HarmonicLoad(Table):
-    """A force value * cos(harmonic * w t + phase), shared equally by the nodes of a group."""
+class HarmonicLoad(StaticLoad):
+    """A load that goes as cos(harmonic * w t + phase)."""
 
-    group: str
-    direction: Direction
-    value: Force
     phase: Angle = 0.0
     harmonic: Annotated[StrictInt, Field(ge=1)] = 1
 
 
-class Loads(Table):
+class Motion(Table):
+    """The ground of a contact face moves: static + harmonic * cos(w t + phase), along a direction."""
+
+    direction: Direction
+    static: Length = 0.0
+    harmonic: Length = 0.0
+    phase: Angle = 0.0
+
+
+Static = TypeVar("Static")
+Harmonic = TypeVar("Harmonic")
+
+
+class Loads(Table, Generic[Static, Harmonic]):
     """Named loads."""
 
-    static: dict[str, StaticLoad] = Field(default_factory=dict)
-    harmonic: dict[str, HarmonicLoad] = Field(default_factory=dict)
+    static: dict[str, Static] = Field(default_factory=dict)
+    harmonic: dict[str, Harmonic] = Field(default_factory=dict)
 
     @model_validator(mode="after")
-    def _distinct(self) -> Loads:
+    def _distinct(self) -> Loads[Static, Harmonic]:
         both = sorted(set(self.static) & set(self.harmonic))
         if both:
             raise ValueError(f'expected one load named "{both[0]}", found it under static and under harmonic')
@@ -181,14 +241,19 @@ class Loads(Table):
         return self
 
 
-class Response(Table):
-    """Which displacement is observed, and the frequency response that is computed.
-
-    references is the range in which the linear references are drawn, the same as frequency unless told.
-    """
+class Output(Table):
+    """A displacement that is observed, the mean of a group."""
 
     group: str
     direction: Direction
+
+
+class Response(Table):
+    """The frequency response that is computed.
+
+    references : the range in which the linear references are drawn, the same as frequency unless told
+    """
+
     frequency: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]]
     references: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]] | None = None
     points: Annotated[StrictInt, Field(ge=2)] = 60
@@ -201,6 +266,12 @@ class Response(Table):
             if low >= high:
                 raise ValueError(f"expected {key} = [low, high] with low below high, got {low:g} Hz and {high:g} Hz")
         return self
+
+
+class PartResponse(Response, Output):
+    """The displacement whose response is computed; others : displacements observed besides, by name."""
+
+    others: dict[str, Output] = Field(default_factory=dict)
 
 
 class Reduction(Table):
@@ -222,6 +293,7 @@ class Harmonics(Table):
 
     kept: tuple[Annotated[StrictInt, Field(ge=0)], ...] = (0, 1)
     samples: Annotated[StrictInt, Field(ge=4, le=65536)] = 128
+    transitions: Literal["sampled", "located"] = "sampled"
 
     @model_validator(mode="after")
     def _resolved(self) -> Harmonics:
@@ -235,9 +307,13 @@ class Harmonics(Table):
 
 
 class Damping(Table):
-    """Structural damping: a ratio for every mode, or Rayleigh's two coefficients."""
+    """Structural damping: a ratio for every mode, or Rayleigh's two coefficients.
+
+    state : whose modes these are, "free" without the contact or "stuck" with every pair closed
+    """
 
     modal: Annotated[Number, Field(ge=0, lt=1)] | None = None
+    state: Literal["free", "stuck"] = "free"
     mass: Annotated[float, quantity("1/s"), Field(ge=0)] | None = None
     stiffness: Annotated[float, quantity("s"), Field(ge=0)] | None = None
 
@@ -300,7 +376,7 @@ class Wear(Table):
     """Wear of the patch until contact is lost or max_steps are done.
 
     rule : "thesis" takes `step`, "error_controlled" takes `tolerance`, its local error as a share
-    lost_below : share of the first preload below which contact counts as lost; 0 waits until the last touch ends
+    lost_below : share of the first preload at which the run ends; 0 waits until the last touch ends
     at, mission : one place where all cycles are taken, or a list of duties that share them
     """
 
@@ -338,22 +414,32 @@ class Pictures(Table):
 class Solver(Table):
     """Newton's tolerance on the contact displacement relative to its size, and threads of the linear algebra."""
 
-    tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-9
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-8
     threads: Annotated[StrictInt, Field(ge=1)] = 1
 
 
 class Scene(Table):
-    """Which geometry, material, contact, loads, reduction, response and wear are modelled."""
+    """What every scene says, whatever its model is made from; see PartScene, and MatrixScene in matrix_scene."""
 
     scene: Heading
-    geometry: Geometry
-    material: Material
     contact: Contact
-    loads: Loads
+    loads: Loads[Any, Any]
     response: Response
-    reduction: Reduction
     harmonics: Harmonics = Harmonics()
     damping: Damping = Damping()
     wear: Wear | None = None
     pictures: Pictures = Pictures()
     solver: Solver = Solver()
+
+
+class PartScene(Scene):
+    """Which geometry, material, contact, loads, reduction, response and wear are modelled."""
+
+    geometry: Geometry
+    material: Material
+    contact: FaceContact
+    springs: dict[str, Spring] = Field(default_factory=dict)
+    motion: dict[str, Motion] = Field(default_factory=dict)
+    loads: Loads[StaticLoad, HarmonicLoad]
+    response: PartResponse
+    reduction: Reduction

@@ -49,6 +49,8 @@ SCHEMA: dict[str, tuple[type, dict[str, tuple[tuple[str, ...], str]]]] = {
             "contact": (("point", "contact", "coefficient"), "m"),
             "energy": (("point",), "J"),
             "newton_steps": (("point",), ""),
+            "folds": (("fold",), ""),
+            "parameter": (("point",), ""),
         },
     ),
     "wear": (
@@ -129,7 +131,9 @@ def _write(file: h5py.File, result: Result) -> None:
         for item in fields(part):
             value = getattr(part, item.name)
             if item.name in arrays:
-                _write_array(file, group, item.name, np.asarray(value), *arrays[item.name])
+                # numpy takes an empty tuple for one of floats
+                dtype = np.int64 if isinstance(value, tuple) and not value else None
+                _write_array(file, group, item.name, np.asarray(value, dtype), *arrays[item.name])
             else:
                 group.attrs[item.name] = value if isinstance(value, str) else np.array(value, dtype=h5py.string_dtype())
 
@@ -165,7 +169,10 @@ def load(path: Path) -> Result:
     with file:
         if file.attrs.get("format") != FORMAT:
             raise ResultError(f'"{path}" is not a result file of this version of tribodyn')
-        parts = {name: _read(file[name], kind, arrays) for name, (kind, arrays) in SCHEMA.items() if name in file}
+        try:
+            parts = {name: _read(file[name], kind, arrays) for name, (kind, arrays) in SCHEMA.items() if name in file}
+        except KeyError:
+            raise ResultError(f'"{path}" was written by another version of tribodyn: run its scene again') from None
         return Result(
             provenance=_attributes(file["provenance"].attrs),
             facts=_attributes(file["facts"].attrs),
@@ -178,7 +185,8 @@ def _read(group: h5py.Group, kind: type, arrays: Mapping[str, Any]) -> Any:
     values: dict[str, Any] = {}
     for item in fields(kind):
         if item.name in arrays:
-            values[item.name] = group[item.name][()]
+            value = group[item.name][()]
+            values[item.name] = tuple(value.tolist()) if str(item.type).startswith("tuple") else value
         else:
             value = group.attrs[item.name]
             values[item.name] = value if isinstance(value, str) else tuple(str(entry) for entry in value)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from hbm.branch import CONVERGED
+from hbm.wear_history import LIFE_SHARE, cycles_to_preload
 from workflows.result import Result
 
 
@@ -14,7 +15,8 @@ def summary(result: Result) -> dict[str, Any]:
     """The numbers of a result; what was not computed is None.
 
     depth_max_m, depth_mean_m : largest, and mean over the area of, the total wear depth
-    cycles : vibration cycles so far; life_cycles : the same if contact was lost, else None
+    cycles : vibration cycles so far; separated_cycles : the same if the last touch has ended, else None
+    life_cycles : until the preload had fallen to LIFE_SHARE of its first value, None if it has not
     energy_J, volume_m3 : friction work and worn volume, accumulated
     wear_steps, hbm_solves : steps taken and balance solves spent on wear
     peak_hz, peak_m, preload_N : [first, last] of the wear run, or the peak of the response curve without one
@@ -31,7 +33,8 @@ def summary(result: Result) -> dict[str, Any]:
 
 
 def _wear(result: Result) -> dict[str, Any]:
-    names = ("depth_max_m", "depth_mean_m", "cycles", "life_cycles", "energy_J", "volume_m3", "hbm_solves")
+    names = ["depth_max_m", "depth_mean_m", "cycles", "separated_cycles", "life_cycles"]
+    names += ["energy_J", "volume_m3", "hbm_solves"]
     wear, patch = result.wear, result.patch
     if wear is None or patch is None or not len(wear.cycles):
         return dict.fromkeys(names)
@@ -40,7 +43,8 @@ def _wear(result: Result) -> dict[str, Any]:
         "depth_max_m": float(depth.max()),
         "depth_mean_m": float(depth @ patch.area / patch.area.sum()),
         "cycles": cycles,
-        "life_cycles": cycles if result.contact_lost else None,
+        "separated_cycles": cycles if result.contact_lost else None,
+        "life_cycles": cycles_to_preload(wear),
         "energy_J": float(wear.work.sum()),
         "volume_m3": float(depth @ patch.area),
         "hbm_solves": int(wear.solves.sum()),
@@ -81,7 +85,7 @@ def lines(result: Result) -> list[tuple[str, str]]:
     shown = [
         ("scene", result.provenance["scene_name"]),
         ("state", result.state),
-        ("model", f"{numbers['full_dofs']} DOFs reduced to {numbers['model_dofs']}"),
+        ("model", _sizes(numbers["full_dofs"], numbers["model_dofs"])),
         ("contact", f"{numbers['contact_pairs']} node pairs, {numbers['unknowns']} unknowns"),
     ]
     if numbers["free_hz"]:
@@ -93,7 +97,9 @@ def lines(result: Result) -> list[tuple[str, str]]:
         shown.append(("amplitude", pair("peak_m", 1e3, "mm")))
     if numbers["depth_max_m"] is not None:
         deepest, mean = 1e3 * numbers["depth_max_m"], 1e3 * numbers["depth_mean_m"]
-        life = "contact not lost" if numbers["life_cycles"] is None else "contact lost"
+        life = "contact not lost" if numbers["separated_cycles"] is None else "contact lost"
+        if numbers["life_cycles"] is not None:
+            life += f"; life until {100 * LIFE_SHARE:g} % of the preload: {numbers['life_cycles']:.4g}"
         shown += [
             ("preload", pair("preload_N", 1, "N")),
             ("cycles", f"{numbers['cycles']:.4g} ({life})"),
@@ -104,3 +110,7 @@ def lines(result: Result) -> list[tuple[str, str]]:
         ]
     shown.append(("computing", f"{numbers['seconds']:.1f} s"))
     return shown
+
+
+def _sizes(full: int | None, model: int | None) -> str:
+    return f"{full} DOFs, as they came" if full == model else f"{full} DOFs reduced to {model}"

@@ -5,7 +5,8 @@
 The slider w creeps along the friction force, so friction opposes the slip velocity whatever the springs are. One time
 sample is one implicit step: T = T* / (1 + lambda k) componentwise from the trial T* = k (u - w), with |T| = mu N. For
 k_1 = k_2 this is the radial return; for unequal springs it is the projection in the elastic metric (not the radial one
-in force space, whose slip is not parallel to friction).
+in force space, whose slip is not parallel to friction). The error is of second order in the sample spacing along a
+line, of first order where the path turns: on a circle friction lags by half a sample, pi / n_samples rad.
 Source  Simo and Hughes 1998, chapter 3 (return mapping); Sanliturk and Ewins 1996 and Afzal et al. 2016 for k_1 = k_2.
 """
 

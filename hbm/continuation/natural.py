@@ -72,7 +72,7 @@ def predict(builder: BranchBuilder, value: float) -> np.ndarray:
     return extrapolate(np.array(builder.value[-DEGREE - 1 :]), builder.x[-DEGREE - 1 :], value)
 
 
-def extrapolate(known: np.ndarray, values: Sequence[np.ndarray], at: float) -> np.ndarray:
+def extrapolate(known: np.ndarray, values: Sequence[np.ndarray] | np.ndarray, at: float) -> np.ndarray:
     """Lagrange polynomial through values known at points (n,), taken at another point."""
     weights = [np.prod((at - np.delete(known, i)) / (known[i] - np.delete(known, i))) for i in range(len(known))]
     return np.sum([w * value for w, value in zip(weights, values, strict=True)], axis=0)

@@ -1,6 +1,6 @@
 """Archard wear law: worn volume is the coefficient times normal force times slip distance.
 
-Source  Archard 1953. Coefficient k = K / H [1/Pa]; with Coulomb friction k = mu alpha equals the energy law in full slip.
+Source  Archard 1953. Coefficient k = K / H [1/Pa]; k = mu alpha equals the energy law in full slip.
 """
 
 from __future__ import annotations

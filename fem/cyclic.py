@@ -1,0 +1,178 @@
+"""One sector of a cyclic part: which faces meet after a turn by one pitch, and what a travelling wave makes of it.
+
+Every sector is described in its own turned frame. Sector n stands n pitches in the positive sense about the axis; its
+left is the side of sector n + 1. In a wave of index j each sector repeats its right neighbour later,
+q_n = q_0 exp(-i 2 pi j n / N), so that right faces touch the left ones of a sector that is ahead by one phase.
+Source  Tamatam 2021, section 3.2.3, whose equation numbers stand as comments; Petrov 2004
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_matrix, vstack
+
+from fem import part as fem_part
+from fem.constraints import Clamp, named
+from fem.contact import pair_halves
+from fem.interface import ContactInterface
+from fem.loads import Load, NodalForce, unit
+from fem.matching import partners
+from fem.material import Material
+from fem.part import Contact, Part
+from fem.system import SecondOrderSystem
+
+AXIS = (1.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Sector:
+    """A sector cut out of its wheel, full or reduced: nothing is joined yet.
+
+    system : n coordinates, real
+    interface : contacts between neighbours; B (n_c, n) is the half of the right face of this sector
+    left : (n_c, n) the half of the left face: relative displacement = B q_n - left q_(n-1)
+    seam_right, seam_left : (k, 3) coordinates of matched nodes where sectors are joined, x, y, z; k = 0 for none
+    turn : (3, 3) rotation by one pitch, from a sector to the one on its left
+    n_sectors : sectors of the wheel
+    """
+
+    system: SecondOrderSystem
+    interface: ContactInterface
+    left: Any
+    seam_right: np.ndarray
+    seam_left: np.ndarray
+    turn: np.ndarray
+    n_sectors: int
+
+    def phase(self, index: int) -> complex:
+        """exp(-i 2 pi j / N), real to the last bit where it is."""
+        return phase(index, self.n_sectors)
+
+
+def phase(index: int, n_sectors: int) -> complex:
+    """exp(-i 2 pi index / n_sectors) as a float where it is 1 or -1."""
+    index = index % n_sectors
+    if 2 * index % n_sectors == 0:
+        return -1.0 if index else 1.0
+    return complex(np.exp(-2j * np.pi * index / n_sectors))
+
+
+def rotation(axis: Sequence[float], angle: float) -> np.ndarray:
+    """Rotation (3, 3) about an axis through the origin by an angle [rad]."""
+    a = unit(axis, "the axis of rotation")
+    cross = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def build(
+    mesh: Any,
+    node_sets: Mapping[str, np.ndarray],
+    material: Material | Mapping[str, Material],
+    clamps: Sequence[Clamp],
+    contacts: Sequence[Contact],
+    loads: Mapping[str, Load],
+    outputs: Mapping[str, NodalForce],
+    n_sectors: int,
+    seam: tuple[str, str] | None = None,
+    axis: Sequence[float] = AXIS,
+    order: int | None = None,
+) -> tuple[Part, Sector]:
+    """Assemble one sector and find what its faces meet in the neighbours.
+
+    contacts : face is on the right, opposite on the left; each meets after a turn by one pitch about the axis
+    seam : names of the right and the left face where sectors are one piece, None where only contacts couple them
+    axis : of the wheel, through the origin. Other arguments as fem.part.build
+    Returns the part of one sector, its interface the half of the right face; and the sector over the same DOFs
+    Raises  ValueError where faces do not match after the turn, a seam is held on one side only, or a contact has no
+        opposite face
+    """
+    if n_sectors < 2:
+        raise ValueError(f"a wheel of {n_sectors} sectors has no neighbours; give at least 2")
+    missing = [contact.face for contact in contacts if contact.opposite is None]
+    if missing:
+        raise ValueError(f"contact '{missing[0]}' of a cyclic part needs the opposite face, that of the next sector")
+    turn = rotation(axis, 2 * np.pi / n_sectors)
+    right = [replace(contact, opposite=None) for contact in contacts]
+    part = fem_part.build(mesh, node_sets, material, clamps, right, loads, outputs, order)
+    left = vstack([_left_half(mesh, contact, turn) for contact in contacts], format="csr")[:, part.free]
+    none = np.empty((0, 3), dtype=int)
+    seams = (none, none) if seam is None else _seams(part, node_sets, seam, turn)
+    return part, Sector(part.system, part.interface, left, *seams, turn, n_sectors)
+
+
+def _left_half(mesh: Any, contact: Contact, turn: np.ndarray) -> csr_matrix:
+    faces = mesh.boundaries or {}
+    face, opposite = named(faces, contact.face, "face"), named(faces, contact.opposite or "", "face")
+    _, left = pair_halves(
+        mesh, face, opposite, contact.t1, contact.components, contact.gap, contact.vertices_only, rotation=turn.T
+    )
+    return left
+
+
+def _seams(
+    part: Part, node_sets: Mapping[str, np.ndarray], seam: tuple[str, str], turn: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Free DOFs (k, 3) of the right seam and of its partners on the left."""
+    right, left = (named(node_sets, name) for name in seam)
+    what = f"the cyclic faces '{seam[0]}' and '{seam[1]}'"
+    if len(right) != len(left):
+        raise ValueError(f"{what} have {len(right)} and {len(left)} nodes; mesh both with the same grid")
+    left = left[partners(part.points[right] @ turn.T, part.points[left], what)]
+    place = np.full(3 * len(part.points), -1)
+    place[part.free] = np.arange(len(part.free))
+    dofs = [place[nodes[:, None] * 3 + np.arange(3)] for nodes in (right, left)]
+    free = [(d >= 0) for d in dofs]
+    whole = free[0].all(axis=1) | ~free[0].any(axis=1)
+    if not whole.all() or (free[0] != free[1]).any():
+        raise ValueError(f"{what} are held unequally; clamp nodes on both of them, in all axes")
+    if np.intersect1d(dofs[0][free[0]], dofs[1][free[1]]).size:
+        raise ValueError(f"{what} share nodes; a sector cannot reach the axis of the wheel")
+    kept = free[0][:, 0]
+    return dofs[0][kept], dofs[1][kept]
+
+
+def seam_parts(sector: Sector) -> tuple[csr_matrix, csr_matrix]:
+    """Own (n, m) and next (n, m): q_n = own z_n + next z_(n+1), where sector n + 1 owns the seam both share."""
+    n, shape = sector.system.n_dof, (len(sector.seam_left), 3, 3)
+    kept = np.setdiff1d(np.arange(n), sector.seam_left)
+    place = np.full(n, -1)
+    place[kept] = np.arange(len(kept))
+    own = csr_matrix((np.ones(len(kept)), (kept, place[kept])), shape=(n, len(kept)))
+    rows = np.broadcast_to(sector.seam_left[:, :, None], shape).ravel()
+    columns = place[np.broadcast_to(sector.seam_right[:, None, :], shape)].ravel()
+    turn = np.broadcast_to(sector.turn, shape).ravel()
+    return own, csr_matrix((turn, (rows, columns)), shape=own.shape)
+
+
+def seam_map(sector: Sector, index: int) -> csr_matrix:
+    """T (n, m) of a wave: the left seam follows the right one, u_left = exp(-i phi) R u_right, q = T z."""
+    own, following = seam_parts(sector)
+    return own + sector.phase(index) * following  # 3.12, 3.15
+
+
+def at_index(sector: Sector, index: int) -> tuple[SecondOrderSystem, Any]:
+    """The system and the contact map (n_c, m) that a wave of this index sees; Hermitian, real for 0 and N/2."""
+    T = seam_map(sector, index)
+    ahead = np.conj(sector.phase(index))
+    return projected(sector.system, T), (sector.interface.B - ahead * sector.left) @ T  # 3.17
+
+
+def projected(system: SecondOrderSystem, T: Any) -> SecondOrderSystem:
+    """The system in coordinates z with q = T z; T (n, n_z) dense or sparse, real or complex."""
+
+    def congruent(matrix: Any) -> Any:
+        small = T.conj().T @ (matrix @ T)
+        return (small + small.conj().T) / 2
+
+    return SecondOrderSystem(
+        congruent(system.mass),
+        congruent(system.stiffness),
+        None if system.damping is None else congruent(system.damping),
+        {name: T.conj().T @ load for name, load in system.loads.items()},
+        {name: T.T @ row for name, row in system.outputs.items()},
+    )
+

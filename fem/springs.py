@@ -1,0 +1,85 @@
+"""Springs in one direction: from a node set to the ground, or across a joint to the matching nodes of another set."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.spatial import cKDTree
+
+from fem.constraints import named
+from fem.elements import coordinates
+from fem.loads import unit
+from fem.surface import surface
+
+REACH = 1e-4  # farthest distance of two matching nodes, as a part of the size of their set
+
+
+@dataclass(frozen=True)
+class Spring:
+    """A joint that gives way in one direction; its stiffness is shared by tributary area on a face, else evenly.
+
+    On a face of some extent it also resists tilting: a rotational stiffness follows from where its shares sit.
+    nodes : name of a face or node set; direction : (3,), need not be a unit vector
+    stiffness : of the whole joint, >= 0 [N/m]; opposite : name of the matching set across the joint, else the ground
+    """
+
+    nodes: str
+    direction: Sequence[float]
+    stiffness: float
+    opposite: str | None = None
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.stiffness) and self.stiffness >= 0):
+            raise ValueError(f"spring at '{self.nodes}': stiffness = {self.stiffness} N/m must be finite and >= 0")
+
+    def matrix(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> csr_matrix:
+        """Stiffness (3 n_node, 3 n_node) [N/m].
+
+        Raises  ValueError where a set is unknown or empty, or where the nodes across the joint do not match
+        """
+        elongation, share = self.elongation(mesh, node_sets)
+        return csr_matrix(elongation.T @ elongation.multiply(self.stiffness * share[:, None]))
+
+    def elongation(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> tuple[csr_matrix, np.ndarray]:
+        """Map (n, 3 n_node) from DOFs to the elongations of the shares, and the shares (n,), which sum to one."""
+        nodes, share = _shares(mesh, node_sets, self.nodes)
+        direction = unit(self.direction, f"the direction of the spring at '{self.nodes}'")
+        rows = np.repeat(np.arange(len(nodes)), 3)
+        shape = (len(nodes), 3 * mesh.doflocs.shape[1])
+
+        def along(of: np.ndarray) -> csr_matrix:
+            columns = (of[:, None] * 3 + np.arange(3)).ravel()
+            matrix = csr_matrix((np.tile(direction, len(of)), (rows, columns)), shape=shape)
+            matrix.eliminate_zeros()
+            return matrix
+
+        if self.opposite is None:
+            return along(nodes), share
+        return csr_matrix(along(nodes) - along(self._partners(mesh, node_sets, nodes))), share
+
+    def _partners(self, mesh: Any, node_sets: Mapping[str, np.ndarray], nodes: np.ndarray) -> np.ndarray:
+        assert self.opposite is not None
+        others = named(node_sets, self.opposite)
+        points = coordinates(mesh)
+        size = np.linalg.norm(np.ptp(points[nodes], axis=0)) or np.linalg.norm(np.ptp(points, axis=0))
+        distance, place = cKDTree(points[others]).query(points[nodes])
+        if distance.max() > REACH * size or len(np.unique(place)) < len(place):
+            raise ValueError(
+                f"the spring from '{self.nodes}' to '{self.opposite}' finds no matching nodes, the farthest pair is "
+                f"{distance.max():.3g} m apart; mesh both with the same grid"
+            )
+        return others[place]
+
+
+def _shares(mesh: Any, node_sets: Mapping[str, np.ndarray], name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes of a set and the part of a stiffness that each one takes."""
+    faces = mesh.boundaries or {}
+    if name in faces:
+        face = surface(mesh, faces[name])
+        return face.nodes, face.area / face.area.sum()
+    nodes = named(node_sets, name)
+    return nodes, np.full(len(nodes), 1.0 / len(nodes))

@@ -1,0 +1,243 @@
+"""Fretting rig: a cantilever in a column rubs on a specimen that a moving platform pushes up (thesis 5.2).
+
+x runs along the beam from the column to the free end, y is the tangential (rubbing) direction across the thin beam, z
+is up, the normal direction of the contact. Three bodies that touch but are not joined here: column, beam with the upper
+specimen, platform with the lower specimen on its separator. Springs join column and table, beam and column, platform
+and table; their places are the named surfaces and points. Joints that the drawings make solid are shared nodes.
+
+The thesis gives the free length, the section, the contact face and its grid; its drawings are lost, so all other
+dimensions are ours. The upper specimen hangs in a slot at the free end so that the contact lies at mid-height, on the
+axis of the beam: twisting hardly feels the closed contact in the thesis (840 Hz open, 868 Hz stuck), while a contact
+below the beam would couple the two.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from geometry import blocks, checks, grid
+
+# Fixed shapes, ours [m].
+SHANK = 0.010  # the upper specimen hangs on a shank of this length and of the beam's whole thickness
+SPECIMEN_SIDE, SPECIMEN_DEPTH = 0.020, 0.040  # lower specimen, reaches into the slot
+HEAD_DEPTH, HEAD_WIDENING_X, HEAD_WIDENING_Y = 0.015, 1.5, 2.0  # separator below the lower specimen
+LIMB_DEPTH = 0.025  # vertical extent of the two limbs of the separator, at 45 degrees to the normal (thesis 5.2.1)
+PLATE_SIDE, PLATE_DEPTH = 0.140, 0.020  # moving platform
+SCREWS = ((-0.040, -0.045), (0.040, -0.045), (-0.040, 0.045), (0.040, 0.045), (0.0, -0.070), (0.0, 0.070))
+PINS = ((-0.070, 0.0), (0.070, 0.0))
+COVER_DEPTH = 0.010
+COLUMN_BEHIND, COLUMN_ABOVE = 0.020, 0.020  # of the column beyond the clamped end, along -x and z
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """The rig, contact centre in the middle of the slot, y = 0.
+
+    free_length, height, thickness : of the beam along x, z, y [m] (thesis 5.2.1)
+    contact_length, contact_width : of the contact face along x and y [m] (thesis 5.2.1; ours: which side is which)
+    n_contact_length, n_contact_width : contact nodes along x and y, odd (thesis 5.4: 5 and 11)
+    slot_length, slot_height : of the slot from the free end and from the lower edge [m], ours
+    protrusion : of the upper specimen into the slot [m], ours: the contact is at mid-height
+    foot : straight part of the protrusion next to the contact [m], ours
+    root_length : of the beam inside its seat on the column [m], ours
+    column_side, column_height : square section, and height of the beam's lower edge above the table [m], ours
+    shaker_distance : from the column to the shaker [m], ours
+    longest : longest element along the free length [m]
+    n_root, n_half : elements along the seat, over half of the beam's height
+    """
+
+    free_length: float = 0.310
+    height: float = 0.060
+    thickness: float = 0.010
+    contact_length: float = 0.002
+    contact_width: float = 0.005
+    n_contact_length: int = 5
+    n_contact_width: int = 11
+    slot_length: float = 0.030
+    slot_height: float = 0.038
+    protrusion: float = 0.008
+    foot: float = 0.001
+    root_length: float = 0.080
+    column_side: float = 0.120
+    column_height: float = 0.180
+    shaker_distance: float = 0.040
+    longest: float = 0.040
+    n_root: int = 3
+    n_half: int = 2
+
+    def __post_init__(self) -> None:
+        checks.positive(self, "free_length", "height", "thickness", "contact_length", "contact_width")
+        checks.positive(self, "slot_length", "slot_height")
+        checks.positive(self, "protrusion", "foot", "root_length", "column_side", "column_height", "shaker_distance")
+        checks.positive(self, "longest")
+        checks.odd(self, "n_contact_length", "n_contact_width")
+        checks.whole(self, "n_root", "n_half", least=1)
+        for name, largest, what in (
+            ("contact_length", SHANK, "the shank of the upper specimen"),
+            ("contact_width", self.thickness, "geometry.thickness"),
+            ("foot", 0.9 * self.protrusion, "nine tenths of geometry.protrusion"),
+            ("protrusion", self.slot_height - 0.001, "geometry.slot_height less 1 mm"),
+            ("slot_height", self.height - 0.005, "geometry.height less 5 mm"),
+            ("slot_length", self.free_length / 2, "half of geometry.free_length"),
+            ("shaker_distance", self.solid_length - 0.01, "the free length without the slot less 10 mm"),
+        ):
+            if getattr(self, name) > largest:
+                raise ValueError(f"geometry.{name} is {getattr(self, name)}: keep it within {what}, {largest:.4g} m")
+        if self.slot_length <= SPECIMEN_SIDE:
+            raise ValueError(f"geometry.slot_length is {self.slot_length}: the lower specimen needs {SPECIMEN_SIDE} m")
+        if self.slot_height <= self.height / 2:
+            raise ValueError(f"geometry.slot_height is {self.slot_height}: keep it above half of geometry.height")
+
+    @property
+    def contact_x(self) -> float:
+        """Position of the contact centre along the beam [m]."""
+        return self.free_length - self.slot_length / 2
+
+    @property
+    def contact_z(self) -> float:
+        """Height of the contact above the lower edge of the beam [m]."""
+        return self.slot_height - self.protrusion
+
+    @property
+    def solid_length(self) -> float:
+        """Free length without the slot [m]."""
+        return self.free_length - self.slot_length
+
+
+def build(parameters: Parameters, path: str | Path) -> None:
+    """Write the mesh.
+
+    Groups: volumes "column", "beam", "upper_specimen", "lower_specimen", "separator", "platform"; surfaces
+    "column_base", "column_seat" and "beam_root" (matching), "upper_contact", "lower_contact" (larger, with the matching
+    grid in its middle); points "shaker", "accelerometer" (free end), "screws" (six below the platform), "pins" (two),
+    and
+    "low", "middle", "high" followed by 1 to 4 at quarters of the length before the slot, for mode shapes
+    """
+    blocks.write(path, _column(parameters), _beam(parameters), _platform(parameters))
+
+
+def _root_lines(p: Parameters) -> np.ndarray:
+    return np.linspace(-p.root_length, 0.0, p.n_root + 1)
+
+
+def _height_lines(p: Parameters) -> tuple[np.ndarray, np.ndarray]:
+    """Vertex positions along z below and above the ceiling of the slot."""
+    lower, upper = np.linspace(0.0, p.height / 2, p.n_half + 1), np.linspace(p.slot_height, p.height, p.n_half + 1)
+    return np.append(lower, p.slot_height), upper
+
+
+def _contact_lines(p: Parameters) -> tuple[np.ndarray, np.ndarray]:
+    """Vertex positions of the contact grid along x and y, both about the contact centre."""
+    along = np.linspace(-p.contact_length / 2, p.contact_length / 2, (p.n_contact_length + 1) // 2)
+    across = np.linspace(-p.contact_width / 2, p.contact_width / 2, (p.n_contact_width + 1) // 2)
+    return along, across
+
+
+def _column(p: Parameters) -> blocks.Body:
+    """Bulk column beside the beam, whose seat on it is the side y = thickness / 2."""
+    root, up = _root_lines(p), np.unique(np.concatenate(_height_lines(p)))
+    behind = np.array([root[0] - COLUMN_BEHIND, root[0]])
+    whole = np.concatenate([behind[:1], root])
+    across = p.thickness / 2 + grid.towards_start(0.0, p.column_side, 3, 2.0)
+    below = np.linspace(-p.column_height, 0.0, 3)
+    above = np.array([p.height, p.height + COLUMN_ABOVE])
+    return blocks.body(
+        [
+            blocks.Block(whole, across, below, "column", {"w-": "column_base"}),
+            blocks.Block(root, across, up, "column", {"v-": "column_seat"}),
+            blocks.Block(behind, across, up, "column"),
+            blocks.Block(whole, across, above, "column"),
+        ]
+    )
+
+
+def _beam(p: Parameters) -> blocks.Body:
+    """Beam on edge with its cover plate at the seat and the upper specimen under its free end."""
+    along, across = _contact_lines(p)
+    root, (_, above) = _root_lines(p), _height_lines(p)
+    up = np.unique(np.concatenate(_height_lines(p)))
+    thick = across * (p.thickness / p.contact_width)
+    cover = np.array([thick[0] - COVER_DEPTH, thick[0]])
+    quarters = p.solid_length * np.array([0.25, 0.5, 0.75, 1.0])
+    span = _lines_through([0.0, p.shaker_distance, *quarters], p.longest)
+    specimen = p.contact_x + along * (SHANK / p.contact_length)
+    arm = np.concatenate([span[-1:], specimen, [p.free_length]])
+    taper = p.contact_z + np.array([0.0, p.foot, (p.foot + p.protrusion) / 2, p.protrusion])
+
+    def widen(at: np.ndarray) -> np.ndarray:
+        rise = np.clip((at[:, 2] - taper[1]) / (taper[2] - taper[1]), 0.0, 1.0)
+        scale = 1 + rise[:, None] * (np.array([SHANK / p.contact_length, p.thickness / p.contact_width]) - 1)
+        return np.column_stack([p.contact_x + scale[:, 0] * at[:, 0], scale[:, 1] * at[:, 1], at[:, 2]])
+
+    points: dict[str, tuple[float, float, float]] = {
+        "shaker": (p.shaker_distance, -p.thickness / 2, p.height / 2),
+        "accelerometer": (p.free_length, -p.thickness / 2, p.height),
+    }
+    for number, x in enumerate(quarters, start=1):
+        for name, z in (("low", 0.0), ("middle", p.height / 2), ("high", p.height)):
+            points[f"{name}{number}"] = (x, -p.thickness / 2, z)
+    return blocks.body(
+        [
+            blocks.Block(root, thick, up, "beam", {"v+": "beam_root"}),
+            blocks.Block(root, cover, up, "beam"),
+            blocks.Block(span, thick, up, "beam"),
+            blocks.Block(arm, thick, above, "beam"),
+            blocks.Block(along, across, taper, "upper_specimen", {"w-": "upper_contact"}, widen),
+        ],
+        points=points,
+    )
+
+
+def _lines_through(stops: list[float], longest: float) -> np.ndarray:
+    """Grid lines at every stop and evenly between them, none farther apart than `longest`."""
+    stops = sorted(set(stops))
+    pieces = [np.linspace(a, b, int(np.ceil((b - a) / longest)) + 1)[:-1] for a, b in pairwise(stops)]
+    return np.concatenate([*pieces, stops[-1:]])
+
+
+def _platform(p: Parameters) -> blocks.Body:
+    """Lower specimen on the separator, whose two limbs stand at 45 degrees on the platform."""
+    along, across = _contact_lines(p)
+    side = SPECIMEN_SIDE / 2
+    u, v = np.concatenate([[-side], along, [side]]), np.concatenate([[-side], across, [side]])
+    top = p.contact_z
+    foot, neck, sole, bottom = top - np.cumsum([SPECIMEN_DEPTH, HEAD_DEPTH, LIMB_DEPTH, PLATE_DEPTH])
+    depths = np.array([foot, (foot + top) / 2, (foot + 7 * top) / 8, top])
+    wide = np.array([HEAD_WIDENING_X, HEAD_WIDENING_Y])
+
+    def place(at: np.ndarray) -> np.ndarray:
+        return at + [p.contact_x, 0.0, 0.0]
+
+    def head(at: np.ndarray) -> np.ndarray:
+        scale = 1 + (foot - at[:, 2:]) / HEAD_DEPTH * (wide - 1)
+        return place(np.column_stack([scale * at[:, :2], at[:, 2]]))
+
+    def limb(sign: int) -> blocks.Block:
+        def lean(at: np.ndarray) -> np.ndarray:
+            outward = sign * (neck - at[:, 2])
+            return place(np.column_stack([wide[0] * at[:, 0], wide[1] * at[:, 1] + outward, at[:, 2]]))
+
+        lines = v[:2] if sign < 0 else v[-2:]
+        return blocks.Block(u, lines, np.linspace(sole, neck, 3), "separator", mapping=lean)
+
+    inner, outer = wide[1] * v[-2] + LIMB_DEPTH, wide[1] * v[-1] + LIMB_DEPTH  # where a limb stands
+    half = PLATE_SIDE / 2
+    plate_x = np.concatenate([[-half, SCREWS[0][0]], wide[0] * u, [SCREWS[1][0], half]])
+    plate_y = np.concatenate([[-half, -outer, -inner, 0.0, inner, outer, half]])
+    return blocks.body(
+        [
+            blocks.Block(u, v, depths, "lower_specimen", {"w+": "lower_contact"}, place),
+            blocks.Block(u, v, np.linspace(neck, foot, 3), "separator", mapping=head),
+            limb(-1),
+            limb(1),
+            blocks.Block(plate_x, plate_y, np.array([bottom, sole]), "platform", mapping=place),
+        ],
+        points={
+            "screws": np.array([(p.contact_x + x, y, bottom) for x, y in SCREWS]),
+            "pins": np.array([(p.contact_x + x, y, bottom) for x, y in PINS]),
+        },
+    )

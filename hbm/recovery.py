@@ -1,0 +1,48 @@
+"""From the contact back to the part: coordinates and full displacement that belong to a solved contact."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hbm.balance import HarmonicBalance
+
+
+def coordinates(
+    balance: HarmonicBalance, displacement: np.ndarray, force: np.ndarray, omega: float
+) -> list[np.ndarray]:
+    """Complex amplitudes (n,) of the model's coordinates [m], harmonic by harmonic.
+
+    displacement, force : (n_contact, n_coeff) relative displacement [m] and contact force [N]; omega : [rad/s]
+    Solves D_h q_h = F_h + B^H (k x - f), where the contact springs k, stuck and closed, are part of D_h so that a
+    structure held by its contact alone is no exception
+    """
+    basis, excitation = balance.basis, balance.excitation
+    k = balance.parameters.stiffness.ravel()
+    moved = displacement if excitation.base is None else displacement + excitation.base
+    g = basis.to_complex(k[:, None] * moved - force)
+    found = []
+    for position, h in enumerate(basis.harmonics):
+        system, B = balance.model.at_harmonic(h)
+        s = 1j * h * omega
+        dynamic = system.stiffness + B.conj().T @ (k[:, None] * B) + s**2 * system.mass
+        if system.damping is not None:
+            dynamic = dynamic + s * system.damping
+        total = B.conj().T @ g[:, position]
+        for (order, name), value in excitation.loads.items():
+            if order == h:
+                total = total + (balance.load_factor if h else 1.0) * value * system.loads[name]
+        found.append(np.linalg.solve(dynamic, total))
+    return found
+
+
+def full_displacement(
+    balance: HarmonicBalance, displacement: np.ndarray, force: np.ndarray, omega: float
+) -> np.ndarray:
+    """Displacement of every DOF of the full part (n_full, n_coeff) [m]; arguments as `coordinates`.
+
+    Of a cyclic part: of sector 0 in its own frame
+    """
+    amplitudes = coordinates(balance, displacement, force, omega)
+    harmonics = balance.basis.harmonics
+    full = [balance.model.reconstruct(q, h) for h, q in zip(harmonics, amplitudes, strict=True)]
+    return balance.basis.to_real(np.stack(full, axis=-1))

@@ -1,0 +1,61 @@
+"""Travelling waves: from the excited sector to any other, and from one sector to the wheel.
+
+Sector n repeats sector 0 later by n phases: x_n(t) = x_0(t - n phi / w), phi = 2 pi EO / N, in its own turned frame;
+harmonic h lags by h n phi.
+Source  Petrov 2004; Tamatam 2021, section 3.2.3
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from hbm.balance import HarmonicBalance
+from hbm.branch import Branch
+from hbm.excitation import Excitation
+from hbm.harmonics import HarmonicBasis
+from reduction.cyclic import Damping, ReducedSector, travelling_wave
+from reduction.model import ReducedModel
+
+
+def at_sector(
+    basis: HarmonicBasis, coefficients: np.ndarray, engine_order: int, n_sectors: int, sector: int
+) -> np.ndarray:
+    """Coefficients (..., n_coeff) of another sector from those of sector 0: displacement, force, output."""
+    return basis.shift(coefficients, -2 * np.pi * (engine_order * sector % n_sectors) / n_sectors)
+
+
+def left_face(basis: HarmonicBasis, coefficients: np.ndarray, engine_order: int, n_sectors: int) -> np.ndarray:
+    """What the left contact of a sector sees, in the frame of the sector on its left, from what its right one sees.
+
+    The contact on the left of sector n is the one on the right of sector n + 1: wear, preload and energy are equal, the
+    force on the sector is opposite (3.17)
+    """
+    return at_sector(basis, coefficients, engine_order, n_sectors, 1)
+
+
+def on_wheel(excitation: Excitation, engine_order: int, n_sectors: int) -> Excitation:
+    """The excitation of one sector as loads "<name>@<sector>" of all sectors of a wheel."""
+    loads = {
+        (h, f"{name}@{n}"): value * np.exp(-2j * np.pi * (h * engine_order * n % n_sectors) / n_sectors)
+        for (h, name), value in excitation.loads.items()
+        for n in range(n_sectors)
+    }
+    return replace(excitation, loads=loads)
+
+
+def responses(
+    reduced: ReducedSector,
+    engine_orders: Iterable[int],
+    damping: Damping | None,
+    problem: Callable[[ReducedModel], HarmonicBalance],
+    follow: Callable[[HarmonicBalance], Branch],
+) -> dict[int, Branch]:
+    """Response of the wheel to several engine orders.
+
+    damping : as for `travelling_wave`; problem : makes the balance of a model; follow : follows its response
+    Returns engine order -> branch of sector 0
+    """
+    return {order: follow(problem(travelling_wave(reduced, order, damping))) for order in engine_orders}

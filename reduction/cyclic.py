@@ -1,0 +1,210 @@
+"""Craig-Bampton of a sector, and the models of its wheel: travelling waves by harmonic index, or all sectors at once.
+
+One real reduction of the sector, with both shroud faces, both seams and the accessories as masters, serves all harmonic
+indices: the phase constraints act on the small system. The contact then becomes a coordinate of its own, the relative
+displacement of neighbours (3.18), so that its map is [I 0] for every index.
+Source  Tamatam 2021, eq. 3.12 to 3.22
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy.linalg as sla
+from scipy.sparse import vstack
+
+from fem import wheel
+from fem.cyclic import Sector, at_index, projected, seam_map
+from fem.hermitian import hermitian_modes
+from fem.system import SecondOrderSystem
+from reduction.craig_bampton import POINT_LOAD, REPORTED_MODES, craig_bampton
+from reduction.linear import stuck_stiffness
+from reduction.model import ReducedModel
+
+Damping = Callable[[SecondOrderSystem], np.ndarray]
+
+
+@dataclass(frozen=True)
+class ReducedSector:
+    """sector : dense, in reduced coordinates; basis : (n_full, n) to the DOFs of the full sector; info : as
+    `craig_bampton` gives it.
+    """
+
+    sector: Sector
+    basis: np.ndarray
+    info: Mapping[str, object] = field(default_factory=dict)
+
+
+def reduce_sector(sector: Sector, n_modes: int | None = None, cutoff: float | None = None) -> ReducedSector:
+    """Reduce a full sector; n_modes or cutoff [Hz] as in `craig_bampton`.
+
+    Raises  ValueError as `craig_bampton` does
+    """
+    both = replace(sector.interface, B=vstack([sector.interface.B, sector.left], format="csr"))
+    seams = np.concatenate([sector.seam_right.ravel(), sector.seam_left.ravel()])
+    model = craig_bampton(sector.system, both, n_modes, cutoff, extra_masters=seams.tolist())
+    masters = np.asarray(model.info["masters"])
+    right, left = np.split(np.asarray(model.interface.B), 2)
+    small = replace(
+        sector,
+        system=model.system,
+        interface=replace(sector.interface, B=right),
+        left=left,
+        seam_right=np.searchsorted(masters, sector.seam_right),
+        seam_left=np.searchsorted(masters, sector.seam_left),
+    )
+    assert model.basis is not None
+    return ReducedSector(small, model.basis, model.info)
+
+
+def nodal_diameters(
+    sector: Sector, diameters: Sequence[int], n_modes: int, stiffness: np.ndarray | None = None
+) -> np.ndarray:
+    """Frequencies [Hz] of the wheel for each nodal diameter: the diagram of a bladed disk, full or reduced.
+
+    diameters : harmonic indices; 0 to N/2 differ; stiffness : (n_pair, n_component) of closed, stuck contacts [N/m],
+        None for open ones
+    Returns (n_diameter, n_modes)
+    """
+    found = []
+    for index in diameters:
+        system, B = at_index(sector, index)
+        K = system.stiffness if stiffness is None else stuck_stiffness(system.stiffness, B, stiffness)
+        found.append(hermitian_modes(K, system.mass, n_modes)[0] / (2 * np.pi))
+    return np.array(found)
+
+
+def travelling_wave(
+    reduced: ReducedSector, engine_order: int, damping: Damping | None = None, cutoff: float | None = None
+) -> ReducedModel:
+    """The model of one sector under a wave of this engine order: harmonic h sees the index h EO modulo N.
+
+    damping : makes the damping matrix of each small system, such as partial(modal_damping, ratio=0.01)
+    cutoff : highest frequency [Hz] of the modes that then stand for seam, left shroud and fixed-interface modes (3.20);
+        None keeps all these coordinates
+    Returns the model whose system and interface are those of harmonic 1; coordinates are the relative displacements,
+        then accessories, then the rest; `reconstruct` takes the harmonic. One object serves all harmonics of one index
+    """
+    index_of = _Indices(reduced, damping, cutoff)
+    n_sectors = reduced.sector.n_sectors
+
+    def per_harmonic(h: int) -> tuple[SecondOrderSystem, np.ndarray]:
+        return index_of(h * engine_order % n_sectors)[:2]
+
+    def harmonic_basis(h: int) -> np.ndarray:
+        return reduced.basis @ index_of(h * engine_order % n_sectors)[2]
+
+    system, B = per_harmonic(1)
+    omega, _ = hermitian_modes(system.stiffness, system.mass, min(REPORTED_MODES, system.n_dof))
+    info = {**_shared_info(reduced), "engine_order": engine_order, "free_frequency": omega / (2 * np.pi)}
+    interface = replace(reduced.sector.interface, B=B)
+    return ReducedModel(system, interface, None, info, per_harmonic, harmonic_basis)
+
+
+def wheel_model(
+    reduced: ReducedSector, damping: Damping | None = None, stiffness: Sequence[float] | None = None
+) -> ReducedModel:
+    """All sectors at once, real and with contacts between all neighbours; arguments as fem.wheel.assemble.
+
+    Loads and outputs are named "<name>@<sector>". The basis is left out: sector n moves by
+    reduced.basis @ (fem.wheel.sector_maps(reduced.sector)[n] @ q) in its own frame
+    """
+    system, interface = wheel.assemble(reduced.sector, stiffness)
+    if damping is not None:
+        system = replace(system, damping=damping(system))
+    return ReducedModel(system, interface, None, _shared_info(reduced))
+
+
+def _shared_info(reduced: ReducedSector) -> dict[str, object]:
+    """Facts that hold for any model of the wheel; frequencies of a sector that is joined to nothing do not."""
+    kept = ("masters", "n_full", "n_masters", "n_modes", "factorisation", "first_omitted_frequency")
+    return {"n_sectors": reduced.sector.n_sectors, **{name: reduced.info[name] for name in kept}}
+
+
+class _Indices:
+    """Small system, contact map and way back T (q = T z) of each harmonic index, each made once."""
+
+    def __init__(self, reduced: ReducedSector, damping: Damping | None, cutoff: float | None):
+        self._sector = reduced.sector
+        self._damping = damping
+        self._cutoff = cutoff
+        self._made: dict[int, tuple[SecondOrderSystem, np.ndarray, np.ndarray]] = {}
+
+    def __call__(self, index: int) -> tuple[SecondOrderSystem, np.ndarray, np.ndarray]:
+        if index not in self._made:
+            T, n_masters = relative_map(self._sector, index)
+            if self._cutoff is not None:
+                T = T @ condensation(projected(self._sector.system, T), n_masters, self._cutoff)
+            system = projected(self._sector.system, T)
+            if self._damping is not None:
+                system = replace(system, damping=self._damping(system))
+            self._made[index] = system, np.eye(len(self._sector.left), system.n_dof), T
+        return self._made[index]
+
+
+def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:
+    """T (n, m) of a wave, q = T [x, y], and how many of these coordinates are contacts and accessories.
+
+    x : (n_c,) relative displacement of neighbours; y : accessories, then the rest. With S the seam map, a = exp(i phi),
+    B_r, B_l the halves of the contact behind S and N a basis of what moves no right face,
+    q = S (B_r^H (x + a B_l N y) + N y), so that B_r z - a B_l z = x whatever y is
+    Raises  ValueError where a right contact face is not made of masters, or shares nodes with a left one or a seam
+    """
+    S = seam_map(sector, index)
+    right, left = sector.interface.B @ S, sector.left @ S
+    faces = np.flatnonzero(np.abs(right).max(axis=0))
+    if np.abs(right @ right.conj().T - np.eye(len(right))).max() > 1e-9 or left[:, faces].any():
+        raise ValueError(
+            "the right contact face of a cyclic part must be of master nodes that lie neither on its left contact face "
+            "nor on a cyclic face"
+        )
+    vectors = (*sector.system.loads.values(), *sector.system.outputs.values())
+    points = [np.flatnonzero(S.T @ v) for v in vectors if np.count_nonzero(v) <= POINT_LOAD]
+    accessories = np.setdiff1d(np.concatenate([*points, []]).astype(int), faces)
+    rest = np.setdiff1d(np.arange(S.shape[1]), np.concatenate([faces, accessories]))
+    others = np.concatenate([accessories, rest])
+    within = sla.null_space(right[:, faces])  # tangential motion that a contact of fewer components leaves free
+    N = np.zeros((S.shape[1], len(others) + within.shape[1]), dtype=right.dtype)
+    N[others, np.arange(len(others))] = 1.0
+    N[faces, len(others) :] = within
+    ahead = np.conj(sector.phase(index))
+    follow = N + ahead * right.conj().T @ (left @ N)
+    return S @ np.concatenate([right.conj().T, follow], axis=1), len(right) + len(accessories)
+
+
+def condensation(system: SecondOrderSystem, n_masters: int, cutoff: float) -> np.ndarray:
+    """Basis (n, n_masters + k): the first coordinates stay, modes with these held up to a cutoff [Hz] replace the rest.
+
+    Raises  ValueError where the rest can move rigidly with the masters held
+    """
+    m, s = slice(0, n_masters), slice(n_masters, None)
+    K, M = system.stiffness, system.mass
+    try:
+        psi = -sla.solve(K[s, s], K[s, m], assume_a="pos")
+    except np.linalg.LinAlgError:
+        raise ValueError("the sector can move rigidly with its shrouds closed: clamp it") from None
+    omega, phi = sla.eigh(K[s, s], M[s, s])
+    phi = phi[:, omega <= (2 * np.pi * cutoff) ** 2]
+    basis = np.zeros((system.n_dof, n_masters + phi.shape[1]), dtype=phi.dtype)
+    basis[m, m] = np.eye(n_masters)
+    basis[s, m] = psi
+    basis[s, n_masters:] = phi
+    return basis
+
+
+def shroud_deflection(reduced: ReducedSector, loads: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Outward normal displacement of the right and of the left face (n_pair,) each [m], neighbours absent.
+
+    loads : name -> static load of every sector [N]. Their sum is the approach of neighbours; the mean over area of one
+    is the thesis's delta_max (4.3.1)
+    """
+    sector = reduced.sector
+    T = seam_map(sector, 0)
+    system = projected(sector.system, T)
+    force = np.sum([value * system.loads[name] for name, value in loads.items()], axis=0)
+    q = T @ sla.solve(system.stiffness, force, assume_a="pos")
+    components = sector.interface.components
+    normal = slice(components.index("n"), None, len(components))
+    return (sector.interface.B @ q)[normal], -(sector.left @ q)[normal]

@@ -1,0 +1,50 @@
+"""Motions of a reduced model that are held: linear constraints on its coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import null_space
+
+from fem.system import SecondOrderSystem
+from reduction.craig_bampton import REPORTED_MODES
+from reduction.linear import linear_modes
+from reduction.model import ReducedModel
+
+# facts about frequencies of the model before; the free ones are told anew
+STALE = ("free_frequency_error", "stuck_frequency", "stuck_frequency_error")
+
+
+def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:
+    """The model without the motions that break rows @ q_full = 0.
+
+    rows : (k, n_full), such as Part.held; none leaves the model as it is
+    Returns the model in coordinates p, q = N p with N an orthonormal basis of what is allowed; they are no longer the
+        displacements of single DOFs, but the contact map, loads, outputs and the way back know that
+    Raises  ValueError for a model without a full field, or one whose harmonics see different systems
+    """
+    if len(rows) == 0:
+        return model
+    if model.basis is None or model.per_harmonic is not None:
+        raise ValueError("motions can be held only in a model that was reduced from one mesh for all harmonics")
+    held = rows @ model.basis
+    N = null_space(held / np.linalg.norm(held, axis=1, keepdims=True))
+    s = model.system
+    system = SecondOrderSystem(
+        _congruent(N, s.mass),
+        _congruent(N, s.stiffness),
+        None if s.damping is None else _congruent(N, s.damping),
+        {name: N.T @ load for name, load in s.loads.items()},
+        {name: N.T @ row for name, row in s.outputs.items()},
+    )
+    interface = replace(model.interface, B=np.asarray(model.interface.B) @ N)
+    held_model = replace(model, system=system, interface=interface, basis=model.basis @ N)
+    facts = {name: fact for name, fact in model.info.items() if name not in STALE}
+    frequency, _ = linear_modes(held_model, n=min(REPORTED_MODES, N.shape[1]))
+    return replace(held_model, info={**facts, "free_frequency": frequency})
+
+
+def _congruent(N: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    product = N.T @ matrix @ N
+    return (product + product.T) / 2

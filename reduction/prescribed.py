@@ -1,0 +1,120 @@
+"""Static displacement given, static force unknown: a platform that is held at a height.
+
+In harmonic 0 the chosen coordinates X_k have a known value and the force that keeps them there is unknown; in the other
+harmonics they move like any others. Tamatam 2021 rearranges the unknowns for it (eq. 5.2-5.9). Here harmonic 0 sees a
+system in which X_k is cut off, and the height is a static load on the rest,
+
+    K_uu X_u = F_u - B^T f - K_uk X_k,      F_k = K_kk X_k + K_ku X_u,
+
+so that every system stays symmetric and a height is an amplitude like a force is; F_k follows from the contact force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg as sla
+
+from fem.constraints import partition
+from fem.system import SecondOrderSystem
+from reduction.model import ReducedModel
+
+
+@dataclass(frozen=True)
+class StaticReaction:
+    """The static force that keeps prescribed coordinates where they are.
+
+    dofs : (k,) coordinates of the reduced model; shape : (k,) their displacement per unit height [m/m]
+    psi : (n, k) static shapes of unit displacements of each; stiffness : (k, k) psi^T K psi [N/m]
+    support : (k,) springs in the model that act about the prescribed position [N/m]
+    """
+
+    dofs: np.ndarray
+    shape: np.ndarray
+    psi: np.ndarray
+    stiffness: np.ndarray
+    support: np.ndarray
+    model: ReducedModel
+
+    def force(self, height: float, contact_force: np.ndarray, loads: Mapping[str, float] | None = None) -> np.ndarray:
+        """Force on each prescribed coordinate (k,) [N], along its displacement.
+
+        height : [m]; contact_force : (n_pair, n_component) static part of the contact force [N]
+        loads : other static loads by name [N]
+        Source  Tamatam 2021, eq. 5.4a after eq. 5.4b is solved for X_u
+        """
+        load = -np.asarray(self.model.interface.B).T @ np.ravel(contact_force)
+        for name, value in (loads or {}).items():
+            load = load + value * self.model.system.loads[name]
+        return (self.stiffness @ self.shape - self.support * self.shape) * height - self.psi.T @ load
+
+
+def prescribe(
+    model: ReducedModel,
+    dofs: np.ndarray,
+    name: str,
+    shape: np.ndarray | float = 1.0,
+    support: np.ndarray | float = 0.0,
+) -> tuple[ReducedModel, StaticReaction]:
+    """Prescribe the static displacement of some coordinates of a reduced model; the rest of their motion stays free.
+
+    dofs : (k,) physical coordinates, outside the contact
+    name : of the new load, whose static amplitude is the height [m]
+    shape : displacement of each per unit height; support : springs that hold each about the prescribed position, which
+        are in the stiffness for the sake of the other harmonics and carry no force at that position [N/m]
+    Returns the model, whose harmonic 0 sees another system, and what gives the reaction
+    Raises  ValueError where a coordinate belongs to the contact, where the name is taken, or where the part can still
+        move rigidly
+    """
+    system, B = model.system, np.asarray(model.interface.B)
+    free, held = partition(system.n_dof, dofs, "prescribed displacement")
+    if len(held) == 0:
+        raise ValueError(f"prescribed displacement '{name}' chooses no coordinate; name a node set that is not clamped")
+    if name in system.loads:
+        raise ValueError(f"prescribed displacement '{name}' has the name of a load; give it another")
+    if np.any(B[:, held]):
+        raise ValueError(f"prescribed displacement '{name}' acts on contact nodes; choose nodes outside the contact")
+    place = np.searchsorted(held, np.asarray(dofs, dtype=int))
+    full_shape, springs = np.empty(len(held)), np.empty(len(held))
+    full_shape[place], springs[place] = shape, support
+
+    K = np.asarray(system.stiffness)
+    try:
+        factor = sla.cho_factor(K[np.ix_(free, free)])
+    except np.linalg.LinAlgError:
+        raise ValueError(
+            f"with '{name}' held and the contact open the part can still move rigidly; clamp it or add a spring"
+        ) from None
+    psi = np.zeros((system.n_dof, len(held)))
+    psi[held, np.arange(len(held))] = 1.0
+    psi[free] = -sla.cho_solve(factor, K[np.ix_(free, held)])
+
+    loads = {**system.loads, name: np.zeros(system.n_dof)}
+    dynamic = replace(system, loads=loads)
+    static = _cut(system, free, held, name, full_shape)
+    reaction = StaticReaction(held, full_shape, psi, psi.T @ K @ psi, springs, model)
+
+    def per_harmonic(h: int) -> tuple[SecondOrderSystem, np.ndarray]:
+        return (static if h == 0 else dynamic), B
+
+    return replace(model, system=dynamic, per_harmonic=per_harmonic), reaction
+
+
+def _cut(
+    system: SecondOrderSystem, free: np.ndarray, held: np.ndarray, name: str, shape: np.ndarray
+) -> SecondOrderSystem:
+    """The system with the held coordinates cut off; the load `name` moves them by `shape` per unit of its amplitude."""
+    K, M = np.array(system.stiffness), np.array(system.mass)
+    push = np.zeros(system.n_dof)
+    push[free] = -K[np.ix_(free, held)] @ shape
+    push[held] = np.diag(K)[held] * shape
+    damping = None if system.damping is None else np.array(system.damping)
+    for matrix in (K, M, damping):
+        if matrix is not None:
+            matrix[np.ix_(free, held)] = 0.0
+            matrix[np.ix_(held, free)] = 0.0
+            matrix[np.ix_(held, held)] = np.diag(np.diag(matrix)[held])
+    loads = {other: np.where(np.isin(np.arange(system.n_dof), held), 0.0, load) for other, load in system.loads.items()}
+    return SecondOrderSystem(M, K, damping, {**loads, name: push}, system.outputs)

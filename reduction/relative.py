@@ -1,0 +1,74 @@
+"""Relative coordinates at a contact of two bodies: half the contact DOFs become masters of a reduction.
+
+The displacement of a body-1 node is replaced by the relative displacement of its pair, u_1 = R^T x + u_2 in the frame R
+of the pair, so that the contact map picks coordinates and the nodes of body 2 may become slaves. Nothing is lost: it is
+a change of variables. Fixed-interface modes are then those of the bodies glued together at the pairs.
+Source  the relative displacement of a shroud in Tamatam 2021, section 3.2.2, for any pair of bodies
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import csr_matrix, eye_array
+
+from fem.interface import COMPONENTS, ContactInterface
+from fem.system import SecondOrderSystem
+
+
+def relative(
+    system: SecondOrderSystem, interface: ContactInterface
+) -> tuple[SecondOrderSystem, ContactInterface, csr_matrix]:
+    """Change the DOFs of the body-1 nodes of a full system to relative displacements.
+
+    system : sparse, n DOFs; interface : all three components, B over the same DOFs
+    Returns the system and interface in the new coordinates, and T (n, n) with q = T q_new; feed the reduced basis
+        through T to get back to the full field
+    Raises  ValueError where a component is missing, or where a body-1 DOF is held or shared by two pairs
+    """
+    if interface.components != COMPONENTS:
+        raise ValueError(f"relative coordinates need contact components t1, t2, n, not {list(interface.components)}")
+    n, n_pair = system.n_dof, interface.n_pair
+    B = csr_matrix(interface.B)
+    own, other = body_1_dofs(interface).ravel(), np.ones(n, dtype=bool)
+    if len(np.unique(own)) < len(own):
+        raise ValueError("relative coordinates need body-1 nodes of their own, but two pairs share one")
+    other[own] = False
+    # x = R u_1 - R u_2, so u_1 = R^T x - R^T (B without its body-1 columns) u
+    rows, columns = np.repeat(own, 3), np.tile(np.arange(3), 3 * n_pair) + np.repeat(3 * np.arange(n_pair), 9)
+    back = csr_matrix((interface.frames.transpose(0, 2, 1).ravel(), (rows, columns)), shape=(n, 3 * n_pair))
+    place = csr_matrix((np.ones(len(own)), (np.arange(len(own)), own)), shape=(3 * n_pair, n))
+    keep = csr_matrix(eye_array(n).tocsr().multiply(other[:, None]))
+    T = csr_matrix(keep + back @ place - back @ (B.multiply(other[None, :])))
+    moved = SecondOrderSystem(
+        mass=csr_matrix(T.T @ system.mass @ T),
+        stiffness=csr_matrix(T.T @ system.stiffness @ T),
+        damping=None if system.damping is None else csr_matrix(T.T @ system.damping @ T),
+        loads={name: T.T @ load for name, load in system.loads.items()},
+        outputs={name: T.T @ row for name, row in system.outputs.items()},
+    )
+    return moved, replace(interface, B=place), T
+
+
+def body_1_dofs(interface: ContactInterface) -> np.ndarray:
+    """DOFs (n_pair, 3) of the body-1 nodes along x, y, z: the columns of B that hold the frames themselves.
+
+    Raises  ValueError where one is not among the DOFs of the system
+    """
+    n_pair = interface.n_pair
+    B = csr_matrix(interface.B)
+    found = np.empty((n_pair, 3), dtype=int)
+    for axis in range(3):
+        weights = csr_matrix(
+            (interface.frames[:, :, axis].ravel(), (np.repeat(np.arange(n_pair), 3), np.arange(3 * n_pair))),
+            shape=(n_pair, 3 * n_pair),
+        )
+        image = csr_matrix(weights @ B)  # x turned from its frame back to the axis
+        for pair in range(n_pair):
+            row = slice(image.indptr[pair], image.indptr[pair + 1])
+            unit = image.indices[row][image.data[row] > 1 - 1e-9]
+            if len(unit) != 1:
+                raise ValueError("relative coordinates need body-1 nodes that are free in x, y and z")
+            found[pair, axis] = unit[0]
+    return found

@@ -1,0 +1,98 @@
+"""The rig's contact grid, matching faces, named points, and the beam's open frequency."""
+
+import numpy as np
+import pytest
+
+import fem.part
+from fem.constraints import Clamp
+from fem.loads import NodalForce
+from fem.material import Material
+from fem.part import Contact
+from fem.surface import surface
+from geometry import mesh as mesh_file
+from geometry import rig
+from reduction.linear import system_modes
+
+
+def read(tmp_path, **changes):
+    rig.build(rig.Parameters(**changes), tmp_path / "rig.msh")
+    return mesh_file.read(tmp_path / "rig.msh")
+
+
+def test_contact_has_the_grid_of_the_thesis(tmp_path):
+    mesh, node_sets = read(tmp_path)
+    assert mesh.doflocs.shape[1] * 3 < 40_000
+    face = surface(mesh, mesh.boundaries["upper_contact"])
+    assert len(face.nodes) == 55
+    assert face.area.sum() == pytest.approx(10e-6)
+    assert [len(np.unique(np.round(face.points[:, axis], 9))) for axis in (0, 1)] == [5, 11]
+    np.testing.assert_allclose(np.ptp(face.points, axis=0), [0.002, 0.005, 0.0], atol=1e-12)
+    np.testing.assert_allclose(face.normals, np.tile([0.0, 0.0, -1.0], (55, 1)), atol=1e-12)
+    lower = mesh.doflocs[:, node_sets["lower_contact"]].T
+    distance = np.abs(lower[:, None] - face.points[None]).max(axis=2).min(axis=0)
+    assert distance.max() < 1e-12
+    assert np.ptp(lower, axis=0).min() == 0.0  # flat, and larger than the upper face
+    assert (np.ptp(lower, axis=0)[:2] > np.ptp(face.points, axis=0)[:2]).all()
+
+
+def test_joint_faces_match_but_share_no_nodes(tmp_path):
+    mesh, node_sets = read(tmp_path)
+    seat, root = (mesh.doflocs[:, node_sets[name]] for name in ("column_seat", "beam_root"))
+    assert not set(node_sets["column_seat"]) & set(node_sets["beam_root"])
+    np.testing.assert_allclose(seat[:, np.lexsort(seat)], root[:, np.lexsort(root)], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"n_contact_length": 3, "n_contact_width": 5, "longest": 0.1, "n_root": 1, "n_height": 2},
+        {"free_length": 0.25},
+    ],
+)
+def test_named_points_stand_where_they_should(tmp_path, changes):
+    p = rig.Parameters(**changes)
+    mesh, node_sets = read(tmp_path, **changes)
+    side, middle = -p.thickness / 2, p.height / 2
+    at = {"shaker": (p.shaker_distance, side, middle), "accelerometer": (p.free_length, side, middle)}
+    at |= {f"high{k}": (p.free_length * k / 4, side, p.height) for k in (1, 2, 3, 4)}
+    for name, where in at.items():
+        np.testing.assert_allclose(mesh.doflocs[:, node_sets[name]].T, [where], atol=1e-12)
+    assert len(node_sets["screws"]) == 6
+    assert len(node_sets["pins"]) == 2
+    below = mesh.doflocs[2, node_sets["platform"]].min()
+    np.testing.assert_allclose(mesh.doflocs[2, node_sets["screws"]], below)
+    np.testing.assert_allclose(mesh.doflocs[:2, node_sets["screws"]].mean(axis=1), [p.contact_x, 0.0], atol=1e-12)
+
+
+def test_clamped_beam_has_the_frequency_of_a_cantilever(tmp_path):
+    """The rigidly held beam is Euler and Bernoulli's but for the specimen's small mass and the beam's width."""
+    mesh, node_sets = read(tmp_path)
+    E, rho = 193e9, 8000.0
+    part = fem.part.build(
+        mesh,
+        node_sets,
+        Material(E, 0.29, rho),
+        [Clamp("column"), Clamp("beam_root"), Clamp("platform")],
+        [Contact("upper_contact", (0, 1, 0), "lower_contact")],
+        {"shaker": NodalForce("shaker", (0, 1, 0))},
+        {},
+    )
+    found = system_modes(part.system, part.interface, None, 1)[0][0]
+    expected = 3.516 / (2 * np.pi) * np.sqrt(E / rho / 12) * 0.010 / 0.310**2
+    assert found == pytest.approx(expected, rel=0.02)
+
+
+def test_impossible_shapes_are_refused_in_one_sentence():
+    for changes, message in (
+        ({"contact_length": 0.011}, "contact_length is 0.011: keep it within the shank"),
+        ({"contact_width": 0.012}, "keep it within geometry.thickness"),
+        ({"foot": 0.008}, "nine tenths of geometry.protrusion"),
+        ({"shaker_distance": 0.29}, "the distance of the upper specimen less 10 mm"),
+        ({"tip_margin": 0.005}, "keep it above 0.005, half the specimen"),
+        ({"n_height": 3}, "give an even number"),
+        ({"n_contact_width": 10}, "give an odd number of nodes"),
+    ):
+        with pytest.raises(ValueError, match=message) as caught:
+            rig.Parameters(**changes)
+        assert "\n" not in str(caught.value)

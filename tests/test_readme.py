@@ -1,0 +1,61 @@
+"""The README is true: its commands run, in its order and from one folder, and its figures are there."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text()
+START = "./tribodyn "
+
+
+def commands(label: str) -> list[str]:
+    """Lines of the fences with this label."""
+    fences = re.findall(rf"^```{label}\n(.*?)^```", README, re.M | re.S)
+    return [line for fence in fences for line in fence.splitlines() if line]
+
+
+def run(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a command of the README with the program of this tree."""
+    assert line.startswith(START)
+    arguments = shlex.split(line.removeprefix(START))
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", "workflows.cli", *arguments]
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_commands_run_one_after_the_other(tmp_path: Path) -> None:
+    lines = commands("sh")
+    assert lines[0] == "./tribodyn run beam"
+    for line in lines:
+        done = run(line, tmp_path)
+        assert done.returncode == 0, f"{line}: {done.stderr}"
+    pictures = sorted((tmp_path / "results/beam/pictures").glob("*.png"))
+    assert len(pictures) == 10
+    figure = ROOT / "workflows/figures/beam_patch.png"
+    made = tmp_path / "results/beam/pictures/patch.png"
+    assert abs(figure.stat().st_size / made.stat().st_size - 1) < 0.2  # the same picture, up to fonts and rounding
+
+
+@pytest.mark.slow
+def test_long_commands_run(tmp_path: Path) -> None:
+    for line in commands("sh long"):
+        done = run(line, tmp_path)
+        assert done.returncode == 0, f"{line}: {done.stderr}"
+
+
+def test_the_check_is_what_ci_runs() -> None:
+    assert commands("sh check") == ["./tribodyn check"]
+    assert 'tribodyn" check' in (ROOT / ".ci/run").read_text()
+
+
+def test_figures_are_there() -> None:
+    for figure in re.findall(r"!\[.*?\]\((.*?)\)", README, re.S):
+        assert (ROOT / figure).is_file(), figure

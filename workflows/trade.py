@@ -1,0 +1,193 @@
+"""What speed costs in accuracy, knob by knob: each setting of a knob on one scene, against a finer reference."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import process_time
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from hbm import error_controlled_rule, thesis_rule
+from hbm.evolution import WearProblem
+from hbm.wear_history import LIFE_SHARE, WearHistory, cycles_to_preload
+from workflows import pipeline, scene_file
+from workflows.progress import Progress
+from workflows.references import free_deflection
+
+THESIS_STEPS = (0.1, 0.05, 0.02, 0.01, 0.005)  # of delta_max, table 4.2
+REFERENCE_STEPS = (0.0025, 0.00125)
+TOLERANCES = (0.1, 0.03)
+PUBLISHED = {  # table 4.2: wear iterations, seconds on four cores, depth [mm], error in depth
+    0.1: (130, 14220, 6.9668, 0.0899),
+    0.05: (183, 21600, 6.6260, 0.0366),
+    0.02: (291, 37020, 6.4849, 0.0145),
+    0.01: (411, 58200, 6.4230, 0.0049),
+    0.005: (577, 70320, 6.3919, 0.0),
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One setting: what it cost and how far it is from the reference.
+
+    seconds : of one processor
+    rule, step : "thesis" with the largest depth of a step over delta_max, or "error_controlled" with its tolerance
+    depth_m : largest total depth when LIFE_SHARE of the preload is left; depth_error, life_error : relative
+    roughness : largest second difference of the depth along the patch, over the depth
+    """
+
+    rule: str
+    step: float
+    hbm_solves: int
+    wear_steps: int
+    seconds: float
+    depth_m: float
+    depth_error: float | None
+    life_cycles: float
+    life_error: float | None
+    roughness: float
+    end: str
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows with their reference: the two finest thesis runs and what their difference says of the reference itself."""
+
+    scene: str
+    rows: tuple[Row, ...]
+    reference: Row
+    depth_uncertainty: float
+    life_uncertainty: float
+
+
+def wear_step(scene: str, say: Callable[[str], None], overrides: tuple[str, ...] = ()) -> Table:
+    """Table 4.2 of the thesis with life added, the error-controlled rule beside it.
+
+    Raises  ValueError for a scene without wear
+    """
+    file = scene_file.read(scene, overrides)
+    if file.scene.wear is None:
+        raise ValueError(f"scene {file.name} has no [wear]: there is no wear step to trade")
+    problem, delta = _problem(file)
+    with threadpool_limits(1):
+        fine = [_measure(problem, delta, "thesis", step, say) for step in REFERENCE_STEPS]
+        rows = [_measure(problem, delta, "thesis", step, say) for step in THESIS_STEPS]
+        rows += [_measure(problem, delta, "error_controlled", tolerance, say) for tolerance in TOLERANCES]
+    # first order in the step: the limit lies as far beyond the finest as the two finest differ
+    depth = 2 * fine[1].depth_m - fine[0].depth_m
+    life = 2 * fine[1].life_cycles - fine[0].life_cycles
+    reference = replace(fine[1], depth_m=depth, life_cycles=life, step=0.0)
+
+    def judged(row: Row) -> Row:
+        return replace(row, depth_error=row.depth_m / depth - 1, life_error=row.life_cycles / life - 1)
+
+    return Table(
+        file.name,
+        tuple(judged(row) for row in (*rows, *fine)),
+        reference,
+        abs(fine[1].depth_m / depth - 1),
+        abs(fine[1].life_cycles / life - 1),
+    )
+
+
+def _problem(file: scene_file.SceneFile) -> tuple[WearProblem, float]:
+    scene = file.scene
+    assert scene.wear is not None
+    with TemporaryDirectory() as folder, threadpool_limits(1):
+        model = pipeline.build(file, Path(folder), Progress())
+    wear, area = scene.wear, model.reduced.interface.area
+    duties = pipeline.mission(scene)
+    problem = WearProblem(model.balance, duties, wear.law, wear.coefficient, area, lost_below=0.9 * LIFE_SHARE)
+    return problem, float(free_deflection(model.balance).max())
+
+
+def _measure(problem: WearProblem, delta: float, rule: str, step: float, say: Callable[[str], None]) -> Row:
+    clock = process_time()
+    if rule == "thesis":
+        worn = thesis_rule.evolve(problem, step * delta)
+    else:
+        worn = error_controlled_rule.evolve(problem, error_controlled_rule.Tolerance(step, delta))
+    seconds = process_time() - clock
+    life = cycles_to_preload(worn)
+    say(f"{rule} {step:g}: {len(worn.cycles)} wear steps, {seconds:.1f} s, {worn.end}")
+    return Row(
+        rule=rule,
+        step=step,
+        hbm_solves=int(worn.solves.sum()),
+        wear_steps=len(worn.cycles) - 1,
+        seconds=seconds,
+        depth_m=_depth_at_life(worn, life),
+        depth_error=None,
+        life_cycles=float("nan") if life is None else life,
+        life_error=None,
+        roughness=roughness(problem.balance.model.interface.points, worn.depth[-1]),
+        end=worn.end,
+    )
+
+
+def _depth_at_life(worn: WearHistory, life: float | None) -> float:
+    deepest = worn.depth.max(axis=1)
+    return float(deepest[-1] if life is None else np.interp(life, worn.cycles, deepest))
+
+
+def roughness(points: np.ndarray, depth: np.ndarray) -> float:
+    """Largest second difference of a depth map between grid neighbours, over its largest depth.
+
+    points : (n_pair, 3) positions on a structured, possibly graded grid [m]; depth : (n_pair,) [m]
+    """
+    spread = np.argsort(np.ptp(points, axis=0))[-2:]
+    worst = 0.0
+    for along, across in (spread, spread[::-1]):
+        lines: dict[float, list[int]] = {}
+        for i, point in enumerate(points):
+            lines.setdefault(round(float(point[across]), 9), []).append(i)
+        for line in lines.values():
+            order = sorted(line, key=lambda i: points[i, along])
+            if len(order) < 3:
+                continue
+            s, w = points[order, along], depth[order]
+            share = (s[1:-1] - s[:-2]) / (s[2:] - s[:-2])
+            straight = w[:-2] + share * (w[2:] - w[:-2])
+            worst = max(worst, float(np.abs(w[1:-1] - straight).max()))
+    return worst / float(depth.max()) if depth.max() > 0 else 0.0
+
+
+def as_records(table: Table) -> list[dict[str, object]]:
+    """The rows for JSON."""
+    return [asdict(row) for row in table.rows]
+
+
+def as_text(table: Table) -> str:
+    """The table for people, the published one beside it."""
+    lines = [
+        "rule               step   steps (thesis)  solves  seconds (thesis)   depth mm (thesis)  error    life 1e6  "
+        "error   roughness"
+    ]
+    for row in table.rows:
+        steps, seconds, depth, _ = PUBLISHED.get(row.step, (None,) * 4) if row.rule == "thesis" else (None,) * 4
+        lines.append(
+            f"{row.rule:17} {100 * row.step:5.3g} % {row.wear_steps:6d} {_bracket(steps, 'd'):8} {row.hbm_solves:6d} "
+            f"{row.seconds:8.1f} {_bracket(seconds, 'd'):9} {1e3 * row.depth_m:8.4f} {_bracket(depth, '.4f'):9} "
+            f"{_percent(row.depth_error):>7} {1e-6 * row.life_cycles:9.3f} {_percent(row.life_error):>7} "
+            f"{100 * row.roughness:8.2f} %"
+        )
+    lines.append(
+        f"reference: {1e3 * table.reference.depth_m:.4f} mm (to {100 * table.depth_uncertainty:.2f} %), "
+        f"{table.reference.life_cycles:.4g} cycles (to {100 * table.life_uncertainty:.2f} %), extrapolated from the "
+        f"thesis's rule at {', '.join(f'{100 * s:g} %' for s in REFERENCE_STEPS)}"
+    )
+    left = f"{100 * LIFE_SHARE:g} % of the first preload is left"
+    lines.append(f"life and depth where {left}; the thesis's depth where the contact has separated")
+    return "\n".join(lines)
+
+
+def _bracket(value: float | None, form: str) -> str:
+    return "" if value is None else f"({value:{form}})"
+
+
+def _percent(value: float | None) -> str:
+    return "" if value is None else f"{100 * value:.2f} %"
