@@ -30,7 +30,7 @@ PLATE_SIDE, PLATE_DEPTH = 0.140, 0.020  # moving platform
 SCREWS = ((-0.040, -0.045), (0.040, -0.045), (-0.040, 0.045), (0.040, 0.045), (0.0, -0.070), (0.0, 0.070))
 PINS = ((-0.070, 0.0), (0.070, 0.0))
 COVER_DEPTH = 0.010
-COLUMN_BEHIND, COLUMN_ABOVE = 0.020, 0.020  # of the column beyond the clamped end, along -x and z
+COLUMN_ABOVE = 0.020  # of the column over the beam
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,8 @@ class Parameters:
     protrusion : of the upper specimen into the slot [m], ours: the contact is at mid-height
     foot : straight part of the protrusion next to the contact [m], ours
     root_length : of the beam inside its seat on the column [m], ours
-    column_side, column_height : square section, and height of the beam's lower edge above the table [m], ours
+    column_length, column_depth : section of the column along x and y [m], ours
+    column_height : of the beam's lower edge above the table [m], ours
     shaker_distance : from the column to the shaker [m], ours
     longest : longest element along the free length [m]
     n_root, n_half : elements along the seat, over half of the beam's height
@@ -62,18 +63,18 @@ class Parameters:
     protrusion: float = 0.008
     foot: float = 0.001
     root_length: float = 0.080
-    column_side: float = 0.120
-    column_height: float = 0.180
+    column_length: float = 0.100
+    column_depth: float = 0.100
+    column_height: float = 0.120
     shaker_distance: float = 0.040
     longest: float = 0.040
     n_root: int = 3
     n_half: int = 2
 
     def __post_init__(self) -> None:
-        checks.positive(self, "free_length", "height", "thickness", "contact_length", "contact_width")
-        checks.positive(self, "slot_length", "slot_height")
-        checks.positive(self, "protrusion", "foot", "root_length", "column_side", "column_height", "shaker_distance")
-        checks.positive(self, "longest")
+        checks.positive(self, "free_length", "height", "thickness", "contact_length", "contact_width", "slot_length")
+        checks.positive(self, "slot_height", "protrusion", "foot", "root_length", "shaker_distance", "longest")
+        checks.positive(self, "column_length", "column_depth", "column_height")
         checks.odd(self, "n_contact_length", "n_contact_width")
         checks.whole(self, "n_root", "n_half", least=1)
         for name, largest, what in (
@@ -89,6 +90,10 @@ class Parameters:
                 raise ValueError(f"geometry.{name} is {getattr(self, name)}: keep it within {what}, {largest:.4g} m")
         if self.slot_length <= SPECIMEN_SIDE:
             raise ValueError(f"geometry.slot_length is {self.slot_length}: the lower specimen needs {SPECIMEN_SIDE} m")
+        if self.root_length >= self.column_length:
+            raise ValueError(
+                f"geometry.root_length is {self.root_length}: keep it below column_length ({self.column_length})"
+            )
         if self.slot_height <= self.height / 2:
             raise ValueError(f"geometry.slot_height is {self.slot_height}: keep it above half of geometry.height")
 
@@ -140,9 +145,9 @@ def _contact_lines(p: Parameters) -> tuple[np.ndarray, np.ndarray]:
 def _column(p: Parameters) -> blocks.Body:
     """Bulk column beside the beam, whose seat on it is the side y = thickness / 2."""
     root, up = _root_lines(p), np.unique(np.concatenate(_height_lines(p)))
-    behind = np.array([root[0] - COLUMN_BEHIND, root[0]])
-    whole = np.concatenate([behind[:1], root])
-    across = p.thickness / 2 + grid.towards_start(0.0, p.column_side, 3, 2.0)
+    behind = np.array([-p.column_length, root[0]])
+    whole = np.append(behind[0], root)
+    across = p.thickness / 2 + grid.towards_start(0.0, p.column_depth, 3, 2.0)
     below = np.linspace(-p.column_height, 0.0, 3)
     above = np.array([p.height, p.height + COLUMN_ABOVE])
     return blocks.body(
