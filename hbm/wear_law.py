@@ -50,7 +50,8 @@ class Exposure:
         k = parameters.stiffness[:, :t, None]
         slider = x[:, :t] - np.divide(f[:, :t], k, out=np.zeros_like(f[:, :t]), where=k > 0)
         step = np.linalg.norm(np.roll(slider, -1, axis=2) - slider, axis=1)
-        normal = 0.5 * (f[:, t] + np.roll(f[:, t], -1, axis=1))
+        # geometric mean: a slider that moved while the pair was apart carried no load on the way
+        normal = np.sqrt(np.maximum(f[:, t] * np.roll(f[:, t], -1, axis=1), 0.0))
         return np.sum(normal * step, axis=1)
 
 

@@ -51,6 +51,8 @@ def craig_bampton(
     """
     K, M = csr_matrix(system.stiffness), csr_matrix(system.mass)
     s, m = partition(system.n_dof, master_dofs(system, interface, extra_masters), "master")
+    if not len(s):
+        raise ValueError("Craig-Bampton: every DOF is a master, nothing is left to reduce: use the matrices")
     K_ss, M_ss = K[s][:, s], M[s][:, s]
     factor = factorise(K_ss, solver=solver)
     psi = constraint_modes(factor, csc_matrix(K[s][:, m]))

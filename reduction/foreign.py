@@ -1,11 +1,23 @@
 """Bring your own matrices: M, K, C from another program, with the DOFs that touch, load and observe.
 
-    from reduction.foreign import read_matrices, reduced_model
+    matrices = read_matrices("part.npz")  # M, K and, if there is one, C; or mass="M.mtx", stiffness="K.mtx"
+    system = matrices.system(loads={"press": {2: 0.5, 5: 0.5}, "shaker": 8}, outputs={"tip": 9})
+    contact = matrices.contact([[0, 1, 2], [3, 4, 5]], components=("t1", "t2", "n"), area=1e-5)
+    model = reduced_model(system, contact)  # dense; reduction.craig_bampton where there are many DOFs
+    springs = contact.stiffness(tangential=2e6, normal=3e6)
+    parameters = ContactParameters.of(contact.components, springs, friction=0.4)
+    excitation = Excitation.of({"press": 50.0}, {1: {"shaker": 20.0}})
+    balance = HarmonicBalance(model, "jenkins", parameters, HarmonicBasis((0, 1, 2, 3)), excitation, omega_max=900.0)
+    response = natural.follow(balance, 200.0, 800.0, natural.Options(n_points=60))
+    print(response.frequency, response.amplitude("tip"))
+    worst = AtPeak("tip", 200.0, 800.0)
+    wear = WearProblem(balance, (Duty(worst),), "energy", 2e-15, contact.area)
+    history = thesis_rule.evolve(wear, 1e-6, max_steps=5)
+    print(history.cycles, history.depth.max(axis=1))
 
-    matrices = read_matrices("blade.mat")                                  # or mass="M.mtx", stiffness="K.mtx"
-    system = matrices.system(loads={"shaker": 17}, outputs={"tip": 41})
-    contact = matrices.contact([[3, 4, 5], [6, 7, 8]], components=("t1", "t2", "n"), area=1e-5)
-    model = reduced_model(system, contact)                                 # dense, ready for hbm
+with `ContactParameters` from hbm.law, `HarmonicBalance` from hbm.balance, `HarmonicBasis` from hbm.harmonics,
+`Excitation` from hbm.excitation, `natural` from hbm.continuation, `AtPeak` from hbm.operating_point, `Duty` and
+`WearProblem` from hbm.evolution and `thesis_rule` from hbm. A scene with [model] does the same without Python.
 
 Units are SI after `scale`. A DOF is a number from 0, or (node, component) where the file carries labels (Abaqus text,
 ANSYS with its mapping file); the component is 1 to 6 or a name such as "UX" or "z".

@@ -54,6 +54,18 @@ def read_matrix(path: Path, variable: str | None = None) -> tuple[sp.csr_matrix,
     return _real(matrix, f"{path.name} {variable or ''}".strip()), labels
 
 
+def read_array(path: Path, variable: str) -> np.ndarray:
+    """A named array of real numbers, such as a list of DOFs, out of a container; raises ValueError."""
+    known = variables(path)
+    if variable not in known:
+        raise ValueError(f"{path.name} has no variable '{variable}': it holds {', '.join(known) or 'one matrix alone'}")
+    found = _from_npz(path, variable) if path.suffix.lower() == ".npz" else _from_mat(path, variable)
+    array = found.toarray() if sp.issparse(found) else np.asarray(found)
+    if array.dtype.kind not in "fiub" or not np.isfinite(array).all():
+        raise ValueError(f"{path.name} {variable} must hold finite real numbers")
+    return array.astype(float)
+
+
 def _from_npz(path: Path, variable: str | None) -> Any:
     if variable is None or variable not in variables(path):
         return sp.load_npz(path)

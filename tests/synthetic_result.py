@@ -7,7 +7,7 @@ import numpy as np
 from hbm.branch import CONVERGED, Branch
 from hbm.evolution import LOST
 from hbm.wear_history import WearHistory
-from workflows.result import Fields, Loops, PartMesh, Patch, References, Result
+from workflows.result import CurveStability, Fields, Loops, PartMesh, Patch, References, Result, ShearBounds
 from workflows.scene_file import read
 
 LENGTH, WIDTH = 0.2, 0.02
@@ -100,6 +100,10 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
         part=part,
         references=References(omega, np.abs(resonance(415, 0.01)), np.abs(resonance(530, 0.01))),
         frf=frf,
+        stability=CurveStability(
+            np.abs(np.arange(61) - 25) > 5, np.full(61, -1.0), omega[[20, 30]], np.array([20.5, 30.5]), ("fold", "fold")
+        ),
+        bounds=ShearBounds(*np.outer([0.9, 1.1, 0.8, 1.2], np.abs(slipping)), np.full(61, 0.5), np.zeros(61, int)),
         wear=wear,
         fields=Fields(rows, bend),
         loops=loops,

@@ -102,15 +102,19 @@ def run(
         _draw(result, folder / "pictures")
 
 
+def _aside(sentence: str) -> None:
+    """Progress of a study, beside what it prints."""
+    print(sentence, file=sys.stderr, flush=True)
+
+
 def _earlier(path: Path, file: scene_file.SceneFile) -> Result | None:
     """The unfinished result to go on from, None where there is none yet."""
     from workflows import pipeline, store
-    from workflows.scene import Scene
 
     if not path.exists():
         return None
     result = store.load(path)
-    key = pipeline.same_problem(Scene.model_validate_json(result.provenance["scene"]), file.scene)
+    key = pipeline.same_problem(scene_file.from_json(result.provenance["scene"]), file.scene)
     if key:
         raise ValueError(f"{path} is the result of another scene, {key} differs: run its scene, or without --resume")
     return result
@@ -152,9 +156,8 @@ def trade(
         Print JSON for machines.
     """
     from workflows import trade as trading
-    from workflows.progress import console_progress
 
-    table = trading.wear_step(scene, console_progress().say, overrides)
+    table = trading.wear_step(scene, _aside, overrides)
     print(json.dumps(trading.as_records(table), indent=2) if as_json else trading.as_text(table))
 
 
@@ -162,6 +165,8 @@ def trade(
 def bench(
     *,
     quick: Annotated[bool, Parameter(negative=())] = False,
+    scaling: Annotated[bool, Parameter(negative=())] = False,
+    out: Path = Path("scaling.png"),
     as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
 ) -> None:
     """Measure the solver beside the dense algorithm of the thesis on the beam scene (tables 7.1 to 7.3).
@@ -169,15 +174,35 @@ def bench(
     Parameters
     ----------
     quick
-        Harmonics 0+1 and 0+3 on one thread, in under a minute.
+        Harmonics 0+1 and 0+3 on one thread, in under a minute; with --scaling up to 13 x 13 contact nodes.
+    scaling
+        Time and memory of one response at 0+3 from 5 x 5 to 31 x 31 contact nodes instead, with a plot.
+    out
+        File of that plot.
     as_json
         Print JSON for machines.
     """
     from workflows import bench as benchmark
-    from workflows.progress import console_progress
 
-    rows = benchmark.run(quick, console_progress().say)
+    if scaling:
+        _scaling(quick, out, as_json)
+        return
+    rows = benchmark.run(quick, _aside)
     print(json.dumps(benchmark.as_records(rows), indent=2) if as_json else benchmark.as_text(rows))
+
+
+def _scaling(quick: bool, out: Path, as_json: bool) -> None:
+    from workflows import scaling as measured
+    from workflows.progress import Progress, console_progress
+
+    progress = Progress() if as_json else console_progress()
+    rows = measured.run(measured.QUICK if quick else measured.FULL, progress.say)
+    measured.picture(rows).savefig(out)
+    if as_json:
+        print(json.dumps({**measured.as_records(rows), "picture": str(out)}, indent=2))
+    else:
+        print(measured.as_text(rows))
+        print(out)
 
 
 @app.command
@@ -266,6 +291,62 @@ def verify(
 
 
 @app.command
+def backbone(
+    scene: str,
+    *,
+    start: Annotated[str, Parameter(name="--from")],
+    stop: Annotated[str, Parameter(name="--to")],
+    mode: int = 0,
+    points: int = 40,
+    overrides: Overrides = (),
+    out: Path | None = None,
+    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+) -> None:
+    """Follow a nonlinear mode: frequency and damping against amplitude, as a table and a plot.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene (see `tribodyn list`) or a .toml file; its harmonic loads play no part.
+    start
+        Amplitude of the response to begin at, such as 1um.
+    stop
+        Amplitude to end at, such as 1mm.
+    mode
+        Number of the mode about the static equilibrium, from 0.
+    points
+        Points on an easy way; there are more where the backbone bends.
+    out
+        Folder of backbone.csv and backbone.png; results/NAME unless told.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import modes
+    from workflows.progress import Progress, console_progress
+
+    file = scene_file.read(scene, overrides)
+    ends = _option("--from", start, "m"), _option("--to", stop, "m")
+    found = modes.follow(file, *ends, mode, points, Progress() if as_json else console_progress())
+    folder = out or Path("results") / file.name
+    folder.mkdir(parents=True, exist_ok=True)
+    modes.write(found, folder / "backbone.csv")
+    modes.picture(found).savefig(folder / "backbone.png")
+    if as_json:
+        print(json.dumps(modes.record(found), indent=2))
+    else:
+        hertz, damping = found.omega / (2 * math.pi), 100 * found.damping
+        _print_lines(
+            [
+                ("at rest", f"{found.reference_omega / (2 * math.pi):.6g} Hz"),
+                ("frequency", f"{hertz[0]:.6g} -> {hertz[-1]:.6g} Hz"),
+                ("damping", f"{damping[0]:.4g} -> {damping[-1]:.4g} %, largest {damping.max():.4g} %"),
+                ("end", found.end),
+            ]
+        )
+        print(folder / "backbone.csv", folder / "backbone.png", sep="\n")
+
+
+@app.command
 def plan(scene: str, *, overrides: Overrides = ()) -> None:
     """Say what a scene will model, and what it will cost, before running it.
 
@@ -306,9 +387,8 @@ def _print_lines(lines: list[tuple[str, str]]) -> None:
 def _draw(result: Result, folder: Path) -> None:
     """Draw what the scene of a result wants drawn; curves come first, they need no system libraries."""
     from workflows import plots
-    from workflows.scene import Scene
 
-    wanted = Scene.model_validate_json(result.provenance["scene"]).pictures
+    wanted = scene_file.from_json(result.provenance["scene"]).pictures
     folder.mkdir(parents=True, exist_ok=True)
     written = plots.draw(result, folder) if wanted.plots else []
     if wanted.renders:

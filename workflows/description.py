@@ -13,6 +13,7 @@ from fem.part import Part
 from geometry import mesh as mesh_reader
 from geometry.numbering import REFERENCE_POINTS, permutation
 from hbm.balance import HarmonicBalance
+from hbm.harmonic_choice import HarmonicChoice
 from workflows.references import free_deflection
 from workflows.result import PartMesh, Patch, Result
 from workflows.scene_file import SceneFile
@@ -22,28 +23,39 @@ PACKAGES = ("tribodyn", "numpy", "scipy", "numba", "scikit-fem", "gmsh", "meshio
 SEED = 0  # of every random start vector and probe in the packages used
 
 
-def described(file: SceneFile, part: Part, balance: HarmonicBalance) -> Result:
-    """The result before anything was solved: where it comes from and what is modelled."""
-    reduced = balance.model
-    nodes = cKDTree(part.points).query(reduced.interface.points)[1]
-    i = reduced.interface
+def described(
+    file: SceneFile, part: Part | None, balance: HarmonicBalance, choice: HarmonicChoice | None = None
+) -> Result:
+    """The result before anything was solved: where it comes from and what is modelled; part None for matrices."""
+    reduced, i = balance.model, balance.model.interface
+    nodes = np.full(i.n_pair, -1) if part is None else cKDTree(part.points).query(i.points)[1]
     patch = Patch(i.components, nodes, i.points, i.frames, i.area, i.gap, i.faces, free_deflection(balance))
     facts: dict[str, str | int | float | np.ndarray] = {
-        "elements": int(part.mesh.nelements),
-        "nodes": len(part.points),
-        "full_dofs": part.system.n_dof,
+        "full_dofs": int(str(reduced.info["n_full"])),
         "model_dofs": reduced.system.n_dof,
-        "retained_modes": int(str(reduced.info["n_modes"])),
-        "first_omitted_hz": float(str(reduced.info["first_omitted_frequency"])),
         "free_hz": np.asarray(reduced.info["free_frequency"]),
         "contact_pairs": i.n_pair,
+        "harmonics": np.array(balance.basis.harmonics),
         "unknowns": balance.n_unknown,
         "delta_max_m": float(patch.free_deflection.max()),
-        "scaled_jacobian": mesh_reader.quality(part.mesh).scaled_jacobian,
-        "factorisation": str(reduced.info["factorisation"]),
         "compliance_error": balance.compliance.error,
     }
-    return Result(provenance(file), facts, "model built", patch=patch, part=part_mesh(part))
+    if part is not None:
+        facts |= {
+            "elements": int(part.mesh.nelements),
+            "nodes": len(part.points),
+            "scaled_jacobian": mesh_reader.quality(part.mesh).scaled_jacobian,
+        }
+    if "factorisation" in reduced.info:  # reduced here, not as the matrices came
+        facts |= {
+            "retained_modes": int(str(reduced.info["n_modes"])),
+            "first_omitted_hz": float(str(reduced.info["first_omitted_frequency"])),
+            "factorisation": str(reduced.info["factorisation"]),
+        }
+    if choice is not None:
+        facts |= {"harmonics_error": choice.estimate.error, "harmonics_choice": choice.outcome}
+    mesh = None if part is None else part_mesh(part)
+    return Result(provenance(file), facts, "model built", patch=patch, part=mesh)
 
 
 def provenance(file: SceneFile) -> dict[str, str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from workflows.scene import Scene
+from workflows.scene import PartScene
 
 LINER_UNIT = 20e-6  # [m] of one published unit of liner displacement (ours)
 FORCE_UNIT = 1e3  # [Pa] of one published unit of force (ours)
@@ -32,7 +32,7 @@ class Case:
     overrides: tuple[str, ...] = ()
 
 
-def cases(scene: Scene) -> list[Case]:
+def cases(scene: PartScene) -> list[Case]:
     """All configurations; the scene itself is the flat, vertical leaf with the liner at rest."""
     contact = scene.contact.normal_stiffness or 0.0
     spring = scene.springs["left_pin"].stiffness

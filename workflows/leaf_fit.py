@@ -28,7 +28,7 @@ from geometry import mesh as mesh_reader
 from reduction.craig_bampton import craig_bampton
 from reduction.held import hold
 from workflows import pipeline, scene_file
-from workflows.scene import Scene
+from workflows.scene import PartScene
 
 PUBLISHED = {
     "leaf alone": (0.00, 0.00, 1.00, 1.71, 2.44, 3.96, 4.78, 5.73, 6.00, 7.11),
@@ -137,7 +137,7 @@ def relative_errors(ratios: np.ndarray) -> np.ndarray:
     return (ratios - _RATIOS) / np.maximum(_RATIOS, FLOOR)
 
 
-def reduced_leaf(scene: Scene, parameters: leaf_seal.Parameters) -> Leaf:
+def reduced_leaf(scene: PartScene, parameters: leaf_seal.Parameters) -> Leaf:
     """The leaf of a scene with other dimensions, by the same chain as a run of the scene, its springs left out."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "leaf.msh"
@@ -155,7 +155,7 @@ def reduced_leaf(scene: Scene, parameters: leaf_seal.Parameters) -> Leaf:
     return Leaf(system.mass, system.stiffness, model.interface, seat_rows, np.concatenate(shares))
 
 
-def of_scene(scene: Scene) -> Fit:
+def of_scene(scene: PartScene) -> Fit:
     """The leaf as a scene has it, beside the published ratios; its unit is the best one."""
     parameters = leaf_seal.Parameters(**cast("dict[str, Any]", scene.geometry.parameters))
     spring = next(iter(scene.springs.values())).stiffness
@@ -185,7 +185,7 @@ def _counted(ratios: np.ndarray) -> np.ndarray:
     return relative_errors(ratios)[COUNTED]
 
 
-def fit(scene: Scene, pin_column: int, max_steps: int = 20) -> Fit:
+def fit(scene: PartScene, pin_column: int, max_steps: int = 20) -> Fit:
     """Fit the shape of the leaf by least squares over all ratios; the same numbers at every run.
 
     Every shape gets its own best unit and stiffnesses, so that only the shape is searched for.
@@ -217,7 +217,7 @@ def fit(scene: Scene, pin_column: int, max_steps: int = 20) -> Fit:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Fit for every column the pins may stand in and print the best; with "check", the leaf as the scene has it."""
     words = sys.argv[1:] if arguments is None else list(arguments)
-    scene = scene_file.read("leaf_seal").scene
+    scene = scene_file.read("leaf_seal").part_scene
     with threadpool_limits(1):
         if words == ["check"]:
             found = of_scene(scene)

@@ -84,7 +84,7 @@ def respond(file: SceneFile) -> LeafResponse:
     Raises  pipeline.SolveFailed where the curve does not come to its end
     """
     start = time.process_time()
-    scene = file.scene
+    scene = file.part_scene
     with TemporaryDirectory() as folder:
         mesh, node_sets = pipeline.make_mesh(file, Path(folder))
     part = pipeline.make_part(scene, mesh, node_sets)

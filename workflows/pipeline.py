@@ -25,6 +25,7 @@ from hbm.balance import HarmonicBalance
 from hbm.branch import CONVERGED, Branch
 from hbm.evolution import Duty, WearProblem
 from hbm.excitation import Excitation
+from hbm.harmonic_choice import HarmonicChoice
 from hbm.harmonics import HarmonicBasis
 from hbm.newton import NewtonOptions
 from hbm.operating_point import AtFrequency, AtPeak, BesidePeak
@@ -34,16 +35,18 @@ from reduction.damping import modal_damping, rayleigh
 from reduction.held import hold
 from reduction.linear import stuck_stiffness
 from reduction.model import ReducedModel
-from workflows import store
+from workflows import curve, matrix_model, store
 from workflows.description import described
 from workflows.fields import displacement_fields, hysteresis_loops
+from workflows.matrix_scene import MatrixScene
 from workflows.progress import Progress
 from workflows.references import linear_references
 from workflows.result import Patch, Result
-from workflows.scene import Place, Scene, StaticLoad, unknown_key
+from workflows.scene import HIGHEST, PartScene, Place, Scene, StaticLoad, unknown_key
 from workflows.scene_file import SceneFile
 
 OUTPUT = "response"
+TOLERANCE = 0.01  # of the response, where a scene leaves the choice of harmonics
 
 
 class SolveFailed(RuntimeError):
@@ -52,11 +55,15 @@ class SolveFailed(RuntimeError):
 
 @dataclass(frozen=True)
 class Model:
-    """The nonlinear problem of a scene with what it was made from."""
+    """The nonlinear problem of a scene with what it was made from; no part where it came as matrices.
 
-    part: Part
+    choice : of harmonics, where the scene leaves it
+    """
+
+    part: Part | None
     reduced: ReducedModel
     balance: HarmonicBalance
+    choice: HarmonicChoice | None = None
 
 
 def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | None = None) -> Result:
@@ -69,8 +76,8 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
     check_names(scene)
     keep = Keeper(folder / "result.h5", clock)
     with threadpool_limits(scene.solver.threads):
-        model = build(file, folder, progress)
-        result = earlier or described(file, model.part, model.balance)
+        model = build(file, folder, progress, harmonics_of(earlier))
+        result = earlier or described(file, model.part, model.balance, model.choice)
         if wears(scene) and result.patch is not None:
             step_limit(scene, result.patch)  # raises before anything long is begun
         previous = None if earlier else store.set_aside(keep.path)
@@ -85,6 +92,7 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
                 references = linear_references(model.balance, OUTPUT, 2 * np.pi * low, 2 * np.pi * high)
             result = keep(replace(result, frf=frf, references=references, state="response computed"))
         check_branch(result.frf)
+        result = keep(judged(scene, model.balance, result, progress))
         if wears(scene):
             with progress.track("wear") as advance:
                 result = wear_down(scene, model, result, keep, advance)
@@ -92,17 +100,47 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
         return keep(replace(result, state=state))
 
 
-def build(file: SceneFile, folder: Path, progress: Progress) -> Model:
-    """The nonlinear problem of a scene, stage by stage; a mesh that is made is kept in `folder`."""
+def judged(scene: Scene, balance: HarmonicBalance, result: Result, progress: Progress) -> Result:
+    """The result with what the scene asks about its response curve and is not there yet."""
+    frf = result.frf
+    assert frf is not None
+    if scene.response.stability and result.stability is None:
+        with progress.stage("stability"):
+            result = replace(result, stability=curve.stability_of(balance, frf))
+    if scene.response.bounds and result.bounds is None:
+        with progress.track("bounds of residual shear") as advance:
+            bounds = curve.shear_bounds(balance, frf, OUTPUT, newton_options(scene), advance)
+            result = replace(result, bounds=bounds)
+    return result
+
+
+def harmonics_of(result: Result | None) -> tuple[int, ...]:
+    """Harmonics that a result was computed with, none where there is no result."""
+    return () if result is None else tuple(int(h) for h in np.atleast_1d(result.facts["harmonics"]))
+
+
+def build(file: SceneFile, folder: Path, progress: Progress, chosen: tuple[int, ...] = ()) -> Model:
+    """The nonlinear problem of a scene, stage by stage; a mesh that is made is kept in `folder`.
+
+    chosen : harmonics of an earlier run, for a scene that leaves the choice
+    """
     scene = file.scene
-    with progress.stage("mesh"):
-        mesh, node_sets = make_mesh(file, folder)
-    with progress.stage("mass and stiffness"):
-        part = make_part(scene, mesh, node_sets)
-    with progress.stage("reduction"):
-        reduced = reduce_part(scene, part)
-    with progress.stage("contact compliance"):
-        return make_model(scene, part, reduced)
+    part = None
+    if isinstance(scene, MatrixScene):
+        with progress.stage("matrices"):
+            reduced = damped(scene, matrix_model.make(scene, file.folder))
+    else:
+        with progress.stage("mesh"):
+            mesh, node_sets = make_mesh(file, folder)
+        with progress.stage("mass and stiffness"):
+            part = make_part(file.part_scene, mesh, node_sets)
+        with progress.stage("reduction"):
+            reduced = reduce_part(file.part_scene, part)
+    with progress.stage("choice of harmonics" if scene.harmonics.automatic and not chosen else "contact compliance"):
+        model = make_model(scene, part, reduced, chosen)
+    if model.choice is not None:
+        progress.say(model.choice.outcome)
+    return model
 
 
 def wears(scene: Scene) -> bool:
@@ -129,7 +167,7 @@ def check_names(scene: Scene) -> None:
 
 def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]]:
     """The mesh with its node sets: read from the scene's file, or built from the part and kept in `folder`."""
-    geometry = file.scene.geometry
+    geometry = file.part_scene.geometry
     if geometry.mesh is not None:
         return mesh_reader.read(file.folder / geometry.mesh)
     assert geometry.part is not None
@@ -138,7 +176,7 @@ def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]
     return mesh_reader.read(path)
 
 
-def make_part(scene: Scene, mesh: Any, node_sets: dict[str, np.ndarray]) -> Part:
+def make_part(scene: PartScene, mesh: Any, node_sets: dict[str, np.ndarray]) -> Part:
     """Mass, stiffness, loads, outputs and contact of the mesh, held where the scene says."""
     contact, response = scene.contact, scene.response
     return fem.part.build(
@@ -163,13 +201,13 @@ def make_part(scene: Scene, mesh: Any, node_sets: dict[str, np.ndarray]) -> Part
     )  # fmt: skip
 
 
-def clamps(scene: Scene) -> list[Clamp]:
+def clamps(scene: PartScene) -> list[Clamp]:
     """What holds the part, whole groups or along some axes."""
     geometry = scene.geometry
     return [*(Clamp(group) for group in geometry.fixed), *(Clamp(*item) for item in geometry.fixed_axes.items())]
 
 
-def springs(scene: Scene) -> list[Spring]:
+def springs(scene: PartScene) -> list[Spring]:
     """Joints that give way."""
     return [Spring(s.group, s.direction, s.stiffness, s.opposite) for s in scene.springs.values()]
 
@@ -179,11 +217,20 @@ def make_load(load: StaticLoad) -> Load:
     return Pressure(load.group) if load.direction is None else NodalForce(load.group, load.direction)
 
 
-def reduce_part(scene: Scene, part: Part) -> ReducedModel:
+def reduce_part(scene: PartScene, part: Part) -> ReducedModel:
     """The part on its contact and load nodes and a few modes, with the scene's damping."""
     reduced = craig_bampton(part.system, part.interface, scene.reduction.modes, scene.reduction.cutoff)
-    reduced = hold(reduced, part.held)
-    return reduced.with_damping(damping_matrix(scene, reduced))
+    return damped(scene, hold(reduced, part.held))
+
+
+def damped(scene: Scene, reduced: ReducedModel) -> ReducedModel:
+    """The model with the scene's damping; raises ValueError where its files hold another one."""
+    damping = damping_matrix(scene, reduced)
+    if reduced.system.damping is None:
+        return reduced.with_damping(damping)
+    if damping is not None:
+        raise ValueError("the files of the model hold a damping matrix: leave [damping] out, or the matrix")
+    return reduced
 
 
 def damping_matrix(scene: Scene, reduced: ReducedModel) -> np.ndarray | None:
@@ -204,29 +251,40 @@ def contact_stiffness(scene: Scene, reduced: ReducedModel) -> np.ndarray:
     return reduced.interface.stiffness(scene.contact.tangential_stiffness or 0.0, scene.contact.normal_stiffness or 0.0)
 
 
-def make_model(scene: Scene, part: Part, reduced: ReducedModel) -> Model:
-    """The harmonic balance of the scene."""
-    contact = scene.contact
+def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: tuple[int, ...] = ()) -> Model:
+    """The harmonic balance of the scene; harmonics are those it names, else `chosen`, else chosen here."""
+    contact, harmonics = scene.contact, scene.harmonics
     parameters = law.ContactParameters.of(
         contact.components,
         contact_stiffness(scene, reduced),
         friction=contact.friction or 0.0,
         gap=reduced.interface.gap,
     )
-    basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples, scene.harmonics.transitions)
-    excitation, omega_max = excite(scene, part, basis), response_range(scene)[1]
-    return Model(part, reduced, HarmonicBalance(reduced, contact.law, parameters, basis, excitation, omega_max))
+
+    def balance(kept: tuple[int, ...]) -> HarmonicBalance:
+        basis = HarmonicBasis(kept, harmonics.samples, harmonics.transitions)
+        base = ground_motion(scene, part, basis) if isinstance(scene, PartScene) and part is not None else None
+        return HarmonicBalance(reduced, contact.law, parameters, basis, excite(scene, base), response_range(scene)[1])
+
+    choice = None
+    if harmonics.automatic and not chosen:
+        first = balance(tuple(sorted({0, 1} | {load.harmonic for load in scene.loads.harmonic.values()})))
+        choice = curve.choose_harmonics(
+            first, peak_of(scene), harmonics.tolerance or TOLERANCE, harmonics.highest or HIGHEST, newton_options(scene)
+        )
+        chosen = choice.harmonics
+    return Model(part, reduced, balance(harmonics.kept or chosen), choice)
 
 
-def excite(scene: Scene, part: Part, basis: HarmonicBasis) -> Excitation:
+def excite(scene: Scene, base: np.ndarray | None) -> Excitation:
     """The loads of the scene, F cos(h w t + phase) as amplitude F exp(i phase), and the motion of the ground."""
     loads: dict[tuple[int, str], complex] = {(0, name): load.amplitude for name, load in scene.loads.static.items()}
     for name, load in scene.loads.harmonic.items():
         loads[load.harmonic, name] = load.amplitude * np.exp(1j * load.phase)
-    return Excitation(loads, ground_motion(scene, part, basis))
+    return Excitation(loads, base)
 
 
-def ground_motion(scene: Scene, part: Part, basis: HarmonicBasis) -> np.ndarray | None:
+def ground_motion(scene: PartScene, part: Part, basis: HarmonicBasis) -> np.ndarray | None:
     """Motion of the ground (n_pair * n_component, n_coeff) [m] along the contact components, None where it rests.
 
     Raises  ValueError where a face has no contact or a harmonic is not kept
@@ -316,11 +374,15 @@ def wear_down(
     return result
 
 
+def peak_of(scene: Scene) -> AtPeak:
+    """The resonance peak within the range of the response."""
+    return AtPeak(OUTPUT, *response_range(scene), scene.response.points, newton=newton_options(scene))
+
+
 def mission(scene: Scene) -> tuple[Duty, ...]:
     """Where the cycles that wear are taken: the scene's one place, or the duties of its mission."""
     assert scene.wear is not None
-    newton = newton_options(scene)
-    peak = AtPeak(OUTPUT, *response_range(scene), scene.response.points, newton=newton)
+    newton, peak = newton_options(scene), peak_of(scene)
 
     def site(place: Place) -> AtFrequency | AtPeak | BesidePeak:
         if place.frequency is not None:
@@ -361,7 +423,7 @@ def with_pictures_of(result: Result, model: Model, duty: Duty) -> Result:
     balance = model.balance.with_load(duty.load)
     return replace(
         result,
-        fields=displacement_fields(balance, model.part, rows, numbers),
+        fields=None if model.part is None else displacement_fields(balance, model.part, rows, numbers),
         loops=hysteresis_loops(balance, rows, numbers),
     )
 

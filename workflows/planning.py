@@ -15,8 +15,10 @@ import numpy as np
 from fem.constraints import free_dofs, named
 from hbm.harmonics import HarmonicBasis
 from reduction.craig_bampton import POINT_LOAD
+from workflows import matrix_model
+from workflows.matrix_scene import MatrixScene
 from workflows.pipeline import check_names, clamps, make_mesh
-from workflows.scene import Scene
+from workflows.scene import PartScene, Scene
 from workflows.scene_file import SceneFile
 
 FACTOR_BYTES = 15e3  # of a sparse Cholesky factor, for each DOF
@@ -25,6 +27,7 @@ BACK_SUBSTITUTION_SECONDS = 1.5e-7  # for each DOF and right-hand side
 DENSE_SECONDS = 3e-9  # for each cubed coordinate of the reduced model, all eigenvalue problems together
 SOLVE_SECONDS = 6e-8  # of a balance solve, for each squared contact coordinate and harmonic coefficient
 SOLVES_AT_PEAK = 10
+LIKELY = tuple(range(8))  # harmonics where a scene leaves the choice
 EQUIVALENT_SHARE = 0.3  # the step of the thesis's rule that takes as many steps as the error-controlled one does
 STEPS_AT_ONE_PERCENT, STEPS_EXPONENT = 411, -0.5  # to loss of contact; Tamatam 2021, table 4.2
 
@@ -56,7 +59,7 @@ class Plan:
         steps = "as many as it takes" if self.wear_steps is None else f"about {self.wear_steps}"
         response, wear = (_time(count * self.solve_seconds) for count in (self.response_solves, self.wear_solves))
         return [
-            ("mesh", f"{self.elements} elements, {self.nodes} nodes"),
+            ("mesh", f"{self.elements} elements, {self.nodes} nodes" if self.elements else "none: matrices"),
             ("full model", f"{self.full_dofs} DOFs"),
             ("contact", f"{self.contact_pairs} node pairs"),
             ("reduced model", f"{self.model_dofs} DOFs"),
@@ -73,33 +76,40 @@ def plan(file: SceneFile) -> Plan:
     """Plan a scene; raises ValueError for what the run would refuse after reading the mesh."""
     scene = file.scene
     check_names(scene)
-    with tempfile.TemporaryDirectory() as folder:
-        mesh, node_sets = make_mesh(file, Path(folder))
-    nodes = mesh.doflocs.shape[1]
-    free = free_dofs(3 * nodes, clamps(scene), node_sets)
-    pairs, masters = _contact(scene, mesh, node_sets, free)
-    basis = HarmonicBasis(scene.harmonics.kept, scene.harmonics.samples, scene.harmonics.transitions)
+    elements = nodes = 0
+    if isinstance(scene, MatrixScene):
+        reduced = matrix_model.make(scene, file.folder)
+        full, pairs, masters = int(str(reduced.info["n_full"])), reduced.interface.n_pair, reduced.system.n_dof
+        modes: int | None = 0
+    else:
+        with tempfile.TemporaryDirectory() as folder:
+            mesh, node_sets = make_mesh(file, Path(folder))
+        elements, nodes = int(mesh.nelements), mesh.doflocs.shape[1]
+        free = free_dofs(3 * nodes, clamps(file.part_scene), node_sets)
+        full = len(free)
+        pairs, masters = _contact(file.part_scene, mesh, node_sets, free)
+        modes, cutoff = file.part_scene.reduction.modes, file.part_scene.reduction.cutoff
+    basis = HarmonicBasis(scene.harmonics.kept or LIKELY, scene.harmonics.samples, scene.harmonics.transitions)
     contact = pairs * len(scene.contact.components)
-    modes = scene.reduction.modes
     model = masters + (modes if modes is not None else 50)
     memory = (
         200e6  # the program itself
-        + FACTOR_BYTES * len(free)
-        + 3 * 8.0 * len(free) * model
+        + FACTOR_BYTES * full
+        + 3 * 8.0 * full * model
         + 10 * 8.0 * model**2
         + 8 * 8.0 * contact**2
         + 4 * 8.0 * pairs * (len(scene.contact.components) * basis.n_coeff) ** 2
     )
     reduction = (
-        FACTOR_SECONDS * len(free) ** 1.5 + BACK_SUBSTITUTION_SECONDS * len(free) * model + 4 * DENSE_SECONDS * model**3
+        FACTOR_SECONDS * full**1.5 + BACK_SUBSTITUTION_SECONDS * full * model + 4 * DENSE_SECONDS * model**3
     )
     steps, solves = _wear(scene)
     return Plan(
-        elements=int(mesh.nelements),
+        elements=elements,
         nodes=nodes,
-        full_dofs=len(free),
+        full_dofs=full,
         contact_pairs=pairs,
-        model_dofs=str(model) if modes is not None else f"{masters} and the modes up to {scene.reduction.cutoff:g} Hz",
+        model_dofs=str(model) if modes is not None else f"{masters} and the modes up to {cutoff:g} Hz",
         unknowns=contact * basis.n_coeff,
         memory=memory,
         reduction_seconds=1.0 + reduction,
@@ -110,7 +120,7 @@ def plan(file: SceneFile) -> Plan:
     )
 
 
-def _contact(scene: Scene, mesh: object, node_sets: dict[str, np.ndarray], free: np.ndarray) -> tuple[int, int]:
+def _contact(scene: PartScene, mesh: object, node_sets: dict[str, np.ndarray], free: np.ndarray) -> tuple[int, int]:
     """Number of node pairs, and of master DOFs that the contact, point loads and the output make."""
     contact = scene.contact
     faces = [*contact.groups, *([] if contact.opposite is None else [contact.opposite])]

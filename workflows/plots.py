@@ -17,6 +17,7 @@ from workflows import maps
 from workflows.result import Result
 from workflows.style import BLUE, GREEN, GREY, INK, ORANGE, RED, STYLE, WEAR_MAP
 
+BIFURCATIONS = {"fold": "o", "flip": "s", "Neimark-Sacker": "D"}  # markers
 FAINT = 1e-3  # share of the first preload below which a touch is faint
 
 
@@ -30,7 +31,7 @@ def draw(result: Result, folder: Path) -> list[Path]:
         ("depth", depth_against_cycles, result.wear_steps > 0),
         ("energy", energy_against_cycles, result.wear_steps > 0),
         ("hysteresis", hysteresis_loops, result.loops is not None),
-        ("patch", maps.patch_maps, result.wear_steps > 0),
+        ("patch", maps.patch_maps, result.wear_steps > 0 and result.patch is not None and len(result.patch.faces) > 0),
     ]
     written = []
     for name, function, possible in figures:
@@ -53,7 +54,7 @@ def frequency_response(result: Result) -> Figure:
         if result.frf is not None:
             good = np.array([outcome == CONVERGED for outcome in result.frf.outcome])
             amplitude = scale * result.frf.amplitude(result.frf.output_names[0])
-            axes.plot(result.frf.frequency[good], amplitude[good], color=BLUE, label="unworn contact")
+            _curve(axes, result, good, amplitude, scale)
         if result.wear is not None and result.wear_steps:
             wear = result.wear
             hertz = wear.omega / (2 * np.pi)
@@ -67,6 +68,32 @@ def frequency_response(result: Result) -> Figure:
         axes.set(yscale="log", xlabel="frequency / Hz", ylabel=f"amplitude / {unit}", title="Frequency response")
         axes.legend(loc="best", fontsize=9)
     return figure
+
+
+def _curve(axes: Any, result: Result, good: np.ndarray, amplitude: np.ndarray, scale: float) -> None:
+    """The response curve: unstable stretches dashed, bifurcations marked, the range over load paths as a band."""
+    frf, marks, bounds = result.frf, result.stability, result.bounds
+    assert frf is not None
+    hertz = frf.frequency
+    if bounds is not None:
+        low, high = scale * bounds.amplitude_low, scale * bounds.amplitude_high
+        axes.fill_between(hertz[good], low[good], high[good], color=BLUE, alpha=0.25, lw=0, label="any load path")
+    if marks is None:
+        axes.plot(hertz[good], amplitude[good], color=BLUE, label="unworn contact")
+        return
+    # each stretch between neighbouring points is stable where both are
+    both = marks.stable[:-1] & marks.stable[1:]
+    solved = good[:-1] & good[1:]
+    for kind, style, name in ((both, "-", "unworn contact, stable"), (~both, ":", "unstable")):
+        ends = np.flatnonzero(kind & solved)
+        x = np.stack([hertz[ends], hertz[ends + 1], np.full(len(ends), np.nan)], axis=1).ravel()
+        y = np.stack([amplitude[ends], amplitude[ends + 1], np.full(len(ends), np.nan)], axis=1).ravel()
+        axes.plot(x, y, style, color=BLUE if style == "-" else RED, label=name if len(ends) else None)
+    for kind, marker in BIFURCATIONS.items():
+        at = [p for p, found in zip(marks.position, marks.kinds, strict=True) if found == kind]
+        if at:
+            x, y = (np.interp(at, np.arange(len(hertz)), values) for values in (hertz, amplitude))
+            axes.plot(x, y, marker, color=RED, ms=6, label=kind)
 
 
 def cycles_per_step(result: Result) -> Figure:

@@ -80,6 +80,45 @@ class References:
 
 
 @dataclass(frozen=True)
+class CurveStability:
+    """Stability of the response curve, point by point.
+
+    stable : (n_point,) False also where the point did not converge
+    growth : (n_point,) largest growth rate of a perturbation [1/s], nan where the point did not converge
+    omega, position : (n_bifurcation,) [rad/s], and between which points, see hbm.stability.Bifurcation
+    kinds : "fold", "flip" or "Neimark-Sacker" of each bifurcation
+    """
+
+    stable: np.ndarray
+    growth: np.ndarray
+    omega: np.ndarray
+    position: np.ndarray
+    kinds: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ShearBounds:
+    """How far the curve depends on the load path of stuck pairs, see hbm.residual_shear.
+
+    amplitude_low, amplitude_high : (n_point,) range of the first output's amplitude [m]
+    energy_low, energy_high : (n_point,) range of the friction work per cycle [J]
+    stuck : (n_point,) share of the tangential directions that stick all the time; failed : extreme starts not solved
+    """
+
+    amplitude_low: np.ndarray
+    amplitude_high: np.ndarray
+    energy_low: np.ndarray
+    energy_high: np.ndarray
+    stuck: np.ndarray
+    failed: np.ndarray
+
+    @property
+    def spread(self) -> np.ndarray:
+        """(n_point,) width of the range of amplitudes over its middle."""
+        return np.asarray(2 * (self.amplitude_high - self.amplitude_low) / (self.amplitude_high + self.amplitude_low))
+
+
+@dataclass(frozen=True)
 class Fields:
     """Full displacement of the part at chosen wear steps.
 
@@ -111,7 +150,7 @@ class Result:
     provenance : scene text and overrides, versions, seed, start time, threads
     facts : what was modelled and how long it took: sizes, solver names, delta_max_m, seconds, ...
     state : sentence that says how far the run came
-    frf : response curve of the unworn contact
+    frf : response curve of the unworn contact; stability, bounds : of it, where the scene asks for them
     """
 
     provenance: Mapping[str, str]
@@ -121,6 +160,8 @@ class Result:
     part: PartMesh | None = None
     references: References | None = None
     frf: Branch | None = None
+    stability: CurveStability | None = None
+    bounds: ShearBounds | None = None
     wear: WearHistory | None = None
     fields: Fields | None = None
     loops: Loops | None = None

@@ -7,13 +7,26 @@ from __future__ import annotations
 
 import difflib
 from dataclasses import asdict, fields
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, StrictInt, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StrictBool,
+    StrictInt,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+    field_serializer,
+    model_validator,
+)
 
 from geometry import parts
 from workflows.units import to_si
+
+HIGHEST = 15  # harmonic that kept = "auto" may keep
 
 
 class Table(BaseModel):
@@ -144,26 +157,13 @@ class Spring(Table):
 
 
 class Contact(Table):
-    """Faces of the part against the ground or a face against another one, and the contact law of every node.
+    """The contact law of every node pair; stiffness is that of all pairs together, shared by their area."""
 
-    group : one face, or a list of faces; stiffness is that of all of them together
-    t1 is the direction that the first tangential component follows; vertices_only leaves the mid-side nodes out.
-    plane : direction towards a ground that is a plane, which each face touches with its nearest node
-    inclination : of that plane about t1, by the right hand
-    """
-
-    group: str | tuple[str, ...]
-    opposite: str | None = None
-    t1: Direction
     components: tuple[Literal["t1", "t2", "n"], ...] = ("t1", "t2", "n")
-    vertices_only: StrictBool = False
     law: str = "jenkins"
     tangential_stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
     normal_stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
     friction: Annotated[Number, Field(ge=0)] | None = None
-    gap: Length = 0.0
-    plane: Direction | None = None
-    inclination: Angle = 0.0
 
     @model_validator(mode="after")
     def _only_what_the_components_need(self) -> Contact:
@@ -173,6 +173,24 @@ class Contact(Table):
                 verb = "is missing" if need else "has no meaning"
                 raise ValueError(f"contact.{name} {verb} for the components {', '.join(self.components)}")
         return self
+
+
+class FaceContact(Contact):
+    """Faces of the part against the ground or a face against another one.
+
+    group : one face, or a list of faces
+    t1 is the direction that the first tangential component follows; vertices_only leaves the mid-side nodes out.
+    plane : direction towards a ground that is a plane, which each face touches with its nearest node
+    inclination : of that plane about t1, by the right hand
+    """
+
+    group: str | tuple[str, ...]
+    opposite: str | None = None
+    t1: Direction
+    vertices_only: StrictBool = False
+    gap: Length = 0.0
+    plane: Direction | None = None
+    inclination: Angle = 0.0
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -216,14 +234,18 @@ class Motion(Table):
     phase: Angle = 0.0
 
 
-class Loads(Table):
+Static = TypeVar("Static")
+Harmonic = TypeVar("Harmonic")
+
+
+class Loads(Table, Generic[Static, Harmonic]):
     """Named loads."""
 
-    static: dict[str, StaticLoad] = Field(default_factory=dict)
-    harmonic: dict[str, HarmonicLoad] = Field(default_factory=dict)
+    static: dict[str, Static] = Field(default_factory=dict)
+    harmonic: dict[str, Harmonic] = Field(default_factory=dict)
 
     @model_validator(mode="after")
-    def _distinct(self) -> Loads:
+    def _distinct(self) -> Loads[Static, Harmonic]:
         both = sorted(set(self.static) & set(self.harmonic))
         if both:
             raise ValueError(f'expected one load named "{both[0]}", found it under static and under harmonic')
@@ -239,18 +261,20 @@ class Output(Table):
     direction: Direction
 
 
-class Response(Output):
-    """Which displacement is observed, and the frequency response that is computed.
+class Response(Table):
+    """The frequency response that is computed.
 
-    others : displacements observed besides, by name
     references : the range in which the linear references are drawn, the same as frequency unless told
+    stability : mark where the curve is stable and where it bifurcates
+    bounds : at every point, how far the response depends on the load path of pairs that stick all the time
     """
 
-    others: dict[str, Output] = Field(default_factory=dict)
     frequency: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]]
     references: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]] | None = None
     points: Annotated[StrictInt, Field(ge=2)] = 60
     method: str = "natural"
+    stability: StrictBool = False
+    bounds: StrictBool = False
     options: dict[str, Any] = Field(default_factory=dict)
 
     @model_validator(mode="after")
@@ -259,6 +283,12 @@ class Response(Output):
             if low >= high:
                 raise ValueError(f"expected {key} = [low, high] with low below high, got {low:g} Hz and {high:g} Hz")
         return self
+
+
+class PartResponse(Response, Output):
+    """The displacement whose response is computed; others : displacements observed besides, by name."""
+
+    others: dict[str, Output] = Field(default_factory=dict)
 
 
 class Reduction(Table):
@@ -275,21 +305,45 @@ class Reduction(Table):
         return self
 
 
-class Harmonics(Table):
-    """Harmonics of the response that are kept, and time samples of one cycle."""
+def _kept(value: object, check: ValidatorFunctionWrapHandler) -> tuple[int, ...]:
+    if value == "auto":
+        return ()
+    kept: tuple[int, ...] = check(value)
+    if not kept or list(kept) != sorted(set(kept)) or max(kept) < 1:
+        raise ValueError(f'expected kept as rising harmonic numbers up to 1 or more, or "auto", got {list(kept)}')
+    return kept
 
-    kept: tuple[Annotated[StrictInt, Field(ge=0)], ...] = (0, 1)
+
+class Harmonics(Table):
+    """Harmonics of the response that are kept, and time samples of one cycle.
+
+    kept : harmonic numbers, or "auto" (then empty here): as many as the response needs at the peak of the unworn
+        contact, so that what is left out changes it by less than `tolerance`, up to `highest`
+    """
+
+    kept: Annotated[tuple[Annotated[StrictInt, Field(ge=0)], ...], WrapValidator(_kept)] = (0, 1)
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] | None = None
+    highest: Annotated[StrictInt, Field(ge=1)] | None = None
     samples: Annotated[StrictInt, Field(ge=4, le=65536)] = 128
     transitions: Literal["sampled", "located"] = "sampled"
 
+    @property
+    def automatic(self) -> bool:
+        """Whether harmonics are chosen."""
+        return not self.kept
+
+    @field_serializer("kept")
+    def _auto(self, kept: tuple[int, ...]) -> tuple[int, ...] | str:
+        return kept or "auto"
+
     @model_validator(mode="after")
     def _resolved(self) -> Harmonics:
-        if not self.kept or list(self.kept) != sorted(set(self.kept)) or max(self.kept) < 1:
-            raise ValueError(f"expected kept as rising harmonic numbers up to 1 or more, got {list(self.kept)}")
-        if self.samples <= 2 * max(self.kept):
-            raise ValueError(
-                f"expected more than {2 * max(self.kept)} samples for harmonic {max(self.kept)}, got {self.samples}"
-            )
+        for name in ("tolerance", "highest"):
+            if not self.automatic and getattr(self, name) is not None:
+                raise ValueError(f'expected {name} only with kept = "auto"')
+        top = 3 * ((self.highest or HIGHEST) + 1) // 2 if self.automatic else max(self.kept)
+        if self.samples <= 2 * top:
+            raise ValueError(f"expected more than {2 * top} samples for harmonic {top}, got {self.samples}")
         return self
 
 
@@ -406,19 +460,27 @@ class Solver(Table):
 
 
 class Scene(Table):
-    """Which geometry, material, contact, loads, reduction, response and wear are modelled."""
+    """What every scene says, whatever its model is made from; see PartScene, and MatrixScene in matrix_scene."""
 
     scene: Heading
-    geometry: Geometry
-    material: Material
     contact: Contact
-    springs: dict[str, Spring] = Field(default_factory=dict)
-    motion: dict[str, Motion] = Field(default_factory=dict)
-    loads: Loads
+    loads: Loads[Any, Any]
     response: Response
-    reduction: Reduction
     harmonics: Harmonics = Harmonics()
     damping: Damping = Damping()
     wear: Wear | None = None
     pictures: Pictures = Pictures()
     solver: Solver = Solver()
+
+
+class PartScene(Scene):
+    """Which geometry, material, contact, loads, reduction, response and wear are modelled."""
+
+    geometry: Geometry
+    material: Material
+    contact: FaceContact
+    springs: dict[str, Spring] = Field(default_factory=dict)
+    motion: dict[str, Motion] = Field(default_factory=dict)
+    loads: Loads[StaticLoad, HarmonicLoad]
+    response: PartResponse
+    reduction: Reduction

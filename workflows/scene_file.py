@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +11,8 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from workflows.scene import Scene, unknown_key
+from workflows.matrix_scene import MatrixScene
+from workflows.scene import PartScene, Scene, unknown_key
 
 SCENES = Path(__file__).parent / "scenes"
 MOST_PROBLEMS = 3  # told in one sentence
@@ -35,6 +37,13 @@ class SceneFile:
     overrides: tuple[str, ...]
     folder: Path
     scene: Scene
+
+    @property
+    def part_scene(self) -> PartScene:
+        """The scene, for what needs a mesh; raises SceneError where it is one of matrices."""
+        if not isinstance(self.scene, PartScene):
+            raise SceneError(f"{self.name} is made of matrices and has no mesh")
+        return self.scene
 
 
 def names() -> list[str]:
@@ -81,12 +90,23 @@ def parse(text: str, label: str, overrides: Sequence[str] = (), folder: Path = S
     for override in overrides:
         _override(data, override)
     try:
-        scene = Scene.model_validate(data)
+        scene = kind_of(data).model_validate(data)
     except ValidationError as error:
-        problems = [_sentence(problem) for problem in error.errors()]
+        problems = [_sentence(problem, kind_of(data)) for problem in error.errors()]
         more = f"; and {len(problems) - MOST_PROBLEMS} more" if len(problems) > MOST_PROBLEMS else ""
         raise SceneError(f"{label}: {'; '.join(problems[:MOST_PROBLEMS])}{more}") from None
     return SceneFile(Path(label).stem, text, tuple(overrides), folder, scene)
+
+
+def kind_of(data: dict[str, Any]) -> type[Scene]:
+    """A scene with a [model] is one of matrices, any other one of a part."""
+    return MatrixScene if "model" in data else PartScene
+
+
+def from_json(text: str) -> Scene:
+    """The scene that a result holds, as `Scene.model_dump_json` wrote it."""
+    data = json.loads(text)
+    return kind_of(data).model_validate(data)
 
 
 def _override(data: dict[str, Any], text: str) -> None:
@@ -109,13 +129,13 @@ def _override(data: dict[str, Any], text: str) -> None:
         table[path[-1]] = value.strip()
 
 
-def _sentence(problem: Any) -> str:
+def _sentence(problem: Any, scene: type[Scene]) -> str:
     """One clause out of a problem that pydantic found: the key, what was expected, what was given."""
     location = [item for item in problem["loc"] if isinstance(item, (str, int))]
     kind, given, context = problem["type"], problem["input"], problem.get("ctx", {})
     key = _key(location)
     if kind == "extra_forbidden":
-        return unknown_key(key, _fields(location[:-1]))
+        return unknown_key(key, _fields(location[:-1], scene))
     if kind == "missing":
         return f"{key} is missing"
     if kind == "value_error":
@@ -148,9 +168,9 @@ def _key(location: Sequence[str | int]) -> str:
     return key or "the scene"
 
 
-def _fields(location: Sequence[str | int]) -> list[str]:
+def _fields(location: Sequence[str | int], scene: type[Scene]) -> list[str]:
     """Names of the keys that the table at a location may have."""
-    table: Any = Scene
+    table: Any = scene
     for item in location:
         if isinstance(table, type) and issubclass(table, BaseModel):
             table = table.model_fields[str(item)].annotation

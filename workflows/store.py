@@ -18,7 +18,7 @@ import numpy as np
 
 from hbm.branch import Branch
 from hbm.wear_history import WearHistory
-from workflows.result import Fields, Loops, PartMesh, Patch, References, Result
+from workflows.result import CurveStability, Fields, Loops, PartMesh, Patch, References, Result, ShearBounds
 
 FORMAT = "tribodyn result 1"
 
@@ -51,6 +51,26 @@ SCHEMA: dict[str, tuple[type, dict[str, tuple[tuple[str, ...], str]]]] = {
             "newton_steps": (("point",), ""),
             "folds": (("fold",), ""),
             "parameter": (("point",), ""),
+        },
+    ),
+    "stability": (
+        CurveStability,
+        {
+            "stable": (("point",), ""),
+            "growth": (("point",), "1/s"),
+            "omega": (("bifurcation",), "rad/s"),
+            "position": (("bifurcation",), ""),
+        },
+    ),
+    "bounds": (
+        ShearBounds,
+        {
+            "amplitude_low": (("point",), "m"),
+            "amplitude_high": (("point",), "m"),
+            "energy_low": (("point",), "J"),
+            "energy_high": (("point",), "J"),
+            "stuck": (("point",), ""),
+            "failed": (("point",), ""),
         },
     ),
     "wear": (

@@ -27,6 +27,7 @@ def summary(result: Result) -> dict[str, Any]:
     numbers |= _wear(result) | _peak(result)
     for name in ("full_dofs", "model_dofs", "contact_pairs", "unknowns", "delta_max_m"):
         numbers[name] = result.facts.get(name)
+    numbers |= _curve(result)
     free = result.facts.get("free_hz")
     numbers["free_hz"] = None if free is None else [float(hertz) for hertz in np.atleast_1d(free)]
     return {name: _finite(value) for name, value in numbers.items()}
@@ -69,6 +70,30 @@ def _peak(result: Result) -> dict[str, Any]:
     return {"peak_hz": None, "peak_m": None, "preload_N": None}
 
 
+def _curve(result: Result) -> dict[str, Any]:
+    harmonics, frf = result.facts.get("harmonics"), result.frf
+    numbers: dict[str, Any] = {
+        "harmonics": None if harmonics is None else [int(h) for h in np.atleast_1d(harmonics)],
+        "harmonics_error": result.facts.get("harmonics_error"),
+        "unstable_points": None,
+        "bifurcations": None,
+        "shear_spread": None,
+        "shear_spread_at_peak": None,
+    }
+    if frf is None:
+        return numbers
+    good = np.array([outcome == CONVERGED for outcome in frf.outcome])
+    if result.stability is not None:
+        where = zip(result.stability.omega / (2 * np.pi), result.stability.kinds, strict=True)
+        numbers["unstable_points"] = int(np.sum(good & ~result.stability.stable))
+        numbers["bifurcations"] = [{"hz": float(hertz), "kind": kind} for hertz, kind in where]
+    if result.bounds is not None and good.any():
+        best = int(np.argmax(np.where(good, frf.amplitude(frf.output_names[0]), -1.0)))
+        numbers["shear_spread"] = float(np.nanmax(result.bounds.spread))
+        numbers["shear_spread_at_peak"] = float(result.bounds.spread[best])
+    return numbers
+
+
 def _finite(value: Any) -> Any:
     """JSON has no nan."""
     return None if isinstance(value, float) and not np.isfinite(value) else value
@@ -85,7 +110,7 @@ def lines(result: Result) -> list[tuple[str, str]]:
     shown = [
         ("scene", result.provenance["scene_name"]),
         ("state", result.state),
-        ("model", f"{numbers['full_dofs']} DOFs reduced to {numbers['model_dofs']}"),
+        ("model", _sizes(numbers["full_dofs"], numbers["model_dofs"])),
         ("contact", f"{numbers['contact_pairs']} node pairs, {numbers['unknowns']} unknowns"),
     ]
     if numbers["free_hz"]:
@@ -95,6 +120,16 @@ def lines(result: Result) -> list[tuple[str, str]]:
     if numbers["peak_hz"] is not None:
         shown.append(("frequency", pair("peak_hz", 1, "Hz")))
         shown.append(("amplitude", pair("peak_m", 1e3, "mm")))
+    if numbers["harmonics"] is not None:
+        error = numbers["harmonics_error"]
+        chosen = "" if error is None else f", chosen: estimated truncation error {error:.1e}"
+        shown.append(("harmonics", ", ".join(map(str, numbers["harmonics"])) + chosen))
+    if numbers["bifurcations"] is not None:
+        places = ", ".join(f"{b['kind']} at {b['hz']:.5g} Hz" for b in numbers["bifurcations"])
+        shown.append(("stability", f"{numbers['unstable_points']} unstable points; {places or 'no bifurcations'}"))
+    if numbers["shear_spread"] is not None:
+        spread, peak = numbers["shear_spread"], numbers["shear_spread_at_peak"]
+        shown.append(("load path", f"moves the amplitude by up to {spread:.2%}, {peak:.2%} at the peak"))
     if numbers["depth_max_m"] is not None:
         deepest, mean = 1e3 * numbers["depth_max_m"], 1e3 * numbers["depth_mean_m"]
         life = "contact not lost" if numbers["separated_cycles"] is None else "contact lost"
@@ -110,3 +145,7 @@ def lines(result: Result) -> list[tuple[str, str]]:
         ]
     shown.append(("computing", f"{numbers['seconds']:.1f} s"))
     return shown
+
+
+def _sizes(full: int | None, model: int | None) -> str:
+    return f"{full} DOFs, as they came" if full == model else f"{full} DOFs reduced to {model}"

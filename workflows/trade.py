@@ -15,6 +15,7 @@ from hbm import error_controlled_rule, thesis_rule
 from hbm.evolution import WearProblem
 from hbm.wear_history import LIFE_SHARE, WearHistory, cycles_to_preload
 from workflows import pipeline, scene_file
+from workflows.progress import Progress
 from workflows.references import free_deflection
 
 THESIS_STEPS = (0.1, 0.05, 0.02, 0.01, 0.005)  # of delta_max, table 4.2
@@ -97,11 +98,8 @@ def _problem(file: scene_file.SceneFile) -> tuple[WearProblem, float]:
     scene = file.scene
     assert scene.wear is not None
     with TemporaryDirectory() as folder, threadpool_limits(1):
-        mesh, node_sets = pipeline.make_mesh(file, Path(folder))
-        part = pipeline.make_part(scene, mesh, node_sets)
-        reduced = pipeline.reduce_part(scene, part)
-        model = pipeline.make_model(scene, part, reduced)
-    wear, area = scene.wear, reduced.interface.area
+        model = pipeline.build(file, Path(folder), Progress())
+    wear, area = scene.wear, model.reduced.interface.area
     duties = pipeline.mission(scene)
     problem = WearProblem(model.balance, duties, wear.law, wear.coefficient, area, lost_below=0.9 * LIFE_SHARE)
     return problem, float(free_deflection(model.balance).max())

@@ -139,7 +139,7 @@ def compare(
     start = time.perf_counter()
     file = rebuilt(result, overrides)
     with TemporaryDirectory() as folder, threadpool_limits(file.scene.solver.threads):
-        unworn = pipeline.build(file, Path(folder), progress).balance
+        unworn = pipeline.build(file, Path(folder), progress, pipeline.harmonics_of(result)).balance
         balance, omega, x = _start(result, file.scene, unworn, at, row)
         target = omega if at is None else at
         if not 0 < target <= balance.omega_max:
@@ -171,8 +171,7 @@ def _start(
     result: Result, scene: Scene, unworn: HarmonicBalance, at: float | None, row: int | None
 ) -> tuple[HarmonicBalance, float, np.ndarray]:
     """The problem, and the known solution to begin at: its frequency and x on the harmonics of the problem."""
-    kept = Scene.model_validate_json(result.provenance["scene"]).harmonics
-    basis = HarmonicBasis(kept.kept, kept.samples)
+    basis = HarmonicBasis(pipeline.harmonics_of(result), scene.harmonics.samples)
     if row is not None:
         held = 0 if result.wear is None else len(result.wear.cycles)
         if not 0 <= row < held:
@@ -193,10 +192,7 @@ def _start(
 
 def _carried(flat: np.ndarray, basis: HarmonicBasis, balance: HarmonicBalance) -> np.ndarray:
     """A solution (n_contact, n_coeff) on the harmonics of a balance, as x (n_pair, n_component, n_coeff)."""
-    x = np.zeros((len(flat), balance.basis.n_coeff))
-    for h in set(basis.harmonics) & set(balance.basis.harmonics):
-        x[:, balance.basis.order == h] = flat[:, basis.order == h]
-    return x.reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
+    return basis.transfer(flat, balance.basis).reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
 
 
 def _walk(

@@ -1,0 +1,64 @@
+"""What a scene may ask about its response curve besides the curve: harmonics, stability, bounds of residual shear."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from hbm import harmonic_choice, residual_shear, stability
+from hbm.balance import HarmonicBalance
+from hbm.branch import CONVERGED, Branch
+from hbm.harmonic_choice import HarmonicChoice
+from hbm.newton import NewtonOptions
+from hbm.operating_point import AtPeak
+from workflows.result import CurveStability, ShearBounds
+
+
+def choose_harmonics(
+    balance: HarmonicBalance, peak: AtPeak, tolerance: float, highest: int, newton: NewtonOptions
+) -> HarmonicChoice:
+    """Harmonics that make the response of every output right to a tolerance at its resonance.
+
+    peak : where the resonance is looked for, with the harmonics of the balance
+    Raises  harmonic_choice.NotSolved
+    """
+    point = peak.first(balance)
+    if not point.solution.converged:
+        raise harmonic_choice.NotSolved(f"harmonics cannot be chosen: no peak was found: {point.solution.outcome}")
+    options = harmonic_choice.Options(tolerance, highest, newton=newton)
+    return harmonic_choice.choose(balance, [point.state.omega], options)
+
+
+def stability_of(balance: HarmonicBalance, branch: Branch) -> CurveStability:
+    """Stability of every point of a curve by Hill's method, and its bifurcations."""
+    found = stability.mark(balance, branch)
+    return CurveStability(
+        found.stable,
+        found.leading.real,
+        np.array([b.value for b in found.bifurcations]),
+        np.array([b.position for b in found.bifurcations]),
+        tuple(b.kind for b in found.bifurcations),
+    )
+
+
+def shear_bounds(
+    balance: HarmonicBalance, branch: Branch, output: str, newton: NewtonOptions, advance: Callable[[float, str], None]
+) -> ShearBounds:
+    """Range of amplitude and energy at every point of a curve, over the two extreme starts of the friction memory.
+
+    Raises  ValueError where the law has no friction memory or harmonic 0 is not kept
+    """
+    n = len(branch.omega)
+    low, high = np.full((2, n), np.nan), np.full((2, n), np.nan)
+    stuck, failed = np.zeros(n), np.zeros(n, int)
+    for i in range(n):
+        if branch.outcome[i] == CONVERGED:
+            x = branch.contact[i].reshape(balance.parameters.n_pair, -1, branch.contact.shape[2])
+            found = residual_shear.response_bounds(balance, branch.omega[i], x, None, newton)
+            failed[i] = np.sum(~found.converged)
+            if found.converged.any():
+                low[:, i], high[:, i] = zip(found.amplitude_range(output), found.energy_range(), strict=True)
+            stuck[i] = found.stuck[0].mean()
+        advance((i + 1) / n, "")
+    return ShearBounds(low[0], high[0], low[1], high[1], stuck, failed)
