@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fem.constraints import Clamp, NoMeanRotation, free_dofs, named
+from fem.constraints import AXES, Clamp, NoMeanRotation, free_dofs, named
 from fem.contact import ground_contact, join, pair_contact, plane_contact
 from fem.elasticity import assemble
 from fem.elements import coordinates
@@ -63,7 +63,7 @@ class Part:
     """system : over the free DOFs; interface : likewise; free : (n_free,) DOF of the mesh that each one is,
     node * 3 + component; points : (n_node, 3) coordinates of the nodes [m]; mesh : scikit-fem's;
     held : (k, n_free) motions that are held besides, held @ q = 0, for reduction.held
-    pairs : contact face -> its pairs in the interface
+    pairs : contact face -> its pairs in the interface; node_sets : as geometry.mesh.read gives them
     """
 
     system: SecondOrderSystem
@@ -73,6 +73,18 @@ class Part:
     mesh: Any
     held: np.ndarray
     pairs: Mapping[str, slice]
+    node_sets: Mapping[str, np.ndarray]
+
+    def dofs(self, group: str, axis: str) -> np.ndarray:
+        """Places among the free DOFs (k,) of the displacements of a node set along "x", "y" or "z".
+
+        Raises  ValueError where the set is unknown or empty, or where one of them is clamped
+        """
+        wanted = named(self.node_sets, group) * 3 + AXES.index(axis)
+        place = np.searchsorted(self.free, wanted)
+        if not np.array_equal(self.free[np.minimum(place, len(self.free) - 1)], wanted):
+            raise ValueError(f"a node of '{group}' is clamped along {axis}; choose nodes that can move")
+        return place
 
     def field(self, q: np.ndarray) -> np.ndarray:
         """Displacement (n_node, 3, ...) [m] of all nodes from free DOFs q (n_free, ...)."""
@@ -115,4 +127,4 @@ def build(
         outputs={name: output.vector(mesh, node_sets)[free] for name, output in outputs.items()},
     )
     rows = np.array([motion.row(points, M)[free] for motion in held]).reshape(len(held), len(free))
-    return Part(system, replace(interface, B=interface.B[:, free]), free, points, mesh, rows, pairs)
+    return Part(system, replace(interface, B=interface.B[:, free]), free, points, mesh, rows, pairs, node_sets)

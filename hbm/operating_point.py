@@ -13,7 +13,7 @@ import numpy as np
 from hbm import newton
 from hbm.balance import HarmonicBalance, State
 from hbm.branch import CONVERGED, amplitude
-from hbm.continuation import natural
+from hbm.continuation import arc_length, natural
 from hbm.newton import NewtonOptions, Solution
 
 
@@ -44,14 +44,17 @@ class AtFrequency:
     newton: NewtonOptions = field(default_factory=NewtonOptions)
 
     def first(self, balance: HarmonicBalance) -> OperatingPoint:
-        """Solve without a neighbour."""
-        return _point(balance, newton.solve_from_rest(balance, self.omega, self.newton), self.output, 1)
+        """Solve without a neighbour, where need be along the folded curve of solutions over the load."""
+        return _point(balance, arc_length.solve_along_load(balance, self.omega, self.newton), self.output, 1)
 
     def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
-        """Solve from a neighbouring x; `omega` is the neighbour's and ignored here."""
+        """Solve from a neighbouring x; `omega` is the neighbour's and ignored here.
+
+        Where the neighbour's branch has ended in a fold, the response jumps to the one that a rising load leads to.
+        """
         solution, solves = newton.solve(balance, self.omega, x, self.newton), 1
         if not solution.converged:
-            solution, solves = newton.solve_from_rest(balance, self.omega, self.newton), 2
+            solution, solves = arc_length.solve_along_load(balance, self.omega, self.newton), 2
         return _point(balance, solution, self.output, solves)
 
 

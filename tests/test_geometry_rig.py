@@ -46,7 +46,7 @@ def test_joint_faces_match_but_share_no_nodes(tmp_path):
     "changes",
     [
         {},
-        {"n_contact_length": 3, "n_contact_width": 5, "longest": 0.1, "n_root": 1, "n_height": 2},
+        {"n_contact_length": 3, "n_contact_width": 5, "longest": 0.1, "n_root": 1, "n_half": 1},
         {"free_length": 0.25},
     ],
 )
@@ -54,8 +54,8 @@ def test_named_points_stand_where_they_should(tmp_path, changes):
     p = rig.Parameters(**changes)
     mesh, node_sets = read(tmp_path, **changes)
     side, middle = -p.thickness / 2, p.height / 2
-    at = {"shaker": (p.shaker_distance, side, middle), "accelerometer": (p.free_length, side, middle)}
-    at |= {f"high{k}": (p.free_length * k / 4, side, p.height) for k in (1, 2, 3, 4)}
+    at = {"shaker": (p.shaker_distance, side, middle), "accelerometer": (p.free_length, side, p.height)}
+    at |= {f"middle{k}": (p.solid_length * k / 4, side, middle) for k in (1, 2, 3, 4)}
     for name, where in at.items():
         np.testing.assert_allclose(mesh.doflocs[:, node_sets[name]].T, [where], atol=1e-12)
     assert len(node_sets["screws"]) == 6
@@ -66,9 +66,9 @@ def test_named_points_stand_where_they_should(tmp_path, changes):
 
 
 def test_clamped_beam_has_the_frequency_of_a_cantilever(tmp_path):
-    """The rigidly held beam is Euler and Bernoulli's but for the specimen's small mass and the beam's width."""
+    """The rigidly held beam is Euler and Bernoulli's with the mass that the slot takes from its tip."""
     mesh, node_sets = read(tmp_path)
-    E, rho = 193e9, 8000.0
+    E, rho, p = 193e9, 8000.0, rig.Parameters()
     part = fem.part.build(
         mesh,
         node_sets,
@@ -79,8 +79,12 @@ def test_clamped_beam_has_the_frequency_of_a_cantilever(tmp_path):
         {},
     )
     found = system_modes(part.system, part.interface, None, 1)[0][0]
-    expected = 3.516 / (2 * np.pi) * np.sqrt(E / rho / 12) * 0.010 / 0.310**2
-    assert found == pytest.approx(expected, rel=0.02)
+    whole = 3.516 / (2 * np.pi) * np.sqrt(E / rho / 12) * p.thickness / p.free_length**2
+    missing = p.slot_length * p.slot_height * 0.9  # less the upper specimen
+    at = 1.8751 * (1 - 0.5 * p.slot_length / p.free_length)  # the mode there: squares integrate to one over the length
+    shape = np.cosh(at) - np.cos(at) - 0.7341 * (np.sinh(at) - np.sin(at))
+    removed = missing * shape**2 / (p.free_length * p.height)  # of the modal mass, whose unit is the beam's mass
+    assert found == pytest.approx(whole / np.sqrt(1 - removed), rel=0.03)
 
 
 def test_impossible_shapes_are_refused_in_one_sentence():
@@ -88,9 +92,12 @@ def test_impossible_shapes_are_refused_in_one_sentence():
         ({"contact_length": 0.011}, "contact_length is 0.011: keep it within the shank"),
         ({"contact_width": 0.012}, "keep it within geometry.thickness"),
         ({"foot": 0.008}, "nine tenths of geometry.protrusion"),
-        ({"shaker_distance": 0.29}, "the distance of the upper specimen less 10 mm"),
-        ({"tip_margin": 0.005}, "keep it above 0.005, half the specimen"),
-        ({"n_height": 3}, "give an even number"),
+        ({"shaker_distance": 0.28}, "the free length without the slot less 10 mm"),
+        ({"slot_length": 0.02}, "the lower specimen needs 0.02 m"),
+        ({"slot_height": 0.03}, "keep it above half of geometry.height"),
+        ({"slot_height": 0.058}, "geometry.height less 5 mm"),
+        ({"protrusion": 0.038}, "geometry.slot_height less 1 mm"),
+        ({"root_length": 0.1}, "keep it below column_length"),
         ({"n_contact_width": 10}, "give an odd number of nodes"),
     ):
         with pytest.raises(ValueError, match=message) as caught:

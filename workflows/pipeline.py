@@ -23,6 +23,7 @@ from geometry import parts
 from hbm import continuation, error_controlled_rule, law, thesis_rule, wear_law
 from hbm.balance import HarmonicBalance
 from hbm.branch import CONVERGED, Branch
+from hbm.contact_stiffness import rectangular_punch
 from hbm.evolution import Duty, WearProblem
 from hbm.excitation import Excitation
 from hbm.harmonic_choice import HarmonicChoice
@@ -30,12 +31,12 @@ from hbm.harmonics import HarmonicBasis
 from hbm.newton import NewtonOptions
 from hbm.operating_point import AtFrequency, AtPeak, BesidePeak
 from hbm.wear_history import WearRow, history
-from reduction.craig_bampton import craig_bampton
 from reduction.damping import modal_damping, rayleigh
 from reduction.held import hold
 from reduction.linear import stuck_stiffness
 from reduction.model import ReducedModel
-from workflows import curve, matrix_model, store
+from workflows import curve, matrix_model, part_reduction, store
+from workflows.contact_surfaces import surface_gap
 from workflows.description import described
 from workflows.fields import displacement_fields, hysteresis_loops
 from workflows.matrix_scene import MatrixScene
@@ -134,6 +135,9 @@ def build(file: SceneFile, folder: Path, progress: Progress, chosen: tuple[int, 
             mesh, node_sets = make_mesh(file, folder)
         with progress.stage("mass and stiffness"):
             part = make_part(file.part_scene, mesh, node_sets)
+        part, repairs = with_surfaces(file.part_scene, part, file.folder)
+        for sentence in repairs:
+            progress.say(sentence)
         with progress.stage("reduction"):
             reduced = reduce_part(file.part_scene, part)
     with progress.stage("choice of harmonics" if scene.harmonics.automatic and not chosen else "contact compliance"):
@@ -201,6 +205,14 @@ def make_part(scene: PartScene, mesh: Any, node_sets: dict[str, np.ndarray]) -> 
     )  # fmt: skip
 
 
+def with_surfaces(scene: PartScene, part: Part, folder: Path) -> tuple[Part, tuple[str, ...]]:
+    """The part with the waviness of measured faces in its gap, and a sentence for each repair of a height map."""
+    if scene.surfaces is None:
+        return part, ()
+    measured = surface_gap(scene.surfaces, part.interface, folder)
+    return replace(part, interface=replace(part.interface, gap=part.interface.gap + measured.gap)), measured.repairs
+
+
 def clamps(scene: PartScene) -> list[Clamp]:
     """What holds the part, whole groups or along some axes."""
     geometry = scene.geometry
@@ -218,9 +230,9 @@ def make_load(load: StaticLoad) -> Load:
 
 
 def reduce_part(scene: PartScene, part: Part) -> ReducedModel:
-    """The part on its contact and load nodes and a few modes, with the scene's damping."""
-    reduced = craig_bampton(part.system, part.interface, scene.reduction.modes, scene.reduction.cutoff)
-    return damped(scene, hold(reduced, part.held))
+    """The part on its contact and load nodes and a few modes, damped and held as the scene says."""
+    reduced = damped(scene, hold(part_reduction.reduce(scene, part), part.held))
+    return part_reduction.with_prescribed(scene, part, reduced)
 
 
 def damped(scene: Scene, reduced: ReducedModel) -> ReducedModel:
@@ -247,7 +259,11 @@ def damping_matrix(scene: Scene, reduced: ReducedModel) -> np.ndarray | None:
 
 
 def contact_stiffness(scene: Scene, reduced: ReducedModel) -> np.ndarray:
-    """Contact springs (n_pair, n_component) [N/m]."""
+    """Contact springs (n_pair, n_component) [N/m]; those of a punch in shear along t1 serve both tangents."""
+    if isinstance(scene, PartScene) and scene.contact.punch is not None:
+        body = (scene.material.young, scene.material.poisson)
+        normal, tangential = rectangular_punch(*scene.contact.punch, *body, *body)
+        return reduced.interface.stiffness(tangential, normal)
     return reduced.interface.stiffness(scene.contact.tangential_stiffness or 0.0, scene.contact.normal_stiffness or 0.0)
 
 
@@ -279,6 +295,8 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
 def excite(scene: Scene, base: np.ndarray | None) -> Excitation:
     """The loads of the scene, F cos(h w t + phase) as amplitude F exp(i phase), and the motion of the ground."""
     loads: dict[tuple[int, str], complex] = {(0, name): load.amplitude for name, load in scene.loads.static.items()}
+    if isinstance(scene, PartScene):
+        loads |= {(0, name): given.displacement for name, given in scene.prescribed.items()}
     for name, load in scene.loads.harmonic.items():
         loads[load.harmonic, name] = load.amplitude * np.exp(1j * load.phase)
     return Excitation(loads, base)

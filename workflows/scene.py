@@ -9,11 +9,8 @@ import difflib
 from dataclasses import asdict, fields
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
-import numpy as np
 from pydantic import (
-    BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     StrictBool,
     StrictInt,
@@ -24,45 +21,23 @@ from pydantic import (
 )
 
 from geometry import parts
+from workflows.scene_contact import Contact, FaceContact, Surfaces
+from workflows.scene_fields import (
+    Angle,
+    Direction,
+    Force,
+    Frequency,
+    Length,
+    Number,
+    Pressure,
+    Stiffness,
+    Table,
+    WearCoefficient,
+    quantity,
+)
 from workflows.units import to_si
 
 HIGHEST = 15  # harmonic that kept = "auto" may keep
-
-
-class Table(BaseModel):
-    """A table of the scene file: nothing may be added to it, nothing changed."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-def quantity(unit: str) -> BeforeValidator:
-    """Validator that turns a text with a unit, or a bare number, into a float counted in `unit`."""
-    return BeforeValidator(lambda value: to_si(value, unit))
-
-
-Length = Annotated[float, quantity("m")]
-Force = Annotated[float, quantity("N")]
-Pressure = Annotated[float, quantity("Pa")]
-Stiffness = Annotated[float, quantity("N/m")]
-Frequency = Annotated[float, quantity("Hz")]
-Angle = Annotated[float, quantity("rad")]
-Number = Annotated[float, quantity("")]
-WearCoefficient = Annotated[float, quantity("m3/J")]
-
-
-def _direction(value: object) -> tuple[float, float, float]:
-    named = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-    if isinstance(value, str) and value.lstrip("+-") in named and len(value) <= 2:
-        x, y, z = named[value[-1]]
-        return (-x or 0.0, -y or 0.0, -z or 0.0) if value.startswith("-") else (x, y, z)
-    numbers = isinstance(value, (list, tuple)) and all(type(c) in (int, float) for c in value)
-    if isinstance(value, (list, tuple)) and numbers and len(value) == 3 and 0 < np.linalg.norm(value) < np.inf:
-        x, y, z = (float(component) for component in np.asarray(value) / np.linalg.norm(value))
-        return x, y, z
-    raise ValueError(f'expected an axis such as "x" or "-z", or three numbers that are not all zero, got {value!r}')
-
-
-Direction = Annotated[tuple[float, float, float], BeforeValidator(_direction)]
 
 
 class Heading(Table):
@@ -156,46 +131,16 @@ class Spring(Table):
     opposite: str | None = None
 
 
-class Contact(Table):
-    """The contact law of every node pair; stiffness is that of all pairs together, shared by their area."""
+class Prescribed(Table):
+    """Nodes whose static displacement is given along an axis; the force that it takes is a result, vibration is free.
 
-    components: tuple[Literal["t1", "t2", "n"], ...] = ("t1", "t2", "n")
-    law: str = "jenkins"
-    tangential_stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
-    normal_stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
-    friction: Annotated[Number, Field(ge=0)] | None = None
-
-    @model_validator(mode="after")
-    def _only_what_the_components_need(self) -> Contact:
-        along, across = any(c != "n" for c in self.components), "n" in self.components
-        for name, need in (("tangential_stiffness", along), ("friction", along), ("normal_stiffness", across)):
-            if need != (getattr(self, name) is not None):
-                verb = "is missing" if need else "has no meaning"
-                raise ValueError(f"contact.{name} {verb} for the components {', '.join(self.components)}")
-        return self
-
-
-class FaceContact(Contact):
-    """Faces of the part against the ground or a face against another one.
-
-    group : one face, or a list of faces
-    t1 is the direction that the first tangential component follows; vertices_only leaves the mid-side nodes out.
-    plane : direction towards a ground that is a plane, which each face touches with its nearest node
-    inclination : of that plane about t1, by the right hand
+    springs : names of springs between these nodes and the ground that act about the prescribed position
     """
 
-    group: str | tuple[str, ...]
-    opposite: str | None = None
-    t1: Direction
-    vertices_only: StrictBool = False
-    gap: Length = 0.0
-    plane: Direction | None = None
-    inclination: Angle = 0.0
-
-    @property
-    def groups(self) -> tuple[str, ...]:
-        """The faces."""
-        return (self.group,) if isinstance(self.group, str) else self.group
+    group: str
+    axis: Literal["x", "y", "z"]
+    displacement: Length
+    springs: tuple[str, ...] = ()
 
 
 class StaticLoad(Table):
@@ -292,9 +237,13 @@ class PartResponse(Response, Output):
 
 
 class Reduction(Table):
-    """Craig-Bampton: how many fixed-interface modes, or up to which frequency."""
+    """Craig-Bampton: how many fixed-interface modes, or up to which frequency.
+
+    relative : keep the relative displacement of node pairs instead of both nodes
+    """
 
     method: Literal["craig_bampton"] = "craig_bampton"
+    relative: StrictBool = False
     modes: Annotated[StrictInt, Field(ge=0)] | None = None
     cutoff: Annotated[Frequency, Field(gt=0)] | None = None
 
@@ -480,7 +429,23 @@ class PartScene(Scene):
     material: Material
     contact: FaceContact
     springs: dict[str, Spring] = Field(default_factory=dict)
+    prescribed: dict[str, Prescribed] = Field(default_factory=dict)
+    surfaces: Surfaces | None = None
     motion: dict[str, Motion] = Field(default_factory=dict)
     loads: Loads[StaticLoad, HarmonicLoad]
     response: PartResponse
     reduction: Reduction
+
+    @model_validator(mode="after")
+    def _one_prescribed(self) -> PartScene:
+        if len(self.prescribed) > 1:
+            raise ValueError(f"expected one table under prescribed, got {', '.join(self.prescribed)}")
+        for name, held in self.prescribed.items():
+            if name in (*self.loads.static, *self.loads.harmonic):
+                raise ValueError(f"prescribed.{name} has the name of a load: give it another")
+            for spring in held.springs:
+                if spring not in self.springs:
+                    raise ValueError(unknown_key(f"springs.{spring}", [f"springs.{known}" for known in self.springs]))
+                if self.springs[spring].group != held.group or self.springs[spring].opposite is not None:
+                    raise ValueError(f"prescribed.{name}: springs.{spring} must hold {held.group} to the ground")
+        return self
