@@ -31,8 +31,15 @@ CANDIDATES = ((24, 4), (48, 4), (48, 6), (96, 6), (192, 6))  # modes and powers 
 ALL_MODES_BELOW = 1500  # coordinates up to which all modes are computed at once
 
 
+NO_DISTANCE = 1e-13  # of a frequency from an undamped resonance, relative: the response is rounding alone
+
+
 class SingularStuckSystem(ValueError):
     """The structure can move as a rigid body even with every contact stuck."""
+
+
+class UndampedResonance(ValueError):
+    """The response of the stuck structure is infinite at this frequency."""
 
 
 class Expansion:
@@ -115,7 +122,21 @@ class Expansion:
         left = self.b - s * np.tensordot(power, self.e, 1)
         right = self.b.conj().T - s * np.tensordot(power, self.e.conj().transpose(0, 2, 1), 1)
         core = np.diag(self.lam + s * s) + s * self.c - s * s * np.tensordot(power, self.t, 1)
-        return PortCompliance(self, s, power, left, right, np.linalg.inv(core))
+        return PortCompliance(self, s, power, left, right, self._inverse(core, s))
+
+    def _inverse(self, core: np.ndarray, s: complex) -> np.ndarray:
+        """Inverse of the modal dynamic stiffness; raises UndampedResonance."""
+        try:
+            inverse = np.linalg.inv(core)
+            lost = NO_DISTANCE * np.abs(inverse).max() * abs(s) ** 2 > 1.0
+        except np.linalg.LinAlgError:
+            lost = True
+        if lost:
+            raise UndampedResonance(
+                f"the stuck structure has an undamped resonance at {abs(s) / (2 * np.pi):.6g} Hz, where its response "
+                "is infinite: give it damping or take another frequency"
+            )
+        return inverse
 
     def _measure_error(self, s: complex) -> float:
         mass, damping, stuck = self._system

@@ -68,7 +68,11 @@ def solve(balance: HarmonicBalance, omega: float, start: np.ndarray, options: Ne
         direction, spent, reached = linear.solve(-state.residual, target, options.max_products)
         products += spent
         if reached > max(10 * target, 0.5):  # Krylov stalled: the direct way
-            direction = np.linalg.solve(linear.dense(), -state.residual.ravel()).reshape(state.residual.shape)
+            try:
+                direction = np.linalg.solve(linear.dense(), -state.residual.ravel()).reshape(state.residual.shape)
+            except np.linalg.LinAlgError:  # nothing holds the contact in some direction
+                why = f"singular Jacobian at relative residual {error:.1e}"
+                return Solution(state, why, step, products, tuple(history))
         state, new_error = _search(balance, omega, state, direction, error, x_lin)
         history.append(new_error)
         if new_error >= error * (1 - 1e-10):
