@@ -272,6 +272,18 @@ class Linearisation:
         )
         return self.spread(d.reshape(shape), rhs), spent, reached
 
+    def solve_refined(self, rhs: np.ndarray, tolerance: float) -> np.ndarray:
+        """As `solve`, but its products are of single precision: refined with the exact one to the tolerance."""
+        d, _, _ = self.solve(rhs, max(tolerance, 1e-6))
+        point, size = self._balance.at(self._omega), np.linalg.norm(rhs)
+        for _ in range(4):
+            residual = rhs - d + point.apply(self.departure_slope(d))
+            error = np.linalg.norm(residual)
+            if error <= tolerance * size:
+                break
+            d = d + self.solve(residual, max(tolerance * size / error, 1e-6))[0]
+        return d
+
     def dense(self) -> np.ndarray:
         """The Jacobian as a matrix (n_contact * n_coeff, same), column by column; for checks and as fallback."""
         n = self._shape[0] * self._shape[1]

@@ -1,24 +1,31 @@
 """Error-controlled wear steps, stable for the stiff coupling of pressure and depth.
 
 dw/dZ = r(w) relaxes a pressure peak thousands of times faster than the contact as a whole wears: explicit steps must
-resolve the former or oscillate from node to node. Here a Rosenbrock step of second order is taken with the contact's
-own wear Jacobian; it is L-stable, keeps its order with an approximate Jacobian, and brings a first-order companion as
-error estimate.
-Source  ROS2: Verwer, Spee, Blom, Hundsdorfer 1999, SIAM J. Sci. Comput. 20(4), with gamma = 1 - 1/sqrt(2).
+resolve the former or oscillate from node to node. Here both stages of a second-order, L-stable, stiffly accurate
+Runge-Kutta step are implicit, each of them one balance solve with the gap wearing along (hbm.wearing); a first-order
+companion gives the error estimate.
+Source  SDIRK2: Alexander 1977, SIAM J. Numer. Anal. 14(6), gamma = 1 - 1/sqrt(2)
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.linalg as sla
 
-from hbm.evolution import WearProblem, WearState, assess, first_preload, reason_to_stop, row_of, state_of
-from hbm.wear_history import WearHistory, WearRow, history
+from hbm import newton, wear_law
+from hbm.evolution import WearProblem, WearState, assess, first_preload, reason_to_stop, row_of, state_of, worn_state
+from hbm.newton import Solution
+from hbm.operating_point import Correction, OperatingPoint, point_of
+from hbm.wear_history import LIFE_SHARE, WearHistory, WearRow, history
+from hbm.wearing import WearingBalance
 
 GAMMA = 1 - 1 / np.sqrt(2)
+GROWTH = (0.2, 3.0)  # limits of the ratio of one step to the one before
+LANDING = (0.97, 0.999)  # of the preload at which an event is located, where a step that would pass it must end
+MAX_CORRECTIONS = 12
+DEBUG = 0
 
 
 @dataclass(frozen=True)
@@ -27,20 +34,6 @@ class Tolerance:
 
     share: float
     scale: float
-
-
-def wear_jacobian(problem: WearProblem, state: WearState) -> np.ndarray:
-    """(n_pair, n_pair) d rate_i / d depth_j [1/cycle] at fixed frequency, by the work that a gap change moves.
-
-    The rate is taken proportional to the friction work of its pair, as the energy law has it and others nearly do.
-    """
-    n_pair = len(state.depth)
-    total = np.zeros((n_pair, n_pair))
-    for duty, point in zip(problem.mission, state.points, strict=True):
-        balance = problem.at_depth(state.depth).with_load(duty.load)
-        total += duty.share * balance.work_slope(point.state)
-    ratio = np.divide(state.rate, state.work, out=np.zeros(n_pair), where=state.work > 0)
-    return ratio[:, None] * total
 
 
 def evolve(
@@ -53,28 +46,30 @@ def evolve(
     """Wear the contact until it is lost, with steps chosen by a local error estimate on depth and on life.
 
     on_row, resume, return : as for the thesis's rule; `step_error` of a row is the estimate over the tolerance
+    Raises  ValueError where the wear law is not a factor times the friction work of each pair
     """
+    wear_law.depth_per_work(problem.law)
     rows = resume.rows() if resume is not None else []
     if rows and rows[-1].cycles_in_step == 0:
         return history(rows, resume.end if resume is not None else "")
-    n_pair = len(problem.area)
-    end = f"stopped after {max_steps} wear steps"
-    if rows:
-        before = state_of(problem, rows[-1])
-        depth, cycles = rows[-1].depth + rows[-1].worn, rows[-1].cycles + rows[-1].cycles_in_step
-        state = assess(problem, depth, cycles, before)
-        stride = _next_stride(rows[-1].cycles_in_step, rows[-1].step_error)
+    if rows:  # the state after the last step was not kept: take the step again, to the same bits
+        state = state_of(problem, rows.pop())
     else:
-        state = assess(problem, np.zeros(n_pair), 0.0, None)
-        stride = tolerance.share * tolerance.scale / max(state.rate.max(), 1e-300)
+        state = assess(problem, np.zeros_like(problem.area), 0.0, None)
+    end = f"stopped after {max_steps} wear steps"
     while len(rows) < max_steps:
         reason = reason_to_stop(problem, state, first_preload(problem, rows, state))
         if reason:
-            rows.append(row_of(problem, state, 0.0, np.zeros(n_pair), np.zeros(n_pair)))
+            nothing = np.zeros_like(problem.area)
+            rows.append(row_of(problem, state, 0.0, nothing, nothing))
             end = reason
         else:
-            state, row, stride = _step(problem, tolerance, state, stride)
-            rows.append(row)
+            taken = _step(problem, tolerance, state, rows)
+            rows.append(taken.row)
+            if taken.after is None:
+                end = taken.failure
+                break
+            state = taken.after
         if on_row is not None:
             on_row(rows[-1])
         if reason:
@@ -82,47 +77,170 @@ def evolve(
     return history(rows, end)
 
 
-def _step(
-    problem: WearProblem, tolerance: Tolerance, state: WearState, stride: float
-) -> tuple[WearState, WearRow, float]:
-    """One accepted step from a state: the state after it, its row, and the cycles to try next."""
-    slope = wear_jacobian(problem, state)
-    share = np.divide(state.work, state.rate, out=np.zeros_like(state.work), where=state.rate > 0)
-    work_slope = share[:, None] * slope
-    solves = state.solves
+@dataclass(frozen=True)
+class _Taken:
+    """A step: its row, and the state after it, or why there is none."""
+
+    row: WearRow
+    after: WearState | None
+    failure: str = ""
+
+
+def _step(problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow]) -> _Taken:
+    """One accepted step from a state; where an event would be passed, the step ends at it."""
+    smallest = 1e-9 * tolerance.scale / max(float(state.rate.max()), 1e-300)
+    stride = rows[-1].next_step if rows else 0.1 * tolerance.share * tolerance.scale / float(state.rate.max())
+    drift = np.zeros(len(state.points))
+    if rows:
+        omega = np.array([point.state.omega for point in state.points])
+        drift = (omega - rows[-1].duty_omega) / (state.cycles - rows[-1].cycles)
+    target = _event(problem, state, rows)
+    solves, longest, aimed = state.solves, np.inf, False
     while True:
-        factor = sla.lu_factor(np.eye(len(slope)) - GAMMA * stride * slope)
-        k1 = sla.lu_solve(factor, state.rate)
-        e1 = state.work + GAMMA * stride * work_slope @ k1
-        middle = assess(problem, np.maximum(state.depth + stride * k1, state.depth), state.cycles + stride, state)
-        solves += middle.solves
-        k2 = sla.lu_solve(factor, middle.rate - 2 * k1)
-        e2 = middle.work - 2 * e1 + GAMMA * stride * work_slope @ k2
-        worn, work = stride * (1.5 * k1 + 0.5 * k2), stride * (1.5 * e1 + 0.5 * e2)
-        # a pair that the linear model would lift off cannot grow: cut off, and what is cut counts as error
-        deviation = 0.5 * stride * (k1 + k2) - np.minimum(worn, 0.0)  # from the first-order companion w + h k1
-        worn, work = np.maximum(worn, 0.0), np.maximum(work, 0.0)
-        error = 4.0 if middle.failure else _error(problem, tolerance, state, stride, worn, deviation)
+        first, second = _stages(problem, state, stride, drift)
+        solves += first.solves + second.solves
+        if DEBUG: print('  step', stride, first.failure, second.failure)
+        if second.failure or first.failure:
+            error, longest = np.inf, stride
+        else:
+            error = _error(problem, tolerance, state, stride, first, second)
         if error <= 1.0:
-            break
-        stride = _next_stride(stride, error)
-        if stride * state.rate.max() < 1e-9 * tolerance.scale:
-            break
-    after = assess(problem, state.depth + worn, state.cycles + stride, state)
-    row = row_of(problem, replace(state, solves=solves), stride, worn, work, error)
-    return after, row, _next_stride(stride, error)
+            preload = problem.balance.preload(second.points[0].state)
+            if preload >= LANDING[0] * target:
+                break
+            longest, aimed = stride, True
+            stride *= _share_to(target, problem.balance.preload(state.points[0].state), preload)
+        else:
+            stride = min(stride * _growth(error), 0.5 * longest if second.failure else np.inf)
+        if stride < smallest:
+            nothing = np.zeros_like(problem.area)
+            failed = row_of(problem, replace(state, solves=solves), 0.0, nothing, nothing)
+            return _Taken(failed, None, second.failure or "no wear step is small enough for the tolerance")
+    del aimed
+    worn = second.depth - state.depth
+    work = stride * ((1 - GAMMA) * first.work + GAMMA * second.work)
+    row = row_of(problem, replace(state, solves=solves), stride, worn, work, error, stride * _growth(error))
+    return _Taken(row, replace(second, solves=0))
+
+
+def _event(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) -> float:
+    """The next preload at which a row is wanted [N]: where life is stated to end, and where the run is to end."""
+    first, now = first_preload(problem, rows, state), problem.balance.preload(state.points[0].state)
+    shares = [share for share in (LIFE_SHARE, problem.lost_below) if share > 0]
+    return max((share * first for share in shares if share * first < now), default=0.0)
+
+
+def _share_to(target: float, start: float, end: float) -> float:
+    """Share of a step after which the preload has fallen from start to just below the target, along its logarithm."""
+    aim = np.mean(LANDING) * target
+    return float(np.clip(np.log(start / aim) / np.log(start / max(end, 1e-3 * target)), 0.05, 0.95))
+
+
+def _stages(
+    problem: WearProblem, state: WearState, stride: float, drift: np.ndarray
+) -> tuple[WearState, WearState]:
+    """Both stages of a step from a state; the second is the state after it."""
+    omega = np.array([point.state.omega for point in state.points])
+    searches = [_Search() for _ in state.points]
+    guess = []
+    for duty, point in zip(problem.mission, state.points, strict=True):
+        balance = problem.at_depth(state.depth).with_load(duty.load)
+        guess.append(point.state.x + balance.gap_response(point.state, GAMMA * stride * state.rate))
+    cycles = state.cycles + GAMMA * stride
+    first = _stage(problem, state.depth, GAMMA * stride, cycles, guess, omega + GAMMA * stride * drift, searches)
+    if first.failure:
+        return first, replace(first, solves=0)
+    base = state.depth + (1 - GAMMA) / GAMMA * (first.depth - state.depth)
+    guess, further = [], []
+    for before, after in zip(state.points, first.points, strict=True):
+        guess.append(before.state.x + (after.state.x - before.state.x) / GAMMA)
+        further.append(before.state.omega + (after.state.omega - before.state.omega) / GAMMA)
+    return first, _stage(problem, base, GAMMA * stride, state.cycles + stride, guess, np.array(further), [_Search(s.slope) for s in searches])
+
+
+def _stage(
+    problem: WearProblem,
+    base: np.ndarray,
+    stretch: float,
+    cycles: float,
+    guess: Sequence[np.ndarray],
+    omega: np.ndarray,
+    searches: Sequence[_Search],
+) -> WearState:
+    """Solve depth = base + stretch rate(depth) with every duty at its site."""
+    per_work = wear_law.depth_per_work(problem.law)
+    unworn = [problem.balance.with_load(duty.load) for duty in problem.mission]
+
+    def gain(depth: np.ndarray) -> np.ndarray:
+        return per_work(wear_law.Exposure(problem.balance, None, problem.area, problem.spread, depth, cycles))
+
+    balance = WearingBalance(unworn, [duty.share for duty in problem.mission], base, stretch, gain)
+    x, solves = balance.joined(guess), 0
+    while True:
+        solution = newton.solve(balance, tuple(omega), x)
+        solves += len(unworn)
+        depth = balance.depth(solution.state.x)
+        points, corrections = [], []
+        for i, (duty, part) in enumerate(zip(problem.mission, balance.parts(solution.state.x), strict=True)):
+            worn = problem.at_depth(depth).with_load(duty.load)
+            state = worn.evaluate(float(omega[i]), part)
+            points.append(point_of(duty.site, worn, replace(solution, state=state), 0))
+            if solution.converged:
+                corrections.append(duty.site.correct(worn, state))
+        solves += sum(c.solves for c in corrections)
+        if DEBUG: print('   ', omega/2/np.pi, solution.outcome, solution.steps, solution.products, [c.distance/2/np.pi for c in corrections])
+        if not solution.converged:
+            return worn_state(problem, depth, cycles, points, solves)
+        miss = np.array([c.distance for c in corrections])
+        after = np.array([search.next(w, m) for search, w, m in zip(searches, omega, miss, strict=True)])
+        if np.all(np.abs(after - omega) <= np.array([duty.site.accuracy for duty in problem.mission]) * omega):
+            return worn_state(problem, depth, cycles, points, solves)
+        if solves > MAX_CORRECTIONS * len(unworn):
+            points = [replace(p, solution=replace(p.solution, outcome="the peak was not found")) for p in points]
+            return worn_state(problem, depth, cycles, points, solves)
+        x = solution.state.x + balance.follow(solution.state, after - omega)
+        omega = after
+
+
+class _Search:
+    """The frequency at which a miss vanishes, from the misses so far; the miss falls as the frequency rises."""
+
+    def __init__(self, slope: float = -1.0):
+        self.slope = slope
+        self._below: tuple[float, float] | None = None
+        self._above: tuple[float, float] | None = None
+        self._last: tuple[float, float] | None = None
+
+    def next(self, omega: float, miss: float) -> float:
+        """The frequency to try after one that missed by `miss`: secant, kept inside what brackets the zero."""
+        if self._last is not None and omega != self._last[0]:
+            slope = (miss - self._last[1]) / (omega - self._last[0])
+            self.slope = slope if slope < -0.1 else self.slope
+        self._last = (omega, miss)
+        if miss > 0:
+            self._below = self._last
+        else:
+            self._above = self._last
+        trial = omega - miss / self.slope
+        if self._below is not None and self._above is not None:
+            low, high = self._below[0], self._above[0]
+            if not min(low, high) < trial < max(low, high):
+                return 0.5 * (low + high)
+            return trial
+        return float(np.clip(trial, 0.97 * omega, 1.03 * omega))
 
 
 def _error(
-    problem: WearProblem, tolerance: Tolerance, state: WearState, stride: float, worn: np.ndarray, deviation: np.ndarray
+    problem: WearProblem, tolerance: Tolerance, state: WearState, stride: float, first: WearState, second: WearState
 ) -> float:
     """Local error over the tolerance: of the deepest deviation, and of the cycles that the same volume takes."""
+    deviation = (1 - GAMMA) * stride * (first.rate - second.rate)
     on_depth = np.abs(deviation).max() / tolerance.scale
-    volume = float(problem.area @ worn)
-    on_life = abs(float(problem.area @ deviation)) / volume * stride / (state.cycles + stride) if volume > 0 else 0.0
+    volume = float(problem.area @ (second.depth - state.depth))
+    on_life = abs(float(problem.area @ deviation)) / volume * stride / second.cycles if volume > 0 else 0.0
     return float(max(on_depth, on_life) / tolerance.share)
 
 
-def _next_stride(stride: float, error: float) -> float:
-    """Step that meets the tolerance by the second power of the step, with a margin and limits."""
-    return stride * float(np.clip(0.85 / np.sqrt(max(error, 1e-10)), 0.2, 5.0))
+def _growth(error: float) -> float:
+    """Ratio of the next step to this one by the second order of the error, with a margin."""
+    return float(np.clip(0.85 / np.sqrt(max(error, 1e-10)), *GROWTH))
