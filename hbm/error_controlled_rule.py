@@ -14,18 +14,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hbm import newton, wear_law
+from hbm import newton
 from hbm.evolution import WearProblem, WearState, assess, first_preload, reason_to_stop, row_of, state_of, worn_state
-from hbm.newton import Solution
-from hbm.operating_point import Correction, OperatingPoint, point_of
+from hbm.operating_point import point_of
 from hbm.wear_history import LIFE_SHARE, WearHistory, WearRow, history
 from hbm.wearing import WearingBalance
 
 GAMMA = 1 - 1 / np.sqrt(2)
 GROWTH = (0.2, 3.0)  # limits of the ratio of one step to the one before
+TREND = 0.2  # power with which an error that grows from step to step holds the next one back
 LANDING = (0.97, 0.999)  # of the preload at which an event is located, where a step that would pass it must end
-MAX_CORRECTIONS = 12
-DEBUG = 0
+MAX_CORRECTIONS = 12  # solves of a stage
+GAIN_ACCURACY = 1e-9  # of the depth, for laws whose depth per work is not constant
 
 
 @dataclass(frozen=True)
@@ -46,30 +46,28 @@ def evolve(
     """Wear the contact until it is lost, with steps chosen by a local error estimate on depth and on life.
 
     on_row, resume, return : as for the thesis's rule; `step_error` of a row is the estimate over the tolerance
-    Raises  ValueError where the wear law is not a factor times the friction work of each pair
+    Raises  ValueError where the wear law wears pairs that do no friction work
     """
-    wear_law.depth_per_work(problem.law)
     rows = resume.rows() if resume is not None else []
     if rows and rows[-1].cycles_in_step == 0:
         return history(rows, resume.end if resume is not None else "")
     if rows:  # the state after the last step was not kept: take the step again, to the same bits
-        state = state_of(problem, rows.pop())
+        again = rows.pop()
+        state = _step(problem, tolerance, replace(state_of(problem, again), solves=0), rows).after
+        rows.append(again)
     else:
         state = assess(problem, np.zeros_like(problem.area), 0.0, None)
     end = f"stopped after {max_steps} wear steps"
-    while len(rows) < max_steps:
+    while len(rows) < max_steps and state is not None:
         reason = reason_to_stop(problem, state, first_preload(problem, rows, state))
         if reason:
             nothing = np.zeros_like(problem.area)
-            rows.append(row_of(problem, state, 0.0, nothing, nothing))
+            rows.append(row_of(problem, state, 0.0, nothing, nothing, 0.0, np.zeros(1 + len(state.points))))
             end = reason
         else:
             taken = _step(problem, tolerance, state, rows)
             rows.append(taken.row)
-            if taken.after is None:
-                end = taken.failure
-                break
-            state = taken.after
+            state, end = taken.after, taken.failure or end
         if on_row is not None:
             on_row(rows[-1])
         if reason:
@@ -89,17 +87,19 @@ class _Taken:
 def _step(problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow]) -> _Taken:
     """One accepted step from a state; where an event would be passed, the step ends at it."""
     smallest = 1e-9 * tolerance.scale / max(float(state.rate.max()), 1e-300)
-    stride = rows[-1].next_step if rows else 0.1 * tolerance.share * tolerance.scale / float(state.rate.max())
-    drift = np.zeros(len(state.points))
+    stride = 0.1 * tolerance.share * tolerance.scale / float(state.rate.max())
+    drift, slopes = np.zeros(len(state.points)), -np.ones(len(state.points))
     if rows:
+        stride, slopes = float(rows[-1].plan[0]), rows[-1].plan[1:]
         omega = np.array([point.state.omega for point in state.points])
         drift = (omega - rows[-1].duty_omega) / (state.cycles - rows[-1].cycles)
     target = _event(problem, state, rows)
-    solves, longest, aimed = state.solves, np.inf, False
+    solves, longest = state.solves, np.inf
     while True:
-        first, second = _stages(problem, state, stride, drift)
+        searches = [_Search(slope) for slope in slopes]
+        first, second = _stages(problem, state, stride, drift, searches)
+        slopes = np.array([search.slope for search in searches])
         solves += first.solves + second.solves
-        if DEBUG: print('  step', stride, first.failure, second.failure)
         if second.failure or first.failure:
             error, longest = np.inf, stride
         else:
@@ -108,18 +108,21 @@ def _step(problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Se
             preload = problem.balance.preload(second.points[0].state)
             if preload >= LANDING[0] * target:
                 break
-            longest, aimed = stride, True
+            longest = stride
             stride *= _share_to(target, problem.balance.preload(state.points[0].state), preload)
         else:
             stride = min(stride * _growth(error), 0.5 * longest if second.failure else np.inf)
         if stride < smallest:
             nothing = np.zeros_like(problem.area)
-            failed = row_of(problem, replace(state, solves=solves), 0.0, nothing, nothing)
+            plan = np.zeros(1 + len(state.points))
+            failed = row_of(problem, replace(state, solves=solves), 0.0, nothing, nothing, 0.0, plan)
             return _Taken(failed, None, second.failure or "no wear step is small enough for the tolerance")
-    del aimed
     worn = second.depth - state.depth
     work = stride * ((1 - GAMMA) * first.work + GAMMA * second.work)
-    row = row_of(problem, replace(state, solves=solves), stride, worn, work, error, stride * _growth(error))
+    trend = (rows[-1].step_error / error) ** TREND if rows and error > 0 else 1.0
+    ratio = float(np.clip(_growth(error) * min(trend, 1.0), *GROWTH))
+    plan = np.array([stride * ratio, *slopes])
+    row = row_of(problem, replace(state, solves=solves), stride, worn, work, error, plan)
     return _Taken(row, replace(second, solves=0))
 
 
@@ -137,17 +140,17 @@ def _share_to(target: float, start: float, end: float) -> float:
 
 
 def _stages(
-    problem: WearProblem, state: WearState, stride: float, drift: np.ndarray
+    problem: WearProblem, state: WearState, stride: float, drift: np.ndarray, searches: Sequence[_Search]
 ) -> tuple[WearState, WearState]:
     """Both stages of a step from a state; the second is the state after it."""
     omega = np.array([point.state.omega for point in state.points])
-    searches = [_Search() for _ in state.points]
     guess = []
     for duty, point in zip(problem.mission, state.points, strict=True):
         balance = problem.at_depth(state.depth).with_load(duty.load)
         guess.append(point.state.x + balance.gap_response(point.state, GAMMA * stride * state.rate))
     cycles = state.cycles + GAMMA * stride
-    first = _stage(problem, state.depth, GAMMA * stride, cycles, guess, omega + GAMMA * stride * drift, searches)
+    ahead = GAMMA * stride
+    first = _stage(problem, state, state.depth, ahead, cycles, guess, omega + ahead * drift, searches)
     if first.failure:
         return first, replace(first, solves=0)
     base = state.depth + (1 - GAMMA) / GAMMA * (first.depth - state.depth)
@@ -155,11 +158,12 @@ def _stages(
     for before, after in zip(state.points, first.points, strict=True):
         guess.append(before.state.x + (after.state.x - before.state.x) / GAMMA)
         further.append(before.state.omega + (after.state.omega - before.state.omega) / GAMMA)
-    return first, _stage(problem, base, GAMMA * stride, state.cycles + stride, guess, np.array(further), [_Search(s.slope) for s in searches])
+    return first, _stage(problem, first, base, ahead, state.cycles + stride, guess, np.array(further), searches)
 
 
 def _stage(
     problem: WearProblem,
+    near: WearState,
     base: np.ndarray,
     stretch: float,
     cycles: float,
@@ -167,46 +171,62 @@ def _stage(
     omega: np.ndarray,
     searches: Sequence[_Search],
 ) -> WearState:
-    """Solve depth = base + stretch rate(depth) with every duty at its site."""
-    per_work = wear_law.depth_per_work(problem.law)
-    unworn = [problem.balance.with_load(duty.load) for duty in problem.mission]
-
-    def gain(depth: np.ndarray) -> np.ndarray:
-        return per_work(wear_law.Exposure(problem.balance, None, problem.area, problem.spread, depth, cycles))
-
-    balance = WearingBalance(unworn, [duty.share for duty in problem.mission], base, stretch, gain)
-    x, solves = balance.joined(guess), 0
+    """Solve depth = base + stretch rate(depth) with every duty at its site; `near` tells the wear per work to try."""
+    duties = problem.mission
+    unworn = [problem.balance.with_load(duty.load) for duty in duties]
+    gain = _gain(problem, near)
+    accuracy = np.array([duty.site.accuracy for duty in duties])
+    x, solves = np.concatenate(guess, axis=1), 0
+    for search in searches:
+        search.start()
     while True:
+        balance = WearingBalance(unworn, [duty.share for duty in duties], base, stretch, gain)
         solution = newton.solve(balance, tuple(omega), x)
-        solves += len(unworn)
+        solves += len(duties)
         depth = balance.depth(solution.state.x)
         points, corrections = [], []
-        for i, (duty, part) in enumerate(zip(problem.mission, balance.parts(solution.state.x), strict=True)):
+        for w, duty, part in zip(omega, duties, balance.parts(solution.state.x), strict=True):
             worn = problem.at_depth(depth).with_load(duty.load)
-            state = worn.evaluate(float(omega[i]), part)
+            state = worn.evaluate(float(w), part)
             points.append(point_of(duty.site, worn, replace(solution, state=state), 0))
             if solution.converged:
                 corrections.append(duty.site.correct(worn, state))
         solves += sum(c.solves for c in corrections)
-        if DEBUG: print('   ', omega/2/np.pi, solution.outcome, solution.steps, solution.products, [c.distance/2/np.pi for c in corrections])
+        found = worn_state(problem, depth, cycles, points, solves)
         if not solution.converged:
-            return worn_state(problem, depth, cycles, points, solves)
-        miss = np.array([c.distance for c in corrections])
-        after = np.array([search.next(w, m) for search, w, m in zip(searches, omega, miss, strict=True)])
-        if np.all(np.abs(after - omega) <= np.array([duty.site.accuracy for duty in problem.mission]) * omega):
-            return worn_state(problem, depth, cycles, points, solves)
-        if solves > MAX_CORRECTIONS * len(unworn):
-            points = [replace(p, solution=replace(p.solution, outcome="the peak was not found")) for p in points]
-            return worn_state(problem, depth, cycles, points, solves)
+            return found
+        after = np.array([s.next(w, c.distance) for s, w, c in zip(searches, omega, corrections, strict=True)])
+        turned = _gain(problem, found)
+        settled = np.all(np.abs(turned - gain) * found.work * stretch <= GAIN_ACCURACY * np.abs(depth).max())
+        if settled and np.all(np.abs(after - omega) <= accuracy * omega):
+            return found
+        if solves > MAX_CORRECTIONS * len(duties):
+            lost = replace(solution, outcome=f"the site of a duty was not found in {MAX_CORRECTIONS} solves")
+            return replace(found, points=tuple(replace(p, solution=replace(lost, state=p.state)) for p in points))
         x = solution.state.x + balance.follow(solution.state, after - omega)
-        omega = after
+        omega, gain = after, turned
+
+
+def _gain(problem: WearProblem, state: WearState) -> np.ndarray:
+    """(n_pair,) wear depth per friction work [m/J]; a pair at rest is taken to wear as the working ones on average."""
+    works = state.work > 0
+    if np.any(state.rate[~works] > 0):
+        raise ValueError(f'wear law "{problem.law}" wears pairs without friction work: take the thesis\'s rule')
+    own = np.divide(problem.spread, problem.area)
+    known = works & (own > 0)
+    factor = np.mean(state.rate[known] / (state.work[known] * own[known])) if known.any() else 1.0
+    return np.divide(state.rate, state.work, out=factor * own, where=works)
 
 
 class _Search:
     """The frequency at which a miss vanishes, from the misses so far; the miss falls as the frequency rises."""
 
-    def __init__(self, slope: float = -1.0):
+    def __init__(self, slope: float):
         self.slope = slope
+        self.start()
+
+    def start(self) -> None:
+        """Forget the points, at another depth, but not the slope."""
         self._below: tuple[float, float] | None = None
         self._above: tuple[float, float] | None = None
         self._last: tuple[float, float] | None = None

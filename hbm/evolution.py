@@ -169,11 +169,11 @@ def row_of(
     worn: np.ndarray,
     work: np.ndarray,
     step_error: float = 0.0,
-    next_step: float = 0.0,
+    plan: np.ndarray | None = None,
 ) -> WearRow:
     """The history row of a state, with what its step wears [m] and dissipates [J]."""
     balance = problem.at_depth(state.depth).with_load(problem.mission[0].load)
-    taken = (cycles_in_step, worn, work, state.solves, step_error, next_step)
+    taken = (cycles_in_step, worn, work, state.solves, step_error, plan)
     return WearRow.of(balance, state.points, state.depth, state.cycles, *taken)
 
 

@@ -1,15 +1,13 @@
 """Wear laws: what a law file sees and offers, and how it is found by its name.
 
 A law is a module `hbm/wear/<name>.py` with `depth_rate(exposure) -> (n_pair,)`: total wear depth of each pair per
-vibration cycle [m]. A law whose depth is a factor times the friction work of the same pair also offers the factor,
-`depth_per_work(exposure) -> (n_pair,)` [m/J]; the error-controlled rule needs it. Depth is the sum over both surfaces; `Exposure.coefficient` carries the unit that the law states.
+vibration cycle [m]. Depth is the sum over both surfaces; `Exposure.coefficient` carries the unit that the law states.
 """
 
 from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from types import ModuleType
@@ -67,11 +65,3 @@ def load(name: str) -> ModuleType:
     if name not in names():
         raise ValueError(f"no wear law '{name}': there are {', '.join(names())}")
     return importlib.import_module(f"hbm.wear.{name}")
-
-
-def depth_per_work(name: str) -> Callable[[Exposure], np.ndarray]:
-    """The law's depth per friction work; raises ValueError where it offers none."""
-    law = load(name)
-    if not hasattr(law, "depth_per_work"):
-        raise ValueError(f'wear law "{name}" is not proportional to the friction work: use wear.rule = "thesis"')
-    return law.depth_per_work

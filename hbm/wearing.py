@@ -2,7 +2,7 @@
 
 A pair wears by its own friction work alone, so the implicit stage
 
-    depth_i = base_i + cycles gain_i(depth_i) sum over duties of share E_i(x_i, depth_i)
+    depth_i = base_i + cycles gain_i sum over duties of share E_i(x_i, depth_i)
 
 is solved pair by pair inside the contact law. Its derivative couples the duties of one pair and stays block diagonal
 over pairs, so the Krylov solver sees nothing new, and the stiffness of pressure against depth is gone.
@@ -67,7 +67,7 @@ class WearingBalance:
 
     balances : one per duty, over the same contact and with the gap before any wear; shares : of the cycles
     base : (n_pair,) depth at no work [m]; cycles : that the stage stands for
-    gain : depth (n_pair,) [m] -> depth per friction work (n_pair,) [m/J]
+    gain : (n_pair,) depth per friction work [m/J]
     x and State run over the duties of a pair, then its components: (n_pair, n_duty * n_component, n_coeff); frequencies
     are a tuple, one per duty.
     """
@@ -78,7 +78,7 @@ class WearingBalance:
         shares: Sequence[float],
         base: np.ndarray,
         cycles: float,
-        gain: Callable[[np.ndarray], np.ndarray],
+        gain: np.ndarray,
     ):
         self.balances, self.shares, self.base, self.cycles, self.gain = balances, shares, base, cycles, gain
         first = balances[0]
@@ -96,17 +96,13 @@ class WearingBalance:
         parts = [b.x_lin(omega) for b, omega in zip(self.balances, omegas, strict=True)]
         return self.at(omegas).join(parts)
 
-    def joined(self, parts: Sequence[np.ndarray]) -> np.ndarray:
-        """x of all duties from one (n_pair, n_component, n_coeff) per duty."""
-        return np.concatenate(parts, axis=1)
-
     def parts(self, x: np.ndarray) -> list[np.ndarray]:
         """x of every duty from the joined one."""
         return [np.ascontiguousarray(part) for part in np.split(x, len(self.balances), axis=1)]
 
-    def evaluate(self, omega: tuple[float, ...], x: np.ndarray, jacobian: bool = True) -> State:
+    def evaluate(self, omega: tuple[float, ...], x: np.ndarray) -> State:
         """The balance at x, every pair at the depth that its own work wears."""
-        _, cycle, _ = self._wear_along(x)
+        _, cycle = self._wear_along(x)
         flat = x.reshape(-1, x.shape[2])
         g = self.compliance.k[:, None] * flat - cycle.force.reshape(flat.shape)
         residual = flat - self.x_lin(omega) - self.at(omega).apply(g)
@@ -118,24 +114,20 @@ class WearingBalance:
 
     def follow(self, state: State, moves: np.ndarray) -> np.ndarray:
         """First-order change of x when the duties' frequencies move by `moves` [rad/s], the depths following."""
-        slopes = []
-        for balance, omega, part in zip(self.balances, state.omega, self.parts(state.x), strict=True):  # type: ignore
-            there = balance.with_gap(balance.parameters.gap + self.depth(state.x))
-            slopes.append(there.frequency_slope(there.evaluate(omega, part))[0])
-        spread = [slope * move for slope, move in zip(slopes, moves, strict=True)]
-        moved, _, _ = self.linearise(state).solve(-self.at(state.omega).join(spread), 1e-4)
+        omegas: tuple[float, ...] = state.omega  # type: ignore[assignment]
+        depth, spread = self.depth(state.x), []
+        for balance, omega, part, move in zip(self.balances, omegas, self.parts(state.x), moves, strict=True):
+            there = balance.with_gap(balance.parameters.gap + depth)
+            spread.append(move * there.frequency_slope(there.evaluate(omega, part))[0])
+        moved, _, _ = self.linearise(state).solve(-self.at(omegas).join(spread), 1e-4)
         return moved.reshape(state.x.shape)
 
     def depth(self, x: np.ndarray) -> np.ndarray:
         """(n_pair,) wear depth that goes with x [m]."""
         return self._wear_along(x)[0]
 
-    def wear_slope(self, x: np.ndarray) -> np.ndarray:
-        """(n_pair, n_duty * n_component * n_coeff) d depth / d x of the same pair [m/m]."""
-        return self._wear_along(x)[2]
-
-    def _wear_along(self, x: np.ndarray) -> tuple[np.ndarray, ContactCycle, np.ndarray]:
-        """Depth that goes with x, the contact cycles at it with their derivative along x and depth, d depth / d x."""
+    def _wear_along(self, x: np.ndarray) -> tuple[np.ndarray, ContactCycle]:
+        """Depth that goes with x, and the contact cycles at it with their derivative along x and depth."""
         parts = self.parts(x)
         depth, samples = self._solve_depth(parts)
         first = self.balances[0]
@@ -146,8 +138,7 @@ class WearingBalance:
         jacobian = np.zeros((n_pair, n_duty * width, n_duty * width))
         along = np.zeros((n_pair, n_duty * width))
         column = np.zeros((n_pair, n_duty * width))
-        bend = 1.0 - self.cycles * self._gain_slope(depth) * sum(s.work for s in samples)
-        gain = self.cycles * self.gain(depth)
+        bend, gain = np.ones(n_pair), self.cycles * self.gain
         t = first.parameters.tangential
         for i, (share, sample, part) in enumerate(zip(self.shares, samples, parts, strict=True)):
             rows = slice(i * width, (i + 1) * width)
@@ -166,7 +157,7 @@ class WearingBalance:
         status = samples[0].cycle.status.copy()
         for sample in samples[1:]:
             status |= sample.cycle.status
-        return depth, ContactCycle(force, jacobian, status), slope
+        return depth, ContactCycle(force, jacobian, status)
 
     def _solve_depth(self, parts: Sequence[np.ndarray]) -> tuple[np.ndarray, list[_Sample]]:
         """The depth of every pair by Newton's method inside a bracket, and the cycles at it."""
@@ -176,10 +167,10 @@ class WearingBalance:
         todo = np.arange(len(depth))
         samples = full
         for _ in range(MAX_ITERATIONS):
-            gain = self.cycles * self.gain(depth)[todo]
+            gain = self.cycles * self.gain[todo]
             work = sum(s.work for s in samples)
             miss = depth[todo] - self.base[todo] - gain * work
-            bend = 1.0 - self.cycles * self._gain_slope(depth)[todo] * work + gain * sum(s.falls for s in samples)
+            bend = 1.0 + gain * sum(s.falls for s in samples)
             low[todo] = np.where(miss < 0, depth[todo], low[todo])
             high[todo] = np.where(miss > 0, depth[todo], high[todo])
             here, below, above = depth[todo], low[todo], high[todo]
@@ -214,11 +205,6 @@ class WearingBalance:
             made.append(_Sample(cycle, column, work, np.where(work > 0, falls, 0.0)))
         return made
 
-    def _gain_slope(self, depth: np.ndarray) -> np.ndarray:
-        """(n_pair,) d gain / d depth by a difference [1/J]; it steers Newton's method and decides nothing."""
-        step = 1e-7 * max(float(np.abs(depth).max()), 1e-12)
-        return (self.gain(depth + step) - self.gain(depth)) / step
-
 
 @dataclass(frozen=True)
 class _Sample:
@@ -234,7 +220,8 @@ class _Sample:
 
     def updated(self, pairs: np.ndarray, part: _Sample) -> _Sample:
         """This with the rows of some pairs replaced."""
-        assert self.cycle.jacobian is not None and part.cycle.jacobian is not None
+        assert self.cycle.jacobian is not None
+        assert part.cycle.jacobian is not None
         for mine, new in (
             (self.cycle.force, part.cycle.force),
             (self.cycle.jacobian, part.cycle.jacobian),

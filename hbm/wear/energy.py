@@ -10,11 +10,6 @@ import numpy as np
 from hbm.wear_law import Exposure
 
 
-def depth_per_work(exposure: Exposure) -> np.ndarray:
-    """(n_pair,) alpha / A [m/J]."""
-    return exposure.coefficient / exposure.area
-
-
 def depth_rate(exposure: Exposure) -> np.ndarray:
     """(n_pair,) total wear depth per cycle, alpha E / A [m]."""
-    return depth_per_work(exposure) * exposure.energy
+    return exposure.coefficient * exposure.energy / exposure.area
