@@ -70,9 +70,9 @@ class Expansion:
         )
         try:
             factor = sla.cho_factor(stuck)
+            lam, phi = _modes(stuck, mass, n if n < ALL_MODES_BELOW else CANDIDATES[-1][0])
         except np.linalg.LinAlgError:
             raise loose from None
-        lam, phi = sla.eigh(stuck, mass, subset_by_index=None if n < ALL_MODES_BELOW else (0, CANDIDATES[-1][0] - 1))
         # a rigid mode comes out of the eigenvalue problem as rounding of the stiffest ones, of either sign
         if lam[0] <= n * np.finfo(float).eps * np.max(np.diag(stuck).real / np.diag(mass).real):
             raise loose
@@ -143,6 +143,19 @@ class Expansion:
         probe = np.random.default_rng(0).normal(size=(self.n_port, 2))
         exact = self._ports @ np.linalg.solve(stuck + s * damping + s * s * mass, self._ports.conj().T @ probe)
         return float(np.abs(self.at(s).apply(probe) - exact).max() / np.abs(exact).max())
+
+
+def _modes(stiffness: np.ndarray, mass: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The lowest modes: squared frequencies (count,) and shapes (n, count) of unit modal mass.
+
+    They come from the compliance's side, M phi = nu K phi: rounding is then relative to the softest mode, however much
+    stiffer the contact springs are, and what it does to stiff ones is as small as their share in the compliance.
+    """
+    n = len(mass)
+    nu, phi = sla.eigh(mass, stiffness, subset_by_index=None if count >= n else (n - count, n - 1))
+    nu, phi = nu[::-1], phi[:, ::-1]
+    lam = 1.0 / np.maximum(nu, np.finfo(float).eps ** 2 * nu[0])  # without mass: as good as rigid
+    return lam, phi * np.sqrt(lam)
 
 
 @dataclass(frozen=True)

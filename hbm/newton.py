@@ -76,7 +76,11 @@ def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOption
             return Solution(state, CONVERGED, step - 1, products, tuple(history))
         linear = balance.linearise(state)
         target = max(min(forcing, 0.1), 0.3 * options.tolerance / error, 1e-12)
-        direction, spent, reached = linear.solve(-state.residual, target, options.max_products)
+        try:
+            with np.errstate(over="raise"):
+                direction, spent, reached = linear.solve(-state.residual, target, options.max_products)
+        except FloatingPointError:  # a slope too steep for the single precision of the products
+            spent, reached = 0, np.inf
         products += spent
         if reached > max(10 * target, 0.5):  # Krylov stalled: the direct way
             try:

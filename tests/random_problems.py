@@ -7,10 +7,13 @@ the extremes and shrink to them.
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sla
+from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
 from fem.system import SecondOrderSystem
@@ -24,7 +27,19 @@ from tests.contact_draws import LAWS, LOCATED
 from tests.verification_models import interface, modal_damping
 
 HARMONICS = ((0, 1), (1,), (0, 1, 2, 3), (1, 3), (0, 1, 5), (2,), tuple(range(8)))
+ON_DEMAND = os.environ.get("TRIBODYN_CASES")  # cases of the first property; the others in proportion
+FIRST = 250
 LONGEST = 400  # cycles after which the memory of a contact counts as one that never repeats
+
+
+def cases(count: int) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """So many cases, the same at every run, or as many and as new as TRIBODYN_CASES asks for."""
+    scaled = count if ON_DEMAND is None else max(1, count * int(ON_DEMAND) // FIRST)
+    every = settings(
+        max_examples=scaled, deadline=None, derandomize=ON_DEMAND is None, database=None,
+        suppress_health_check=list(HealthCheck), print_blob=True,
+    )  # fmt: skip
+    return every
 
 
 @dataclass(frozen=True)
@@ -210,3 +225,13 @@ def displacement_under(balance: HarmonicBalance, omega: float, x: np.ndarray, fo
         dynamic = system.stiffness + b.T @ (k[:, None] * b) + s * damping + s * s * system.mass
         back[:, position] = b @ np.linalg.solve(dynamic, load + b.T @ spring[:, position])
     return basis.to_real(back) - base
+
+
+def condition(balance: HarmonicBalance, omega: float) -> float:
+    """Largest condition number of the stuck dynamic stiffness of any harmonic, unit stiffness in every coordinate."""
+    system, b = balance.model.system, np.asarray(balance.model.interface.B)
+    damping = np.zeros_like(system.mass) if system.damping is None else system.damping
+    stuck = system.stiffness + b.T @ (balance.parameters.stiffness.reshape(-1, 1) * b)
+    scale = 1 / np.sqrt(np.diag(stuck))
+    matrices = [stuck + 1j * h * omega * damping - (h * omega) ** 2 * system.mass for h in balance.basis.harmonics]
+    return max(float(np.linalg.cond(scale[:, None] * matrix * scale)) for matrix in matrices)
