@@ -52,9 +52,9 @@ class Solution:
 
 
 def relative_residual(state: State, x_lin: np.ndarray) -> float:
-    """|R| / max(|x|, |x_lin|), Euclidean; invariant to the units of length and force."""
+    """|R| / max(|x|, |x_lin|), Euclidean, 1 where only these vanish; invariant to the units of length and force."""
     scale = max(np.linalg.norm(state.x), np.linalg.norm(x_lin))
-    return float(np.linalg.norm(state.residual) / scale) if scale > 0 else float(np.linalg.norm(state.residual))
+    return float(np.linalg.norm(state.residual) / scale) if scale > 0 else float(state.residual.any())
 
 
 def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOptions | None = None) -> Solution:
