@@ -172,12 +172,13 @@ class HarmonicBalance:
         return self._loaded(point.outputs_lin) + point.outputs(state.g)
 
     def energy(self, state: State) -> np.ndarray:
-        """(n_pair,) friction work per cycle, both tangential components [J].
+        """(n_pair,) friction work per cycle, both tangential components [J]; none where a pair sticks all the time.
 
         The normal spring is elastic: what work its sampled force does when a pair lifts is an error of sampling.
         """
         t = self.parameters.tangential
-        return self.basis.work_per_cycle(state.cycle.force[:, t], state.x[:, t]).sum(axis=1)
+        work = self.basis.work_per_cycle(state.cycle.force[:, t], state.x[:, t]).sum(axis=1)
+        return np.where(state.cycle.status == contact_law.STICKS, 0.0, work)  # else rounding, which would wear
 
     def preload(self, state: State) -> float:
         """Static normal force of the whole contact [N]; zero where the law has no normal component."""

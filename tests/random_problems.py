@@ -35,11 +35,10 @@ LONGEST = 400  # cycles after which the memory of a contact counts as one that n
 def cases(count: int) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """So many cases, the same at every run, or as many and as new as TRIBODYN_CASES asks for."""
     scaled = count if ON_DEMAND is None else max(1, count * int(ON_DEMAND) // FIRST)
-    every = settings(
+    return settings(
         max_examples=scaled, deadline=None, derandomize=ON_DEMAND is None, database=None,
         suppress_health_check=list(HealthCheck), print_blob=True,
     )  # fmt: skip
-    return every
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Properties of the solver over random small models, contact laws, loads and wear runs, by hypothesis.
 
-Wherever the solver says "converged", dense solves with the forces of a plain march of the contact law give back the same
-displacement; friction never gives energy away; nothing is nan; and no exception but the declared ones is raised.
+Wherever the solver says "converged", dense solves with the forces of a plain march of the contact law give back the
+same displacement; friction never gives energy away; nothing is nan; no exception but the declared ones is raised.
 
 The test command runs the same few hundred cases every time. More of them, drawn anew at every run:
 
@@ -41,25 +41,31 @@ from tests.random_problems import (
 DECLARED = (SingularStuckSystem, UndampedResonance, CycleNotPeriodic)
 TOLERANCE = NewtonOptions().tolerance
 WORN = [(law, components) for law, components in LAWS if "n" in components and law != "cubic_spring"]
-SAMPLING = 8.0  # energy that sampling at n instants per period of the highest harmonic makes, times n^2
+# friction work that sampling makes, over the product of force and displacement: factor and order in samples per period
+# of the highest harmonic; planar friction lags where its path turns (see hbm.contact.coulomb_planar)
+SAMPLING = {"coulomb_planar": (4.0, 1)}
+UNCOUPLED = (8.0, 2)
 
 
 def check(balance: HarmonicBalance, state: State) -> None:
     """A state that counts as converged is finite, balanced, and takes energy from the vibration."""
     for values in (state.x, state.cycle.force, state.residual, balance.outputs(state)):
         assert np.isfinite(values).all()
+    base, parameters = balance.excitation.base, balance.parameters
+    offsets = [parameters.gap, balance.memory, np.zeros(1) if base is None else base]
+    tiny = 1e-14 * max(float(np.abs(offset).max(initial=0.0)) for offset in offsets)  # their rounding
     force = contact_forces(balance, state.x)
     if np.isfinite(force).all():
-        base = balance.excitation.base
-        sizes = [state.x, balance.x_lin(state.omega), np.zeros(1) if base is None else base]
+        size = max(float(np.linalg.norm(v)) for v in (state.x, balance.x_lin(state.omega), offsets[-1]))
         back = displacement_under(balance, state.omega, state.x, force)
         rounding = 5e-14 * condition(balance, state.omega)
-        allowed = (3 * TOLERANCE + rounding) * max(np.linalg.norm(size) for size in sizes)
-        assert np.linalg.norm(back - state.flat) <= allowed
-    along = balance.parameters.tangential
-    each = [np.linalg.norm(values[:, along], axis=2) for values in (state.cycle.force, state.x)]
-    basis, scale = balance.basis, np.pi * (each[0] * each[1]).sum(axis=1)
-    coarse = 0.0 if basis.transitions == "located" else SAMPLING * (basis.harmonics[-1] / basis.n_samples) ** 2
+        assert np.linalg.norm(back - state.flat) <= (3 * TOLERANCE + rounding) * size + tiny * np.sqrt(back.size)
+    along = parameters.tangential
+    forces, travels = (np.linalg.norm(values[:, along], axis=2) for values in (state.cycle.force, state.x))
+    basis = balance.basis
+    scale = np.pi * ((forces + tiny * parameters.stiffness[:, along]) * (travels + tiny)).sum(axis=1)
+    factor, order = SAMPLING.get(balance.law_name, UNCOUPLED)
+    coarse = 0.0 if basis.transitions == "located" else factor * (basis.harmonics[-1] / basis.n_samples) ** order
     assert (balance.energy(state) >= -(1e-10 + coarse) * scale).all()
 
 
@@ -121,9 +127,9 @@ def test_wear_only_grows(d: Drawn, law: str, rule: str, share: float) -> None:
     except DECLARED:
         return
     except ValueError as refused:
-        assert rule == "error_controlled"
-        assert "take the thesis's rule" in str(refused)
-        return
+        if rule == "error_controlled" and "take the thesis's rule" in str(refused):
+            return
+        raise
     check_wear(history, problem, law)
 
 
