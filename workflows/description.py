@@ -52,6 +52,8 @@ def described(
             "first_omitted_hz": float(str(reduced.info["first_omitted_frequency"])),
             "factorisation": str(reduced.info["factorisation"]),
         }
+    if file.scene.wear is not None:
+        facts["wear_split"] = file.scene.wear.split
     if choice is not None:
         facts |= {"harmonics_error": choice.estimate.error, "harmonics_choice": choice.outcome}
     mesh = None if part is None else part_mesh(part)
