@@ -211,6 +211,35 @@ def _scaling(quick: bool, out: Path, as_json: bool) -> None:
 
 
 @app.command
+def extremes(
+    *,
+    quick: Annotated[bool, Parameter(negative=())] = False,
+    out: Path = Path("extremes.png"),
+    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+) -> None:
+    """Try the solver at its numerical extremes: each cell converged and checked, or refused with a sentence.
+
+    Parameters
+    ----------
+    quick
+        Every third cell, on smaller models.
+    out
+        File of the picture.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import extremes as table
+    from workflows import extremes_picture
+
+    rows = table.run(quick, _aside)
+    extremes_picture.picture(rows).savefig(out)
+    print(json.dumps(table.as_records(rows), indent=2) if as_json else table.as_text(rows))
+    wrong = table.counts(rows)["wrong"]
+    if wrong:
+        raise RuntimeError(f"{wrong} of {len(rows)} extreme settings ended with a wrong number, see the table")
+
+
+@app.command
 def show(result: Path, *, as_json: Annotated[bool, Parameter(name="--json", negative=())] = False) -> None:
     """Say what a result holds.
 
