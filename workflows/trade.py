@@ -16,7 +16,7 @@ from hbm.evolution import WearProblem
 from hbm.wear_history import LIFE_SHARE, WearHistory, cycles_to_preload
 from workflows import pipeline, scene_file
 from workflows.progress import Progress
-from workflows.references import free_deflection
+from workflows.references import delta_max, free_deflection
 
 THESIS_STEPS = (0.1, 0.05, 0.02, 0.01, 0.005)  # of delta_max, table 4.2
 REFERENCE_STEPS = (0.0025, 0.00125)
@@ -102,7 +102,7 @@ def _problem(file: scene_file.SceneFile) -> tuple[WearProblem, float]:
     wear, area = scene.wear, model.reduced.interface.area
     duties = pipeline.mission(scene)
     problem = WearProblem(model.balance, duties, wear.law, wear.coefficient, area, lost_below=0.9 * LIFE_SHARE)
-    return problem, float(free_deflection(model.balance).max())
+    return problem, delta_max(scene, free_deflection(model.balance), area)
 
 
 def _measure(problem: WearProblem, delta: float, rule: str, step: float, say: Callable[[str], None]) -> Row:
