@@ -381,6 +381,36 @@ def leaf(work: Literal["fit", "check", "study", "accuracy"], *, out: Path | None
         chosen.run(out or Path("results") / f"leaf_{work}")
 
 
+@app.command
+def blade(
+    work: Literal["study"],
+    scene: str = "blade",
+    *,
+    overrides: Overrides = (),
+    speed: str | None = None,
+    out: Path | None = None,
+) -> None:
+    """What only a bladed disk has: figures 4.11 to 4.17 and table 4.4 of the thesis beside ours.
+
+    Parameters
+    ----------
+    work
+        study draws nodal diameters, responses to engine orders and to rising forces, and wear for several wear steps.
+    scene
+        Name of a scene with a [wheel] or a .toml file.
+    speed
+        Highest speed of a Campbell diagram, such as 6000rpm; no diagram unless told.
+    out
+        Folder of tables and pictures; results/blade_study unless told.
+    """
+    from workflows import blade_study
+
+    highest = None if speed is None else _option("--speed", speed, "Hz")
+    folder = out or Path("results") / f"blade_{work}"
+    for path in blade_study.run(scene, overrides, folder, highest, _aside, blade_study.Extent()):
+        print(path)
+
+
 def _option(name: str, text: str, unit: str) -> float:
     from workflows.units import to_si
 
