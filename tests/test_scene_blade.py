@@ -91,7 +91,8 @@ def test_left_and_right_face_agree(finished):
         x, force = finished.wear.displacement[row], finished.wear.force[row]
         moved, pushed = (left_face(basis, values, 1, 40) for values in (x, force))
         work = basis.work_per_cycle(force, x)
-        assert basis.work_per_cycle(pushed, moved) == pytest.approx(work, rel=1e-9, abs=1e-9 * np.abs(work).max() + 1e-12)
+        rounding = 1e-9 * np.abs(work).max() + 1e-12
+        assert basis.work_per_cycle(pushed, moved) == pytest.approx(work, rel=1e-9, abs=rounding)
         assert pushed[:, 0] == pytest.approx(force[:, 0], abs=1e-12)
 
 
@@ -100,7 +101,7 @@ def test_every_blade_has_its_phase(finished):
     moved = np.stack(list(render_wheel.instants(wheel, (0, 1), field)))
     assert moved.shape == (40, *field.shape[:2])
     assert moved[0] == pytest.approx(field[..., 1])  # cos at the start of the period
-    assert moved[10] == pytest.approx(-field[..., 2], abs=1e-12)  # a quarter of the wheel on, a quarter of a period late
+    assert moved[10] == pytest.approx(-field[..., 2], abs=1e-12)  # a quarter of the wheel on, a quarter period late
     assert np.abs(moved.sum(axis=0)).max() < 1e-12
 
 

@@ -37,27 +37,28 @@ def diagram_figure(families: Mapping[str, np.ndarray]) -> Figure:
                 axes.plot(diameters, values, style, color=color, ms=3.5, label=f"shrouds {state}" if i == 0 else None)
         axes.axvline(SHOWN_DIAMETERS, color=INK, lw=0.8, ls=":", label="shown in the thesis up to here")
         axes.set(xlabel="nodal diameter", ylabel="frequency / Hz", title="Nodal diameters")
-        axes.set_ylim(bottom=0)
-        axes.legend(loc="lower right", fontsize=9)
+        axes.set_ylim(0, 1.25 * families["stuck"].max())
+        axes.legend(loc="upper left", fontsize=9)
     return figure
 
 
-def campbell_figure(speeds: np.ndarray, found: Mapping[str, np.ndarray], orders: Sequence[int]) -> Figure:
+def campbell_figure(
+    speeds: np.ndarray, found: Mapping[str, np.ndarray], critical: Mapping[int, Sequence[float]]
+) -> Figure:
     """Frequencies of the waves of several engine orders over the speed, with the lines of these orders.
 
     speeds : (n_speed,) [Hz]; found : "free" and "stuck" (n_speed, n_order, family) [Hz]
+    critical : engine order -> speeds [Hz] at which it meets its first stuck frequency
     """
     with plots.axes_of(7.2, 4.8) as (figure, axes):
         rpm = 60 * speeds
         axes.plot(rpm, found["free"][:, 0, 0], "--", color=GREY, label="free")
-        top = 1.15 * float(found["stuck"][:, :, 0].max())
-        for i, (order, color) in enumerate(zip(orders, shades(len(orders)), strict=True)):
+        top = 1.5 * float(found["stuck"][:, :, 0].max())
+        for i, (order, color) in enumerate(zip(critical, shades(len(critical)), strict=True)):
             axes.plot(rpm, found["stuck"][:, i, 0], color=color, label=f"stuck, engine order {order}")
             axes.plot(rpm, order * speeds, ":", color=color, lw=1)
-            miss = found["stuck"][:, i, 0] - order * speeds
-            for k in np.flatnonzero(miss[:-1] * miss[1:] < 0):
-                at = np.interp(0.0, np.sort(miss[k : k + 2]), rpm[[k + 1, k]] if miss[k] > 0 else rpm[[k, k + 1]])
-                axes.plot(at, order * at / 60, "o", color=RED, ms=6, zorder=4)
+            for speed in critical[order]:
+                axes.plot(60 * speed, order * speed, "o", color=RED, ms=6, zorder=4)
         axes.set(xlabel="speed / rpm", ylabel="frequency / Hz", title="Campbell diagram, first mode", ylim=(0, top))
         axes.set_xlim(0, rpm[-1])
         axes.legend(loc="upper left", fontsize=8, ncols=2)
@@ -116,21 +117,22 @@ def backbone_figure(curves: Sequence[tuple[int, Curve]], worn: Worn) -> Figure:
         for (row, curve), color in zip(curves, shades(len(curves)), strict=True):
             label = f"before wear step {row + 1}, {MILLI * history.depth[row].max():.2f} mm"
             axes.plot(curve.branch.frequency, MILLI * curve.amplitude(), color=color, lw=1.2, label=label)
-        axes.plot(history.omega / (2 * np.pi), MILLI * history.amplitude, ".-", color=RED, ms=5, label="peak under wear")
+        way = history.omega / (2 * np.pi), MILLI * history.amplitude
+        axes.plot(*way, ".-", color=RED, ms=5, label="peak under wear")
         axes.set(yscale="log", xlabel="frequency / Hz", ylabel="tip amplitude / mm")
         axes.set_title(f"Response under wear, step {100 * worn.step:g} % of delta_max")
         axes.legend(fontsize=8)
     return figure
 
 
-def cycles_figure(worn: Worn, published: tuple[float, ...] | None) -> Figure:
-    """Cycles that each wear step stands for (figure 4.16)."""
+def cycles_figure(worn: Worn, published: int | None) -> Figure:
+    """Cycles that each wear step stands for; published : number of wear steps (figure 4.16)."""
     count = worn.history.cycles_in_step[worn.history.cycles_in_step > 0]
     with plots.axes_of() as (figure, axes):
         axes.step(np.arange(1, len(count) + 1), count, where="mid", color=BLUE, label=f"ours, {len(count)} steps")
         if published is not None:
-            label = f"contact lost in the thesis, {published[1]:g} steps"
-            axes.axvline(published[1], color=ORANGE, ls="--", label=label)
+            label = f"contact lost in the thesis, {published} steps"
+            axes.axvline(published, color=ORANGE, ls="--", label=label)
         axes.set(yscale="log", xlabel="wear step", ylabel="cycles in the step")
         axes.set_title(f"Cycles per wear step of {100 * worn.step:g} % of delta_max")
         axes.legend(fontsize=9)

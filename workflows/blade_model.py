@@ -64,7 +64,7 @@ class Blade:
             response = response.model_copy(update={"frequency": frequency, "references": None})
         return self.scene.model_copy(update={"wheel": wheel, "response": response})
 
-    def whole_wheel(self, stiffness: np.ndarray | None = None) -> HarmonicBalance:
+    def whole_wheel(self, stiffness: Sequence[float] | None = None) -> HarmonicBalance:
         """The balance of all sectors at once, outputs and loads named "<name>@<sector>".
 
         stiffness : (n_sectors,) factor on the stiffness of each blade: what a travelling wave of one blade cannot say

@@ -1,7 +1,7 @@
 """The study of the shrouded bladed disk: tribodyn blade study.
 
-Figures 4.11 to 4.17 and table 4.4 of the thesis with ours: nodal diameters, engine orders, rising excitation, wear until
-the shrouds are lost for several wear steps; and a Campbell diagram where a highest speed is given.
+Figures 4.11 to 4.17 and table 4.4 of the thesis with ours: nodal diameters, engine orders, rising excitation, wear
+until the shrouds are lost for several wear steps; and a Campbell diagram where a highest speed is given.
 """
 
 from __future__ import annotations
@@ -27,17 +27,12 @@ from workflows.description import described
 from workflows.references import delta_max, free_deflection, linear_references
 from workflows.result import References
 from workflows.scene_file import SceneError
+from workflows.trade import PUBLISHED as PUBLISHED_BY_SCENE
 
 OUTPUT = pipeline.OUTPUT
 FULL_DIAMETERS = (0, 1, 2, 5, 10, 20)  # that are held against the full sector
 FAMILIES = 4
-PUBLISHED = {  # table 4.4: seconds on four cores, wear iterations, depth [mm], error in depth
-    0.005: (19020, 596, 8.2566, 0.0),
-    0.01: (9480, 298, 8.2572, 0.0001),
-    0.02: (4740, 152, 8.2916, 0.004),
-    0.05: (2100, 63, 8.3808, 0.015),
-    0.1: (1020, 34, 8.4697, 0.026),
-}
+PUBLISHED = PUBLISHED_BY_SCENE["blade"]  # table 4.4
 
 
 @dataclass(frozen=True)
@@ -70,9 +65,11 @@ class Curve:
         return self.branch.amplitude(OUTPUT)
 
     def peak(self) -> tuple[float, float]:
-        """Frequency [Hz] and amplitude [m] of the highest point."""
+        """Frequency [Hz] and amplitude [m] of the highest maximum, or of the highest end where there is none."""
         height = self.amplitude()
-        return float(self.branch.frequency[height.argmax()]), float(height.max())
+        inner = np.flatnonzero((height[1:-1] >= height[:-2]) & (height[1:-1] > height[2:])) + 1
+        best = inner[height[inner].argmax()] if len(inner) else height.argmax()
+        return float(self.branch.frequency[best]), float(height[best])
 
 
 @dataclass(frozen=True)
@@ -119,8 +116,10 @@ def reduction_error(blade: Blade) -> dict[str, np.ndarray]:
     }
 
 
-def campbell(blade: Blade, highest: float, count: int, orders: Sequence[int]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Speeds (n_speed,) [Hz] and stuck and free frequencies (n_speed, n_order, family) [Hz] of each engine order's wave."""
+def campbell(
+    blade: Blade, highest: float, count: int, orders: Sequence[int]
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Speeds (n_speed,), and frequencies (n_speed, n_order, 2) of each engine order's wave, free and stuck [Hz]."""
     speeds = np.linspace(0.0, highest, count)
     found: dict[str, list[np.ndarray]] = {"free": [], "stuck": []}
     for speed in speeds:
@@ -133,7 +132,7 @@ def campbell(blade: Blade, highest: float, count: int, orders: Sequence[int]) ->
 def critical_speeds(speeds: np.ndarray, frequency: np.ndarray, order: int) -> list[float]:
     """Speeds [Hz] at which an engine order meets a frequency (n_speed,) of its wave [Hz]."""
     miss = frequency - order * speeds
-    cross = np.flatnonzero(miss[:-1] * miss[1:] < 0)
+    cross = np.flatnonzero((miss[:-1] > 0) != (miss[1:] > 0))
     return [float(speeds[i] + (speeds[i + 1] - speeds[i]) * miss[i] / (miss[i] - miss[i + 1])) for i in cross]
 
 
@@ -183,7 +182,7 @@ def wear(problem: WearProblem, delta: float, step: float) -> Worn:
 
 
 def trade(runs: Sequence[Worn]) -> list[TradeRow]:
-    """Table 4.4: the reference of the depth is the finest step that is published, that of the life the finest of all."""
+    """Table 4.4: the reference of the depth is the finest published step, that of the life the finest of all."""
     depths = {run.step: 1e3 * float(run.history.depth[-1].max()) for run in runs}
     lives = {run.step: cycles_to_preload(run.history) or float("nan") for run in runs}
     known = [step for step in depths if step in PUBLISHED]
@@ -209,12 +208,12 @@ def trade(runs: Sequence[Worn]) -> list[TradeRow]:
 def as_text(rows: Sequence[TradeRow]) -> str:
     """Table 4.4 for people and for Markdown, the published one in brackets."""
     lines = [
-        "| largest depth of a step | wear steps (thesis) | seconds, of them processor (thesis, 4 cores) | largest depth, "
-        "mm (thesis) | error in depth (thesis) | life, million cycles | error in life |",
+        "| largest depth of a step | wear steps (thesis) | seconds, of them processor (thesis, 4 cores) | largest "
+        "depth, mm (thesis) | error in depth (thesis) | life, million cycles | error in life |",
         "|---|---|---|---|---|---|---|",
     ]
     for row in rows:
-        clock, count, depth, error = PUBLISHED.get(row.step, (None,) * 4)
+        count, clock, depth, error = PUBLISHED.get(row.step, (None,) * 4)
         lines.append(
             f"| {100 * row.step:g} % | {row.wear_steps}{_bracket(count, 'd')} | {row.seconds:.0f}, "
             f"{row.processor_seconds:.0f}{_bracket(clock, 'd')} | {row.depth_mm:.4f}{_bracket(depth, '.4f')} | "
@@ -246,7 +245,12 @@ def frames(history: WearHistory, count: int) -> np.ndarray:
 
 
 def run(
-    scene: str, overrides: Sequence[str], folder: Path, highest: float | None, say: Callable[[str], None], extent: Extent
+    scene: str,
+    overrides: Sequence[str],
+    folder: Path,
+    highest: float | None,
+    say: Callable[[str], None],
+    extent: Extent,
 ) -> list[Path]:
     """Run the whole study into a folder; highest : speed of the Campbell diagram [Hz], None for no diagram."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -262,16 +266,16 @@ def run(
         if highest is not None:
             chosen = [o for o in extent.orders if o <= blade.reduced.sector.n_sectors // 2]
             speeds, found = campbell(blade, highest, extent.speeds, chosen)
-            for i, order in enumerate(chosen):
-                met = [60 * speed for speed in critical_speeds(speeds, found["stuck"][:, i, 0], order)]
-                say(f"engine order {order}: critical at {', '.join(f'{rpm:.0f}' for rpm in met) or 'no'} rpm, stuck")
-            drawn["campbell"] = blade_figures.campbell_figure(speeds, found, chosen)
+            met = {o: critical_speeds(speeds, found["stuck"][:, i, 0], o) for i, o in enumerate(chosen)}
+            for order, at in met.items():
+                say(f"engine order {order}: critical at {', '.join(f'{60 * s:.0f}' for s in at) or 'no'} rpm, stuck")
+            drawn["campbell"] = blade_figures.campbell_figure(speeds, found, met)
         by_order = orders(blade, extent)
         drawn["orders"] = blade_figures.orders_figure(by_order)
         by_load = forces(blade, extent)
         force = next(iter(blade.scene.loads.harmonic.values())).amplitude
         drawn["forces"] = blade_figures.forces_figure({force * load: curve for load, curve in by_load.items()})
-        rows = [("engine order", order, *curve.peak()) for order, curve in by_order.items()]
+        rows = [("engine_order", float(order), *curve.peak()) for order, curve in by_order.items()]
         rows += [("force_N", force * load, *curve.peak()) for load, curve in by_load.items()]
         _write_table(folder / "peaks.csv", ("what", "value", "peak_Hz", "peak_m"), rows)
         for what, value, hertz, height in rows:
@@ -281,7 +285,7 @@ def run(
         result = replace(described(file, blade.part, problem.balance), wear=shown.history)
         drawn["maps"] = blade_figures.maps_figure(result, frames(shown.history, extent.frames))
         drawn["backbone"] = blade_figures.backbone_figure(worn_curves(problem, blade, shown, extent), shown)
-        drawn["cycles"] = blade_figures.cycles_figure(shown, PUBLISHED.get(shown.step))
+        drawn["cycles"] = blade_figures.cycles_figure(shown, PUBLISHED.get(shown.step, (None,))[0])
         drawn["peaks"] = blade_figures.peaks_figure(runs)
     table = trade(runs)
     _write_table(folder / "trade.csv", tuple(asdict(table[0])), [tuple(asdict(row).values()) for row in table])

@@ -383,7 +383,7 @@ def leaf(work: Literal["fit", "check", "study", "accuracy"], *, out: Path | None
 
 @app.command
 def blade(
-    work: Literal["study"],
+    work: Literal["study", "mistuned"],
     scene: str = "blade",
     *,
     overrides: Overrides = (),
@@ -395,7 +395,8 @@ def blade(
     Parameters
     ----------
     work
-        study draws nodal diameters, responses to engine orders and to rising forces, and wear for several wear steps.
+        study draws nodal diameters, responses to engine orders and to rising forces, and wear for several wear steps;
+        mistuned solves all blades of a small wheel at once, their stiffnesses a few per cent apart.
     scene
         Name of a scene with a [wheel] or a .toml file.
     speed
@@ -403,11 +404,15 @@ def blade(
     out
         Folder of tables and pictures; results/blade_study unless told.
     """
-    from workflows import blade_study
+    from workflows import blade_mistuning, blade_study
 
     highest = None if speed is None else _option("--speed", speed, "Hz")
     folder = out or Path("results") / f"blade_{work}"
-    for path in blade_study.run(scene, overrides, folder, highest, _aside, blade_study.Extent()):
+    if work == "mistuned":
+        written = blade_mistuning.run(scene, overrides, folder)
+    else:
+        written = blade_study.run(scene, overrides, folder, highest, _aside, blade_study.Extent())
+    for path in written:
         print(path)
 
 

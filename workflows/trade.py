@@ -21,12 +21,21 @@ from workflows.references import delta_max, free_deflection
 THESIS_STEPS = (0.1, 0.05, 0.02, 0.01, 0.005)  # of delta_max, table 4.2
 REFERENCE_STEPS = (0.0025, 0.00125)
 TOLERANCES = (0.1, 0.03)
-PUBLISHED = {  # table 4.2: wear iterations, seconds on four cores, depth [mm], error in depth
-    0.1: (130, 14220, 6.9668, 0.0899),
-    0.05: (183, 21600, 6.6260, 0.0366),
-    0.02: (291, 37020, 6.4849, 0.0145),
-    0.01: (411, 58200, 6.4230, 0.0049),
-    0.005: (577, 70320, 6.3919, 0.0),
+PUBLISHED = {  # by scene and step: wear iterations, seconds on four cores, depth [mm], error in depth
+    "beam": {  # table 4.2
+        0.1: (130, 14220, 6.9668, 0.0899),
+        0.05: (183, 21600, 6.6260, 0.0366),
+        0.02: (291, 37020, 6.4849, 0.0145),
+        0.01: (411, 58200, 6.4230, 0.0049),
+        0.005: (577, 70320, 6.3919, 0.0),
+    },
+    "blade": {  # table 4.4
+        0.1: (34, 1020, 8.4697, 0.026),
+        0.05: (63, 2100, 8.3808, 0.015),
+        0.02: (152, 4740, 8.2916, 0.004),
+        0.01: (298, 9480, 8.2572, 0.0001),
+        0.005: (596, 19020, 8.2566, 0.0),
+    },
 }
 
 
@@ -168,7 +177,8 @@ def as_text(table: Table) -> str:
         "error   roughness"
     ]
     for row in table.rows:
-        steps, seconds, depth, _ = PUBLISHED.get(row.step, (None,) * 4) if row.rule == "thesis" else (None,) * 4
+        published = PUBLISHED.get(table.scene, {}) if row.rule == "thesis" else {}
+        steps, seconds, depth, _ = published.get(row.step, (None,) * 4)
         lines.append(
             f"{row.rule:17} {100 * row.step:5.3g} % {row.wear_steps:6d} {_bracket(steps, 'd'):8} {row.hbm_solves:6d} "
             f"{row.seconds:8.1f} {_bracket(seconds, 'd'):9} {1e3 * row.depth_m:8.4f} {_bracket(depth, '.4f'):9} "
