@@ -24,15 +24,15 @@ from hbm.wear_history import WearHistory, cycles_to_preload
 from workflows import blade_figures, blade_model, pipeline, scene_file
 from workflows.blade_model import Blade
 from workflows.description import described
+from workflows.published import WEAR_STEPS
 from workflows.references import delta_max, free_deflection, linear_references
 from workflows.result import References
 from workflows.scene_file import SceneError
-from workflows.trade import PUBLISHED as PUBLISHED_BY_SCENE
 
 OUTPUT = pipeline.OUTPUT
 FULL_DIAMETERS = (0, 1, 2, 5, 10, 20)  # that are held against the full sector
 FAMILIES = 4
-PUBLISHED = PUBLISHED_BY_SCENE["blade"]  # table 4.4
+PUBLISHED = WEAR_STEPS["blade"]  # table 4.4
 
 
 @dataclass(frozen=True)

@@ -142,6 +142,7 @@ def trade(
     *,
     knob: Literal["wear_step"] = "wear_step",
     overrides: Overrides = (),
+    out: Path | None = None,
     as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
 ) -> None:
     """Measure what a knob costs and what it is worth, against a finer reference on the same scene.
@@ -152,12 +153,16 @@ def trade(
         Name of a scene or a .toml file.
     knob
         wear_step: table 4.2 of the thesis with life added, and the error-controlled rule.
+    out
+        File for a plot of the errors against the work.
     as_json
         Print JSON for machines.
     """
     from workflows import trade as trading
 
     table = trading.wear_step(scene, _aside, overrides)
+    if out is not None:
+        trading.picture(table).savefig(out)
     print(json.dumps(trading.as_records(table), indent=2) if as_json else trading.as_text(table))
 
 
