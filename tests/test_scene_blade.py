@@ -10,6 +10,7 @@ import scipy.linalg as sla
 
 from fem.constraints import named
 from fem.cyclic import rotation
+from fem.elasticity import assemble
 from hbm.harmonics import HarmonicBasis
 from hbm.travelling_wave import at_sector, left_face
 from reduction.cyclic import nodal_diameters
@@ -94,6 +95,41 @@ def test_left_and_right_face_agree(finished):
         rounding = 1e-9 * np.abs(work).max() + 1e-12
         assert basis.work_per_cycle(pushed, moved) == pytest.approx(work, rel=1e-9, abs=rounding)
         assert pushed[:, 0] == pytest.approx(force[:, 0], abs=1e-12)
+
+
+def test_forces_on_both_faces_balance_in_the_full_sector(finished, folder):
+    """Item 5, from the unreduced stiffness and the static field alone: what the two shrouds of a blade are pushed with.
+
+    Equal preload and shear on both faces; over the wheel the shrouds turn nothing, so the roots take no torque
+    """
+    model = built(folder)
+    wheel, patch, wear = render_wheel.wheel_of(finished), finished.patch, finished.wear
+    _, K = assemble(model.part.mesh, part_reduction.material(model_scene()))
+    left = render_wheel.left_patch(patch, finished.part.points, wheel)
+    clamp = named(model.part.node_sets, "clamp")
+    row = int(finished.fields.row[0])
+    field = finished.fields.displacement[0, ..., 0]
+    force = (K @ field.ravel()).reshape(field.shape)  # that acts on each node from outside
+    frames = patch.frames
+    on_right = np.einsum("pij,pj->pi", frames, force[patch.nodes])  # by the blade behind, in the frame of this face
+    on_left = np.einsum("pij,pj->pi", frames, force[left.nodes] @ wheel.turn)  # by the next, turned back to it
+    solved = wear.force[row].reshape(len(frames), 3, -1)[..., 0]
+    scale = np.abs(solved).max()
+    assert np.abs(on_right + solved).max() < 1e-6 * scale
+    assert np.abs(on_left - solved).max() < 1e-6 * scale
+    assert -on_right[:, 2].sum() == pytest.approx(on_left[:, 2].sum()) == pytest.approx(wear.preload[row])
+
+    def torque(nodes):
+        return np.cross(finished.part.points[nodes], force[nodes]).sum(axis=0) @ wheel.axis
+
+    each = np.abs(np.cross(finished.part.points[patch.nodes], force[patch.nodes])).sum()
+    assert abs(torque(patch.nodes)) > 0.1 * each
+    assert abs(torque(patch.nodes) + torque(left.nodes)) < 1e-7 * each
+    assert abs(torque(clamp)) < 1e-6 * each
+
+
+def model_scene():
+    return scene_file.read("blade", COARSE).part_scene
 
 
 def test_every_blade_has_its_phase(finished):
