@@ -429,6 +429,41 @@ def leaf(
         leaf_fit.run(work == "check", as_json)
 
 
+@app.command
+def blade(
+    work: Literal["study", "mistuned"],
+    scene: str = "blade",
+    *,
+    overrides: Overrides = (),
+    speed: str | None = None,
+    out: Path | None = None,
+) -> None:
+    """What only a bladed disk has: figures 4.11 to 4.17 and table 4.4 of the thesis beside ours.
+
+    Parameters
+    ----------
+    work
+        study draws nodal diameters, responses to engine orders and to rising forces, and wear for several wear steps;
+        mistuned solves all blades of a small wheel at once, their stiffnesses a few per cent apart.
+    scene
+        Name of a scene with a [wheel] or a .toml file.
+    speed
+        Highest speed of a Campbell diagram, such as 6000rpm; no diagram unless told.
+    out
+        Folder of tables and pictures; results/blade_study unless told.
+    """
+    from workflows import blade_mistuning, blade_study
+
+    highest = None if speed is None else _option("--speed", speed, "Hz")
+    folder = out or Path("results") / f"blade_{work}"
+    if work == "mistuned":
+        written = blade_mistuning.run(scene, overrides, folder)
+    else:
+        written = blade_study.run(scene, overrides, folder, highest, _aside, blade_study.Extent())
+    for path in written:
+        print(path)
+
+
 def _option(name: str, text: str, unit: str) -> float:
     from workflows.units import to_si
 

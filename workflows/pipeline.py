@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,10 @@ from threadpoolctl import threadpool_limits
 import fem.part
 from fem.constraints import Clamp, NoMeanRotation
 from fem.interface import COMPONENTS
-from fem.loads import Load, NodalForce, Pressure
-from fem.material import Material
+from fem.loads import Centrifugal, Load, NodalForce, Pressure
 from fem.part import Part
 from fem.springs import Spring
+from fem.system import SecondOrderSystem
 from geometry import mesh as mesh_reader
 from geometry import parts
 from hbm import continuation, error_controlled_rule, law, thesis_rule, wear_law
@@ -35,15 +36,14 @@ from reduction.damping import modal_damping, rayleigh
 from reduction.held import hold
 from reduction.linear import stuck_stiffness
 from reduction.model import ReducedModel
-from workflows import curve, matrix_model, part_reduction, store, worn_responses
+from workflows import curve, matrix_model, part_reduction, references, store, worn_responses
 from workflows.contact_surfaces import surface_gap
 from workflows.description import described
 from workflows.fields import displacement_fields, hysteresis_loops
 from workflows.matrix_scene import MatrixScene
 from workflows.progress import Progress
-from workflows.references import linear_references
 from workflows.result import Patch, Result
-from workflows.scene import HIGHEST, PartScene, Place, Scene, StaticLoad, unknown_key
+from workflows.scene import CENTRIFUGAL, HIGHEST, PartScene, Place, Scene, StaticLoad, unknown_key
 from workflows.scene_file import SceneFile
 
 OUTPUT = "response"
@@ -90,8 +90,8 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
                 frf = follow_response(scene, model.balance, advance)
             with progress.stage("linear references"):
                 low, high = scene.response.references or scene.response.frequency
-                references = linear_references(model.balance, OUTPUT, 2 * np.pi * low, 2 * np.pi * high)
-            result = keep(replace(result, frf=frf, references=references, state="response computed"))
+                linear = references.linear_references(model.balance, OUTPUT, 2 * np.pi * low, 2 * np.pi * high)
+            result = keep(replace(result, frf=frf, references=linear, state="response computed"))
         check_branch(result.frf)
         result = keep(judged(scene, model.balance, result, progress))
         if wears(scene):
@@ -198,27 +198,23 @@ def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]
 
 def make_part(scene: PartScene, mesh: Any, node_sets: dict[str, np.ndarray]) -> Part:
     """Mass, stiffness, loads, outputs and contact of the mesh, held where the scene says."""
-    contact, response = scene.contact, scene.response
+    loads = {name: make_load(load) for name, load in {**scene.loads.static, **scene.loads.harmonic}.items()}
+    if scene.wheel is not None and scene.wheel.speed:
+        loads[CENTRIFUGAL] = Centrifugal(scene.wheel.axis)
     return fem.part.build(
         mesh,
         node_sets,
-        Material(scene.material.young, scene.material.poisson, scene.material.density),
+        part_reduction.material(scene),
         clamps(scene),
-        [
-            fem.part.Contact(
-                face, contact.t1, contact.opposite, contact.components, contact.gap, contact.vertices_only,
-                contact.plane, contact.inclination,
-            )
-            for face in contact.groups
-        ],
-        {name: make_load(load) for name, load in {**scene.loads.static, **scene.loads.harmonic}.items()},
+        part_reduction.contacts(scene, alone=scene.wheel is not None),
+        loads,
         {
             name: NodalForce(output.group, output.direction)
-            for name, output in {OUTPUT: response, **response.others}.items()
+            for name, output in {OUTPUT: scene.response, **scene.response.others}.items()
         },
         springs=springs(scene),
         held=[] if scene.geometry.no_turning is None else [NoMeanRotation(scene.geometry.no_turning)],
-    )  # fmt: skip
+    )
 
 
 def with_surfaces(scene: PartScene, part: Part, folder: Path) -> tuple[Part, tuple[str, ...]]:
@@ -253,21 +249,19 @@ def reduce_part(scene: PartScene, part: Part) -> ReducedModel:
 
 def damped(scene: Scene, reduced: ReducedModel) -> ReducedModel:
     """The model with the scene's damping; raises ValueError where its files hold another one."""
-    damping = damping_matrix(scene, reduced)
     if reduced.system.damping is None:
-        return reduced.with_damping(damping)
-    if damping is not None:
+        return reduced.with_damping(partial(damping_matrix, scene, contact_stiffness(scene, reduced)))
+    if scene.damping.given:
         raise ValueError("the files of the model hold a damping matrix: leave [damping] out, or the matrix")
     return reduced
 
 
-def damping_matrix(scene: Scene, reduced: ReducedModel) -> np.ndarray | None:
-    """Damping matrix (n, n) [N s/m] of the reduced model, None where the scene has no damping."""
-    damping, system = scene.damping, reduced.system
+def damping_matrix(scene: Scene, springs: np.ndarray, system: SecondOrderSystem, B: np.ndarray) -> np.ndarray | None:
+    """Damping matrix (n, n) [N s/m] of a system with its contact map and springs, None where the scene has none."""
+    damping = scene.damping
     if damping.modal is not None:
         if damping.state == "stuck":
-            K = stuck_stiffness(system.stiffness, reduced.interface.B, contact_stiffness(scene, reduced))
-            system = replace(system, stiffness=K)
+            system = replace(system, stiffness=stuck_stiffness(system.stiffness, B, springs))
         return modal_damping(system, damping.modal)
     if damping.mass is not None or damping.stiffness is not None:
         return rayleigh(system, damping.mass or 0.0, damping.stiffness or 0.0)
@@ -313,6 +307,8 @@ def excite(scene: Scene, base: np.ndarray | None) -> Excitation:
     loads: dict[tuple[int, str], complex] = {(0, name): load.amplitude for name, load in scene.loads.static.items()}
     if isinstance(scene, PartScene):
         loads |= {(0, name): given.displacement for name, given in scene.prescribed.items()}
+        if scene.wheel is not None and scene.wheel.speed:
+            loads[0, CENTRIFUGAL] = (2 * np.pi * scene.wheel.speed) ** 2
     for name, load in scene.loads.harmonic.items():
         loads[load.harmonic, name] = load.amplitude * np.exp(1j * load.phase)
     return Excitation(loads, base)
@@ -441,7 +437,7 @@ def step_limit(scene: Scene, patch: Patch) -> float:
     step = scene.wear.step
     if scene.wear.rule == "thesis" and step is not None and step.depth is not None:
         return step.depth
-    delta_max = float(patch.free_deflection.max())
+    delta_max = references.delta_max(scene, patch.free_deflection, patch.area)
     if not (np.isfinite(delta_max) and delta_max > 0):
         raise ValueError(
             "wear.step: a share of delta_max needs static loads that press the contact of a part held without it; "

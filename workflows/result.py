@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from hbm.branch import Branch
 from hbm.evolution import LOST
@@ -51,6 +52,10 @@ class Patch:
     def flat(self) -> np.ndarray:
         """(n_pair, 2) positions in the mean tangential plane, from the middle of the patch [m]."""
         return np.asarray((self.points - self.points.mean(0)) @ self.frames.mean(0)[:2].T)
+
+    def moved(self, mesh: np.ndarray, points: np.ndarray, frames: np.ndarray) -> Patch:
+        """The same patch elsewhere on the part, at the nodes of the mesh (n_node, 3) [m] nearest to its points."""
+        return replace(self, nodes=cKDTree(mesh).query(points)[1], points=points, frames=frames)
 
     def shares(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Cut every face into one quadrangle for each of its corners, to show what has one value for each pair.

@@ -125,6 +125,8 @@ def lines(result: Result) -> list[tuple[str, str]]:
         ("model", _sizes(numbers["full_dofs"], numbers["model_dofs"])),
         ("contact", f"{numbers['contact_pairs']} node pairs, {numbers['unknowns']} unknowns"),
     ]
+    if "sectors" in result.facts:
+        shown.append(("wheel", "{sectors} sectors, engine order {engine_order}".format(**result.facts)))
     if numbers["free_hz"]:
         shown.append(("free modes", ", ".join(f"{hertz:.2f}" for hertz in numbers["free_hz"][:4]) + " Hz"))
     if numbers["delta_max_m"] is not None:
