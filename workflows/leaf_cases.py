@@ -1,7 +1,8 @@
 """The configurations of the leaf seal's study: what the thesis varies, one thing at a time (sections 6.3, 6.6).
 
-Published are normalised values; their units are ours and stand here and in the scene: 1 unit of force is 1 kPa of
-pressure, 1 unit of liner displacement is 20 um, K_n = 25 and K_spring = 1 are the stiffnesses that the fit found.
+Published are normalised values; their units are ours and stand here and in the scene: one unit of force is 1 kPa of
+pressure, one of static liner displacement 0.5 mm (it tilts the leaf by a quarter of a degree), one of harmonic liner
+displacement 20 um; K_n = 25 and K_spring = 1 are the stiffnesses that the fit found.
 """
 
 from __future__ import annotations
@@ -10,17 +11,17 @@ from dataclasses import dataclass
 
 from workflows.scene import PartScene
 
-LINER_UNIT = 20e-6  # [m] of one published unit of liner displacement (ours)
+STATIC_UNIT, HARMONIC_UNIT = 0.5e-3, 20e-6  # [m] of one published unit of liner displacement (ours)
 FORCE_UNIT = 1e3  # [Pa] of one published unit of force (ours)
 CONTACT_UNITS, SPRING_UNITS = 25.0, 1.0  # published normalised stiffnesses of the scene
-LINER = {  # table 6.1: number -> static and harmonic displacement, in units
+LINER: dict[int, tuple[float, complex]] = {  # table 6.1: number -> static and harmonic displacement, in units
     1: (0, 0), 2: (1, 0), 3: (-1, 0), 4: (0, 1), 5: (0, 1j), 6: (1, 1), 7: (-1, 1),
 }  # fmt: skip
 FORCES = (0.1, 0.2, 0.5, 1.0)
 CONTACTS = (5.0, 12.5, 50.0, 100.0)
 SPRINGS = (0.1, 0.5, 2.0, 10.0)
-INCLINATIONS = (-0.3, -0.1, 0.1, 0.3)  # [degree], ours
-BOWS = (-0.2, -0.05, 0.05, 0.2)  # [mm], ours
+INCLINATIONS = (-3.0, -1.0, 1.0, 3.0)  # [degree], ours
+BOWS = (-1.0, -0.3, 0.3, 1.0)  # [mm], ours
 
 
 @dataclass(frozen=True)
@@ -49,17 +50,14 @@ def cases(scene: PartScene) -> list[Case]:
             for s, h in LINER.values()
             if h
         ),
-        *(
-            Case("K_n", f"{k:g}", (f"contact.normal_stiffness={contact * k / CONTACT_UNITS!r}",))
-            for k in CONTACTS
-        ),
+        *(Case("K_n", f"{k:g}", (f"contact.normal_stiffness={contact * k / CONTACT_UNITS!r}",)) for k in CONTACTS),
         *(Case("K_spring", f"{k:g}", springs(k)) for k in SPRINGS),
         *(Case("inclination", f"{a:+g}°", (f"contact.inclination={a} deg",)) for a in INCLINATIONS),
         *(Case("bow", f"{b:+g} mm", (f"geometry.bow={b} mm",)) for b in BOWS),
     ]  # fmt: skip
 
 
-def liner(static: complex, harmonic: complex) -> tuple[str, ...]:
+def liner(static: float, harmonic: complex) -> tuple[str, ...]:
     """Overrides that move the liner, in published units; positive is towards the leaf."""
     if not static and not harmonic:
         return ()
@@ -67,8 +65,8 @@ def liner(static: complex, harmonic: complex) -> tuple[str, ...]:
     phase = 0.0 if complex(harmonic).imag == 0 else 90.0
     return (
         f'{table}.direction="z"',
-        f"{table}.static={LINER_UNIT * complex(static).real!r}",
-        f"{table}.harmonic={LINER_UNIT * abs(harmonic)!r}",
+        f"{table}.static={STATIC_UNIT * static!r}",
+        f"{table}.harmonic={HARMONIC_UNIT * abs(harmonic)!r}",
         f"{table}.phase={phase} deg",
     )
 

@@ -1,4 +1,4 @@
-"""Dimensions of the leaf seal from its published frequency ratios: run with python -m workflows.leaf_fit.
+"""Dimensions of the leaf seal from its published frequency ratios: tribodyn leaf fit.
 
 Published are ten normalised frequencies of the leaf alone, on its pin springs, and on springs with every contact stuck
 (Tamatam 2021, table 6.2), but no dimension. Radius and thickness set the scale and stay as the scene has them; angle,
@@ -10,12 +10,10 @@ numbers count alike; what remains is what the table allows.
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
@@ -146,7 +144,7 @@ def reduced_leaf(scene: PartScene, parameters: leaf_seal.Parameters) -> Leaf:
     part = pipeline.make_part(scene.model_copy(update={"springs": {}}), mesh, node_sets)
     rows, shares = zip(*(spring.elongation(mesh, node_sets) for spring in pipeline.springs(scene)), strict=True)
     seats = [row[:, part.free] for row in rows]
-    masters = np.concatenate([seat.nonzero()[1] for seat in seats])
+    masters = np.concatenate([seat.nonzero()[1] for seat in seats]).tolist()
     model = hold(
         craig_bampton(part.system, part.interface, scene.reduction.modes, scene.reduction.cutoff, masters), part.held
     )
@@ -155,9 +153,15 @@ def reduced_leaf(scene: PartScene, parameters: leaf_seal.Parameters) -> Leaf:
     return Leaf(system.mass, system.stiffness, model.interface, seat_rows, np.concatenate(shares))
 
 
+def dimensions(scene: PartScene) -> leaf_seal.Parameters:
+    """The leaf of a scene."""
+    parameters: dict[str, Any] = scene.geometry.parameters
+    return leaf_seal.Parameters(**parameters)
+
+
 def of_scene(scene: PartScene) -> Fit:
     """The leaf as a scene has it, beside the published ratios; its unit is the best one."""
-    parameters = leaf_seal.Parameters(**cast("dict[str, Any]", scene.geometry.parameters))
+    parameters = dimensions(scene)
     spring = next(iter(scene.springs.values())).stiffness
     contact = scene.contact.normal_stiffness or 0.0
     columns = reduced_leaf(scene, parameters).columns(spring, contact)
@@ -190,7 +194,7 @@ def fit(scene: PartScene, pin_column: int, max_steps: int = 20) -> Fit:
 
     Every shape gets its own best unit and stiffnesses, so that only the shape is searched for.
     """
-    first = leaf_seal.Parameters(**cast("dict[str, Any]", scene.geometry.parameters))
+    first = dimensions(scene)
     lower, start, upper, scale = (np.array(column) for column in zip(*SHAPE.values(), strict=True))
 
     def parameters(shape: np.ndarray) -> leaf_seal.Parameters:
@@ -214,12 +218,11 @@ def fit(scene: PartScene, pin_column: int, max_steps: int = 20) -> Fit:
     return Fit(p, spring, contact, unit, leaf.columns(spring, contact))
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Fit for every column the pins may stand in and print the best; with "check", the leaf as the scene has it."""
-    words = sys.argv[1:] if arguments is None else list(arguments)
+def run(check_only: bool) -> None:
+    """Fit for every column the pins may stand in and print the best; or just print the leaf as the scene has it."""
     scene = scene_file.read("leaf_seal").part_scene
     with threadpool_limits(1):
-        if words == ["check"]:
+        if check_only:
             found = of_scene(scene)
         else:
             fits = [fit(scene, column) for column in PIN_COLUMNS]
@@ -230,8 +233,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print(f"error {100 * found.rms:.2f} % r.m.s.; 1.00 is {found.unit:.4g} Hz")
     print(f"contact of both patches over spring of one pin: {found.contact / found.spring:.3g}")
     print(found.toml())
-    print(asdict(found.parameters))
-
-
-if __name__ == "__main__":
-    main()

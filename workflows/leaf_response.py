@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -21,22 +22,30 @@ from hbm.wear_law import Exposure
 from workflows import pipeline
 from workflows.scene_file import SceneFile
 
-LINEAR, APART = 0.85, 1.12  # frequencies of the linear regime over those where separation begins and ends
+LINEAR, APART = 0.85, 1.12  # frequencies of the linear points, over those where separation begins and ends
 LINER_NODE = "lower_corner"  # the output that moves most where the leaf chatters
+WEAR_COEFFICIENT = 2e-15  # [m3/J], that of the thesis's friction contacts put to impacts (ours)
 
 
 @dataclass(frozen=True)
 class LeafResponse:
     """A configuration and its response curve.
 
-    stable : stability of the curve by Hill's method; seconds : processor time of model and curve [s]
+    springs : name of a pin, which is also an output, -> stiffness [N/m]; seat : bearing area of a pin [m2]
+    seconds : processor time of model and curve [s]
     """
 
     part: Part
     balance: HarmonicBalance
     branch: Branch
-    stability: BranchStability
+    springs: dict[str, float]
+    seat: float
     seconds: float
+
+    @cached_property
+    def stability(self) -> BranchStability:
+        """Stability along the curve, by Hill's method."""
+        return stability.mark(self.balance, self.branch)
 
     def state(self, point: int) -> State:
         """The solved state of a point of the curve."""
@@ -63,9 +72,17 @@ class LeafResponse:
             first, last = int(apart[0]), int(apart[-1])
             peak = int(apart[np.argmax(height[apart])])
             low, high = branch.omega[first] * LINEAR, branch.omega[last] * APART
-        before = int(np.argmin(np.abs(branch.omega[: first + 1] - low)))
-        after = last + int(np.argmin(np.abs(branch.omega[last:] - high)))
-        return [before, (first + peak) // 2, peak, (peak + last) // 2, after]
+
+        def nearest(start: int, stop: int, omega: float) -> int:
+            return start + int(np.argmin(np.abs(branch.omega[start : stop + 1] - omega)))
+
+        return [
+            nearest(0, first, low),
+            nearest(first, peak, 0.5 * (branch.omega[first] + branch.omega[peak])),
+            peak,
+            nearest(peak, last, 0.5 * (branch.omega[peak] + branch.omega[last])),
+            nearest(last, len(branch.omega) - 1, high),
+        ]
 
     def chatter(self, point: int) -> Chatter:
         """Openings, closings and impact velocities at a point of the curve."""
@@ -76,6 +93,20 @@ class LeafResponse:
         n = self.balance.parameters.n_pair
         exposure = Exposure(self.balance, self.state(point), np.ones(n), np.ones(n), np.zeros(n), 0.0)
         return impact.impact_work(exposure)
+
+    def pin_work(self, point: int) -> dict[str, float]:
+        """Work per cycle that the leaf puts into the spring of each pin, which rubs and hammers its seat [J]."""
+        work = {}
+        for name, stiffness in self.springs.items():
+            row = self.branch.response[point, self.branch.output_names.index(name)]
+            z = self.balance.basis.to_time(row)
+            work[name] = float(impact.loading_work(stiffness * z, z))
+        return work
+
+    def wear_rates(self, point: int, coefficient: float = WEAR_COEFFICIENT) -> tuple[np.ndarray, np.ndarray]:
+        """Wear depth per cycle of every pair (n_pair,) and of every pin (n_pin,) by the law of impacts [m]."""
+        pins = np.array(list(self.pin_work(point).values()))
+        return coefficient * self.impact_work(point) / self.part.interface.area, coefficient * pins / self.seat
 
 
 def respond(file: SceneFile) -> LeafResponse:
@@ -93,4 +124,6 @@ def respond(file: SceneFile) -> LeafResponse:
     seconds = time.process_time() - start
     pipeline.check_branch(branch)
     assert branch.outcome[-1] == CONVERGED
-    return LeafResponse(part, balance, branch, stability.mark(balance, branch), seconds)
+    pins = {name: spring.stiffness for name, spring in scene.springs.items()}
+    leaf = scene.geometry.parameters
+    return LeafResponse(part, balance, branch, pins, leaf["pin_width"] * leaf["thickness"], seconds)

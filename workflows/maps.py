@@ -32,9 +32,9 @@ def patch_maps(result: Result) -> Figure:
             maps[0, column].set_title(
                 f"wear step {row + 1}\n{_cycles(result.cycles_after(row))} cycles", fontsize=10, fontweight="normal"
             )
-            shown = _field(maps[0, column], patch, depth[column], WEAR_MAP, depth.max())
-            _status(maps[1, column], patch, wear.status[row])
-            pressed = _field(maps[2, column], patch, pressure[column], PRESSURE_MAP, pressure.max())
+            shown = draw_field(maps[0, column], patch, depth[column], WEAR_MAP, depth.max())
+            draw_status(maps[1, column], patch, wear.status[row])
+            pressed = draw_field(maps[2, column], patch, pressure[column], PRESSURE_MAP, pressure.max())
         for side in sides:
             side.axis("off")
         figure.colorbar(shown, cax=sides[0].inset_axes([0, 0, 0.12, 1]), label="total wear depth / mm")
@@ -52,7 +52,7 @@ def patch_maps(result: Result) -> Figure:
     return figure
 
 
-def _field(axes: Any, patch: Patch, values: np.ndarray, colors: str, largest: float) -> Any:
+def draw_field(axes: Any, patch: Patch, values: np.ndarray, colors: str, largest: float) -> Any:
     """A field with one value for each pair, interpolated between them."""
     x, y = 1e3 * patch.flat.T
     faces = patch.faces
@@ -63,7 +63,7 @@ def _field(axes: Any, patch: Patch, values: np.ndarray, colors: str, largest: fl
     )
 
 
-def _status(axes: Any, patch: Patch, status: np.ndarray) -> None:
+def draw_status(axes: Any, patch: Patch, status: np.ndarray) -> None:
     """The status of each pair on its share of the patch."""
     corners, pair = patch.shares(1e3 * patch.flat)
     colors = [STATUS[int(bits)][1] for bits in status[pair]]

@@ -30,7 +30,7 @@ def draw(result: Result, folder: Path) -> list[Path]:
         ("preload", preload_against_cycles, result.wear_steps > 0),
         ("depth", depth_against_cycles, result.wear_steps > 0),
         ("energy", energy_against_cycles, result.wear_steps > 0),
-        ("hysteresis", hysteresis_loops, result.loops is not None),
+        ("hysteresis", hysteresis_loops, result.loops is not None and has_friction(result)),
         ("patch", maps.patch_maps, result.wear_steps > 0 and result.patch is not None and len(result.patch.faces) > 0),
     ]
     written = []
@@ -166,6 +166,11 @@ def energy_against_cycles(result: Result) -> Figure:
         lower.plot(spent * 1e-6, 1e9 * wear.depth @ patch.area, ".-", color=ORANGE, ms=4)
         lower.set(xlabel="accumulated energy / MJ", ylabel="worn volume / mm³")
     return figure
+
+
+def has_friction(result: Result) -> bool:
+    """Whether the contact has a tangential component, so that it can have hysteresis."""
+    return result.patch is not None and any(name != "n" for name in result.patch.components)
 
 
 def hysteresis_loops(result: Result) -> Figure:

@@ -16,6 +16,7 @@ from hbm.parameter import Parameter
 KINK_ANGLE = 0.75  # turn between neighbouring points beyond which they lie on either side of a kink [rad]
 FOLD_TIGHTER = 1e-3  # Newton tolerance at folds, relative to that of other points
 FOLD_TRIALS = 80
+SHARP = 1e-10  # relative accuracy of tangents at folds
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,38 +175,59 @@ def locate_fold(path: Parameter, segment: Segment, options: NewtonOptions, toler
     """
     tight = replace(options, tolerance=max(FOLD_TIGHTER * options.tolerance, 1e-13))
     metric = segment.metric
-    weight = [1.0, 1.0]
-    best = min(segment.start, segment.end, key=lambda p: abs(p.tangent.p))
-    for _ in range(FOLD_TRIALS):
-        corner = segment.angle > KINK_ANGLE
-        if corner:
-            a, b, _ = segment.corner
-            share = a / (a + b) if min(a, b) > 0 else 0.5
-        else:
-            slopes = abs(segment.start.tangent.p) * weight[0], abs(segment.end.tangent.p) * weight[1]
-            share = float(np.clip(slopes[0] / (slopes[0] + slopes[1]), 0.02, 0.98))
-        guess = segment.at(share)
-        solution, value = bordered.correct(path, guess, segment.along, metric, tight)
-        if min(solution.history) > options.tolerance:
-            return None
-        try:
-            tangent = bordered.tangent(path, value, solution.state, segment.along, metric, tight, 1e-10)
-        except BorderFailed:
-            return None
-        point = CurvePoint.of(value, replace(solution, outcome=CONVERGED), tangent, fold=True)
-        if corner:  # its distance from the fold is at most some times its distance from the corner of the tangents
-            best = point
-            reach = min(segment.length, 10 * metric.norm(point.place - guess))
-            steepness = max(abs(segment.start.tangent.p), abs(segment.end.tangent.p))
-        else:
-            best = min(best, point, key=lambda p: abs(p.tangent.p))
-            reach, steepness = segment.length, abs(tangent.p)
-        if steepness * reach <= tolerance * abs(value):
-            break
-        if tangent.p * segment.start.tangent.p > 0:  # Illinois: halve the weight of an end that stays
-            segment, weight = Segment(point, segment.end, metric), [1.0, 0.5 * weight[1]]
-        else:
-            segment, weight = Segment(segment.start, point, metric), [0.5 * weight[0], 1.0]
-        if segment.length < 1e-13:
-            break
-    return replace(best, fold=True)
+    try:
+        ends = [replace(p, tangent=_sharp_tangent(path, p, metric, tight)) for p in (segment.start, segment.end)]
+        segment, weight, corner = Segment(ends[0], ends[1], metric), [1.0, 1.0], np.inf
+        for _ in range(FOLD_TRIALS):
+            before, corner = corner, _corner_value(segment)
+            settled = abs(corner - before) <= 0.1 * tolerance * abs(corner)
+            guess = segment.at(_share(segment, weight, settled))
+            solution, value = bordered.correct(path, guess, segment.along, metric, tight)
+            if min(solution.history) > options.tolerance:
+                return None
+            tangent = bordered.tangent(path, value, solution.state, segment.along, metric, tight, SHARP)
+            point = CurvePoint.of(value, replace(solution, outcome=CONVERGED), tangent, fold=True)
+            if tangent.p * segment.start.tangent.p > 0:  # Illinois: halve the weight of an end that stays
+                segment, weight = Segment(point, segment.end, metric), [1.0, 0.5 * weight[1]]
+            else:
+                segment, weight = Segment(segment.start, point, metric), [0.5 * weight[0], 1.0]
+            steepest = max(abs(segment.start.tangent.p), abs(segment.end.tangent.p))
+            slope = abs(tangent.p) if segment.angle < KINK_ANGLE else steepest
+            if settled or slope * segment.length <= tolerance * abs(value) or segment.length < 1e-13:
+                return point
+    except BorderFailed:
+        return None
+    return point
+
+
+def _sharp_tangent(path: Parameter, point: CurvePoint, metric: Metric, options: NewtonOptions) -> Direction:
+    """The tangent of a point, more accurate than the walk has it; raises BorderFailed."""
+    balance, omega = path.place(point.value)
+    flat = point.place.x
+    state = balance.evaluate(omega, flat.reshape(balance.parameters.n_pair, -1, flat.shape[-1]))
+    return bordered.tangent(path, point.value, state, point.tangent, metric, options, SHARP)
+
+
+def _corner_value(segment: Segment) -> float:
+    """The parameter where the tangents of the ends meet; none where the segment is smooth."""
+    a, b, _ = segment.corner
+    if segment.angle <= KINK_ANGLE or min(a, b) <= 0:
+        return float("nan")
+    return segment.start.value + a * segment.start.tangent.p
+
+
+def _share(segment: Segment, weight: list[float], settled: bool) -> float:
+    """Where between its ends to look for the fold of a segment, 0..1.
+
+    Round a corner it is on the longer leg, close to where the tangents meet, so that both legs get short in turn and the
+    meeting point settles; there at last. Elsewhere it is the secant's zero of the tangent's share in the parameter.
+    """
+    if segment.angle > KINK_ANGLE:
+        a, b, _ = segment.corner
+        if min(a, b) <= 0:
+            return 0.5
+        if settled:
+            return a / (a + b)
+        return (0.9 * a if a > b else a + 0.1 * b) / (a + b)
+    a, b = abs(segment.start.tangent.p) * weight[0], abs(segment.end.tangent.p) * weight[1]
+    return float(np.clip(a / (a + b), 0.02, 0.98))

@@ -144,10 +144,12 @@ class Stepper:
 
     def _fits(self, trial: Segment, step: float) -> bool:
         """Whether a step is short for the curve, or turns at a corner whose legs are straight and meet."""
-        if trial.angle <= KINK_ANGLE:
-            self.trouble = f"the next solution strays from the curve at every step down to {step:.1e}"
-            return self._metric.norm(trial.end.place - self._ahead(step)) <= STRAY * step
-        self.trouble = f"the curve turns sharply at every step down to {step:.1e}"
+        stray = self._metric.norm(trial.end.place - self._ahead(step))
+        if trial.angle <= KINK_ANGLE and stray <= STRAY * step:
+            return True
+        self.trouble = f"the curve turns sharply, or jumps, at every step down to {step:.1e}"
+        if trial.angle < STRAY:
+            return False
         first, second, miss = trial.corner
         if min(first, second) < -0.02 * step or first + second > 2 * step or miss > 0.05 * trial.length:
             return False

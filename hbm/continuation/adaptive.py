@@ -16,6 +16,7 @@ import numpy as np
 from hbm import newton, parameter
 from hbm.balance import HarmonicBalance
 from hbm.branch import Branch, BranchBuilder
+from hbm.continuation.arc_length import solve_along_load
 from hbm.continuation.natural import DEGREE, extrapolate
 from hbm.newton import NewtonOptions, Solution
 from hbm.parameter import Parameter
@@ -68,7 +69,7 @@ def follow(
     options = options or Options()
     path = parameter.of(problem)
     builder = BranchBuilder(path)
-    first = newton.solve_from_rest(*path.place(start), options.newton)
+    first = solve_along_load(*path.place(start), options.newton)
     builder.add(start, first)
     if not first.converged:
         return builder.finish(f"ended at {path.say(start)}: {first.outcome}")
@@ -154,7 +155,7 @@ class _Sweep:
             place = self._path.place(value)
             solution = newton.solve(*place, self._builder.x[-1], self._options.newton)
             if not solution.converged:
-                solution = newton.solve_from_rest(*place, self._options.newton)
+                solution = solve_along_load(*place, self._options.newton)
             if solution.converged:
                 self._ahead = [a for a in self._ahead if abs(a[0] - here) > abs(value - here)]
                 self._accept(value, solution, self._outputs(value, solution), jumped=True)
