@@ -96,6 +96,8 @@ class Identification:
             return f"at its {bound} bound"
         if self.deviation[i] > OPEN:
             return "not determined by these numbers"
+        if len(self.measured) <= len(self.parameters):
+            return "as many numbers as parameters: no error to tell its own from"
         return f"+- {100 * self.deviation[i]:.2g} %" + ("" if p.ratio else " of the bounds' width")
 
     def report(self) -> str:
@@ -137,7 +139,9 @@ def fit(parameters: Sequence[Parameter], measured: Sequence[Measured], predict: 
         values = {p.name: p.value(float(u)) for p, u in zip(parameters, unknowns, strict=True)}
         found = np.asarray(predict(values), dtype=float)
         if found.shape != target.shape or not (found > 0).all():
-            raise ValueError(f"the model predicts {found.tolist()}, not {len(target)} numbers above 0; narrow the bounds")
+            raise ValueError(
+                f"the model predicts {found.tolist()} instead of {len(target)} numbers above 0: narrow the bounds"
+            )
         return found
 
     def residual(unknowns: np.ndarray) -> np.ndarray:

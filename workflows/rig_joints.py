@@ -21,6 +21,7 @@ from reduction.linear import stuck_stiffness
 from reduction.model import ReducedModel
 from reduction.relative import relative
 from workflows import pipeline
+from workflows.rig_published import OPEN, STUCK
 from workflows.scene import Output
 from workflows.scene_file import SceneFile
 
@@ -29,11 +30,6 @@ STATIONS = (1, 2, 3, 4)
 MODES = 14  # looked at in each state
 DOMINANT = 0.4  # share of the motion that makes a mode one of its kind
 STRANGER = 10.0  # cost of calling a mode what it is not, against squared logarithms of frequencies
-
-OPEN = (("tangential", 91.0), ("normal", 230.0), ("tangential", 300.0), ("tangential", 575.0), ("twisting", 840.0))
-STUCK = (("tangential", 285.0), ("tangential", 400.0), ("twisting", 868.0), ("tangential", 1180.0))
-"""Published modes (Tamatam 2021, table 5.2), dominant motion and frequency [Hz]; the fifth stuck one is "complex"."""
-
 
 @dataclass(frozen=True)
 class Modes:
@@ -102,7 +98,7 @@ class Joints:
 def joints_of(file: SceneFile) -> Joints:
     """Reduce the rig of a scene with the nodes of all its springs as masters."""
     scene = file.part_scene
-    probes = {}
+    probes: dict[str, Output] = {}
     for place, axis in (("low", "y"), ("middle", "y"), ("high", "y"), ("middle", "z")):
         along = (0.0, 1.0, 0.0) if axis == "y" else (0.0, 0.0, 1.0)
         probes |= {f"{place}{k}_{axis}": Output(group=f"{place}{k}", direction=along) for k in STATIONS}

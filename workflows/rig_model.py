@@ -1,4 +1,4 @@
-"""The fretting rig of a scene, reduced once, with other platform heights, forces, mating heights, damping, harmonics."""
+"""The fretting rig of a scene, reduced once, with other heights of platform and faces, forces, damping, harmonics."""
 
 from __future__ import annotations
 
@@ -88,10 +88,10 @@ class Rig:
         """The rig with other harmonics."""
         return self._changed(harmonics=self.scene.harmonics.model_copy(update={"kept": kept}))
 
-    def with_gap_shift(self, shift: float) -> Rig:
-        """The rig with all gaps opened by `shift` [m]; a mating height of +3 um is a shift of -3 um."""
+    def with_mating_height(self, more: float) -> Rig:
+        """The rig with its faces pushed on by `more` [m] than in the scene (thesis 5.5: 0, +3 and -3 um)."""
         interface = self.plain.interface
-        return replace(self, plain=replace(self.plain, interface=replace(interface, gap=interface.gap + shift)))
+        return replace(self, plain=replace(self.plain, interface=replace(interface, gap=interface.gap - more)))
 
     def _changed(self, **changes: object) -> Rig:
         return replace(self, scene=self.scene.model_copy(update=changes))
