@@ -100,6 +100,27 @@ class Identification:
             return "as many numbers as parameters: no error to tell its own from"
         return f"+- {100 * self.deviation[i]:.2g} %" + ("" if p.ratio else " of the bounds' width")
 
+    def record(self) -> dict[str, object]:
+        """The same as the report, for machines; what is open is None."""
+        return {
+            "parameters": [
+                {
+                    "name": p.name, "unit": p.unit, "low": p.low, "high": p.high, "start": p.starts[0],
+                    "found": float(self.values[i]), "verdict": self.verdict(i),
+                    "deviation": float(self.deviation[i]) if np.isfinite(self.deviation[i]) else None,
+                }
+                for i, p in enumerate(self.parameters)
+            ],
+            "numbers": [
+                {
+                    "name": m.name, "unit": m.unit, "measured": m.value, "before": float(self.before[i]),
+                    "after": float(self.after[i]), "sensitivity": [float(s) for s in self.sensitivity[i]],
+                }
+                for i, m in enumerate(self.measured)
+            ],
+            "rms": self.rms, "evaluations": self.evaluations,
+        }  # fmt: skip
+
     def report(self) -> str:
         """Tables of parameters, of numbers before and after, and of sensitivities."""
         lines = [f"{'parameter':24}{'start':>12}{'found':>12}  {'unit':8}verdict"]

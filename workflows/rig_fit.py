@@ -142,3 +142,8 @@ def _coefficient(rig: Rig, file: SceneFile, tell: Callable[[str], None]) -> Iden
 def as_text(found: Mapping[str, Identification]) -> str:
     """All reports."""
     return "\n\n".join(f"{title}\n{identification.report()}" for title, identification in found.items())
+
+
+def as_records(found: Mapping[str, Identification]) -> dict[str, object]:
+    """All reports for machines."""
+    return {title: identification.record() for title, identification in found.items()}

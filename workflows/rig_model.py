@@ -89,9 +89,13 @@ class Rig:
         return self._changed(harmonics=self.scene.harmonics.model_copy(update={"kept": kept}))
 
     def with_mating_height(self, more: float) -> Rig:
-        """The rig with its faces pushed on by `more` [m] than in the scene (thesis 5.5: 0, +3 and -3 um)."""
+        """The rig with its faces pushed on by another `more` [m] (thesis 5.5: 0, +3 and -3 um)."""
+        return self.with_opening(np.full(self.plain.interface.n_pair, -more))
+
+    def with_opening(self, depth: np.ndarray) -> Rig:
+        """The rig with its gaps opened by a wear depth (n_pair,) [m]."""
         interface = self.plain.interface
-        return replace(self, plain=replace(self.plain, interface=replace(interface, gap=interface.gap - more)))
+        return replace(self, plain=replace(self.plain, interface=replace(interface, gap=interface.gap + depth)))
 
     def _changed(self, **changes: object) -> Rig:
         return replace(self, scene=self.scene.model_copy(update=changes))

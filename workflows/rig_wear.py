@@ -18,6 +18,7 @@ from hbm.balance import HarmonicBalance
 from hbm.evolution import Duty, WearProblem
 from hbm.operating_point import AtFrequency
 from hbm.wear_history import WearHistory
+from hbm.wear_history import history as joined
 from workflows import pipeline
 from workflows.rig_model import NoSolution, Rig
 
@@ -80,8 +81,8 @@ class RigWear:
         return int(np.argmin(np.abs(self.volume - share * self.volume[-1])))
 
 
-def wear_down(rig: Rig, shift: float, tell: Callable[[str], None], max_steps: int = 400) -> RigWear:
-    """Wear the rig by its scene's error-controlled rule until the preload at rest has fallen to `lost_below`.
+def wear_down(rig: Rig, shift: float, tell: Callable[[str], None]) -> RigWear:
+    """Wear the rig by the error-controlled rule until the preload at rest has fallen to `lost_below` of the scene.
 
     shift : mating height over that of the scene [m]; tell : called with a sentence as the run goes on
     Raises  NoSolution where a wear step fails
@@ -97,7 +98,7 @@ def wear_down(rig: Rig, shift: float, tell: Callable[[str], None], max_steps: in
     history: WearHistory | None = None
     rest: list[float] = []
     while True:
-        count = min(len(rest) + STRIDE, max_steps)
+        count = min(len(rest) + STRIDE, wear.max_steps)
         history = error_controlled_rule.evolve(problem, tolerance, count, resume=history)
         if history.end.startswith("solve failed"):
             raise NoSolution(f"mating height {shift * 1e6:+.3g} um, wear step {len(history.cycles)}: {history.end}")
@@ -107,7 +108,7 @@ def wear_down(rig: Rig, shift: float, tell: Callable[[str], None], max_steps: in
             f"preload {rest[-1]:.3g} N at rest"
         )
         below = np.flatnonzero(np.array(rest) < wear.lost_below * rest[0])
-        if len(below) or len(rest) >= max_steps or history.cycles_in_step[-1] == 0:
+        if len(below) or len(rest) >= wear.max_steps or history.cycles_in_step[-1] == 0:
             break
     rows = len(rest) if not len(below) else int(below[0]) + 1
     end = f"preload at rest fell below {wear.lost_below:.3g} of its first value" if len(below) else history.end
@@ -128,8 +129,6 @@ def preload_at_rest(still: HarmonicBalance, omega: float, depth: np.ndarray) -> 
 
 def history_of(history: WearHistory, rows: int) -> WearHistory:
     """The first rows of a history."""
-    from hbm.wear_history import history as joined
-
     return joined(history.rows()[:rows], history.end)
 
 
