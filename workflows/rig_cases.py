@@ -104,7 +104,7 @@ def compute(file: SceneFile, tell: Callable[[str], None]) -> Study:
         references = linear_references(model.balance, pipeline.OUTPUT, *pipeline.response_range(scene))
         return Study(
             before, after, _stuck_complex(joints), heights, apart(rig, references), cycles, tight, runs, stages,
-            references, patch_of(rig), scene.wear.coefficient, scene.contact.friction or 0.0,
+            references, rig.patch(model.balance), scene.wear.coefficient, scene.contact.friction or 0.0,
             time.process_time() - clock,
         )  # fmt: skip
 
@@ -138,13 +138,6 @@ def _stage(rig: Rig, run: RigWear, share: float, tell: Callable[[str], None]) ->
     options = Options(newton=pipeline.newton_options(rig.scene))
     response = arc_length.follow(worn.balance, low, high, options)
     return Stage(row, share, response, *loop(rig.model().balance, run.history, row))
-
-
-def patch_of(rig: Rig) -> Patch:
-    """The contact patch as pictures need it."""
-    i = rig.plain.interface
-    missing = np.full(i.n_pair, np.nan)
-    return Patch(i.components, np.full(i.n_pair, -1), i.points, i.frames, i.area, i.gap, i.faces, missing)
 
 
 def solved(branch: Branch) -> np.ndarray:

@@ -14,6 +14,8 @@ from hbm.balance import HarmonicBalance, State
 from hbm.continuation.arc_length import solve_along_load
 from reduction.model import ReducedModel
 from workflows import part_reduction, pipeline
+from workflows.references import free_deflection
+from workflows.result import Patch
 from workflows.scene import Damping, PartScene
 from workflows.scene_file import SceneFile
 
@@ -104,6 +106,12 @@ class Rig:
         """The nonlinear problem."""
         damped = pipeline.damped(self.scene, self.plain)
         return pipeline.make_model(self.scene, self.part, part_reduction.with_prescribed(self.scene, self.part, damped))
+
+    def patch(self, balance: HarmonicBalance) -> Patch:
+        """The contact patch as pictures need it; `balance` is this rig's problem."""
+        i = self.plain.interface
+        nodes = np.full(i.n_pair, -1)
+        return Patch(i.components, nodes, i.points, i.frames, i.area, i.gap, i.faces, free_deflection(balance))
 
     def at_rest(self) -> Cycle:
         """The static state: the rig without its shaker force."""

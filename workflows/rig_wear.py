@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hbm import aft, error_controlled_rule, newton
+from hbm import aft, error_controlled_rule, newton, thesis_rule
 from hbm.balance import HarmonicBalance
 from hbm.evolution import Duty, WearProblem
 from hbm.operating_point import AtFrequency
@@ -22,7 +22,7 @@ from hbm.wear_history import history as joined
 from workflows import pipeline
 from workflows.rig_model import NoSolution, Rig
 
-STRIDE = 4  # wear steps between two looks at the preload at rest
+STRIDE = 8  # wear steps between two looks at the preload at rest
 WORN = 0.1e-6  # depth from which on a pair counts as worn [m]: what a profilometer tells from noise
 
 
@@ -82,7 +82,7 @@ class RigWear:
 
 
 def wear_down(rig: Rig, shift: float, tell: Callable[[str], None]) -> RigWear:
-    """Wear the rig by the error-controlled rule until the preload at rest has fallen to `lost_below` of the scene.
+    """Wear the rig by the rule of its scene until the preload at rest has fallen to the scene's `lost_below`.
 
     shift : mating height over that of the scene [m]; tell : called with a sentence as the run goes on
     Raises  NoSolution where a wear step fails
@@ -94,12 +94,16 @@ def wear_down(rig: Rig, shift: float, tell: Callable[[str], None]) -> RigWear:
     site = AtFrequency(pipeline.OUTPUT, rig.omega, pipeline.newton_options(rig.scene))
     area = rig.plain.interface.area
     problem = WearProblem(balance, (Duty(site),), wear.law, wear.coefficient, area)
-    tolerance = error_controlled_rule.Tolerance(wear.tolerance, rig.height + shift)
+    limit = pipeline.step_limit(rig.scene, rig.patch(balance))
     history: WearHistory | None = None
     rest: list[float] = []
     while True:
         count = min(len(rest) + STRIDE, wear.max_steps)
-        history = error_controlled_rule.evolve(problem, tolerance, count, resume=history)
+        if wear.rule == "thesis":
+            history = thesis_rule.evolve(problem, limit, count, resume=history)
+        else:
+            tolerance = error_controlled_rule.Tolerance(wear.tolerance, limit)
+            history = error_controlled_rule.evolve(problem, tolerance, count, resume=history)
         if history.end.startswith("solve failed"):
             raise NoSolution(f"mating height {shift * 1e6:+.3g} um, wear step {len(history.cycles)}: {history.end}")
         rest += [preload_at_rest(still, rig.omega, depth) for depth in history.depth[len(rest) :]]
