@@ -63,7 +63,7 @@ class Measured:
 class Identification:
     """What a fit found.
 
-    values : (n_parameter,); before, after : (n_measured,) predictions at the first start and at the end
+    origin, values : (n_parameter,) before and after; before, after : (n_measured,) predictions there
     sensitivity : (n_measured, n_parameter) d ln(predicted) / d ln(parameter), or / d parameter in widths of its bounds
     deviation : (n_parameter,) standard error in the same units, from what the fit leaves; inf where nothing tells
     """
@@ -76,6 +76,7 @@ class Identification:
     sensitivity: np.ndarray
     deviation: np.ndarray
     evaluations: int
+    origin: np.ndarray
 
     @property
     def rms(self) -> float:
@@ -105,7 +106,7 @@ class Identification:
         return {
             "parameters": [
                 {
-                    "name": p.name, "unit": p.unit, "low": p.low, "high": p.high, "start": p.starts[0],
+                    "name": p.name, "unit": p.unit, "low": p.low, "high": p.high, "before": float(self.origin[i]),
                     "found": float(self.values[i]), "verdict": self.verdict(i),
                     "deviation": float(self.deviation[i]) if np.isfinite(self.deviation[i]) else None,
                 }
@@ -123,9 +124,9 @@ class Identification:
 
     def report(self) -> str:
         """Tables of parameters, of numbers before and after, and of sensitivities."""
-        lines = [f"{'parameter':24}{'start':>12}{'found':>12}  {'unit':8}verdict"]
+        lines = [f"{'parameter':24}{'before':>12}{'found':>12}  {'unit':8}verdict"]
         for i, p in enumerate(self.parameters):
-            lines.append(f"{p.name:24}{p.starts[0]:12.4g}{self.values[i]:12.4g}  {p.unit:8}{self.verdict(i)}")
+            lines.append(f"{p.name:24}{self.origin[i]:12.4g}{self.values[i]:12.4g}  {p.unit:8}{self.verdict(i)}")
         names = "".join(f"{p.name:>{max(14, len(p.name) + 2)}}" for p in self.parameters)
         lines += ["", f"{'number':30}{'measured':>10}{'before':>10}{'after':>10}{'error':>9}   sensitivity to{names}"]
         for i, m in enumerate(self.measured):
@@ -141,10 +142,16 @@ class Identification:
         return "\n".join(lines)
 
 
-def fit(parameters: Sequence[Parameter], measured: Sequence[Measured], predict: Prediction) -> Identification:
+def fit(
+    parameters: Sequence[Parameter],
+    measured: Sequence[Measured],
+    predict: Prediction,
+    before: Mapping[str, float] | None = None,
+) -> Identification:
     """Least squares of logarithmic residuals, from every combination of starts; the best is kept.
 
     predict : parameters by name -> (n_measured,) predictions, above 0
+    before : the parameters as they were, for the report; the first starts unless told
     Raises  ValueError where a prediction at a start is not a positive number, or a measured number is not
     Source  bounded trust region: Branch, Coleman, Li 1999, as in scipy.optimize.least_squares
     """
@@ -177,7 +184,8 @@ def fit(parameters: Sequence[Parameter], measured: Sequence[Measured], predict: 
         if best is None or found.cost < best.cost:
             best = found
     assert best is not None
-    origin = np.array([p.scaled(p.starts[0]) for p in parameters])
+    first_values = {p.name: p.starts[0] for p in parameters} if before is None else before
+    origin = np.array([p.scaled(first_values[p.name]) for p in parameters])
     slope = _slope(predicted, best.x, low, high)
     return Identification(
         parameters,
@@ -188,6 +196,7 @@ def fit(parameters: Sequence[Parameter], measured: Sequence[Measured], predict: 
         slope,
         _deviation(weight[:, None] * slope, float(np.sum(best.fun**2))),
         count,
+        np.array([first_values[p.name] for p in parameters]),
     )
 
 

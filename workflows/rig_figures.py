@@ -63,23 +63,22 @@ def energy_against_force(study: Study) -> Figure:
 
 
 def contact_area_maps(study: Study) -> Figure:
-    """Figure 5.26: depth at the cycles of the experiment's scans, worn area inside of the white line."""
+    """Figure 5.26: depth at the cycles of the experiment's scans, with the worn part of the face."""
     run, patch = study.runs[0], study.patch
     cycles = [c for c in published.SCANS if c < run.history.cycles[-1]] + [float(run.history.cycles[-1])]
     largest = MICRO * run.history.depth.max()
     with mpl.rc_context({"axes.grid": False}):
-        figure = Figure(figsize=(9.0, 4.6), layout="constrained")
+        figure = Figure(figsize=(10.0, 3.0), layout="constrained")
         grid = figure.subplots(2, 4, sharex=True, sharey=True).ravel()
     for axes, count in zip(grid, cycles, strict=False):
         depth = np.array([np.interp(count, run.history.cycles, column) for column in run.history.depth.T])
         shown = draw_field(axes, patch, MICRO * depth, WEAR_MAP, largest)
         share = float((depth > WORN) @ run.area / run.area.sum())
         axes.set_title(f"{MILLION * count:.3g} million: {share:.0%}", fontsize=10, fontweight="normal")
-        axes.axhline(0, alpha=0)
     for axes in grid[len(cycles) :]:
         axes.axis("off")
-    figure.colorbar(shown, ax=list(grid), label="total wear depth / µm", shrink=0.8)
-    figure.suptitle("Figure 5.26: wear at the cycles of the scans; column side at the bottom", fontsize=11)
+    figure.colorbar(shown, ax=list(grid), label="total wear depth / µm")
+    figure.suptitle("Figure 5.26: worn part of the face at the cycles of the scans; the column is below", fontsize=11)
     return figure
 
 
@@ -87,15 +86,17 @@ def total_wear(study: Study) -> Figure:
     """Figure 5.27: total wear when the preload is lost."""
     run = study.runs[0]
     along, across = 1e3 * run.points.T
-    with mpl.rc_context({"axes.grid": True}):
-        figure = Figure(figsize=(7.2, 4.6), layout="constrained")
-        axes = figure.add_subplot(projection="3d")
-    shown = axes.plot_trisurf(across, along, -MICRO * run.history.depth[-1], cmap=WEAR_MAP + "_r", lw=0.2)
+    figure = Figure(figsize=(7.2, 4.2), layout="constrained")
+    axes = figure.add_subplot(projection="3d")
+    corners = study.patch.faces
+    triangles = np.concatenate([corners[:, [0, i, i + 1]] for i in range(1, corners.shape[1] - 1)])
+    height = -MICRO * run.history.depth[-1]
+    shown = axes.plot_trisurf(across, along, height, triangles=triangles, cmap=WEAR_MAP + "_r", lw=0.2)
     figure.colorbar(shown, ax=axes, label="total wear / µm", shrink=0.7)
-    axes.set(xlabel="sliding direction / mm", ylabel="along the beam / mm")
+    axes.set(xlabel="sliding direction / mm", ylabel="along the beam / mm", yticks=[-1, 0, 1])
     axes.set_title("Figure 5.27: total wear", loc="left")
-    axes.set_box_aspect((5, 3, 2))
-    axes.view_init(28, -60)
+    axes.set_box_aspect((5, 3, 2), zoom=0.9)
+    axes.view_init(35, -60)
     return figure
 
 
@@ -177,12 +178,12 @@ def response(study: Study) -> Figure:
         for value in (value for _, value in modes if low <= value <= high):
             axes.axvline(value, color=RED, ls=style, lw=1)
             axes.annotate(
-                f"{name} {value:.0f}", (value, 0.98), (3, 0), textcoords="offset points", color=RED, fontsize=7,
-                xycoords=("data", "axes fraction"), rotation=90, va="top",
+                f"{name} {value:.0f}", (value, 0.02), (3, 0), textcoords="offset points", color=RED, fontsize=7,
+                xycoords=("data", "axes fraction"), rotation=90, va="bottom",
             )  # fmt: skip
     axes.set(yscale="log", xlabel="frequency / Hz", ylabel="amplitude / µm")
     axes.set_title("Figure 5.31: response at 70 N under wear; red: published modes")
-    axes.legend(fontsize=8, loc="lower left")
+    axes.legend(fontsize=7, loc="upper right")
     return figure
 
 

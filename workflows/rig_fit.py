@@ -53,9 +53,9 @@ def rigid() -> dict[str, float]:
 
 def fit_joints(joints: Joints) -> Identification:
     """Joint springs to the published frequencies; "before" is the rig with rigid joints."""
-    starts = {"base_vertical": (RIGID, 1e9), "base_sliding": (RIGID, 1e9), "seat": (RIGID,)}
-    parameters = [Parameter(name, 1e8, RIGID, starts[name], "N/m") for name in TIED]
-    return fit(parameters, FREQUENCIES, lambda values: joints.frequencies(stiffnesses(values)))
+    parameters = [Parameter(name, 1e8, RIGID, (1e9 if name.startswith("base") else RIGID,), "N/m") for name in TIED]
+    before = dict.fromkeys(TIED, RIGID)
+    return fit(parameters, FREQUENCIES, lambda values: joints.frequencies(stiffnesses(values)), before)
 
 
 def fit_column(overrides: Sequence[str] = ()) -> Identification:

@@ -210,7 +210,7 @@ def _responses(stages: Sequence[Stage], study: Study) -> list[Trend]:
     open_ = float(study.references.omega[np.argmax(study.references.free)] / (2 * np.pi))
     return [
         Trend("response", "the peak near 400 Hz softens with wear", f"{said} Hz at the five stages",
-              len(found) > 1 and found[-1] < found[0]),
+              len(found) > 1 and bool((np.diff(found) < 0).all())),
         Trend("response", "ends on the open one",
               f"largest at {top:.0f} Hz (open: {open_:.0f}), half of the points within {near:.0%} of the open response",
               near < 0.1),
