@@ -166,27 +166,6 @@ class HarmonicBalance:
         moved, _, _ = self.linearise(state).solve(self.at(state.omega).apply(g_slope), 1e-6)
         return moved.reshape(state.x.shape)
 
-    def work_slope(self, state: State) -> np.ndarray:
-        """(n_pair, n_pair) d (work per cycle of pair i) / d (gap of pair j) at fixed frequency [J/m]."""
-        n_pair, _, n_coeff = state.x.shape
-        slope = np.zeros((n_pair, n_pair))
-        if not self.basis.has_static:
-            return slope
-        jac = state.cycle.jacobian
-        assert jac is not None
-        column = jac[:, :, self.parameters.components.index("n") * n_coeff].reshape(state.x.shape)
-        linear, point = self.linearise(state), self.at(state.omega)
-        for j in np.flatnonzero(np.abs(column).max(axis=(1, 2)) > 0):
-            g_slope = np.zeros_like(state.x)
-            g_slope[j] = column[j]
-            flat, _, _ = linear.solve(point.apply(g_slope.reshape(-1, n_coeff)), 1e-3)
-            dx = flat.reshape(state.x.shape)
-            df = np.matmul(jac, dx.reshape(n_pair, -1, 1)).reshape(dx.shape)
-            df[j] -= column[j]
-            work = self.basis.work_per_cycle(df, state.x) + self.basis.work_per_cycle(state.cycle.force, dx)
-            slope[:, j] = work[:, self.parameters.tangential].sum(axis=1)
-        return slope
-
     def outputs(self, state: State) -> np.ndarray:
         """(n_output, n_coeff) response of the observed outputs [m]."""
         point = self.at(state.omega)
@@ -271,6 +250,18 @@ class Linearisation:
             lambda v: self.product(v.reshape(shape)).ravel(), rhs[self.rows].ravel(), tolerance, max_products
         )
         return self.spread(d.reshape(shape), rhs), spent, reached
+
+    def solve_refined(self, rhs: np.ndarray, tolerance: float) -> np.ndarray:
+        """As `solve`, but its products are of single precision: refined with the exact one to the tolerance."""
+        d, _, _ = self.solve(rhs, max(tolerance, 1e-6))
+        point, size = self._balance.at(self._omega), float(np.linalg.norm(rhs))
+        for _ in range(4):
+            residual = rhs - d + point.apply(self.departure_slope(d))
+            error = float(np.linalg.norm(residual))
+            if error <= tolerance * size:
+                break
+            d = d + self.solve(residual, max(tolerance * size / error, 1e-6))[0]
+        return d
 
     def dense(self) -> np.ndarray:
         """The Jacobian as a matrix (n_contact * n_coeff, same), column by column; for checks and as fallback."""

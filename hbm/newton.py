@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
-from hbm.balance import HarmonicBalance, State
+from hbm.balance import HarmonicBalance, Linearisation, State
 from hbm.branch import CONVERGED
+
+
+class Balance(Protocol):
+    """What Newton's method solves; omega is whatever the balance takes for its frequency."""
+
+    def x_lin(self, omega: Any) -> np.ndarray: ...
+
+    def evaluate(self, omega: Any, x: np.ndarray) -> State: ...
+
+    def linearise(self, state: State) -> Linearisation: ...
 
 
 @dataclass(frozen=True)
@@ -46,7 +57,7 @@ def relative_residual(state: State, x_lin: np.ndarray) -> float:
     return float(np.linalg.norm(state.residual) / scale) if scale > 0 else float(np.linalg.norm(state.residual))
 
 
-def solve(balance: HarmonicBalance, omega: float, start: np.ndarray, options: NewtonOptions | None = None) -> Solution:
+def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOptions | None = None) -> Solution:
     """Solve the balance at one frequency.
 
     omega : [rad/s]; start : (n_pair, n_component, n_coeff) first guess [m]
@@ -82,7 +93,7 @@ def solve(balance: HarmonicBalance, omega: float, start: np.ndarray, options: Ne
 
 
 def _search(
-    balance: HarmonicBalance, omega: float, state: State, direction: np.ndarray, error: float, x_lin: np.ndarray
+    balance: Balance, omega: Any, state: State, direction: np.ndarray, error: float, x_lin: np.ndarray
 ) -> tuple[State, float]:
     """Backtrack until the residual falls; the derivative has kinks, so the best trial is kept if none falls enough."""
     best, best_error = state, error

@@ -142,6 +142,7 @@ def trade(
     *,
     knob: Literal["wear_step"] = "wear_step",
     overrides: Overrides = (),
+    out: Path | None = None,
     as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
 ) -> None:
     """Measure what a knob costs and what it is worth, against a finer reference on the same scene.
@@ -152,12 +153,16 @@ def trade(
         Name of a scene or a .toml file.
     knob
         wear_step: table 4.2 of the thesis with life added, and the error-controlled rule.
+    out
+        File for a plot of the errors against the work.
     as_json
         Print JSON for machines.
     """
     from workflows import trade as trading
 
     table = trading.wear_step(scene, _aside, overrides)
+    if out is not None:
+        trading.picture(table).savefig(out)
     print(json.dumps(trading.as_records(table), indent=2) if as_json else trading.as_text(table))
 
 
@@ -361,7 +366,13 @@ def plan(scene: str, *, overrides: Overrides = ()) -> None:
 
 
 @app.command
-def leaf(work: Literal["fit", "check", "study", "accuracy"], *, out: Path | None = None) -> None:
+def leaf(
+    work: Literal["fit", "check", "study", "accuracy"],
+    *,
+    out: Path | None = None,
+    resume: Annotated[bool, Parameter(negative=())] = False,
+    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+) -> None:
     """What only the leaf seal has: the fit of its dimensions, its parameter study, its accuracy.
 
     Parameters
@@ -371,14 +382,22 @@ def leaf(work: Literal["fit", "check", "study", "accuracy"], *, out: Path | None
         runs some thirty configurations; accuracy holds 1 to 9 harmonics against time integration.
     out
         Folder of tables and pictures; results/leaf_study or results/leaf_accuracy unless told.
+    resume
+        Let a study go on with what is complete in its folder.
+    as_json
+        Print JSON for machines.
     """
     from workflows import leaf_accuracy, leaf_fit, leaf_study
 
-    if work in ("fit", "check"):
-        leaf_fit.run(check_only=work == "check")
+    folder = out or Path("results") / f"leaf_{work}"
+    if resume and work != "study":
+        raise ValueError(f"--resume is for leaf study, leaf {work} has nothing to go on with: run it without")
+    if work == "study":
+        leaf_study.run(folder, resume, as_json)
+    elif work == "accuracy":
+        leaf_accuracy.run(folder, as_json)
     else:
-        chosen = leaf_study if work == "study" else leaf_accuracy
-        chosen.run(out or Path("results") / f"leaf_{work}")
+        leaf_fit.run(work == "check", as_json)
 
 
 @app.command

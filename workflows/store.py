@@ -91,6 +91,7 @@ SCHEMA: dict[str, tuple[type, dict[str, tuple[tuple[str, ...], str]]]] = {
             "response": (("row", "output", "coefficient"), "m"),
             "solves": (("row",), ""),
             "step_error": (("row",), ""),
+            "plan": (("row", "plan"), ""),
             "work": (("row", "pair"), "J"),
             "duty_omega": (("row", "duty"), "rad/s"),
             "duty_displacement": (("row", "duty", "contact", "coefficient"), "m"),
