@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 import tempfile
 import tomllib
 from collections.abc import Callable
@@ -30,30 +31,45 @@ GARBAGE = (
     '"3 mm"', '"-3 mm"', '"1e9 N"', '"5 kg"', '"10 Hz"', '"1 %"', '"-1 %"', '"90 deg"', '"0 deg"', '"z"', '"-x"',
     '"\\u00e4\\u0000"', '"../../etc"', "1979-05-27", "plain words", "'", '"', "[", "=", "",
 )  # fmt: skip
+NUMBERS = ("0", "-1", "1", "2", "5", "1e-12", "1e-3", "1e3", "1e12", "1e300", "nan", "inf", "-inf")
 WORDS = ("x", "material", "contact", "n", "law", "0", "frequency", "harmonics.kept", "wear.step", "loads.static.a")
 
 
-def keys(table: dict[str, Any], before: str = "") -> list[str]:
-    """Dotted keys of everything in a scene, tables included."""
-    found = []
+def entries(table: dict[str, Any], before: str = "") -> list[tuple[str, Any]]:
+    """Dotted keys of everything in a scene with their values, tables included."""
+    found: list[tuple[str, Any]] = []
     for name, value in table.items():
-        found.append(f"{before}{name}")
+        found.append((f"{before}{name}", value))
         if isinstance(value, dict):
-            found += keys(value, f"{before}{name}.")
+            found += entries(value, f"{before}{name}.")
     return found
 
 
-KEYS = {name: keys(tomllib.loads(text)) for name, text in {**TEXTS, "matrices": SCENE}.items()}
+def measures(found: list[tuple[str, Any]]) -> list[tuple[str, str]]:
+    """Keys that hold a number, with its unit as it stands after the number."""
+    numbers = [(key, re.fullmatch(r"[-+.\deE]+( [^ ]+)", value)) for key, value in found if isinstance(value, str)]
+    bare = [(key, "") for key, value in found if isinstance(value, int | float) and not isinstance(value, bool)]
+    return [(key, match[1]) for key, match in numbers if match] + bare
+
+
+ENTRIES = {name: entries(tomllib.loads(text)) for name, text in {**TEXTS, "matrices": SCENE}.items()}
+MEASURES = {name: measures(found) for name, found in ENTRIES.items()}
+
+
+def _number(pair: tuple[tuple[str, str], str]) -> str:
+    (key, unit), number = pair
+    return f'{key}="{number}{unit}"' if unit else f"{key}={number}"
 
 
 @st.composite
 def spoilt(draw: st.DrawFn, name: str | None = None) -> tuple[str, list[str]]:
-    """A scene and texts for --set that put garbage into one to three of its keys, or take them out."""
+    """A scene and texts for --set that put garbage into one or two of its keys, odd numbers, or take them out."""
     scene = draw(st.sampled_from(sorted(TEXTS))) if name is None else name
-    key = st.sampled_from(KEYS[scene])
-    own = st.tuples(key, st.sampled_from(GARBAGE)).map("=".join)
+    key = st.sampled_from([key for key, _ in ENTRIES[scene]])
+    odd = st.tuples(st.sampled_from(MEASURES[scene]), st.sampled_from(NUMBERS)).map(_number)
+    garbage = st.tuples(key, st.sampled_from(GARBAGE)).map("=".join)
     strange = st.tuples(key, st.sampled_from(WORDS), st.sampled_from(GARBAGE)).map(lambda t: f"{t[0]}.{t[1]}={t[2]}")
-    return scene, draw(st.lists(own | own | own | strange, min_size=1, max_size=3))
+    return scene, draw(st.lists(odd | odd | odd | garbage | strange, min_size=1, max_size=2))
 
 
 @st.composite
