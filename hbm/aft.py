@@ -64,8 +64,24 @@ def history(
     every = 1 if basis.transitions == "sampled" else -(-FINE // basis.n_samples)
     fine = HarmonicBasis(basis.harmonics, every * basis.n_samples)
     samples = fine.to_time(x)
-    force = _periodic(law, samples, parameters, memory, fine.synthesis[:, :0], fine.analysis)[0]
+    force = _plain_march(law, samples, parameters.packed(), memory)
+    if force is None:
+        force = _periodic(law, samples, parameters, memory, fine.synthesis[:, :0], fine.analysis)[0]
     return samples[..., ::every], force[..., ::every]
+
+
+def _plain_march(law: ModuleType, samples: np.ndarray, p: np.ndarray, memory: np.ndarray) -> np.ndarray | None:
+    """Force at the samples of the periodic cycle where the memory repeats after a few cycles, None where it does not.
+
+    Without derivatives there is little to compile, which would take longer than all the marching.
+    """
+    s, force = memory.copy(), np.zeros(samples.shape)
+    for _ in range(FIRST_CYCLES):
+        before, size = s.copy(), np.full(len(s), np.finfo(float).tiny)
+        _follow(law.step, samples, p, s, size, force)
+        if np.all(np.abs(s - before) <= PERIODIC * size[:, None]):
+            return force
+    return None
 
 
 def _periodic(
@@ -164,10 +180,27 @@ def _newton(turn: Turn, i: np.ndarray, s: np.ndarray, ds: np.ndarray) -> np.ndar
 
 
 @numba.njit
+def _follow(step, x, p, s, size, force):
+    """One cycle of every pair: force at its samples, s to its value after it, `size` the largest |s| met."""
+    n_pair, n_comp, n_time = x.shape
+    n_state = s.shape[1]
+    f = np.zeros(n_comp)
+    dfx, dfs = np.zeros((n_comp, n_comp)), np.zeros((n_comp, n_state))
+    dsx, dss = np.zeros((n_state, n_comp)), np.zeros((n_state, n_state))
+    for i in range(n_pair):
+        for j in range(n_time):
+            step(x[i, :, j], s[i], p[i], f, dfx, dfs, dsx, dss)
+            for c in range(n_comp):
+                force[i, c, j] = f[c]
+            for r in range(n_state):
+                size[i] = max(size[i], abs(s[i, r]))
+
+
+@numba.njit
 def _advance(step, x, p, phi, s, ds, size):
     """One cycle of every pair: s and ds to their values after it, `size` the largest |s| met.
 
-    Not cached, nor is `_record`: `step` lives in another file.
+    Not cached, nor are `_record` and `_follow`: `step` lives in another file.
     """
     n_pair, n_comp, n_time = x.shape
     n_state = s.shape[1]

@@ -7,7 +7,17 @@ import numpy as np
 from hbm.branch import CONVERGED, Branch
 from hbm.evolution import LOST
 from hbm.wear_history import WearHistory
-from workflows.result import CurveStability, Fields, Loops, PartMesh, Patch, References, Result, ShearBounds
+from workflows.result import (
+    CurveStability,
+    Fields,
+    Loops,
+    PartMesh,
+    Patch,
+    References,
+    Result,
+    ShearBounds,
+    WornResponses,
+)
 from workflows.scene_file import read
 
 LENGTH, WIDTH = 0.2, 0.02
@@ -105,6 +115,9 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
         ),
         bounds=ShearBounds(*np.outer([0.9, 1.1, 0.8, 1.2], np.abs(slipping)), np.full(61, 0.5), np.zeros(61, int)),
         wear=wear,
+        worn=WornResponses(
+            rows, np.tile(omega, (3, 1)), np.abs([resonance(hertz, 0.015) for hertz in (510, 460, 420)])
+        ),
         fields=Fields(rows, bend),
         loops=loops,
     )
