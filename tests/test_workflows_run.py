@@ -26,7 +26,9 @@ SMALL = [
     "geometry.n_height=1",
     "reduction.modes=4",
     "response.points=25",
+    "wear.rule=thesis",
     "wear.step=30 %",
+    "wear.lost_below=0",
 ]
 COMMAND = [sys.executable, "-m", "workflows.cli", "run", "beam", "--no-pictures"]
 
@@ -161,7 +163,7 @@ def test_ctrl_c_keeps_what_was_computed_and_says_where(tmp_path: Path) -> None:
     assert process.returncode == 130
     assert err.count("\n") == 1
     assert str(tmp_path / "result.h5") in err
-    assert err.endswith("--set 'wear.step=30 %' --resume.\n")
+    assert err.endswith("--set wear.lost_below=0 --resume.\n")
     wear = store.load(tmp_path / "result.h5").wear
     assert wear is not None
     assert len(wear.cycles) >= 2
