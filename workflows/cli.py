@@ -211,6 +211,35 @@ def _scaling(quick: bool, out: Path, as_json: bool) -> None:
 
 
 @app.command
+def extremes(
+    *,
+    quick: Annotated[bool, Parameter(negative=())] = False,
+    out: Path = Path("extremes.png"),
+    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+) -> None:
+    """Try the solver at its numerical extremes: each cell converged and checked, or refused with a sentence.
+
+    Parameters
+    ----------
+    quick
+        Every third cell, on smaller models.
+    out
+        File of the picture.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import extremes as table
+    from workflows import extremes_picture
+
+    rows = table.run(quick, _aside)
+    extremes_picture.picture(rows).savefig(out)
+    print(json.dumps(table.as_records(rows), indent=2) if as_json else table.as_text(rows))
+    wrong = table.counts(rows)["wrong"]
+    if wrong:
+        raise RuntimeError(f"{wrong} of {len(rows)} extreme settings ended with a wrong number, see the table")
+
+
+@app.command
 def show(result: Path, *, as_json: Annotated[bool, Parameter(name="--json", negative=())] = False) -> None:
     """Say what a result holds.
 
@@ -433,6 +462,47 @@ def blade(
         written = blade_study.run(scene, overrides, folder, highest, _aside, blade_study.Extent())
     for path in written:
         print(path)
+
+
+@app.command
+def rig(
+    work: Literal["fit", "study"],
+    *,
+    column: Annotated[bool, Parameter(negative=())] = False,
+    wear: Annotated[bool, Parameter(negative=())] = False,
+    overrides: Overrides = (),
+    out: Path | None = None,
+    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+) -> None:
+    """What only the fretting rig has: fits of what is not published, and its comparison with the published experiment.
+
+    Parameters
+    ----------
+    work
+        fit looks for joint springs, platform height and damping that give published numbers, and says how well these
+        determine them; study holds every published number and trend against ours, wear to the loss of the preload for
+        three mating heights included.
+    column
+        fit: the section of the column too, minutes.
+    wear
+        fit: the wear coefficient too, from a whole wear run, minutes.
+    out
+        study: folder of table and pictures; results/rig_study unless told.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import rig_fit, rig_study, rig_table
+
+    if work == "fit":
+        fits = rig_fit.run(overrides, column, wear, _aside)
+        print(json.dumps(rig_fit.as_records(fits), indent=2) if as_json else rig_fit.as_text(fits))
+        return
+    table, paths = rig_study.run(out or Path("results") / "rig_study", overrides, _aside)
+    if as_json:
+        print(json.dumps({**rig_table.as_records(table), "files": [str(path) for path in paths]}, indent=2))
+    else:
+        print(rig_table.as_text(table))
+        print(*paths, sep="\n")
 
 
 def _option(name: str, text: str, unit: str) -> float:

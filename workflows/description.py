@@ -53,6 +53,8 @@ def described(
             "first_omitted_hz": float(str(reduced.info["first_omitted_frequency"])),
             "factorisation": str(reduced.info["factorisation"]),
         }
+    if file.scene.wear is not None:
+        facts["wear_split"] = file.scene.wear.split
     if isinstance(file.scene, PartScene) and (around := file.scene.wheel) is not None:
         facts |= {"sectors": around.sectors, "engine_order": around.engine_order, "axis": np.array(around.axis)}
     if choice is not None:

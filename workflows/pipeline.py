@@ -36,7 +36,7 @@ from reduction.damping import modal_damping, rayleigh
 from reduction.held import hold
 from reduction.linear import stuck_stiffness
 from reduction.model import ReducedModel
-from workflows import curve, matrix_model, part_reduction, references, store
+from workflows import curve, matrix_model, part_reduction, references, store, worn_responses
 from workflows.contact_surfaces import surface_gap
 from workflows.description import described
 from workflows.fields import displacement_fields, hysteresis_loops
@@ -74,7 +74,7 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
     Raises  ValueError: the scene asks for what cannot be, SolveFailed: after what was computed is kept
     """
     scene, clock = file.scene, Clock(earlier)
-    check_names(scene)
+    check_names(scene, file.folder)
     keep = Keeper(folder / "result.h5", clock)
     with threadpool_limits(scene.solver.threads):
         model = build(file, folder, progress, harmonics_of(earlier))
@@ -96,7 +96,16 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
         result = keep(judged(scene, model.balance, result, progress))
         if wears(scene):
             with progress.track("wear") as advance:
-                result = wear_down(scene, model, result, keep, advance)
+                result = wear_down(file, model, result, keep, advance)
+        if scene.wear is not None and scene.wear.responses and result.wear_steps:
+            with progress.track("responses of the worn contact") as advance:
+
+                def again(worn: HarmonicBalance) -> Branch:
+                    return follow_response(scene, worn, lambda done, text: None)
+
+                count = scene.wear.responses
+                curves = worn_responses.curves(result, model.balance, count, again, advance)
+                result = keep(replace(result, worn=curves))
         state = "complete" if result.wear is None else f"complete: {result.wear.end}"
         return keep(replace(result, state=state))
 
@@ -161,12 +170,19 @@ def is_complete(result: Result, scene: Scene) -> bool:
     return not stopped or result.wear_steps >= scene.wear.max_steps
 
 
-def check_names(scene: Scene) -> None:
+def check_names(scene: Scene, folder: Path) -> None:
     """Raise ValueError where a scene names a law or a method that does not exist, before anything is built."""
     law.check_components(law.load(scene.contact.law), scene.contact.components)
     response_options(scene)
     if scene.wear is not None:
-        wear_law.load(scene.wear.law)
+        wear_law.load(law_of(scene, folder))
+
+
+def law_of(scene: Scene, folder: Path) -> str:
+    """Name of the wear law of a scene that stands in `folder`, or path of its file."""
+    assert scene.wear is not None
+    name = scene.wear.law
+    return str(folder / name) if name.endswith(".py") else name
 
 
 def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]]:
@@ -358,9 +374,10 @@ def check_branch(branch: Branch | None) -> None:
 
 
 def wear_down(
-    scene: Scene, model: Model, result: Result, keep: Keeper, advance: Callable[[float, str], None]
+    file: SceneFile, model: Model, result: Result, keep: Keeper, advance: Callable[[float, str], None]
 ) -> Result:
     """Wear until contact is lost; every step is kept as soon as it is done."""
+    scene = file.scene
     assert scene.wear is not None
     assert result.patch is not None
     patch, wear = result.patch, scene.wear
@@ -374,7 +391,9 @@ def wear_down(
         advance(done, f"step {len(rows)}, {row.cycles + row.cycles_in_step:.3g} cycles, {row.preload:.4g} N")
 
     duties = mission(scene)
-    problem = WearProblem(model.balance, duties, wear.law, wear.coefficient, patch.area, wear.lost_below)
+    problem = WearProblem(
+        model.balance, duties, law_of(scene, file.folder), wear.coefficient, patch.area, wear.lost_below
+    )
     limit = step_limit(scene, patch)
     if wear.rule == "thesis":
         worn = thesis_rule.evolve(problem, limit, wear.max_steps, on_row, result.wear)
@@ -471,9 +490,10 @@ class Keeper:
 def same_problem(first: Scene, second: Scene) -> str:
     """Empty where one scene's result can be gone on from by the other, else the first key that differs.
 
-    What is drawn, how many wear steps are wanted and how many threads work may differ.
+    What is drawn, how many wear steps are wanted, how their result is told and how many threads work may differ.
     """
-    ignored: dict[str, Any] = {"scene": True, "pictures": True, "solver": {"threads"}, "wear": {"max_steps"}}
+    ignored: dict[str, Any] = {"scene": True, "pictures": True, "solver": {"threads"}}
+    ignored["wear"] = {"max_steps", "responses", "split"}
     return _difference(first.model_dump(exclude=ignored), second.model_dump(exclude=ignored))
 
 

@@ -149,6 +149,20 @@ class Loops:
 
 
 @dataclass(frozen=True)
+class WornResponses:
+    """Response curves of the worn contact.
+
+    row : (n_curve,) rows of the wear history whose depth the curves have
+    omega, amplitude : (n_curve, n_curve_point) [rad/s], of the first output [m]; nan after the end of a curve and where
+        a point did not converge
+    """
+
+    row: np.ndarray
+    omega: np.ndarray
+    amplitude: np.ndarray
+
+
+@dataclass(frozen=True)
 class Result:
     """A run, finished or not.
 
@@ -168,6 +182,7 @@ class Result:
     stability: CurveStability | None = None
     bounds: ShearBounds | None = None
     wear: WearHistory | None = None
+    worn: WornResponses | None = None
     fields: Fields | None = None
     loops: Loops | None = None
 

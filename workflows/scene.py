@@ -375,9 +375,14 @@ class Wear(Table):
     rule : "thesis" takes `step`, "error_controlled" takes `tolerance`, its local error as a share
     lost_below : share of the first preload at which the run ends; 0 waits until the last touch ends
     at, mission : one place where all cycles are taken, or a list of duties that share them
+    law : name of a wear law, or a file my_law.py beside the scene
+    split : share of the depth that the scene's own part loses, or the first of two faces; the rest wears the other one
+    responses : curves of the worn contact, evenly spread over what is worn
     """
 
     law: str = "energy"
+    split: Annotated[Number, Field(ge=0, le=1)] = 0.5
+    responses: Annotated[StrictInt, Field(ge=0, le=100)] = 0
     coefficient: Annotated[WearCoefficient, Field(ge=0)]
     rule: Literal["thesis", "error_controlled"] = "thesis"
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 0.01

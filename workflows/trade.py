@@ -103,7 +103,8 @@ def _problem(file: scene_file.SceneFile) -> tuple[WearProblem, float]:
         model = pipeline.build(file, Path(folder), Progress())
     wear, area = scene.wear, model.reduced.interface.area
     duties = pipeline.mission(scene)
-    problem = WearProblem(model.balance, duties, wear.law, wear.coefficient, area, lost_below=LIFE_SHARE)
+    law = pipeline.law_of(scene, file.folder)
+    problem = WearProblem(model.balance, duties, law, wear.coefficient, area, lost_below=LIFE_SHARE)
     return problem, delta_max(scene, free_deflection(model.balance), area)
 
 
