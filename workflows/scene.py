@@ -461,6 +461,7 @@ class PartScene(Scene):
             ("prescribed", bool(self.prescribed)),
             ("reduction.relative", self.reduction.relative),
             ("geometry.no_turning", self.geometry.no_turning is not None),
+            ("response.stability", self.response.stability),  # perturbations see other waves than the solution does
         ):
             if has:
                 raise ValueError(f"{key} has no meaning for a sector of a wheel: leave it out")
