@@ -52,8 +52,8 @@ class Check:
     cycles: float
     preload_at_rest: float
     energy: float
-    energy_in_time: float
-    amplitude_difference: float
+    energy_in_time: float | None
+    amplitude_difference: float | None
     outcome: str
 
 
@@ -248,11 +248,13 @@ def as_text(found: Table) -> str:
     lines += [f"| {t.topic} | {t.published} | {t.ours} | {'yes' if t.agrees else 'no'} |" for t in found.trends]
     lines += ["", "| 10^6 cycles | preload at rest, N | energy, uJ | in time, uJ | amplitude | time integration |"]
     lines += ["|---|---|---|---|---|---|"]
-    lines += [
-        f"| {c.cycles / MILLION:.3g} | {c.preload_at_rest:.1f} | {1e6 * c.energy:.0f} | {1e6 * c.energy_in_time:.0f} "
-        f"| {100 * c.amplitude_difference:+.2g} % | {c.outcome} |"
-        for c in found.checks
-    ]
+    for c in found.checks:
+        energy = "-" if c.energy_in_time is None else f"{1e6 * c.energy_in_time:.0f}"
+        amplitude = "-" if c.amplitude_difference is None else f"{100 * c.amplitude_difference:+.2g} %"
+        lines.append(
+            f"| {c.cycles / MILLION:.3g} | {c.preload_at_rest:.1f} | {1e6 * c.energy:.0f} | {energy} | {amplitude} "
+            f"| {c.outcome} |"
+        )
     lines += ["", f"{found.seconds:.0f} s of processor time, one thread"]
     return "\n".join(lines) + "\n"
 

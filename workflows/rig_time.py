@@ -12,14 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hbm.balance import HarmonicBalance
+from hbm.branch import CONVERGED
 from hbm.excitation import Excitation
-from hbm.time_integration import Options
+from hbm.time_integration import IntegrationFailed, Options
 from hbm.verify import verify
 from workflows import part_reduction, pipeline
 from workflows.rig_model import PLATFORM, Cycle, Rig
 
 HOLD = "hold"  # the load that takes the place of the height
-STEPS, PERIODS, DRIFT = 512, 200, 1e-5  # per period; periods to settle in; of the state over one period
+STEPS, PERIODS, DRIFT = 1024, 200, 1e-5  # per period; periods to settle in; of the state over one period
 
 
 @dataclass(frozen=True)
@@ -27,13 +28,18 @@ class InTime:
     """Time integration beside the balance: energy per cycle [J], preload [N], and how the integration ended.
 
     amplitude : of the balance's response over that in time, less one
+    The numbers are those of the last period, periodic or not; None where there is none.
     """
 
-    energy: float
-    preload: float
-    amplitude: float
+    energy: float | None
+    preload: float | None
+    amplitude: float | None
     outcome: str
-    periodic: bool
+
+    @property
+    def periodic(self) -> bool:
+        """Whether a periodic motion was found."""
+        return self.outcome == CONVERGED
 
 
 def held_by_force(rig: Rig, cycle: Cycle) -> HarmonicBalance:
@@ -58,11 +64,10 @@ def held_by_force(rig: Rig, cycle: Cycle) -> HarmonicBalance:
 
 def in_time(rig: Rig, cycle: Cycle) -> InTime:
     """Integrate from a solved cycle to the periodic motion nearby."""
-    found = verify(held_by_force(rig, cycle), cycle.state, Options(STEPS, tolerance=DRIFT, max_periods=PERIODS))
-    return InTime(
-        float(found.motion.energy.sum()),
-        found.motion.preload,
-        found.amplitude[pipeline.OUTPUT],
-        found.outcome,
-        found.outcome == "converged",
-    )
+    options = Options(STEPS, tolerance=DRIFT, max_periods=PERIODS)
+    try:
+        found = verify(held_by_force(rig, cycle), cycle.state, options)
+    except IntegrationFailed as failure:
+        return InTime(None, None, None, str(failure))
+    amplitude = found.amplitude[pipeline.OUTPUT]
+    return InTime(float(found.motion.energy.sum()), found.motion.preload, amplitude, found.outcome)
