@@ -64,6 +64,8 @@ class HarmonicBalance:
     ):
         self.law = contact_law.load(law)
         contact_law.check_components(self.law, parameters.components)
+        if not 0 < omega_max < np.inf:
+            raise ValueError(f"the highest frequency is {omega_max} rad/s: give a finite one above zero")
         self.law_name = law
         self.model = model
         self.parameters = parameters
@@ -97,6 +99,11 @@ class HarmonicBalance:
     def with_load(self, factor: float) -> HarmonicBalance:
         """The same problem with the harmonics >= 1 of the excitation times a factor."""
         return self._changed(load_factor=factor)
+
+    def with_samples(self, n_samples: int, located: bool) -> HarmonicBalance:
+        """The same problem with other time samples, transitions located or not; everything linear is shared."""
+        transitions = "located" if located else "sampled"
+        return self._changed(basis=replace(self.basis, n_samples=n_samples, transitions=transitions))
 
     def with_harmonics(self, harmonics: tuple[int, ...]) -> HarmonicBalance:
         """The same problem with fewer of its harmonics; raises ValueError for unknown ones and ones a load needs."""
@@ -174,10 +181,12 @@ class HarmonicBalance:
     def energy(self, state: State) -> np.ndarray:
         """(n_pair,) friction work per cycle, both tangential components [J].
 
-        The normal spring is elastic: what work its sampled force does when a pair lifts is an error of sampling.
+        The normal spring is elastic: what work its sampled force does when a pair lifts is an error of sampling. A pair
+        that sticks throughout is elastic too: what is left of its work is rounding, and would be taken for slow wear.
         """
         t = self.parameters.tangential
-        return self.basis.work_per_cycle(state.cycle.force[:, t], state.x[:, t]).sum(axis=1)
+        work = self.basis.work_per_cycle(state.cycle.force[:, t], state.x[:, t]).sum(axis=1)
+        return np.where(state.cycle.status == contact_law.STICKS, 0.0, work)
 
     def preload(self, state: State) -> float:
         """Static normal force of the whole contact [N]; zero where the law has no normal component."""

@@ -74,6 +74,8 @@ def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOption
     for step in range(1, options.max_steps + 1):
         if error <= options.tolerance:
             return Solution(state, CONVERGED, step - 1, products, tuple(history))
+        if not np.isfinite(error):
+            return Solution(state, "the residual is not a finite number", step - 1, products, tuple(history))
         linear = balance.linearise(state)
         target = max(min(forcing, 0.1), 0.3 * options.tolerance / error, 1e-12)
         direction, spent, reached = linear.solve(-state.residual, target, options.max_products)

@@ -211,6 +211,35 @@ def _scaling(quick: bool, out: Path, as_json: bool) -> None:
 
 
 @app.command
+def extremes(
+    *,
+    quick: Annotated[bool, Parameter(negative=())] = False,
+    out: Path = Path("extremes.png"),
+    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+) -> None:
+    """Try the solver at its numerical extremes: each cell converged and checked, or refused with a sentence.
+
+    Parameters
+    ----------
+    quick
+        Every third cell, on smaller models.
+    out
+        File of the picture.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import extremes as table
+    from workflows import extremes_picture
+
+    rows = table.run(quick, _aside)
+    extremes_picture.picture(rows).savefig(out)
+    print(json.dumps(table.as_records(rows), indent=2) if as_json else table.as_text(rows))
+    wrong = table.counts(rows)["wrong"]
+    if wrong:
+        raise RuntimeError(f"{wrong} of {len(rows)} extreme settings ended with a wrong number, see the table")
+
+
+@app.command
 def show(result: Path, *, as_json: Annotated[bool, Parameter(name="--json", negative=())] = False) -> None:
     """Say what a result holds.
 
@@ -398,6 +427,41 @@ def leaf(
         leaf_accuracy.run(folder, as_json)
     else:
         leaf_fit.run(work == "check", as_json)
+
+
+@app.command
+def blade(
+    work: Literal["study", "mistuned"],
+    scene: str = "blade",
+    *,
+    overrides: Overrides = (),
+    speed: str | None = None,
+    out: Path | None = None,
+) -> None:
+    """What only a bladed disk has: figures 4.11 to 4.17 and table 4.4 of the thesis beside ours.
+
+    Parameters
+    ----------
+    work
+        study draws nodal diameters, responses to engine orders and to rising forces, and wear for several wear steps;
+        mistuned solves all blades of a small wheel at once, their stiffnesses a few per cent apart.
+    scene
+        Name of a scene with a [wheel] or a .toml file.
+    speed
+        Highest speed of a Campbell diagram, such as 6000rpm; no diagram unless told.
+    out
+        Folder of tables and pictures; results/blade_study unless told.
+    """
+    from workflows import blade_mistuning, blade_study
+
+    highest = None if speed is None else _option("--speed", speed, "Hz")
+    folder = out or Path("results") / f"blade_{work}"
+    if work == "mistuned":
+        written = blade_mistuning.run(scene, overrides, folder)
+    else:
+        written = blade_study.run(scene, overrides, folder, highest, _aside, blade_study.Extent())
+    for path in written:
+        print(path)
 
 
 @app.command

@@ -75,7 +75,7 @@ class Plan:
 def plan(file: SceneFile) -> Plan:
     """Plan a scene; raises ValueError for what the run would refuse after reading the mesh."""
     scene = file.scene
-    check_names(scene)
+    check_names(scene, file.folder)
     elements = nodes = 0
     if isinstance(scene, MatrixScene):
         reduced = matrix_model.make(scene, file.folder)
