@@ -52,6 +52,8 @@ def described(
             "first_omitted_hz": float(str(reduced.info["first_omitted_frequency"])),
             "factorisation": str(reduced.info["factorisation"]),
         }
+    if "n_interface_modes" in reduced.info:
+        facts |= {"interface_modes": int(str(reduced.info["n_interface_modes"]))}
     if choice is not None:
         facts |= {"harmonics_error": choice.estimate.error, "harmonics_choice": choice.outcome}
     mesh = None if part is None else part_mesh(part)

@@ -240,12 +240,23 @@ class Reduction(Table):
     """Craig-Bampton: how many fixed-interface modes, or up to which frequency.
 
     relative : keep the relative displacement of node pairs instead of both nodes
+    interface_modes : replace the masters by so many characteristic constraint modes
+    interface_keep : groups whose masters stay physical all the same, [] for none (SCC); unless told, every master that
+        does not belong to the contact stays (SCCe)
     """
 
     method: Literal["craig_bampton"] = "craig_bampton"
     relative: StrictBool = False
     modes: Annotated[StrictInt, Field(ge=0)] | None = None
     cutoff: Annotated[Frequency, Field(gt=0)] | None = None
+    interface_modes: Annotated[StrictInt, Field(ge=1)] | None = None
+    interface_keep: tuple[str, ...] | None = None
+
+    @model_validator(mode="after")
+    def _interface(self) -> Reduction:
+        if self.interface_modes is None and self.interface_keep is not None:
+            raise ValueError("expected interface_keep only with interface_modes")
+        return self
 
     @model_validator(mode="after")
     def _one_truncation(self) -> Reduction:
