@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import workflows as scenes
 from hbm import error_controlled_rule, newton, thesis_rule, wear_law
 from hbm.evolution import Duty, WearProblem, assess
+from hbm.harmonics import HarmonicBasis
+from hbm.law import SEPARATES
 from hbm.operating_point import AtFrequency, AtPeak, BesidePeak
+from hbm.wear_events import events
 from hbm.wear_history import WearHistory, cycles_to_preload
 from hbm.wearing import WearingBalance
 from tests.pressed_body import N_PAIR, wear_problem
@@ -135,3 +141,42 @@ def test_error_controlled_rule_takes_laws_whose_depth_per_work_changes(law: str)
     fine = thesis_rule.evolve(other, 5e-7)
     worn = error_controlled_rule.evolve(other, error_controlled_rule.Tolerance(0.02, 2e-4))
     assert life(worn) == pytest.approx(life(fine), rel=0.01)
+
+
+def test_a_law_file_of_ones_own_is_taken_by_both_rules() -> None:
+    law = str(Path(scenes.__file__ or "").parent / "scenes" / "running_in.py")
+    own = wear_problem(law=law, coefficient=4e-10)
+    fine = thesis_rule.evolve(own, 5e-7)
+    worn = error_controlled_rule.evolve(own, error_controlled_rule.Tolerance(0.02, 2e-4))
+    assert life(worn) == pytest.approx(life(fine), rel=0.015)
+    plain = error_controlled_rule.evolve(wear_problem(coefficient=4e-10), error_controlled_rule.Tolerance(0.02, 2e-4))
+    assert 0.25 * life(plain) < life(worn) < life(plain)  # a fresh face wears four times as fast
+
+
+@pytest.mark.parametrize(("text", "says"), [(None, "there is no wear law file"), ("x = 1", "no function depth_rate")])
+def test_a_file_that_is_no_wear_law_is_refused(tmp_path: Path, text: str | None, says: str) -> None:
+    path = tmp_path / "law.py"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(ValueError, match=says):
+        wear_law.load(str(path))
+
+
+def test_events_are_where_the_penetration_of_a_pair_changes_its_sign(problem: WearProblem, fine: WearHistory) -> None:
+    gap, basis = problem.balance.parameters.gap, HarmonicBasis((0, 1), 1024)
+    found = events(fine, ("t1", "t2", "n"), gap, basis)
+    assert found is not None
+    # by the status that the contact law itself reported, to one row
+    for i in range(N_PAIR):
+        lost = np.flatnonzero(fine.status[:, i] == SEPARATES)
+        touching = np.flatnonzero(fine.status[:, i] != SEPARATES)
+        if np.isfinite(found.lost[i]) and found.lost[i] > 0:
+            k = np.searchsorted(fine.cycles, found.lost[i])
+            assert lost[0] == pytest.approx(k, abs=1)
+        elif not np.isfinite(found.lost[i]):
+            assert touching[-1] == len(fine.cycles) - 1
+    coarse = error_controlled_rule.evolve(problem, error_controlled_rule.Tolerance(0.01, 2e-4))
+    rough = events(coarse, ("t1", "t2", "n"), gap, basis)
+    assert rough is not None
+    assert found.first_loss is not None
+    assert rough.first_loss == pytest.approx(found.first_loss, rel=0.05)

@@ -59,7 +59,7 @@ class Body:
         loads: dict[tuple[int, str], complex] = {(1, "shake"): setting.force}
         if setting.preload != 0:
             loads[0, "press"] = setting.preload
-        model = self.model.with_damping(modal_damping(self.model.system, setting.damping))
+        model = self.model.with_damping(lambda system, _: modal_damping(system, setting.damping))
         return HarmonicBalance(model, "jenkins", parameters, basis, Excitation(loads), setting.omega)
 
 

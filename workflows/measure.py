@@ -30,12 +30,14 @@ NAMES = ("peak frequency", "amplitude", "energy", "preload", "depth", "life")
 class Measured:
     """Answers by QUANTITIES, None where the scene does not ask or the solve failed, as `outcome` says.
 
-    points : (n_pair, 3) contact nodes [m]; depth : (n_pair,) at the end of life [m], zeros without wear
-    energy : (n_pair,) friction work per cycle at the peak [J]; seconds : of one processor; memory : its peak [bytes]
+    patch : (n_pair, 2) contact nodes in their plane [m]; area : (n_pair,) [m2]
+    depth : (n_pair,) at the end of life [m], zeros without wear; energy : (n_pair,) per cycle at the peak [J]
+    seconds : of one processor; memory : its peak [bytes]
     """
 
     values: dict[str, float | None]
-    points: np.ndarray
+    patch: np.ndarray
+    area: np.ndarray
     depth: np.ndarray
     energy: np.ndarray
     seconds: float
@@ -77,7 +79,8 @@ def measure(file: SceneFile, wears: bool = True, refined: bool = True) -> Measur
         except RuntimeError as failure:
             outcome = str(failure)
     spent, memory = process_time() - clock, _peak_memory()
-    return Measured(values, interface.points, depth, energy, spent, memory, outcome)
+    flat = (interface.points - interface.points.mean(axis=0)) @ interface.frames.mean(axis=0)[:2].T
+    return Measured(values, flat, interface.area, depth, energy, spent, memory, outcome)
 
 
 def wear(file: SceneFile, model: pipeline.Model) -> WearHistory:
@@ -92,7 +95,8 @@ def wear(file: SceneFile, model: pipeline.Model) -> WearHistory:
         share = wanted.step.share
         limit = wanted.step.depth if share is None else share * scale
         return thesis_rule.evolve(problem, limit or 0.0, wanted.max_steps)
-    return error_controlled_rule.evolve(problem, error_controlled_rule.Tolerance(wanted.tolerance, scale), wanted.max_steps)
+    tolerance = error_controlled_rule.Tolerance(wanted.tolerance, scale)
+    return error_controlled_rule.evolve(problem, tolerance, wanted.max_steps)
 
 
 def depth_at(worn: WearHistory, cycles: float) -> np.ndarray:

@@ -18,20 +18,14 @@ from hbm.evolution import WearProblem
 from hbm.wear_history import LIFE_SHARE, WearHistory, cycles_to_preload
 from workflows import pipeline, scene_file
 from workflows.progress import Progress
-from workflows.references import free_deflection
+from workflows.published import WEAR_STEPS
+from workflows.references import delta_max, free_deflection
 from workflows.style import BLUE, GREY, ORANGE, STYLE
 
-THESIS_STEPS = (0.1, 0.05, 0.02, 0.01, 0.005)  # of delta_max, table 4.2
+THESIS_STEPS = (0.1, 0.05, 0.02, 0.01, 0.005)  # of delta_max, tables 4.2 and 4.4
 FINER_STEPS = (0.0025,)  # ours
 TOLERANCES = (0.1, 0.03, 0.01)
 REFERENCE_TOLERANCES = (0.003, 0.001)
-PUBLISHED = {  # table 4.2: wear iterations, seconds on four cores, depth [mm], error in depth
-    0.1: (130, 14220, 6.9668, 0.0899),
-    0.05: (183, 21600, 6.6260, 0.0366),
-    0.02: (291, 37020, 6.4849, 0.0145),
-    0.01: (411, 58200, 6.4230, 0.0049),
-    0.005: (577, 70320, 6.3919, 0.0),
-}
 
 
 @dataclass(frozen=True)
@@ -109,8 +103,9 @@ def _problem(file: scene_file.SceneFile) -> tuple[WearProblem, float]:
         model = pipeline.build(file, Path(folder), Progress())
     wear, area = scene.wear, model.reduced.interface.area
     duties = pipeline.mission(scene)
-    problem = WearProblem(model.balance, duties, wear.law, wear.coefficient, area, lost_below=LIFE_SHARE)
-    return problem, float(free_deflection(model.balance).max())
+    law = pipeline.law_of(scene, file.folder)
+    problem = WearProblem(model.balance, duties, law, wear.coefficient, area, lost_below=LIFE_SHARE)
+    return problem, delta_max(scene, free_deflection(model.balance), area)
 
 
 def _measure(problem: WearProblem, delta: float, rule: str, step: float, say: Callable[[str], None]) -> Row:
@@ -196,7 +191,8 @@ def as_text(table: Table) -> str:
         "error   roughness"
     ]
     for row in table.rows:
-        steps, seconds, depth, _ = PUBLISHED.get(row.step, (None,) * 4) if row.rule == "thesis" else (None,) * 4
+        published = WEAR_STEPS.get(table.scene, {}) if row.rule == "thesis" else {}
+        steps, seconds, depth, _ = published.get(row.step, (None,) * 4)
         lines.append(
             f"{row.rule:17} {100 * row.step:5.3g} % {row.wear_steps:6d} {_bracket(steps, 'd'):8} {row.hbm_solves:6d} "
             f"{row.seconds:8.1f} {_bracket(seconds, 'd'):9} {1e3 * row.depth_m:8.4f} {_bracket(depth, '.4f'):9} "
