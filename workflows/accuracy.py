@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from hbm.branch import CONVERGED
-from workflows.knob_trade import TRADES, Row, Trade, key_of, load
-from workflows.measure import NAMES, QUANTITIES
 from workflows.scene_file import SceneFile, read
+from workflows.trade_table import NAMES, QUANTITIES, TRADES, Row, Trade, key_of, load
 
 MARGIN = 0.7  # of the wanted error that the knobs together may use up: they were measured one by one
-REFERENCE_SHARE = 0.5  # of the error of the setting before it, what a reference is taken to be off itself
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,17 @@ class Choice:
         """Overrides of the scene that set every knob."""
         return tuple(text for row in self.rows for text in row.overrides)
 
+    @property
+    def sentence(self) -> str:
+        """What is promised and by which settings."""
+        settings = ", ".join(row.setting for row in self.rows)
+        return f"settings {settings}: expected error {self.error:.2g}, about {self.seconds:.2g} s of one processor"
+
 
 def choose(trade: Trade, wanted: float, quantities: Sequence[str] = QUANTITIES) -> Choice:
     """The cheapest settings whose errors add up to less than the wanted one, in every quantity.
 
-    wanted : relative error, above 0; quantities : that matter, out of measure.QUANTITIES
+    wanted : relative error, above 0; quantities : that matter, out of trade_table.QUANTITIES
     Errors of different knobs are added without their signs, times are taken to multiply. From the finest settings each
     step coarsens the knob that saves most time for the error it adds.
     Raises  ValueError where even the finest settings do not meet it
@@ -42,7 +48,7 @@ def choose(trade: Trade, wanted: float, quantities: Sequence[str] = QUANTITIES) 
     place = {knob: len(rows) - 1 for knob, rows in ladders.items()}
 
     def total(places: dict[str, int]) -> float:
-        return max(sum(_error(ladders[k], i, q) for k, i in places.items()) for q in quantities)
+        return max(sum(error_of(ladders[k], i, q) for k, i in places.items()) for q in quantities)
 
     def seconds(places: dict[str, int]) -> float:
         spent = trade.base_seconds
@@ -69,13 +75,17 @@ def _usable(rows: Sequence[Row]) -> list[Row]:
     return [row for row in rows if row.tunable and row.outcome == CONVERGED]
 
 
-def _error(rows: Sequence[Row], place: int, quantity: str) -> float:
-    """Error of a setting; a reference is off by a share of what the setting before it is off."""
+def error_of(rows: Sequence[Row], place: int, quantity: str) -> float:
+    """Error of a setting; a reference is off by what a first-order knob leaves of the error of the setting before it.
+
+    A reference without a size, such as located transitions, is exact.
+    """
     row = rows[place]
     if not row.reference:
         return abs(row.errors[quantity] or 0.0)
-    before = rows[place - 1].errors[quantity] if place else None
-    return REFERENCE_SHARE * abs(before or 0.0)
+    if not place or not np.isfinite(row.size):
+        return 0.0
+    return abs(rows[place - 1].errors[quantity] or 0.0) * max(rows[place - 1].size, 0.0) / row.size
 
 
 def advice(trade: Trade, wanted: float = 0.01) -> list[str]:
@@ -103,7 +113,7 @@ def table_of(file: SceneFile, path: Path | None = None) -> Trade:
     places = [path] if path is not None else [p for p in (here, TRADES / f"{file.name}.json") if p.is_file()]
     for place in places:
         trade = load(place)
-        if trade.key == key_of(file.scene):
+        if trade.key == key_of(file.name, file.scene):
             return trade
     if places:
         raise ValueError(

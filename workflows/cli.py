@@ -59,6 +59,8 @@ def run(
     scene: str,
     *,
     overrides: Overrides = (),
+    accuracy: str | None = None,
+    table: Path | None = None,
     out: Path | None = None,
     resume: Annotated[bool, Parameter(negative=())] = False,
     pictures: Annotated[bool, Parameter(negative="--no-pictures")] = True,
@@ -69,6 +71,10 @@ def run(
     ----------
     scene
         Name of a scene (see `tribodyn list`) or a .toml file.
+    accuracy
+        Relative error wanted, such as "1 %": the cheapest settings that promise it by the scene's trade are taken.
+    table
+        The trade to go by; results/NAME/trade.json or the one that comes with the program unless told.
     out
         Folder of the result; results/NAME unless told.
     resume
@@ -77,11 +83,16 @@ def run(
         Draw curves, maps and renders when done.
     """
     from workflows import pipeline
+    from workflows.accuracy import tuned
     from workflows.progress import console_progress
 
-    file = scene_file.read(scene, overrides)
-    folder = out or Path("results") / file.name
     progress = console_progress()
+    if accuracy is None:
+        file = scene_file.read(scene, overrides)
+    else:
+        file, promise = tuned(scene, overrides, _option("--accuracy", accuracy, ""), table)
+        progress.say(promise.sentence)
+    folder = out or Path("results") / file.name
     path = folder / "result.h5"
     earlier = _earlier(path, file) if resume else None
     if earlier is not None and pipeline.is_complete(earlier, file.scene):
@@ -92,7 +103,7 @@ def run(
         try:
             result = pipeline.run(file, folder, progress, earlier)
         except KeyboardInterrupt:
-            raise KeyboardInterrupt(_kept(path, scene, overrides)) from None
+            raise KeyboardInterrupt(_kept(path, scene, file.overrides)) from None
         except pipeline.SolveFailed as failure:
             raise pipeline.SolveFailed(f"{failure}; what was computed before is kept in {path}") from None
     _print_summary(result)

@@ -47,7 +47,7 @@ def trade(
     as_json
         Print JSON for machines.
     """
-    from workflows import accuracy, knob_trade, trade_picture
+    from workflows import accuracy, knob_trade, trade_picture, trade_table
     from workflows import trade as wear_step
 
     if knob == ("wear_step",):
@@ -58,7 +58,7 @@ def trade(
         return
     found = knob_trade.run(scene, knob, overrides, aside, most)
     path = out or Path("results") / found.scene / "trade.json"
-    knob_trade.save(found, path)
+    trade_table.save(found, path)
     trade_picture.picture(found).savefig(path.with_suffix(".png"))
     if as_json:
         print(json.dumps(knob_trade.as_records(found), indent=2))

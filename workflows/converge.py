@@ -18,8 +18,9 @@ from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from hbm.branch import CONVERGED
 from workflows import scene_file
 from workflows.knobs import Ladder, study_of
-from workflows.measure import NAMES, QUANTITIES, Measured, measure
+from workflows.measure import Measured, measure
 from workflows.style import BLUE, GREEN, GREY, ORANGE, STYLE
+from workflows.trade_table import NAMES, QUANTITIES
 
 WANTED = 0.01
 ORDERS = (0.3, 6.0)  # between which a fitted order is believed
@@ -29,8 +30,9 @@ ORDERS = (0.3, 6.0)  # between which a fitted order is believed
 class Row:
     """One grid.
 
-    size : nodes along the patch; setting : its overrides; values, errors : by measure.QUANTITIES, errors against the
-    limit; map_difference : r.m.s. difference of friction work per area from the finest grid, over its r.m.s.
+    size : nodes along the patch; setting : its overrides
+    values, errors : by trade_table.QUANTITIES, errors against the limit
+    map_difference : r.m.s. difference of friction work per area from the finest grid, over its r.m.s.
     """
 
     size: float

@@ -2,87 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass, fields
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from typing import Any
-
-import numpy as np
 
 from hbm.branch import CONVERGED
 from workflows import scene_file
 from workflows.knobs import Knob, Setting, chosen, knobs_of, study_of
-from workflows.measure import NAMES, QUANTITIES, Measured, measure
-from workflows.scene import Scene
+from workflows.measure import Measured, measure
+from workflows.trade_table import NAMES, QUANTITIES, Row, Trade, key_of, plain
 
-FORMAT = "tribodyn trade 1"
-TRADES = Path(__file__).parent / "trades"
 BASE = "base"
-ROUNDING = 1e-9  # relative difference below which no order can be told
-
-
-@dataclass(frozen=True)
-class Row:
-    """One setting of a knob.
-
-    size : of the setting, larger is finer, nan without a measure; overrides : of the scene
-    values : by measure.QUANTITIES in SI units, None where there is none; errors : relative to the knob's reference
-    seconds : of one processor; memory : largest of the process [bytes]; outcome : "converged" or a sentence
-    reference : whether this is the setting that the others are held against
-    """
-
-    knob: str
-    setting: str
-    size: float
-    overrides: tuple[str, ...]
-    values: dict[str, float | None]
-    errors: dict[str, float | None]
-    seconds: float
-    memory: float
-    outcome: str
-    reference: bool
-    tunable: bool
-
-    @property
-    def worst(self) -> float:
-        """Largest relative error of all quantities; inf where the setting failed."""
-        known = [abs(error) for error in self.errors.values() if error is not None]
-        return max(known, default=0.0) if self.outcome == CONVERGED else float("inf")
-
-
-@dataclass(frozen=True)
-class Trade:
-    """All rows of a scene.
-
-    scene : name; key : of the scene and its study, so that a table of another scene is told; base : overrides under
-    which all was measured; base_seconds : of the scene with them
-    """
-
-    scene: str
-    key: str
-    base: tuple[str, ...]
-    base_seconds: float
-    rows: tuple[Row, ...]
-
-    @property
-    def knobs(self) -> tuple[str, ...]:
-        """Names of the knobs, in order."""
-        return tuple(dict.fromkeys(row.knob for row in self.rows))
-
-    def of(self, knob: str) -> tuple[Row, ...]:
-        """Rows of a knob, the reference last."""
-        return tuple(row for row in self.rows if row.knob == knob)
-
-    def order(self, knob: str, quantity: str) -> float | None:
-        """Observed order: minus the slope of log error over log size; None where errors are too few or rounding."""
-        points = [(row.size, abs(row.errors[quantity] or 0.0)) for row in self.of(knob) if not row.reference]
-        usable = [(size, error) for size, error in points if np.isfinite(size) and size > 0 and error > ROUNDING]
-        if len(usable) < 2:
-            return None
-        size, error = np.log(np.array(usable)).T
-        return float(-np.polyfit(size, error, 1)[0])
 
 
 def run(
@@ -93,7 +23,8 @@ def run(
     overrides : of the scene, on top of its study's base; most : settings of each knob, the reference included
     Raises  ValueError for a knob that the scene does not have
     """
-    study = study_of(scene_file.find(scene).stem)
+    name = scene_file.find(scene).stem
+    study = study_of(name)
     base = (*study.base, *overrides)
     file = scene_file.read(scene, base)
     knobs = chosen(knobs_of(file, study), names)
@@ -102,7 +33,7 @@ def run(
     rows: list[Row] = []
     for knob in knobs:
         rows += _rows_of(scene, knob, knob.settings[-most:], base, say)
-    return Trade(file.name, key_of(scene_file.read(scene, overrides).scene), base, once.seconds, tuple(rows))
+    return Trade(file.name, key_of(name, scene_file.read(scene, overrides).scene), base, once.seconds, tuple(rows))
 
 
 def _rows_of(
@@ -143,74 +74,10 @@ def _relative(value: float | None, reference: float | None) -> float | None:
     return None if value is None or not reference else value / reference - 1
 
 
-def key_of(scene: Scene) -> str:
-    """A short name of everything in a scene that its trade depends on; the knobs themselves are not among it."""
-    said = scene.model_dump(mode="json", exclude={"scene": True, "pictures": True, "solver": True})
-    for section, keys in KNOB_KEYS.items():
-        for key in keys:
-            if isinstance(said.get(section), dict):
-                said[section].pop(key, None)
-    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()[:16]
-
-
-KNOB_KEYS = {  # set by generic knobs, so that they do not make another scene
-    "reduction": ("modes", "interface_modes", "interface_keep"),
-    "harmonics": ("kept", "samples", "transitions", "tolerance", "highest"),
-    "response": ("points",),
-    "wear": ("rule", "step", "tolerance", "max_steps"),
-}
-
-
-def pareto(rows: Iterable[Row], quantity: str) -> list[Row]:
-    """Rows that no other row beats in both seconds and error, the fastest first."""
-    front: list[Row] = []
-    best = float("inf")
-    for row in sorted((r for r in rows if r.errors.get(quantity) is not None), key=lambda r: r.seconds):
-        error = abs(row.errors[quantity] or 0.0)
-        if error < best:
-            front.append(row)
-            best = error
-    return front
-
-
-def save(trade: Trade, path: Path) -> None:
-    """Write a trade as JSON."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps({"format": FORMAT, **_plain(asdict(trade))}, indent=1) + "\n", encoding="utf-8")
-
-
-def load(path: Path) -> Trade:
-    """Read what `save` wrote; raises ValueError for anything else."""
-    try:
-        said = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        raise ValueError(f'there is no trade table "{path}": make one with tribodyn trade SCENE --out {path}') from None
-    if not isinstance(said, dict) or said.get("format") != FORMAT:
-        raise ValueError(f'"{path}" is no trade table of this version: make it again with tribodyn trade SCENE')
-    rows = [
-        Row(**{f.name: row[f.name] for f in fields(Row)} | {"overrides": tuple(row["overrides"]), "size": _size(row)})
-        for row in said["rows"]
-    ]
-    return Trade(said["scene"], said["key"], tuple(said["base"]), said["base_seconds"], tuple(rows))
-
-
-def _size(row: dict[str, Any]) -> float:
-    return float("nan") if row["size"] is None else float(row["size"])
-
-
-def _plain(value: Any) -> Any:
-    """JSON has no nan."""
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
 def as_records(trade: Trade) -> list[dict[str, Any]]:
     """The rows for JSON, with the observed orders of their knob."""
     orders = {knob: {name: trade.order(knob, name) for name in QUANTITIES} for knob in trade.knobs}
-    return [{**_plain(asdict(row)), "scene": trade.scene, "order": orders[row.knob]} for row in trade.rows]
+    return [{**plain(asdict(row)), "scene": trade.scene, "order": orders[row.knob]} for row in trade.rows]
 
 
 def as_text(trade: Trade) -> str:

@@ -21,9 +21,7 @@ from workflows import pipeline
 from workflows.progress import Progress
 from workflows.references import free_deflection
 from workflows.scene_file import SceneFile
-
-QUANTITIES = ("peak_hz", "peak_m", "energy_J", "preload_N", "depth_m", "life_cycles")
-NAMES = ("peak frequency", "amplitude", "energy", "preload", "depth", "life")
+from workflows.trade_table import QUANTITIES
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from workflows.knob_trade import Trade, pareto
-from workflows.measure import NAMES, QUANTITIES
 from workflows.style import GREY, INK, STYLE
+from workflows.trade_table import NAMES, QUANTITIES, Trade, pareto
 
 SHOWN = ("peak_m", "energy_J", "life_cycles")
 FLOOR = 1e-8  # errors below this are drawn here
