@@ -23,11 +23,16 @@ class Balance(Protocol):
 
 @dataclass(frozen=True)
 class NewtonOptions:
-    """tolerance : of the residual over the displacement; max_steps : Newton steps; max_products : per direction."""
+    """How exactly and how long Newton works.
+
+    tolerance : of the residual over the displacement; max_steps : Newton steps; max_products : per direction
+    krylov : largest relative residual of a direction; the forcing term asks for less where Newton is fast
+    """
 
     tolerance: float = 1e-8
     max_steps: int = 40
     max_products: int = 300
+    krylov: float = 0.1
 
 
 @dataclass(frozen=True)
@@ -77,7 +82,7 @@ def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOption
         if not np.isfinite(error):
             return Solution(state, "the residual is not a finite number", step - 1, products, tuple(history))
         linear = balance.linearise(state)
-        target = max(min(forcing, 0.1), 0.3 * options.tolerance / error, 1e-12)
+        target = max(min(forcing, options.krylov), 0.3 * options.tolerance / error, 1e-12)
         try:
             with np.errstate(over="raise"):
                 direction, spent, reached = linear.solve(-state.residual, target, options.max_products)

@@ -54,6 +54,8 @@ def described(
             "first_omitted_hz": float(str(reduced.info["first_omitted_frequency"])),
             "factorisation": str(reduced.info["factorisation"]),
         }
+    if "n_interface_modes" in reduced.info:
+        facts |= {"interface_modes": int(str(reduced.info["n_interface_modes"]))}
     if file.scene.wear is not None:
         facts |= {"delta_max_m": delta_max(file.scene, free, i.area), "wear_split": file.scene.wear.split}
     if isinstance(file.scene, PartScene) and (around := file.scene.wheel) is not None:

@@ -37,6 +37,7 @@ from reduction.held import hold
 from reduction.linear import stuck_stiffness
 from reduction.model import ReducedModel
 from workflows import curve, matrix_model, part_reduction, references, store, worn_responses
+from workflows.budget import with_budget
 from workflows.contact_surfaces import surface_gap
 from workflows.description import described
 from workflows.fields import with_shown
@@ -106,6 +107,8 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
                 count = scene.wear.responses
                 curves = worn_responses.curves(result, model.balance, count, again, advance)
                 result = keep(replace(result, worn=curves))
+        with progress.stage("error budget"):
+            result = with_budget(file, model.balance, result)
         state = "complete" if result.wear is None else f"complete: {result.wear.end}"
         return keep(replace(result, state=state))
 
@@ -364,7 +367,7 @@ def response_range(scene: Scene) -> tuple[float, float]:
 
 def newton_options(scene: Scene) -> NewtonOptions:
     """How exactly every balance is solved."""
-    return NewtonOptions(tolerance=scene.solver.tolerance)
+    return NewtonOptions(tolerance=scene.solver.tolerance, krylov=scene.solver.krylov)
 
 
 def check_branch(branch: Branch | None) -> None:
