@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,11 @@ import pytest
 
 import workflows as scenes
 from hbm import error_controlled_rule, newton, thesis_rule, wear_law
+from hbm.balance import HarmonicBalance
 from hbm.evolution import Duty, WearProblem, assess
 from hbm.harmonics import HarmonicBasis
 from hbm.law import SEPARATES
-from hbm.operating_point import AtFrequency, AtPeak, BesidePeak
+from hbm.operating_point import AtFrequency, AtPeak, BesidePeak, OperatingPoint
 from hbm.wear_events import events
 from hbm.wear_history import WearHistory, cycles_to_preload
 from hbm.wearing import WearingBalance
@@ -180,3 +182,20 @@ def test_events_are_where_the_penetration_of_a_pair_changes_its_sign(problem: We
     assert rough is not None
     assert found.first_loss is not None
     assert rough.first_loss == pytest.approx(found.first_loss, rel=0.05)
+
+
+def test_a_branch_that_has_ended_is_looked_for_afresh(problem: WearProblem) -> None:
+    """Where no way leads on from the neighbour, the site is asked as at the start, and its solves are counted."""
+
+    class Lost(AtFrequency):
+        def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
+            found = self.first(balance)
+            return replace(found, solution=replace(found.solution, outcome="no way from here"))
+
+    lost = replace(problem, mission=(Duty(Lost("tip", 420.0)),))
+    before = assess(lost, np.zeros(N_PAIR), 0.0, None)
+    depth = np.full(N_PAIR, 1e-6)
+    after, expected = assess(lost, depth, 1.0, before), assess(problem, depth, 1.0, None)
+    assert after.failure == ""
+    assert after.rate == pytest.approx(expected.rate, rel=1e-6)
+    assert after.solves > 3
