@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _leave(code: int, sentence: str) -> None:
     one_line = " ".join(sentence.split()).rstrip(".")
-    print(f"tribodyn: {one_line}.", file=sys.stderr)
+    print(f"tribodyn: {one_line}{'' if one_line.endswith('?') else '.'}", file=sys.stderr)
     sys.exit(code)
 
 

@@ -14,7 +14,7 @@ What is found stands in scenes/rig.toml, marked "fit"; nothing is written there 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -34,6 +34,7 @@ TIED = {
 }
 RIGID = 1e11  # stiffness beyond which no published frequency changes by one in a thousand [N/m]
 MICROMETRE = 1e-6
+SECTIONS = 3  # models kept, some 0.2 GB each: a section and its two neighbours for the derivatives
 FREQUENCIES = tuple(
     Measured(f"{state}, {kind}", value, "Hz")
     for state, modes in (("open", OPEN), ("stuck", STUCK))
@@ -61,7 +62,7 @@ def fit_joints(joints: Joints) -> Identification:
 def fit_column(overrides: Sequence[str] = ()) -> Identification:
     """Section of the column and springs at its base to the published frequencies, from a square section."""
 
-    @cache
+    @lru_cache(maxsize=SECTIONS)
     def joints(length: float, depth: float) -> Joints:
         section = (f"geometry.column_length={length!r} m", f"geometry.column_depth={depth!r} m")
         return joints_of(scene_file.read("rig", (*overrides, *section)))

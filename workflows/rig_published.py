@@ -31,6 +31,9 @@ The text does not say whether the displacement is an amplitude or a range. A loo
 dissipates 450 and 1400 uJ is at least 8 and 25 um wide, so that 12 and 50 um are read as the range.
 """
 
+FULL_SLIP = 50.0
+"""Shaker force from which on the contact slides as a whole; below it there is micro-slip only [N]."""
+
 LIFE_MEASURED, LIFE_SIMULATED = 16e6, 17e6
 """Cycles to full loss of contact, experiment and simulation."""
 

@@ -148,7 +148,8 @@ def _statics(study: Study) -> list[Trend]:
                   study.tight.state.cycle.status) == 0 else f"range {tight:.2g} um at 70 N of shaker force",
               tight < 1.0),
         Trend("sliding", "stick and micro-slip below 50 N, stick and full slip from 50 N on",
-              f"pairs in contact that slide: {shares}", slips[10.0] < 1.0 and slips[50.0] == slips[70.0] == 1.0),
+              f"pairs in contact that slide: {shares}",
+              all((share == 1.0) == (force >= published.FULL_SLIP) for force, share in slips.items())),
     ]  # fmt: skip
 
 
