@@ -12,6 +12,7 @@ from hbm.branch import CONVERGED
 from workflows.scene_file import SceneFile, read
 from workflows.trade_table import NAMES, QUANTITIES, TRADES, Row, Trade, key_of, load
 
+OF_WEAR = ("depth_m", "life_cycles")
 MARGIN = 0.7  # of the wanted error that the knobs together may use up: they were measured one by one
 
 
@@ -81,6 +82,8 @@ def error_of(rows: Sequence[Row], place: int, quantity: str) -> float:
     A reference without a size, such as located transitions, is exact.
     """
     row = rows[place]
+    if quantity in OF_WEAR and all(other.errors[quantity] is None for other in rows):
+        quantity = "energy_J"  # the contact was not worn for this knob: life is in proportion to the work per cycle
     if not row.reference:
         return abs(row.errors[quantity] or 0.0)
     if not place or not np.isfinite(row.size):
