@@ -31,8 +31,15 @@ CANDIDATES = ((24, 4), (48, 4), (48, 6), (96, 6), (192, 6))  # modes and powers 
 ALL_MODES_BELOW = 1500  # coordinates up to which all modes are computed at once
 
 
+NO_DISTANCE = 1e-13  # of a frequency from an undamped resonance, relative: the response is rounding alone
+
+
 class SingularStuckSystem(ValueError):
     """The structure can move as a rigid body even with every contact stuck."""
+
+
+class UndampedResonance(ValueError):
+    """The response of the stuck structure is infinite at this frequency."""
 
 
 class Expansion:
@@ -63,9 +70,9 @@ class Expansion:
         )
         try:
             factor = sla.cho_factor(stuck)
+            lam, phi = _modes(stuck, mass, n if n < ALL_MODES_BELOW else CANDIDATES[-1][0])
         except np.linalg.LinAlgError:
             raise loose from None
-        lam, phi = sla.eigh(stuck, mass, subset_by_index=None if n < ALL_MODES_BELOW else (0, CANDIDATES[-1][0] - 1))
         # a rigid mode comes out of the eigenvalue problem as rounding of the stiffest ones, of either sign
         if lam[0] <= n * np.finfo(float).eps * np.max(np.diag(stuck).real / np.diag(mass).real):
             raise loose
@@ -115,13 +122,40 @@ class Expansion:
         left = self.b - s * np.tensordot(power, self.e, 1)
         right = self.b.conj().T - s * np.tensordot(power, self.e.conj().transpose(0, 2, 1), 1)
         core = np.diag(self.lam + s * s) + s * self.c - s * s * np.tensordot(power, self.t, 1)
-        return PortCompliance(self, s, power, left, right, np.linalg.inv(core))
+        return PortCompliance(self, s, power, left, right, self._inverse(core, s))
+
+    def _inverse(self, core: np.ndarray, s: complex) -> np.ndarray:
+        """Inverse of the modal dynamic stiffness; raises UndampedResonance."""
+        try:
+            inverse = np.linalg.inv(core)
+            lost = NO_DISTANCE * np.abs(inverse).max() * abs(s) ** 2 > 1.0
+        except np.linalg.LinAlgError:
+            lost = True
+        if lost:
+            raise UndampedResonance(
+                f"the stuck structure has an undamped resonance at {abs(s) / (2 * np.pi):.6g} Hz, where its response "
+                "is infinite: give it damping or take another frequency"
+            )
+        return inverse
 
     def _measure_error(self, s: complex) -> float:
         mass, damping, stuck = self._system
         probe = np.random.default_rng(0).normal(size=(self.n_port, 2))
         exact = self._ports @ np.linalg.solve(stuck + s * damping + s * s * mass, self._ports.conj().T @ probe)
         return float(np.abs(self.at(s).apply(probe) - exact).max() / np.abs(exact).max())
+
+
+def _modes(stiffness: np.ndarray, mass: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The lowest modes: squared frequencies (count,) and shapes (n, count) of unit modal mass.
+
+    They come from the compliance's side, M phi = nu K phi: rounding is then relative to the softest mode, however much
+    stiffer the contact springs are, and what it does to stiff ones is as small as their share in the compliance.
+    """
+    n = len(mass)
+    nu, phi = sla.eigh(mass, stiffness, subset_by_index=None if count >= n else (n - count, n - 1))
+    nu, phi = nu[::-1], phi[:, ::-1]
+    lam = 1.0 / np.maximum(nu, np.finfo(float).eps ** 2 * nu[0])  # without mass: as good as rigid
+    return lam, phi * np.sqrt(lam)
 
 
 @dataclass(frozen=True)

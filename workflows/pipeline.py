@@ -40,7 +40,7 @@ from workflows import curve, matrix_model, part_reduction, references, store, wo
 from workflows.budget import with_budget
 from workflows.contact_surfaces import surface_gap
 from workflows.description import described
-from workflows.fields import displacement_fields, hysteresis_loops
+from workflows.fields import with_shown
 from workflows.matrix_scene import MatrixScene
 from workflows.progress import Progress
 from workflows.result import Patch, Result
@@ -403,7 +403,7 @@ def wear_down(
     else:
         tolerance = error_controlled_rule.Tolerance(wear.tolerance, limit)
         worn = error_controlled_rule.evolve(problem, tolerance, wear.max_steps, on_row, result.wear)
-    result = with_pictures_of(replace(result, wear=worn), model, duties[0])
+    result = with_shown(scene, replace(result, wear=worn), model.balance.with_load(duties[0].load), model.part)
     if worn.end.startswith("solve failed"):
         keep(replace(result, state=worn.end))
         raise SolveFailed(f"wear step {len(worn.cycles)}: {worn.end}")
@@ -448,20 +448,6 @@ def step_limit(scene: Scene, patch: Patch) -> float:
         )
     share = step.share if scene.wear.rule == "thesis" and step is not None else None
     return delta_max if share is None else share * delta_max
-
-
-def with_pictures_of(result: Result, model: Model, duty: Duty) -> Result:
-    """The result with displacement fields and hysteresis loops of the rows that pictures show."""
-    assert result.wear is not None
-    if not result.wear_steps:
-        return result
-    rows, numbers = result.wear.rows(), replace(result, fields=None).shown_rows()
-    balance = model.balance.with_load(duty.load)
-    return replace(
-        result,
-        fields=None if model.part is None else displacement_fields(balance, model.part, rows, numbers),
-        loops=hysteresis_loops(balance, rows, numbers),
-    )
 
 
 class Clock:

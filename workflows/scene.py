@@ -477,6 +477,7 @@ class PartScene(Scene):
             ("reduction.relative", self.reduction.relative),
             ("reduction.interface_modes", self.reduction.interface_modes is not None),
             ("geometry.no_turning", self.geometry.no_turning is not None),
+            ("response.stability", self.response.stability),  # perturbations see other waves than the solution does
         ):
             if has:
                 raise ValueError(f"{key} has no meaning for a sector of a wheel: leave it out")
