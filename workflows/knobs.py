@@ -15,7 +15,7 @@ from workflows.scene_file import SceneFile
 STUDIES = Path(__file__).parent / "studies"
 TOPS = (1, 3, 5)  # highest harmonic kept
 SAMPLES = (32, 64, 256)
-NEWTON = (1e-2, 1e-4, 1e-6, 1e-10)
+NEWTON = (1e-2, 1e-4, 1e-6, 1e-9)
 KRYLOV = (0.5, 1e-2, 1e-8)
 POINTS = (10, 20, 40, 80, 320)
 RANKS = (3, 6, 12, 24)
@@ -103,7 +103,7 @@ def knobs_of(file: SceneFile, study: Study) -> tuple[Knob, ...]:
     if isinstance(scene, PartScene):
         found += _of_a_part(scene)
     found += [*_of_harmonics(scene)]
-    found.append(_numbers("newton", "solver.tolerance", NEWTON))
+    found.append(_numbers("newton", "solver.tolerance", NEWTON, wears=False))
     found.append(_numbers("krylov", "solver.krylov", KRYLOV, wears=False))
     if scene.response.method == "natural":
         settings = tuple(Setting(n, (f"response.points={n}",)) for n in POINTS)
