@@ -40,12 +40,13 @@ def choose(trade: Trade, wanted: float, quantities: Sequence[str] = QUANTITIES) 
     """The cheapest settings whose errors add up to less than the wanted one, in every quantity.
 
     wanted : relative error, above 0; quantities : that matter, out of trade_table.QUANTITIES
-    Errors of different knobs are added without their signs, times are taken to multiply. From the finest settings each
-    step coarsens the knob that saves most time for the error it adds.
+    Errors of different knobs are added without their signs; times are taken to multiply, each over the median of its
+    knob. From the finest settings each step coarsens the knob that saves most time for the error it adds.
     Raises  ValueError where even the finest settings do not meet it
     """
     options = {knob: _usable(trade.of(knob)) for knob in trade.knobs}
     ladders = {knob: rows for knob, rows in options.items() if rows}
+    usual = {knob: float(np.median([row.seconds for row in rows])) for knob, rows in ladders.items()}
     place = {knob: len(rows) - 1 for knob, rows in ladders.items()}
 
     def total(places: dict[str, int]) -> float:
@@ -54,7 +55,7 @@ def choose(trade: Trade, wanted: float, quantities: Sequence[str] = QUANTITIES) 
     def seconds(places: dict[str, int]) -> float:
         spent = trade.base_seconds
         for k, i in places.items():
-            spent *= ladders[k][i].seconds / trade.base_seconds
+            spent *= ladders[k][i].seconds / usual[k]
         return spent
 
     if total(place) > MARGIN * wanted:

@@ -38,8 +38,8 @@ def trade(
     scene
         Name of a scene or a .toml file.
     knob
-        Knob to measure, can be repeated; the other knobs of an earlier table stay. All knobs unless told. wear_step alone is table 4.2 of the
-        thesis with life added.
+        Knob to measure, can be repeated; the other knobs of an earlier table stay. All knobs unless told.
+        wear_step alone is table 4.2 of the thesis with life added.
     most
         Settings of each knob, the finest ones.
     out

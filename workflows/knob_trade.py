@@ -27,7 +27,8 @@ def run(
     """Measure knobs of a scene, all that it has where none is named.
 
     overrides : of the scene, on top of its study's base; most : settings of each knob, the reference included
-    keep : called after each knob with what is there; earlier : table whose other knobs are taken over, of the same scene
+    keep : called after each knob with what is there
+    earlier : table of the same scene, whose other knobs are taken over
     Raises  ValueError for a knob that the scene does not have
     """
     name = scene_file.find(scene).stem
@@ -35,6 +36,7 @@ def run(
     base = (*study.base, *overrides)
     file = scene_file.read(scene, base)
     knobs = chosen(knobs_of(file, study), names)
+    measure(file, wears=False)  # compiles what the others only use
     once = measure(file)
     say(f"{BASE}: {once.seconds:.1f} s, {once.outcome}")
     found = Trade(file.name, key_of(name, scene_file.read(scene, overrides).scene), base, once.seconds, ())
