@@ -181,3 +181,10 @@ def test_the_budget_says_where_no_life_can_be_stated() -> None:
     result = Result({}, {budget.FACT: json.dumps(entries)}, "complete")
     assert "no life can be stated" in dict(budget.lines(result))["  wear steps"]
     assert replace(made_up("a", 1, 0.1, False), outcome="solve failed").worst == np.inf
+
+
+def test_tables_that_come_with_the_program_can_be_read() -> None:
+    for path in trade_table.TRADES.glob("*.json"):
+        trade = trade_table.load(path)
+        assert trade.scene == path.stem
+        assert trade.rows

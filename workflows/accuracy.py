@@ -12,6 +12,7 @@ from hbm.branch import CONVERGED
 from workflows.scene_file import SceneFile, read
 from workflows.trade_table import NAMES, QUANTITIES, TRADES, Row, Trade, key_of, load
 
+OF_WEAR = ("depth_m", "life_cycles")
 MARGIN = 0.7  # of the wanted error that the knobs together may use up: they were measured one by one
 
 
@@ -39,12 +40,13 @@ def choose(trade: Trade, wanted: float, quantities: Sequence[str] = QUANTITIES) 
     """The cheapest settings whose errors add up to less than the wanted one, in every quantity.
 
     wanted : relative error, above 0; quantities : that matter, out of trade_table.QUANTITIES
-    Errors of different knobs are added without their signs, times are taken to multiply. From the finest settings each
-    step coarsens the knob that saves most time for the error it adds.
+    Errors of different knobs are added without their signs; times are taken to multiply, each over the median of its
+    knob. From the finest settings each step coarsens the knob that saves most time for the error it adds.
     Raises  ValueError where even the finest settings do not meet it
     """
     options = {knob: _usable(trade.of(knob)) for knob in trade.knobs}
     ladders = {knob: rows for knob, rows in options.items() if rows}
+    usual = {knob: float(np.median([row.seconds for row in rows])) for knob, rows in ladders.items()}
     place = {knob: len(rows) - 1 for knob, rows in ladders.items()}
 
     def total(places: dict[str, int]) -> float:
@@ -53,7 +55,7 @@ def choose(trade: Trade, wanted: float, quantities: Sequence[str] = QUANTITIES) 
     def seconds(places: dict[str, int]) -> float:
         spent = trade.base_seconds
         for k, i in places.items():
-            spent *= ladders[k][i].seconds / trade.base_seconds
+            spent *= ladders[k][i].seconds / usual[k]
         return spent
 
     if total(place) > MARGIN * wanted:
@@ -81,6 +83,8 @@ def error_of(rows: Sequence[Row], place: int, quantity: str) -> float:
     A reference without a size, such as located transitions, is exact.
     """
     row = rows[place]
+    if quantity in OF_WEAR and all(other.errors[quantity] is None for other in rows):
+        quantity = "energy_J"  # the contact was not worn for this knob: life is in proportion to the work per cycle
     if not row.reference:
         return abs(row.errors[quantity] or 0.0)
     if not place or not np.isfinite(row.size):

@@ -38,8 +38,8 @@ def trade(
     scene
         Name of a scene or a .toml file.
     knob
-        Knob to measure, can be repeated; all that the scene has unless told. wear_step alone is table 4.2 of the
-        thesis with life added.
+        Knob to measure, can be repeated; the other knobs of an earlier table stay. All knobs unless told.
+        wear_step alone is table 4.2 of the thesis with life added.
     most
         Settings of each knob, the finest ones.
     out
@@ -56,9 +56,9 @@ def trade(
             wear_step.picture(table).savefig(out)
         print(json.dumps(wear_step.as_records(table), indent=2) if as_json else wear_step.as_text(table))
         return
-    found = knob_trade.run(scene, knob, overrides, aside, most)
-    path = out or Path("results") / found.scene / "trade.json"
-    trade_table.save(found, path)
+    path = out or Path("results") / Path(scene).stem / "trade.json"
+    earlier = trade_table.load(path) if knob and path.exists() else None
+    found = knob_trade.run(scene, knob, overrides, aside, most, lambda table: trade_table.save(table, path), earlier)
     trade_picture.picture(found).savefig(path.with_suffix(".png"))
     if as_json:
         print(json.dumps(knob_trade.as_records(found), indent=2))

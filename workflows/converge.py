@@ -13,6 +13,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from hbm.branch import CONVERGED
@@ -210,11 +211,14 @@ def picture(study: Study) -> Figure:
         panes[0].axhline(WANTED, color=GREY, linestyle=":", linewidth=1)
         title = f"{study.scene}: {study.ladder.replace('_', ' ')}"
         panes[0].set(xlabel="node pairs", ylabel="relative error", title=title)
+        panes[0].xaxis.set_minor_formatter(NullFormatter())
         panes[0].legend()
         reach = max(float((finest.energy / finest.area).max()), 1e-300)
-        for pane, one in zip(panes[1:], some, strict=True):
-            off = (one.energy / one.area - on_grid(finest.patch, finest.energy / finest.area, one.patch)) / reach
-            drawn = pane.tripcolor(*(1e3 * one.patch.T), off, shading="gouraud", cmap="RdBu_r", vmin=-0.3, vmax=0.3)
+        work = finest.energy / finest.area
+        offs = [(one.energy / one.area - on_grid(finest.patch, work, one.patch)) / reach for one in some]
+        most = max((float(np.abs(off).max()) for off in offs), default=0.0) or 1.0
+        for pane, one, off in zip(panes[1:], some, offs, strict=True):
+            drawn = pane.tripcolor(*(1e3 * one.patch.T), off, shading="gouraud", cmap="RdBu_r", vmin=-most, vmax=most)
             pane.set(aspect="equal", title=f"{len(one.area)} pairs", xlabel="mm")
             pane.grid(visible=False)
         if some:

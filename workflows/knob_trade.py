@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 from hbm.branch import CONVERGED
@@ -16,11 +16,19 @@ BASE = "base"
 
 
 def run(
-    scene: str, names: Sequence[str], overrides: Sequence[str], say: Callable[[str], None], most: int = 99
+    scene: str,
+    names: Sequence[str],
+    overrides: Sequence[str],
+    say: Callable[[str], None],
+    most: int = 99,
+    keep: Callable[[Trade], None] = lambda trade: None,
+    earlier: Trade | None = None,
 ) -> Trade:
     """Measure knobs of a scene, all that it has where none is named.
 
     overrides : of the scene, on top of its study's base; most : settings of each knob, the reference included
+    keep : called after each knob with what is there
+    earlier : table of the same scene, whose other knobs are taken over
     Raises  ValueError for a knob that the scene does not have
     """
     name = scene_file.find(scene).stem
@@ -28,12 +36,18 @@ def run(
     base = (*study.base, *overrides)
     file = scene_file.read(scene, base)
     knobs = chosen(knobs_of(file, study), names)
+    measure(file, wears=False)  # compiles what the others only use
     once = measure(file)
     say(f"{BASE}: {once.seconds:.1f} s, {once.outcome}")
-    rows: list[Row] = []
+    found = Trade(file.name, key_of(name, scene_file.read(scene, overrides).scene), base, once.seconds, ())
+    if earlier is not None and (earlier.key, earlier.base) == (found.key, found.base):
+        measured = {knob.name for knob in knobs}
+        found = replace(found, rows=tuple(row for row in earlier.rows if row.knob not in measured))
     for knob in knobs:
-        rows += _rows_of(scene, knob, knob.settings[-most:], base, say)
-    return Trade(file.name, key_of(name, scene_file.read(scene, overrides).scene), base, once.seconds, tuple(rows))
+        rows = _rows_of(scene, knob, knob.settings[-most:], base, say)
+        found = replace(found, rows=(*found.rows, *rows))
+        keep(found)
+    return found
 
 
 def _rows_of(

@@ -15,7 +15,7 @@ from workflows.scene_file import SceneFile
 STUDIES = Path(__file__).parent / "studies"
 TOPS = (1, 3, 5)  # highest harmonic kept
 SAMPLES = (32, 64, 256)
-NEWTON = (1e-2, 1e-4, 1e-6, 1e-10)
+NEWTON = (1e-2, 1e-4, 1e-6, 1e-9)
 KRYLOV = (0.5, 1e-2, 1e-8)
 POINTS = (10, 20, 40, 80, 320)
 RANKS = (3, 6, 12, 24)
@@ -103,8 +103,8 @@ def knobs_of(file: SceneFile, study: Study) -> tuple[Knob, ...]:
     if isinstance(scene, PartScene):
         found += _of_a_part(scene)
     found += [*_of_harmonics(scene)]
-    found.append(_numbers("newton", "solver.tolerance", NEWTON))
-    found.append(_numbers("krylov", "solver.krylov", KRYLOV))
+    found.append(_numbers("newton", "solver.tolerance", NEWTON, wears=False))
+    found.append(_numbers("krylov", "solver.krylov", KRYLOV, wears=False))
     if scene.response.method == "natural":
         settings = tuple(Setting(n, (f"response.points={n}",)) for n in POINTS)
         found.append(Knob("points", settings, wears=False, refined=False))
@@ -147,21 +147,21 @@ def _of_harmonics(scene: Scene) -> list[Knob]:
     first = 0 if 0 in needed or scene.harmonics.automatic else 1
     more = ("harmonics.samples=128",) if scene.harmonics.samples < 128 else ()
     kept = tuple(Setting(top, (f"harmonics.kept={list(range(first, top + 1))}", *more)) for top in tops)
-    found = [Knob("harmonics", kept)] if len(kept) > 1 else []
+    found = [Knob("harmonics", kept, wears=False)] if len(kept) > 1 else []
     if hasattr(law.load(scene.contact.law), "located"):
         top = max(scene.harmonics.kept, default=1)
         sampled = tuple(
             Setting(n, (f"harmonics.samples={n}", 'harmonics.transitions="sampled"')) for n in SAMPLES if n > 2 * top
         )
         located = Setting(float("nan"), ("harmonics.samples=256", 'harmonics.transitions="located"'))
-        found.append(Knob("samples", (*sampled, located)))
+        found.append(Knob("samples", (*sampled, located), wears=False))
     if scene.contact.components == ("t1", "t2", "n") and scene.contact.law == "jenkins":
         common = ("harmonics.samples=256", 'harmonics.transitions="sampled"')
         names = ("jenkins", "coulomb_planar")  # directions that know nothing of each other, or one planar slider
         laws = tuple(Setting(i, (f'contact.law="{name}"', *common)) for i, name in enumerate(names))
-        found.append(Knob("friction", laws, tunable=False))
+        found.append(Knob("friction", laws, tunable=False, wears=False))
     return found
 
 
-def _numbers(name: str, key: str, values: tuple[float, ...]) -> Knob:
-    return Knob(name, tuple(Setting(1 / value, (f"{key}={value:g}",)) for value in values))
+def _numbers(name: str, key: str, values: tuple[float, ...], wears: bool = True) -> Knob:
+    return Knob(name, tuple(Setting(1 / value, (f"{key}={value:g}",)) for value in values), wears=wears)

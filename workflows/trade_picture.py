@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from workflows.style import GREY, INK, STYLE
 from workflows.trade_table import NAMES, QUANTITIES, Trade, pareto
@@ -29,9 +30,11 @@ def picture(trade: Trade) -> Figure:
             front = [row for row in pareto(trade.rows, quantity) if not row.reference]
             at = [max(abs(row.errors[quantity] or 0.0), FLOOR) for row in front]
             pane.plot([row.seconds for row in front], at, color=INK, linewidth=0.8, zorder=0)
+            pane.set_xscale("log")  # before its formatter
             pane.axhline(0.01, color=GREY, linestyle=":", linewidth=1)
+            pane.xaxis.set_minor_formatter(NullFormatter())
             name = NAMES[QUANTITIES.index(quantity)]
-            pane.set(xscale="log", yscale="log", xlabel="seconds of one processor", title=f"{trade.scene}: {name}")
+            pane.set(yscale="log", xlabel="seconds of one processor", title=f"{trade.scene}: {name}")
         panes[0].set_ylabel("relative error against the knob's reference")
         panes[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
     return figure
