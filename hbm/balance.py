@@ -9,8 +9,10 @@ Source  design of tribodyn; x_lin and G in hbm.compliance; f_c from a contact la
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+import scipy.linalg as sla
 
 from hbm import law as contact_law
 from hbm.compliance import CompliancePoint, ContactCompliance
@@ -229,8 +231,8 @@ class Linearisation:
         self._dg = np.ascontiguousarray(dg[self.active])
         self._shape = (n_pair * n_comp, n_coeff)
         self._balance = balance
-        self._omega = state.omega
-        self._product = balance.at(state.omega).jacobian_product(self.rows)
+        self._point = balance.at(state.omega)
+        self._product = self._point.jacobian_product(self.rows)
 
     def departure_slope(self, direction: np.ndarray) -> np.ndarray:
         """dg/dx . direction: (n_contact, n_coeff)."""
@@ -247,6 +249,42 @@ class Linearisation:
         """(I - G dg/dx) d on the rows of active pairs, d (n_active_rows, n_coeff)."""
         return d - self._product(self._g_slope(d))
 
+    def precondition(self, d: np.ndarray) -> np.ndarray:
+        """An approximate solution of (I - G dg/dx) p = d on the rows of active pairs: G by its coarse shapes alone.
+
+        With G ~ U A U^T the inverse is I + U (I - A U^T D U)^-1 A U^T D, D = dg/dx (Woodbury).
+        """
+        if self._coarse is None:
+            return d
+        u, a, factor = self._coarse
+        inner = a @ (u.T @ self._g_slope(d)).ravel()
+        return d + u @ sla.lu_solve(factor, inner, check_finite=False).reshape(u.shape[1], -1)
+
+    @cached_property
+    def _coarse(self) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]] | None:
+        """U (n_active_rows, r), A and the factors of I - A U^T D U, both (r n_coeff, r n_coeff); None where r = 0."""
+        c, basis = self._balance.compliance, self._balance.basis
+        r, m = c.coarse.shape[1], basis.n_coeff
+        if r == 0:
+            return None
+        root = np.sqrt(c.k[self.rows])[:, None]
+        u = np.divide(c.coarse[self.rows], root, out=np.zeros((len(self.rows), r)), where=root > 0)
+        a = np.zeros((r, m, r, m))
+        for h, amplitude in zip(basis.harmonics, self._point.coarse, strict=True):  # acts on X_h = a_h - i b_h
+            cosine, *sine = np.flatnonzero(basis.order == h)
+            a[:, cosine, :, cosine] = amplitude.real
+            for column in sine:
+                a[:, column, :, column] = amplitude.real
+                a[:, cosine, :, column] = amplitude.imag
+                a[:, column, :, cosine] = -amplitude.imag
+        a = a.reshape(r * m, r * m)
+        n, n_comp = len(self.active), len(self.rows) // len(self.active)
+        single = u.astype(np.float32)
+        d = self._dg.reshape(n, n_comp, m, n_comp, m).transpose(0, 1, 2, 4, 3).astype(np.float32, order="C")
+        through = np.matmul(d.reshape(n, -1, n_comp), single.reshape(n, n_comp, r)).reshape(n * n_comp, -1)
+        projected = (single.T @ through).reshape(r, m, m, r).transpose(0, 1, 3, 2).reshape(r * m, r * m)
+        return u, a, sla.lu_factor(np.eye(r * m) - a @ projected, check_finite=False)
+
     def spread(self, d: np.ndarray, rhs: np.ndarray) -> np.ndarray:
         """The solution of (I - G dg/dx) d = rhs in all rows (n_contact, n_coeff) from that in the active rows."""
         if len(self.rows) == self._shape[0]:
@@ -255,7 +293,7 @@ class Linearisation:
             return rhs.copy()
         g = np.zeros(self._shape)
         g[self.rows] = self._g_slope(d)
-        full = rhs + self._balance.at(self._omega).apply(g)
+        full = rhs + self._point.apply(g)
         full[self.rows] = d
         return full
 
@@ -268,14 +306,18 @@ class Linearisation:
             return rhs.copy(), 0, 0.0
         shape = (len(self.rows), self._shape[1])
         d, spent, reached = gmres(
-            lambda v: self.product(v.reshape(shape)).ravel(), rhs[self.rows].ravel(), tolerance, max_products
+            lambda v: self.product(v.reshape(shape)).ravel(),
+            rhs[self.rows].ravel(),
+            tolerance,
+            max_products,
+            lambda v: self.precondition(v.reshape(shape)).ravel(),
         )
         return self.spread(d.reshape(shape), rhs), spent, reached
 
     def dense(self) -> np.ndarray:
         """The Jacobian as a matrix (n_contact * n_coeff, same), column by column; for checks and as fallback."""
         n = self._shape[0] * self._shape[1]
-        point = self._balance.at(self._omega)
+        point = self._point
         eye = np.eye(n).reshape(n, *self._shape)
         columns = [(e - point.apply(self.departure_slope(e))).ravel() for e in eye]
         return np.stack(columns, axis=1)

@@ -9,11 +9,15 @@ import numpy as np
 
 
 def gmres(
-    product: Callable[[np.ndarray], np.ndarray], b: np.ndarray, tolerance: float, max_products: int
+    product: Callable[[np.ndarray], np.ndarray],
+    b: np.ndarray,
+    tolerance: float,
+    max_products: int,
+    precondition: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> tuple[np.ndarray, int, float]:
     """Solve A x = b by GMRES without restart, orthogonalised twice.
 
-    product : A times a vector (n,)
+    product : A times a vector (n,); precondition : an approximate inverse of A, applied from the right
     Returns x, products spent, relative residual reached
     Source  Saad and Schultz 1986
     """
@@ -29,7 +33,7 @@ def gmres(
     rhs[0] = beta
     k = 0
     for k in range(1, size + 1):
-        w = product(v[k - 1])
+        w = product(v[k - 1] if precondition is None else precondition(v[k - 1]))
         span = v[:k]
         coefficients = span @ w
         w = w - coefficients @ span
@@ -50,7 +54,8 @@ def gmres(
     y = np.zeros(k)
     for i in range(k - 1, -1, -1):
         y[i] = (rhs[i] - h[i, i + 1 : k] @ y[i + 1 :]) / h[i, i]
-    return y @ v[:k], k, abs(rhs[k]) / beta
+    x = y @ v[:k]
+    return x if precondition is None else precondition(x), k, abs(rhs[k]) / beta
 
 
 @numba.njit(cache=True)

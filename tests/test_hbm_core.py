@@ -9,10 +9,11 @@ import scipy.linalg as sla
 from fem.system import SecondOrderSystem
 from hbm import error_controlled_rule, newton, thesis_rule, wear_law
 from hbm.balance import HarmonicBalance
-from hbm.compliance import ContactCompliance, SingularStuckSystem
+from hbm.compliance import ContactCompliance
 from hbm.continuation import natural
 from hbm.evolution import Duty, WearProblem, assess
 from hbm.excitation import Excitation
+from hbm.expansion import SingularStuckSystem
 from hbm.harmonics import HarmonicBasis
 from hbm.law import ContactParameters
 from hbm.newton import NewtonOptions

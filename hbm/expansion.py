@@ -1,0 +1,193 @@
+"""Dynamic compliance of one stuck system between its ports, expanded in low modes and powers of s = i h w.
+
+The contact springs, stuck and closed, are part of the linear system: K_s = K + B^T k B, so that it depends neither on
+the load nor on wear. Its lowest modes Phi carry the dynamics; the rest is expanded in powers of s:
+
+    D(s)^-1 = W(s) + L(s) S(s)^-1 L'(s),   W(s) = sum_k s^k W_k,   W_0 = K_s^-1 - Phi Lambda^-1 Phi^H,
+    W_k = -W_0 (C W_(k-1) + M W_(k-2)),    L(s) = (I - s W(s) C) Phi,
+    S(s) = Lambda + s C_m + s^2 - s^2 Phi^H C W(s) C Phi,
+
+which holds for any Hermitian damping matrix; the error falls like (|s| / omega_next)^order and is measured against a
+direct solve. What s multiplies is small beside W_0 and Phi: single precision keeps it exact enough.
+Source  block elimination of modal coordinates (ours); static correction of truncated modes as in MacNeal 1971.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg as sla
+
+from fem.system import SecondOrderSystem
+
+RESOLUTION = 5e-10  # relative error allowed in the expansion at the highest frequency asked for
+ROUNDING = 1e-7  # largest error that may be rounding
+CANDIDATES = ((24, 3), (48, 3), (96, 3), (96, 4), (192, 4), (192, 6))  # modes and powers of s tried in turn
+ALL_MODES_BELOW = 1500  # coordinates up to which all modes are computed at once
+
+
+class SingularStuckSystem(ValueError):
+    """The structure can move as a rigid body even with every contact stuck."""
+
+
+class Expansion:
+    """D(s)^-1 between ports (contacts, loads, outputs) of one stuck system; see the module text.
+
+    system : dense, b : (n_contact, n) contact map, stiffness : (n_contact,) stuck contact springs [N/m]
+    ports : (n_port, n) rows; contact rows first
+    s_max : largest h w that will be asked for [rad/s]
+    w0 : (n_port, n_port) W_0; higher : (order - 1, n_port, n_port) W_k s_max^k / unit, single precision
+    b : (n_port, m) modes; e : (order - 2, n_port, m) W_k C Phi s_max^(k+1) at the ports, single precision
+    error : relative, at s_max, against a direct solve
+    Raises  SingularStuckSystem
+    """
+
+    def __init__(
+        self, system: SecondOrderSystem, b: np.ndarray, stiffness: np.ndarray, ports: np.ndarray, s_max: float
+    ):
+        self.n_port = len(ports)
+        self.s_unit = s_max or 1.0
+        mass = np.asarray(system.mass)
+        damping = np.zeros_like(mass) if system.damping is None else np.asarray(system.damping)
+        stuck = np.asarray(system.stiffness) + b.conj().T @ (stiffness[:, None] * b)
+        stuck = 0.5 * (stuck + stuck.conj().T)
+        self._system = (mass, damping, stuck)
+        self._ports = ports
+        n = len(mass)
+        loose = SingularStuckSystem(
+            "the part can move as a rigid body even with all contacts stuck: clamp it, add a spring, "
+            "or raise the contact stiffness"
+        )
+        try:
+            factor = sla.cho_factor(stuck)
+        except np.linalg.LinAlgError:
+            raise loose from None
+        lam, phi = sla.eigh(stuck, mass, subset_by_index=None if n < ALL_MODES_BELOW else (0, CANDIDATES[-1][0] - 1))
+        # a rigid mode comes out of the eigenvalue problem as rounding of the stiffest ones, of either sign
+        if lam[0] <= n * np.finfo(float).eps * np.max(np.diag(stuck).real / np.diag(mass).real):
+            raise loose
+        before = np.inf
+        last = (len(lam), 1 if len(lam) == n else 8)
+        for m, order in (*(c for c in CANDIDATES if c[0] < len(lam)), last):
+            self._build(lam[:m], phi[:, :m], factor, order)
+            self.error = self._measure_error(1j * s_max)
+            # near a resonance rounding of the direct solve itself is what remains: more modes would not help
+            if self.error <= RESOLUTION or 0.5 * before < self.error < ROUNDING:
+                break
+            before = self.error
+        del self._system, self._ports
+
+    def _build(self, lam: np.ndarray, phi: np.ndarray, factor: tuple[np.ndarray, bool], order: int) -> None:
+        mass, damping, _ = self._system
+        cphi = damping @ phi
+        full = len(lam) == len(mass)
+
+        def quasi_static(y: np.ndarray) -> np.ndarray:  # W_0 y
+            return sla.cho_solve(factor, y, check_finite=False) - phi @ ((phi.conj().T @ y) / lam[:, None])
+
+        p, ports = self.n_port, self._ports
+        right = np.concatenate([ports.conj().T, cphi], axis=1)
+        y_before, y = np.zeros_like(right), np.zeros_like(right) if full else quasi_static(right)
+        single = np.complex64 if np.iscomplexobj(y) else np.float32
+        self.order = order
+        self.w0 = ports @ y[:, :p]
+        self.b = ports @ phi  # (port, mode)
+        # the largest compliance, so that no unit of length or force leaves the range of single precision
+        self.unit = float(np.max(np.diag(self.w0).real + (np.abs(self.b) ** 2 / lam).sum(axis=1))) or 1.0
+        self.higher = np.empty((order - 1, p, p), single)
+        self.e = np.empty((max(order - 2, 0), p, len(lam)), single)
+        self.t = np.empty((max(order - 2, 0), len(lam), len(lam)), y.dtype)
+        for k in range(order - 1):
+            if k < len(self.e):
+                self.e[k] = ports @ y[:, p:] * self.s_unit ** (k + 1)
+                self.t[k] = cphi.conj().T @ y[:, p:]
+            y_before, y = y, -quasi_static(damping @ y + mass @ y_before)
+            self.higher[k] = ports @ y[:, :p] * (self.s_unit ** (k + 1) / self.unit)
+        self.lam = lam
+        self.c = phi.conj().T @ cphi
+        self.b_single = self.b.astype(single)
+
+    def at(self, s: complex) -> PortCompliance:
+        """The compliance at s = i h w."""
+        core = s * self.c
+        for k, t in enumerate(self.t):
+            core = core - s ** (k + 2) * t
+        core = core + np.diag(self.lam + s * s)
+        return PortCompliance(self, s, core)
+
+    def _measure_error(self, s: complex) -> float:
+        mass, damping, stuck = self._system
+        probe = np.random.default_rng(0).normal(size=(self.n_port, 2))
+        exact = self._ports @ np.linalg.solve(stuck + s * damping + s * s * mass, self._ports.conj().T @ probe)
+        return float(np.abs(self.at(s).apply(probe) - exact).max() / np.abs(exact).max())
+
+
+@dataclass(frozen=True)
+class PortCompliance:
+    """D(s)^-1 between ports at one s: sum_k s^k W_k + L core^-1 L', with core = S(s); ratio = s / s_max."""
+
+    expansion: Expansion
+    s: complex
+    core: np.ndarray
+
+    @property
+    def ratio(self) -> complex:
+        """s over the largest one asked for."""
+        return self.s / self.expansion.s_unit
+
+    @cached_property
+    def _factor(self) -> tuple[np.ndarray, np.ndarray]:
+        lu, pivots, _ = sla.lapack.zgetrf(self.core)
+        return lu, pivots
+
+    def through_core(self, z: np.ndarray) -> np.ndarray:
+        """S(s)^-1 z for modal forces z (n_mode, ...)."""
+        if self.s == 0:
+            return (z.T / self.expansion.lam).T
+        solution: np.ndarray = sla.lapack.zgetrs(*self._factor, z)[0]
+        return solution.reshape(z.shape)
+
+    def apply(self, force: np.ndarray, columns: slice = slice(None), rows: slice = slice(None)) -> np.ndarray:
+        """Displacement of the ports in `rows` under forces (n, ...) at the ports in `columns`."""
+        x, ratio = self.expansion, self.ratio
+        z = _product(x.b[columns].conj().T, force).astype(complex)
+        for k, e in enumerate(x.e, start=1):
+            z -= ratio**k * _product(e[columns].conj().T, force)
+        y = self.through_core(z)
+        out = _product(x.b[rows], y) + _product(x.w0[rows, columns], force)
+        for k, e in enumerate(x.e, start=1):
+            out -= ratio**k * _product(e[rows], y)
+        for k, w in enumerate(x.higher, start=1):
+            out += x.unit * ratio**k * _product(w[rows, columns], force)
+        return out
+
+    def slope(self, force: np.ndarray) -> np.ndarray:
+        """d (apply) / d s of all ports under forces (n_port,)."""
+        x, s, ratio = self.expansion, self.s, self.ratio
+        z, dz = _product(x.b.conj().T, force).astype(complex), np.zeros(len(x.lam), complex)
+        d_core = 2 * s * np.eye(len(x.lam)) + x.c
+        for k, (e, t) in enumerate(zip(x.e, x.t, strict=True), start=1):
+            part = _product(e.conj().T, force)
+            z -= ratio**k * part
+            dz -= k * ratio ** (k - 1) / x.s_unit * part
+            d_core = d_core - (k + 1) * s**k * t
+        y = self.through_core(z)
+        dy = self.through_core(dz - d_core @ y)
+        out = _product(x.b, dy)
+        for k, e in enumerate(x.e, start=1):
+            out -= _product(e, ratio**k * dy + k * ratio ** (k - 1) / x.s_unit * y)
+        for k, w in enumerate(x.higher, start=1):
+            out += x.unit * k * ratio ** (k - 1) / x.s_unit * _product(w, force)
+        return out
+
+
+def _product(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """matrix @ vector in the precision of the matrix, without widening a real matrix to complex."""
+    if np.iscomplexobj(matrix):
+        return matrix @ vector.astype(matrix.dtype)
+    if not np.iscomplexobj(vector):
+        return matrix @ vector.astype(matrix.dtype)
+    real, imag = np.ascontiguousarray(vector.real, matrix.dtype), np.ascontiguousarray(vector.imag, matrix.dtype)
+    return (matrix @ real).astype(float) + 1j * (matrix @ imag)
