@@ -15,7 +15,7 @@ from hbm.expansion import Expansion, PortCompliance
 from hbm.harmonics import HarmonicBasis
 from reduction.model import ReducedModel
 
-COARSE = 0.05  # share of the contact flexibility from which on a mode counts in the preconditioner
+COARSE = 0.1  # share of the contact flexibility from which on a mode counts in the preconditioner
 
 
 class ContactCompliance:
@@ -135,7 +135,8 @@ class CompliancePoint:
         out = np.zeros((len(range(*rows.indices(first.n_port))), force.shape[1]), complex)
         for (_, positions), ports in zip(self._c.groups, self._ports, strict=True):
             for p, port in zip(positions, ports, strict=True):
-                out[:, p] = port.apply(force[:, p], columns, rows)
+                if force[:, p].any():
+                    out[:, p] = port.apply(force[:, p], columns, rows)
         return out
 
     def apply(self, g: np.ndarray) -> np.ndarray:

@@ -7,6 +7,8 @@ from collections.abc import Callable
 import numba
 import numpy as np
 
+FEW = 16  # products for which room is made at first
+
 
 def gmres(
     product: Callable[[np.ndarray], np.ndarray],
@@ -25,8 +27,8 @@ def gmres(
     if beta == 0.0:
         return np.zeros_like(b), 0, 0.0
     size = min(max_products, len(b))
-    v = np.empty((size + 1, len(b)))
-    h = np.zeros((size + 1, size))
+    v = np.empty((min(size, FEW) + 1, len(b)))
+    h = np.zeros((size, size))
     v[0] = b / beta
     cs, sn = np.zeros(size), np.zeros(size)
     rhs = np.zeros(size + 1)
@@ -48,6 +50,8 @@ def gmres(
             break
         if abs(rhs[k]) <= tolerance * beta or norm <= 1e-14 * radius:
             break
+        if k == len(v):
+            v = np.concatenate([v, np.empty((min(k, size + 1 - k), len(b)))])
         v[k] = w / norm
     if k == 0:
         return np.zeros_like(b), 1, 1.0

@@ -58,7 +58,7 @@ def solve(balance: HarmonicBalance, omega: float, start: np.ndarray, options: Ne
     state = balance.evaluate(omega, start)
     error = relative_residual(state, x_lin)
     history = [error]
-    forcing = 1e-2
+    forcing = 1e-3
     products = 0
     for step in range(1, options.max_steps + 1):
         if error <= options.tolerance:
