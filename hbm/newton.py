@@ -9,6 +9,8 @@ import numpy as np
 from hbm.balance import HarmonicBalance, State
 from hbm.branch import CONVERGED
 
+SHORTEST = 1e-2  # share of a Newton step that is tried
+
 
 @dataclass(frozen=True)
 class NewtonOptions:
@@ -84,17 +86,21 @@ def solve(balance: HarmonicBalance, omega: float, start: np.ndarray, options: Ne
 def _search(
     balance: HarmonicBalance, omega: float, state: State, direction: np.ndarray, error: float, x_lin: np.ndarray
 ) -> tuple[State, float]:
-    """Backtrack until the residual falls; the derivative has kinks, so the best trial is kept if none falls enough."""
+    """Backtrack until the residual falls; the derivative has kinks, so the best trial is kept if none falls enough.
+
+    Source  parabola through |R|^2, its slope and the last trial, Kelley 1995, 8.3.1
+    """
     best, best_error = state, error
     length = 1.0
-    for _ in range(12):
+    while length > SHORTEST:
         trial = balance.evaluate(omega, state.x + length * direction.reshape(state.x.shape))
         trial_error = relative_residual(trial, x_lin)
         if trial_error < best_error:
             best, best_error = trial, trial_error
         if trial_error <= (1 - 0.1 * length) * error:
             return trial, trial_error
-        length *= 0.5
+        bend = (trial_error / error) ** 2 - 1 + 2 * length  # |R|^2 / |R_0|^2 = 1 - 2 l + bend (l / length)^2
+        length *= float(np.clip(length / bend, 0.25, 0.5)) if bend > 0 else 0.5
     return best, best_error
 
 
