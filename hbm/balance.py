@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import scipy.linalg as sla
 
 from hbm import law as contact_law
 from hbm.compliance import CompliancePoint, ContactCompliance
@@ -256,13 +255,12 @@ class Linearisation:
         """
         if self._coarse is None:
             return d
-        u, a, factor = self._coarse
-        inner = a @ (u.T @ self._g_slope(d)).ravel()
-        return d + u @ sla.lu_solve(factor, inner, check_finite=False).reshape(u.shape[1], -1)
+        u, inner = self._coarse
+        return d + u @ (inner @ (u.T @ self._g_slope(d)).ravel()).reshape(u.shape[1], -1)
 
     @cached_property
-    def _coarse(self) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]] | None:
-        """U (n_active_rows, r), A and the factors of I - A U^T D U, both (r n_coeff, r n_coeff); None where r = 0."""
+    def _coarse(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """U (n_active_rows, r) and (I - A U^T D U)^-1 A (r n_coeff, r n_coeff); None where r = 0 or it is singular."""
         c, basis = self._balance.compliance, self._balance.basis
         r, m = c.coarse.shape[1], basis.n_coeff
         if r == 0:
@@ -283,7 +281,10 @@ class Linearisation:
         d = self._dg.reshape(n, n_comp, m, n_comp, m).transpose(0, 1, 2, 4, 3).astype(np.float32, order="C")
         through = np.matmul(d.reshape(n, -1, n_comp), single.reshape(n, n_comp, r)).reshape(n * n_comp, -1)
         projected = (single.T @ through).reshape(r, m, m, r).transpose(0, 1, 3, 2).reshape(r * m, r * m)
-        return u, a, sla.lu_factor(np.eye(r * m) - a @ projected, check_finite=False)
+        try:
+            return u, np.linalg.solve(np.eye(r * m) - a @ projected, a)
+        except np.linalg.LinAlgError:
+            return None
 
     def spread(self, d: np.ndarray, rhs: np.ndarray) -> np.ndarray:
         """The solution of (I - G dg/dx) d = rhs in all rows (n_contact, n_coeff) from that in the active rows."""

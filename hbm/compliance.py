@@ -10,8 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
+from hbm import all_harmonics
 from hbm.excitation import Excitation
-from hbm.expansion import Expansion, PortCompliance
+from hbm.expansion import Expansion
 from hbm.harmonics import HarmonicBasis
 from reduction.model import ReducedModel
 
@@ -116,11 +117,11 @@ class CompliancePoint:
     """
 
     def __init__(self, compliance: ContactCompliance, omega: float):
-        self._c = compliance
+        self.compliance = compliance
         self.omega = omega
         basis = compliance.basis
         self._harmonics = np.asarray(basis.harmonics, float)
-        self._ports = [
+        self.ports = [
             [expansion.at(1j * basis.harmonics[p] * omega) for p in positions]
             for expansion, positions in compliance.groups
         ]
@@ -131,9 +132,9 @@ class CompliancePoint:
         self.x_lin = x if compliance.base is None else x - compliance.base
 
     def _through_ports(self, force: np.ndarray, columns: slice = slice(None), rows: slice = slice(None)) -> np.ndarray:
-        first = self._c.groups[0][0]
+        first = self.compliance.groups[0][0]
         out = np.zeros((len(range(*rows.indices(first.n_port))), force.shape[1]), complex)
-        for (_, positions), ports in zip(self._c.groups, self._ports, strict=True):
+        for (_, positions), ports in zip(self.compliance.groups, self.ports, strict=True):
             for p, port in zip(positions, ports, strict=True):
                 if force[:, p].any():
                     out[:, p] = port.apply(force[:, p], columns, rows)
@@ -141,69 +142,61 @@ class CompliancePoint:
 
     def apply(self, g: np.ndarray) -> np.ndarray:
         """G g: (n_contact, n_coeff) relative displacement [m] under contact forces g (n_contact, n_coeff) [N]."""
-        if self._c.shared_real:
+        if self.compliance.shared_real:
             return self._apply_shared_real(g)
-        contacts = slice(0, self._c.n_contact)
-        return self._c.basis.to_real(self._through_ports(self._c.basis.to_complex(g), contacts, contacts))
+        contacts = slice(0, self.compliance.n_contact)
+        return self.compliance.basis.to_real(self._through_ports(self.compliance.basis.to_complex(g), contacts, contacts))
 
     def _apply_shared_real(self, g: np.ndarray) -> np.ndarray:
         """The same for one real system: every matrix meets all harmonics in one real product."""
-        n = self._c.n_contact
-        x = self._c.groups[0][0]
-        f = np.ascontiguousarray(g.T)
-        single = f.astype(np.float32)
-        moved = f @ x.w0[:n, :n]
-        z = f @ x.b[:n]
-        for k, e in enumerate(x.e, start=1):
-            z -= self._times_power(single @ e[:n], k)
-        y = _through_core(self._c.basis, self._ports[0], z)
-        moved += y @ x.b[:n].T
-        single_y = y.astype(np.float32)
-        for k, e in enumerate(x.e, start=1):
-            moved -= self._times_power(single_y @ e[:n].T, k)
-        for k, w in enumerate(x.higher, start=1):
-            moved += x.unit * self._times_power(single @ w[:n, :n], k)
-        return np.ascontiguousarray(moved.T)
+        n, x = self.compliance.n_contact, self.compliance.groups[0][0]
+        rows = np.ascontiguousarray(g.T)
+        moved = rows @ x.columns[:n]
+        higher = rows.astype(np.float32) @ x.single[:n]
+        y = self.modal(moved[:, x.n_port :], len(x.e))
+        static = self.compliance.basis.has_static
+        return all_harmonics.gathered(y @ x.left, moved, higher, n, x.n_port, x.unit, self._ratio, static)
 
-    def _times_power(self, rows: np.ndarray, k: int) -> np.ndarray:
-        """(i h w / s_max)^k times the amplitudes a - i b of rows [x_0, a_1, b_1, ...]; double precision."""
-        ratio = (self._c.basis.order * (self.omega / self._c.groups[0][0].s_unit))[:, None] ** k
-        s = int(self._c.basis.has_static)
-        if k % 2 == 0:
-            return (-1) ** (k // 2) * ratio * rows
-        out = np.zeros(rows.shape)
-        sign = (-1) ** (k // 2)
-        out[s::2] = sign * ratio[s::2] * rows[s + 1 :: 2]
-        out[s + 1 :: 2] = -sign * ratio[s::2] * rows[s::2]
-        return out
+    @cached_property
+    def _ratio(self) -> np.ndarray:
+        """(n_dynamic,) h w over the largest one asked for."""
+        return self.omega / self.compliance.groups[0][0].s_unit * np.array(self.compliance.basis.dynamic)
+
+    def modal(self, forces: np.ndarray, n_e: int) -> np.ndarray:
+        """Modal displacements (n_coeff, m + n_e m) from modal forces, of one real system; see `all_harmonics`."""
+        has_static = self.compliance.basis.has_static
+        z = all_harmonics.modal_forces(forces, n_e, self._ratio, has_static)
+        for amplitude, port in zip(z, self.ports[0], strict=True):
+            amplitude[:] = port.through_core(amplitude)
+        return all_harmonics.modal_rows(z, n_e, self._ratio, has_static)
 
     def outputs(self, g: np.ndarray) -> np.ndarray:
         """(n_output, n_coeff) outputs under contact forces g alone [m]."""
-        c = self._c
+        c = self.compliance
         contacts, outputs = slice(0, c.n_contact), slice(c.n_contact + c.n_load, None)
         return c.basis.to_real(self._through_ports(c.basis.to_complex(g), contacts, outputs))
 
     def slope(self, g: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         """d / d omega of contact displacement and outputs under g alone, or under the excitation where g is None."""
-        c = self._c
+        c = self.compliance
         force = c.port_force(g)
         moved = np.zeros_like(force)
-        for (_, positions), ports in zip(c.groups, self._ports, strict=True):
+        for (_, positions), ports in zip(c.groups, self.ports, strict=True):
             for p, port in zip(positions, ports, strict=True):
                 moved[:, p] = 1j * self._harmonics[p] * port.slope(force[:, p])
         return c.basis.to_real(moved[: c.n_contact]), c.basis.to_real(moved[c.n_contact + c.n_load :])
 
     def jacobian_product(self, rows: np.ndarray) -> JacobianProduct:
         """The product with G restricted to contact rows (active ones), to the accuracy a Newton direction needs."""
-        return JacobianProduct(self._c, self._ports, rows)
+        return JacobianProduct(self, rows)
 
     @cached_property
     def coarse(self) -> list[np.ndarray]:
         """Q^T sqrt(k) G_h sqrt(k) Q of each harmonic, by its modes alone; Q from `ContactCompliance.coarse`."""
-        c = self._c
+        c = self.compliance
         weighted = c.coarse.T * np.sqrt(c.k)
         found: list[np.ndarray] = [np.empty(0)] * len(c.basis.harmonics)
-        for (expansion, positions), ports in zip(c.groups, self._ports, strict=True):
+        for (expansion, positions), ports in zip(c.groups, self.ports, strict=True):
             modes = weighted @ expansion.b[: c.n_contact]
             for p, port in zip(positions, ports, strict=True):
                 found[p] = modes @ port.through_core(modes.conj().T)
@@ -213,32 +206,23 @@ class CompliancePoint:
 class JacobianProduct:
     """G restricted to active rows, as exact as a Newton direction needs: W_0 and modes, single precision."""
 
-    def __init__(self, compliance: ContactCompliance, ports: list[list[PortCompliance]], rows: np.ndarray):
-        self._basis = compliance.basis
-        self._shared_real = compliance.shared_real
-        self._parts = compliance.on_rows(rows)
-        self._positions = [positions for _, positions in compliance.groups]
-        self._ports = ports
+    def __init__(self, point: CompliancePoint, rows: np.ndarray):
+        self._point = point
+        self._compliance = point.compliance
+        self._parts = self._compliance.on_rows(rows)
 
     def __call__(self, d: np.ndarray) -> np.ndarray:
         """G d for d (n_active, n_coeff)."""
-        if self._shared_real:
+        c = self._compliance
+        if c.shared_real:
             w0, b = self._parts[0]
             rows = d.T.astype(np.float32, order="C")
-            y = _through_core(self._basis, self._ports[0], rows @ b)
-            return (rows @ w0 + y.astype(np.float32, order="C") @ b.T).T
-        force = self._basis.to_complex(d).astype(np.complex64)
+            y = self._point.modal(rows @ b, 0)
+            return (rows @ w0 + y.astype(np.float32) @ b.T).T
+        force = c.basis.to_complex(d).astype(np.complex64)
         moved = np.empty_like(force)
-        for (w0, b), ports, positions in zip(self._parts, self._ports, self._positions, strict=True):
+        for (w0, b), ports, (_, positions) in zip(self._parts, self._point.ports, c.groups, strict=True):
             for port, p in zip(ports, positions, strict=True):
                 f = force[:, p]
                 moved[:, p] = w0 @ f + b @ port.through_core(b.conj().T @ f)
-        return self._basis.to_real(moved)
-
-
-def _through_core(basis: HarmonicBasis, ports: list[PortCompliance], z: np.ndarray) -> np.ndarray:
-    """Modal displacements of modal forces z (n_coeff, n_mode) of one real system."""
-    amplitudes = basis.to_complex(z.T)
-    for i, port in enumerate(ports):
-        amplitudes[:, i] = port.through_core(amplitudes[:, i])
-    return basis.to_real(amplitudes).T
+        return c.basis.to_real(moved)

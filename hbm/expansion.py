@@ -38,8 +38,9 @@ class Expansion:
     system : dense, b : (n_contact, n) contact map, stiffness : (n_contact,) stuck contact springs [N/m]
     ports : (n_port, n) rows; contact rows first
     s_max : largest h w that will be asked for [rad/s]
-    w0 : (n_port, n_port) W_0; higher : (order - 1, n_port, n_port) W_k s_max^k / unit, single precision
-    b : (n_port, m) modes; e : (order - 2, n_port, m) W_k C Phi s_max^(k+1) at the ports, single precision
+    w0 : (n_port, n_port) W_0; b : (n_port, m) modes; e : (order - 2, n_port, m) W_k C Phi s_max^(k+1) at the ports,
+        all three views of `columns` = [w0, b, e_0, ...]
+    higher : order - 1 matrices (n_port, n_port) W_k s_max^k / unit, views of `single`, which holds them side by side
     error : relative, at s_max, against a direct solve
     Raises  SingularStuckSystem
     """
@@ -90,24 +91,28 @@ class Expansion:
         p, ports = self.n_port, self._ports
         right = np.concatenate([ports.conj().T, cphi], axis=1)
         y_before, y = np.zeros_like(right), np.zeros_like(right) if full else quasi_static(right)
-        single = np.complex64 if np.iscomplexobj(y) else np.float32
-        self.order = order
-        self.w0 = ports @ y[:, :p]
-        self.b = ports @ phi  # (port, mode)
+        self.order, self.n_mode, m = order, len(lam), len(lam)
+        n_e = max(order - 2, 0)
+        self.columns = np.empty((p, p + m * (1 + n_e)), y.dtype)
+        self.w0, self.b = self.columns[:, :p], self.columns[:, p : p + m]
+        self.e = [self.columns[:, p + m * (k + 1) : p + m * (k + 2)] for k in range(n_e)]
+        self.single = np.empty((p, p * (order - 1)), np.complex64 if np.iscomplexobj(y) else np.float32)
+        self.higher = [self.single[:, p * k : p * (k + 1)] for k in range(order - 1)]
+        self.t = np.empty((n_e, m, m), y.dtype)
+        self.w0[:] = ports @ y[:, :p]
+        self.b[:] = ports @ phi
         # the largest compliance, so that no unit of length or force leaves the range of single precision
         self.unit = float(np.max(np.diag(self.w0).real + (np.abs(self.b) ** 2 / lam).sum(axis=1))) or 1.0
-        self.higher = np.empty((order - 1, p, p), single)
-        self.e = np.empty((max(order - 2, 0), p, len(lam)), single)
-        self.t = np.empty((max(order - 2, 0), len(lam), len(lam)), y.dtype)
         for k in range(order - 1):
-            if k < len(self.e):
-                self.e[k] = ports @ y[:, p:] * self.s_unit ** (k + 1)
+            if k < n_e:
+                self.e[k][:] = ports @ y[:, p:] * self.s_unit ** (k + 1)
                 self.t[k] = cphi.conj().T @ y[:, p:]
             y_before, y = y, -quasi_static(damping @ y + mass @ y_before)
-            self.higher[k] = ports @ y[:, :p] * (self.s_unit ** (k + 1) / self.unit)
+            self.higher[k][:] = ports @ y[:, :p] * (self.s_unit ** (k + 1) / self.unit)
+        self.left = np.ascontiguousarray(self.columns[:, p:].T)
         self.lam = lam
         self.c = phi.conj().T @ cphi
-        self.b_single = self.b.astype(single)
+        self.b_single = self.b.astype(self.single.dtype)
 
     def at(self, s: complex) -> PortCompliance:
         """The compliance at s = i h w."""
