@@ -9,7 +9,8 @@ import numpy as np
 from hbm.balance import HarmonicBalance, State
 from hbm.branch import CONVERGED
 
-SHORTEST = 1e-2  # share of a Newton step that is tried
+VANISHING = 1e-6  # size of x, relative to the start, below which a solution counts as zero
+SHORTEST = 4e-4  # share of a Newton step that is tried
 
 
 @dataclass(frozen=True)
@@ -42,9 +43,9 @@ class Solution:
         return self.outcome == CONVERGED
 
 
-def relative_residual(state: State, x_lin: np.ndarray) -> float:
-    """|R| / max(|x|, |x_lin|), Euclidean; invariant to the units of length and force."""
-    scale = max(np.linalg.norm(state.x), np.linalg.norm(x_lin))
+def relative_residual(state: State, x_lin: np.ndarray, least: float = 0.0) -> float:
+    """|R| / max(|x|, |x_lin|, least), Euclidean; invariant to the units of length and force."""
+    scale = max(np.linalg.norm(state.x), np.linalg.norm(x_lin), least)
     return float(np.linalg.norm(state.residual) / scale) if scale > 0 else float(np.linalg.norm(state.residual))
 
 
@@ -58,7 +59,8 @@ def solve(balance: HarmonicBalance, omega: float, start: np.ndarray, options: Ne
     options = options or NewtonOptions()
     x_lin = balance.x_lin(omega)
     state = balance.evaluate(omega, start)
-    error = relative_residual(state, x_lin)
+    least = VANISHING * float(np.linalg.norm(start))
+    error = relative_residual(state, x_lin, least)
     history = [error]
     forcing = 1e-3
     products = 0
@@ -71,7 +73,7 @@ def solve(balance: HarmonicBalance, omega: float, start: np.ndarray, options: Ne
         products += spent
         if reached > max(10 * target, 0.5):  # Krylov stalled: the direct way
             direction = np.linalg.solve(linear.dense(), -state.residual.ravel()).reshape(state.residual.shape)
-        state, new_error = _search(balance, omega, state, direction, error, x_lin)
+        state, new_error = _search(balance, omega, state, direction, error, x_lin, least)
         history.append(new_error)
         if new_error >= error * (1 - 1e-10):
             if new_error <= options.tolerance:
@@ -84,7 +86,13 @@ def solve(balance: HarmonicBalance, omega: float, start: np.ndarray, options: Ne
 
 
 def _search(
-    balance: HarmonicBalance, omega: float, state: State, direction: np.ndarray, error: float, x_lin: np.ndarray
+    balance: HarmonicBalance,
+    omega: float,
+    state: State,
+    direction: np.ndarray,
+    error: float,
+    x_lin: np.ndarray,
+    least: float,
 ) -> tuple[State, float]:
     """Backtrack until the residual falls; the derivative has kinks, so the best trial is kept if none falls enough.
 
@@ -94,7 +102,7 @@ def _search(
     length = 1.0
     while length > SHORTEST:
         trial = balance.evaluate(omega, state.x + length * direction.reshape(state.x.shape))
-        trial_error = relative_residual(trial, x_lin)
+        trial_error = relative_residual(trial, x_lin, least)
         if trial_error < best_error:
             best, best_error = trial, trial_error
         if trial_error <= (1 - 0.1 * length) * error:
