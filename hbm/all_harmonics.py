@@ -1,6 +1,6 @@
 """Kernels for one real system that all harmonics share: coefficients are rows [x_0, a_1, b_1, ...] of real matrices.
 
-A row pair (a_h, b_h) is the amplitude a_h - i b_h; `ratio` is h w over the largest one asked for, one per harmonic >= 1.
+A row pair (a_h, b_h) is the amplitude a_h - i b_h; `ratio` is h w over the largest one asked for, of each h >= 1.
 """
 
 from __future__ import annotations

@@ -237,54 +237,63 @@ class Linearisation:
         """dg/dx . direction: (n_contact, n_coeff)."""
         out = np.zeros(self._shape)
         if len(self.rows):
-            out[self.rows] = self._g_slope(direction[self.rows])
+            out[self.rows] = self.g_slope(direction[self.rows])
         return out
 
-    def _g_slope(self, active_direction: np.ndarray) -> np.ndarray:
+    def g_slope(self, active_direction: np.ndarray) -> np.ndarray:
+        """dg/dx . direction on the rows of active pairs, both (n_active_rows, n_coeff)."""
         shape = active_direction.shape
         return np.matmul(self._dg, active_direction.reshape(len(self.active), -1, 1)).reshape(shape)
 
     def product(self, d: np.ndarray) -> np.ndarray:
         """(I - G dg/dx) d on the rows of active pairs, d (n_active_rows, n_coeff)."""
-        return d - self._product(self._g_slope(d))
+        return d - self._product(self.g_slope(d))
 
     def precondition(self, d: np.ndarray) -> np.ndarray:
-        """An approximate solution of (I - G dg/dx) p = d on the rows of active pairs: G by its coarse shapes alone.
-
-        With G ~ U A U^T the inverse is I + U (I - A U^T D U)^-1 A U^T D, D = dg/dx (Woodbury).
-        """
-        if self._coarse is None:
+        """An approximate solution of (I - G dg/dx) p = d on the rows of active pairs, by the coarse part of G."""
+        if self._coarse_inverse is None:
             return d
-        u, inner = self._coarse
-        return d + u @ (inner @ (u.T @ self._g_slope(d)).ravel()).reshape(u.shape[1], -1)
+        u, inverse = self._coarse_inverse
+        return d + u @ (inverse @ (u.T @ self.g_slope(d)).ravel()).reshape(u.shape[1], -1)
 
     @cached_property
-    def _coarse(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """U (n_active_rows, r) and (I - A U^T D U)^-1 A (r n_coeff, r n_coeff); None where r = 0 or it is singular."""
+    def _coarse_inverse(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """U and (I - A U^T D U)^-1 A; None where there is no coarse part or it is singular."""
+        if self.coarse is None:
+            return None
+        u, a, matrix = self.coarse
+        try:
+            return u, np.linalg.solve(matrix, a)
+        except np.linalg.LinAlgError:
+            return None
+
+    @cached_property
+    def coarse(self) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """U (n_active_rows, r) and A, I - A U^T D U (r n_coeff, r n_coeff), where G ~ U A U^T; None where r = 0.
+
+        With D = dg/dx the inverse of I - U A U^T D is I + U (I - A U^T D U)^-1 A U^T D (Woodbury).
+        """
         c, basis = self._balance.compliance, self._balance.basis
         r, m = c.coarse.shape[1], basis.n_coeff
         if r == 0:
             return None
         root = np.sqrt(c.k[self.rows])[:, None]
         u = np.divide(c.coarse[self.rows], root, out=np.zeros((len(self.rows), r)), where=root > 0)
-        a = np.zeros((r, m, r, m))
+        blocks = np.zeros((r, m, r, m))
         for h, amplitude in zip(basis.harmonics, self._point.coarse, strict=True):  # acts on X_h = a_h - i b_h
             cosine, *sine = np.flatnonzero(basis.order == h)
-            a[:, cosine, :, cosine] = amplitude.real
+            blocks[:, cosine, :, cosine] = amplitude.real
             for column in sine:
-                a[:, column, :, column] = amplitude.real
-                a[:, cosine, :, column] = amplitude.imag
-                a[:, column, :, cosine] = -amplitude.imag
-        a = a.reshape(r * m, r * m)
+                blocks[:, column, :, column] = amplitude.real
+                blocks[:, cosine, :, column] = amplitude.imag
+                blocks[:, column, :, cosine] = -amplitude.imag
+        a = blocks.reshape(r * m, r * m)
         n, n_comp = len(self.active), len(self.rows) // len(self.active)
         single = u.astype(np.float32)
         d = self._dg.reshape(n, n_comp, m, n_comp, m).transpose(0, 1, 2, 4, 3).astype(np.float32, order="C")
         through = np.matmul(d.reshape(n, -1, n_comp), single.reshape(n, n_comp, r)).reshape(n * n_comp, -1)
         projected = (single.T @ through).reshape(r, m, m, r).transpose(0, 1, 3, 2).reshape(r * m, r * m)
-        try:
-            return u, np.linalg.solve(np.eye(r * m) - a @ projected, a)
-        except np.linalg.LinAlgError:
-            return None
+        return u, a, np.eye(r * m) - a @ projected
 
     def spread(self, d: np.ndarray, rhs: np.ndarray) -> np.ndarray:
         """The solution of (I - G dg/dx) d = rhs in all rows (n_contact, n_coeff) from that in the active rows."""
@@ -293,7 +302,7 @@ class Linearisation:
         if len(self.rows) == 0:
             return rhs.copy()
         g = np.zeros(self._shape)
-        g[self.rows] = self._g_slope(d)
+        g[self.rows] = self.g_slope(d)
         full = rhs + self._point.apply(g)
         full[self.rows] = d
         return full

@@ -65,6 +65,7 @@ class ContactCompliance:
         other = object.__new__(ContactCompliance)
         other.__dict__.update(self.__dict__)
         other.basis = basis
+        other._active = None
         other._load = self._load[:, [old.index(h) for h in basis.harmonics]]
         other.base = None if self.base is None else self.basis.transfer(self.base, basis)
         kept = [(e, [basis.harmonics.index(old[p]) for p in ps if old[p] in basis.harmonics]) for e, ps in self.groups]
@@ -80,19 +81,19 @@ class ContactCompliance:
         """
         n, root = self.n_contact, np.sqrt(self.k)
         shapes = [root[:, None] * e.b[:n] / np.sqrt(e.lam) for e, _ in self.groups]
-        columns = np.concatenate([part for b in shapes for part in ((b.real, b.imag) if np.iscomplexobj(b) else (b,))], 1)
+        parts = [part for b in shapes for part in ((b.real, b.imag) if np.iscomplexobj(b) else (b,))]
+        columns = np.concatenate(parts, axis=1)
         left, size, _ = np.linalg.svd(columns, full_matrices=False)
         return np.ascontiguousarray(left[:, size**2 > COARSE])
 
     def on_rows(self, rows: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """W_0 and modes of each group at some contact rows, single precision; the last ones are kept."""
         if self._active is None or not np.array_equal(self._active[0], rows):
-            n = self.n_contact
-            kept = []
-            for e, _ in self.groups:
-                w0 = e.w0[:n, :n].astype(e.b_single.dtype)
-                kept.append((w0, e.b_single[:n]) if len(rows) == n else (w0[np.ix_(rows, rows)], e.b_single[rows]))
-            self._active = (rows, kept)
+            n, of = self.n_contact, [e for e, _ in self.groups]
+            if len(rows) == n:
+                self._active = (rows, [(e.w0_single, e.b_single) for e in of])
+            else:
+                self._active = (rows, [(e.w0_single[np.ix_(rows, rows)], e.b_single[rows]) for e in of])
         return self._active[1]
 
     def at(self, omega: float) -> CompliancePoint:
@@ -154,8 +155,8 @@ class CompliancePoint:
         moved = rows @ x.columns[:n]
         higher = rows.astype(np.float32) @ x.single[:n]
         y = self.modal(moved[:, x.n_port :], len(x.e))
-        static = self.compliance.basis.has_static
-        return all_harmonics.gathered(y @ x.left, moved, higher, n, x.n_port, x.unit, self._ratio, static)
+        modal, static = y @ x.left, self.compliance.basis.has_static
+        return all_harmonics.gathered(modal, moved, higher, n, x.n_port, x.unit, self._ratio, static)
 
     @cached_property
     def _ratio(self) -> np.ndarray:

@@ -40,6 +40,7 @@ class Expansion:
     s_max : largest h w that will be asked for [rad/s]
     w0 : (n_port, n_port) W_0; b : (n_port, m) modes; e : (order - 2, n_port, m) W_k C Phi s_max^(k+1) at the ports,
         all three views of `columns` = [w0, b, e_0, ...]
+    w0_single, b_single : those of the contacts in single precision
     higher : order - 1 matrices (n_port, n_port) W_k s_max^k / unit, views of `single`, which holds them side by side
     error : relative, at s_max, against a direct solve
     Raises  SingularStuckSystem
@@ -48,7 +49,7 @@ class Expansion:
     def __init__(
         self, system: SecondOrderSystem, b: np.ndarray, stiffness: np.ndarray, ports: np.ndarray, s_max: float
     ):
-        self.n_port = len(ports)
+        self.n_port, self._n_contact = len(ports), len(b)
         self.s_unit = s_max or 1.0
         mass = np.asarray(system.mass)
         damping = np.zeros_like(mass) if system.damping is None else np.asarray(system.damping)
@@ -112,7 +113,8 @@ class Expansion:
         self.left = np.ascontiguousarray(self.columns[:, p:].T)
         self.lam = lam
         self.c = phi.conj().T @ cphi
-        self.b_single = self.b.astype(self.single.dtype)
+        n = self._n_contact
+        self.w0_single, self.b_single = (a.astype(self.single.dtype) for a in (self.w0[:n, :n], self.b[:n]))
 
     def at(self, s: complex) -> PortCompliance:
         """The compliance at s = i h w."""

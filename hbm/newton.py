@@ -45,7 +45,7 @@ class Solution:
 
 def relative_residual(state: State, x_lin: np.ndarray, least: float = 0.0) -> float:
     """|R| / max(|x|, |x_lin|, least), Euclidean; invariant to the units of length and force."""
-    scale = max(np.linalg.norm(state.x), np.linalg.norm(x_lin), least)
+    scale = max(float(np.linalg.norm(state.x)), float(np.linalg.norm(x_lin)), least)
     return float(np.linalg.norm(state.residual) / scale) if scale > 0 else float(np.linalg.norm(state.residual))
 
 
