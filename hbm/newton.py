@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from hbm.balance import HarmonicBalance, State
 from hbm.branch import CONVERGED
 
 VANISHING = 1e-6  # size of x, relative to the start, below which a solution counts as zero
+RAMP_STEPS = 12  # Newton steps in one step of the load ramp
 SHORTEST = 4e-4  # share of a Newton step that is tried
 
 
@@ -115,7 +116,7 @@ def _search(
 def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None) -> Solution:
     """Solve without a neighbouring solution: from the stuck response, else by raising the vibration load in steps.
 
-    The ramp halves its step where it fails; products and steps of the whole way are counted in the Solution.
+    The ramp halves its step where Newton fails or takes long, as it does when it leaves for another solution; products and steps of the whole way are counted in the Solution.
     """
     first = solve(balance, omega, balance.stuck(omega), options)
     if first.converged:
@@ -124,9 +125,10 @@ def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptio
     factor, stride = 0.0, 0.25
     start = balance.with_load(0.0).stuck(omega)
     last = solve(balance.with_load(0.0), omega, start, options)
+    short = replace(options or NewtonOptions(), max_steps=RAMP_STEPS)
     while last.converged and stride > 1e-3:
         target = min(1.0, factor + stride)
-        trial = solve(balance.with_load(target * balance.load_factor), omega, last.state.x, options)
+        trial = solve(balance.with_load(target * balance.load_factor), omega, last.state.x, short)
         steps, products = steps + trial.steps, products + trial.products
         if trial.converged:
             factor, last, stride = target, trial, 1.5 * stride
