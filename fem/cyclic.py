@@ -87,6 +87,22 @@ def build(
     seam : names of the right and the left face where sectors are one piece, None where only contacts couple them
     axis : of the wheel, through the origin. Other arguments as fem.part.build
     Returns the part of one sector, its interface the half of the right face; and the sector over the same DOFs
+    Raises  ValueError as `cut_from` does
+    """
+    right = [replace(contact, opposite=None) for contact in contacts]
+    part = fem_part.build(mesh, node_sets, material, clamps, right, loads, outputs, order)
+    return part, cut_from(part, contacts, n_sectors, seam, axis)
+
+
+def cut_from(
+    part: Part,
+    contacts: Sequence[Contact],
+    n_sectors: int,
+    seam: tuple[str, str] | None = None,
+    axis: Sequence[float] = AXIS,
+) -> Sector:
+    """The sector that a part is; arguments as `build`, the contacts of the part are those with the right faces alone.
+
     Raises  ValueError where faces do not match after the turn, a seam is held on one side only, or a contact has no
         opposite face
     """
@@ -96,12 +112,10 @@ def build(
     if missing:
         raise ValueError(f"contact '{missing[0]}' of a cyclic part needs the opposite face, that of the next sector")
     turn = rotation(axis, 2 * np.pi / n_sectors)
-    right = [replace(contact, opposite=None) for contact in contacts]
-    part = fem_part.build(mesh, node_sets, material, clamps, right, loads, outputs, order)
-    left = vstack([_left_half(mesh, contact, turn) for contact in contacts], format="csr")[:, part.free]
+    left = vstack([_left_half(part.mesh, contact, turn) for contact in contacts], format="csr")[:, part.free]
     none = np.empty((0, 3), dtype=int)
-    seams = (none, none) if seam is None else _seams(part, node_sets, seam, turn)
-    return part, Sector(part.system, part.interface, left, *seams, turn, n_sectors)
+    seams = (none, none) if seam is None else _seams(part, seam, turn)
+    return Sector(part.system, part.interface, left, *seams, turn, n_sectors)
 
 
 def _left_half(mesh: Any, contact: Contact, turn: np.ndarray) -> csr_matrix:
@@ -113,11 +127,9 @@ def _left_half(mesh: Any, contact: Contact, turn: np.ndarray) -> csr_matrix:
     return left
 
 
-def _seams(
-    part: Part, node_sets: Mapping[str, np.ndarray], seam: tuple[str, str], turn: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _seams(part: Part, seam: tuple[str, str], turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Free DOFs (k, 3) of the right seam and of its partners on the left."""
-    right, left = (named(node_sets, name) for name in seam)
+    right, left = (named(part.node_sets, name) for name in seam)
     what = f"the cyclic faces '{seam[0]}' and '{seam[1]}'"
     if len(right) != len(left):
         raise ValueError(f"{what} have {len(right)} and {len(left)} nodes; mesh both with the same grid")

@@ -14,26 +14,52 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix, identity, kron
 
-from fem.elasticity import per_element, symmetric
+from fem.elasticity import assemble, per_element, symmetric
 from fem.elements import batches, connectivity, scatter
 from fem.factor import factorise
-from fem.loads import unit
+from fem.loads import Centrifugal, unit
 from fem.material import Material
 from fem.part import Part
 
 
-def prestressed(part: Part, material: Material | Mapping[str, Material], force: np.ndarray, softening: Any = 0) -> Part:
+def prestressed(
+    part: Part,
+    material: Material | Mapping[str, Material],
+    force: np.ndarray,
+    softening: Any = 0,
+    tie: csr_matrix | None = None,
+) -> Part:
     """The part vibrating about its static equilibrium under a force.
 
     material : the one it was built with; force : (n_free,) static force [N], such as speed^2 times a centrifugal load
     softening : `spin_softening` at that speed over the free DOFs [N/m], 0 where it does not spin
+    tie : (n_free, m) what q = tie z the equilibrium is looked for in, such as fem.cyclic.seam_map of index 0
     Returns the part with stiffness K + softening + geometric stiffness of the stress under the force
     Raises  ValueError where the part can move rigidly
     """
     K = part.system.stiffness + softening
-    u = part.field(factorise(K, definite=False).solve(force))
+    T = identity(K.shape[0], format="csr") if tie is None else tie
+    u = part.field(T @ factorise(csr_matrix(T.T @ K @ T), definite=False).solve(T.T @ force))
     stress_stiffness = geometric_stiffness(part.mesh, material, u)[part.free][:, part.free]
     return replace(part, system=replace(part.system, stiffness=csr_matrix(K + stress_stiffness)))
+
+
+def spinning(
+    part: Part,
+    material: Material | Mapping[str, Material],
+    axis: Sequence[float],
+    speed: float,
+    tie: csr_matrix | None = None,
+) -> Part:
+    """The part vibrating about its equilibrium under its own centrifugal force.
+
+    axis : (3,) of rotation, through the origin; speed : [rad/s]; others as `prestressed`. Its contacts are open: what
+    they carry when the blades untwist does not stiffen
+    """
+    mass, _ = assemble(part.mesh, material)
+    force = speed**2 * Centrifugal(axis).vector(part.mesh, part.node_sets, mass)[part.free]
+    softening = spin_softening(mass, axis, speed)[part.free][:, part.free]
+    return prestressed(part, material, force, softening, tie)
 
 
 def geometric_stiffness(mesh: Any, material: Material | Mapping[str, Material], u: np.ndarray) -> csr_matrix:

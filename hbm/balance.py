@@ -65,6 +65,8 @@ class HarmonicBalance:
     ):
         self.law = contact_law.load(law)
         contact_law.check_components(self.law, parameters.components)
+        if not 0 < omega_max < np.inf:
+            raise ValueError(f"the highest frequency is {omega_max} rad/s: give a finite one above zero")
         self.law_name = law
         self.model = model
         self.parameters = parameters
@@ -98,6 +100,11 @@ class HarmonicBalance:
     def with_load(self, factor: float) -> HarmonicBalance:
         """The same problem with the harmonics >= 1 of the excitation times a factor."""
         return self._changed(load_factor=factor)
+
+    def with_samples(self, n_samples: int, located: bool) -> HarmonicBalance:
+        """The same problem with other time samples, transitions located or not; everything linear is shared."""
+        transitions = "located" if located else "sampled"
+        return self._changed(basis=replace(self.basis, n_samples=n_samples, transitions=transitions))
 
     def with_harmonics(self, harmonics: tuple[int, ...]) -> HarmonicBalance:
         """The same problem with fewer of its harmonics; raises ValueError for unknown ones and ones a load needs."""
@@ -167,27 +174,6 @@ class HarmonicBalance:
         moved, _, _ = self.linearise(state).solve(self.at(state.omega).apply(g_slope), 1e-6)
         return moved.reshape(state.x.shape)
 
-    def work_slope(self, state: State) -> np.ndarray:
-        """(n_pair, n_pair) d (work per cycle of pair i) / d (gap of pair j) at fixed frequency [J/m]."""
-        n_pair, _, n_coeff = state.x.shape
-        slope = np.zeros((n_pair, n_pair))
-        if not self.basis.has_static:
-            return slope
-        jac = state.cycle.jacobian
-        assert jac is not None
-        column = jac[:, :, self.parameters.components.index("n") * n_coeff].reshape(state.x.shape)
-        linear, point = self.linearise(state), self.at(state.omega)
-        for j in np.flatnonzero(np.abs(column).max(axis=(1, 2)) > 0):
-            g_slope = np.zeros_like(state.x)
-            g_slope[j] = column[j]
-            flat, _, _ = linear.solve(point.apply(g_slope.reshape(-1, n_coeff)), 1e-3)
-            dx = flat.reshape(state.x.shape)
-            df = np.matmul(jac, dx.reshape(n_pair, -1, 1)).reshape(dx.shape)
-            df[j] -= column[j]
-            work = self.basis.work_per_cycle(df, state.x) + self.basis.work_per_cycle(state.cycle.force, dx)
-            slope[:, j] = work[:, self.parameters.tangential].sum(axis=1)
-        return slope
-
     def outputs(self, state: State) -> np.ndarray:
         """(n_output, n_coeff) response of the observed outputs [m]."""
         point = self.at(state.omega)
@@ -196,10 +182,12 @@ class HarmonicBalance:
     def energy(self, state: State) -> np.ndarray:
         """(n_pair,) friction work per cycle, both tangential components [J].
 
-        The normal spring is elastic: what work its sampled force does when a pair lifts is an error of sampling.
+        The normal spring is elastic: what work its sampled force does when a pair lifts is an error of sampling. A pair
+        that sticks throughout is elastic too: what is left of its work is rounding, and would be taken for slow wear.
         """
         t = self.parameters.tangential
-        return self.basis.work_per_cycle(state.cycle.force[:, t], state.x[:, t]).sum(axis=1)
+        work = self.basis.work_per_cycle(state.cycle.force[:, t], state.x[:, t]).sum(axis=1)
+        return np.where(state.cycle.status == contact_law.STICKS, 0.0, work)
 
     def preload(self, state: State) -> float:
         """Static normal force of the whole contact [N]; zero where the law has no normal component."""
@@ -229,7 +217,6 @@ class Linearisation:
         self.rows = (self.active[:, None] * n_comp + np.arange(n_comp)).ravel()
         self._dg = np.ascontiguousarray(dg[self.active])
         self._shape = (n_pair * n_comp, n_coeff)
-        self._balance = balance
         self._point = balance.at(state.omega)
         self._product = self._point.jacobian_product(self.rows)
 
@@ -273,21 +260,10 @@ class Linearisation:
 
         With D = dg/dx the inverse of I - U A U^T D is I + U (I - A U^T D U)^-1 A U^T D (Woodbury).
         """
-        c, basis = self._balance.compliance, self._balance.basis
-        r, m = c.coarse.shape[1], basis.n_coeff
+        u, a = self._point.coarse_part(self.rows)
+        r, m = u.shape[1], self._shape[1]
         if r == 0:
             return None
-        root = np.sqrt(c.k[self.rows])[:, None]
-        u = np.divide(c.coarse[self.rows], root, out=np.zeros((len(self.rows), r)), where=root > 0)
-        blocks = np.zeros((r, m, r, m))
-        for h, amplitude in zip(basis.harmonics, self._point.coarse, strict=True):  # acts on X_h = a_h - i b_h
-            cosine, *sine = np.flatnonzero(basis.order == h)
-            blocks[:, cosine, :, cosine] = amplitude.real
-            for column in sine:
-                blocks[:, column, :, column] = amplitude.real
-                blocks[:, cosine, :, column] = amplitude.imag
-                blocks[:, column, :, cosine] = -amplitude.imag
-        a = blocks.reshape(r * m, r * m)
         n, n_comp = len(self.active), len(self.rows) // len(self.active)
         single = u.astype(np.float32)
         d = self._dg.reshape(n, n_comp, m, n_comp, m).transpose(0, 1, 2, 4, 3).astype(np.float32, order="C")
@@ -323,6 +299,18 @@ class Linearisation:
             lambda v: self.precondition(v.reshape(shape)).ravel(),
         )
         return self.spread(d.reshape(shape), rhs), spent, reached
+
+    def solve_refined(self, rhs: np.ndarray, tolerance: float) -> np.ndarray:
+        """As `solve`, but its products are of single precision: refined with the exact one to the tolerance."""
+        d, _, _ = self.solve(rhs, max(tolerance, 1e-6))
+        size = float(np.linalg.norm(rhs))
+        for _ in range(4):
+            residual = rhs - d + self._point.apply(self.departure_slope(d))
+            error = float(np.linalg.norm(residual))
+            if error <= tolerance * size:
+                break
+            d = d + self.solve(residual, max(tolerance * size / error, 1e-6))[0]
+        return d
 
     def dense(self) -> np.ndarray:
         """The Jacobian as a matrix (n_contact * n_coeff, same), column by column; for checks and as fallback."""

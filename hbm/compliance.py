@@ -146,7 +146,8 @@ class CompliancePoint:
         if self.compliance.shared_real:
             return self._apply_shared_real(g)
         contacts = slice(0, self.compliance.n_contact)
-        return self.compliance.basis.to_real(self._through_ports(self.compliance.basis.to_complex(g), contacts, contacts))
+        modal, still = y @ x.left, self.compliance.basis.has_static
+        return all_harmonics.gathered(modal, moved, higher, n, x.n_port, x.unit, self._ratio, still)
 
     def _apply_shared_real(self, g: np.ndarray) -> np.ndarray:
         """The same for one real system: every matrix meets all harmonics in one real product."""
@@ -155,8 +156,8 @@ class CompliancePoint:
         moved = rows @ x.columns[:n]
         higher = rows.astype(np.float32) @ x.single[:n]
         y = self.modal(moved[:, x.n_port :], len(x.e))
-        modal, static = y @ x.left, self.compliance.basis.has_static
-        return all_harmonics.gathered(modal, moved, higher, n, x.n_port, x.unit, self._ratio, static)
+        still = self.compliance.basis.has_static
+        return all_harmonics.gathered(y @ x.left, moved, higher, n, x.n_port, x.unit, self._ratio, still)
 
     @cached_property
     def _ratio(self) -> np.ndarray:
@@ -191,17 +192,30 @@ class CompliancePoint:
         """The product with G restricted to contact rows (active ones), to the accuracy a Newton direction needs."""
         return JacobianProduct(self, rows)
 
-    @cached_property
-    def coarse(self) -> list[np.ndarray]:
-        """Q^T sqrt(k) G_h sqrt(k) Q of each harmonic, by its modes alone; Q from `ContactCompliance.coarse`."""
+    def coarse_part(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """U (n_rows, r) and A (r n_coeff, r n_coeff) with G ~ U A U^T on contact rows; r may be 0."""
         c = self.compliance
+        root = np.sqrt(c.k[rows])[:, None]
+        shapes = c.coarse[rows]
+        return np.divide(shapes, root, out=np.zeros(shapes.shape), where=root > 0), self._coarse_compliance
+
+    @cached_property
+    def _coarse_compliance(self) -> np.ndarray:
+        """Q^T sqrt(k) G sqrt(k) Q by the modes alone, on all coefficients; Q from `ContactCompliance.coarse`."""
+        c, basis = self.compliance, self.compliance.basis
         weighted = c.coarse.T * np.sqrt(c.k)
-        found: list[np.ndarray] = [np.empty(0)] * len(c.basis.harmonics)
+        blocks = np.zeros((len(weighted), basis.n_coeff, len(weighted), basis.n_coeff))
         for (expansion, positions), ports in zip(c.groups, self.ports, strict=True):
             modes = weighted @ expansion.b[: c.n_contact]
             for p, port in zip(positions, ports, strict=True):
-                found[p] = modes @ port.through_core(modes.conj().T)
-        return found
+                amplitude = modes @ port.through_core(modes.conj().T)  # acts on X_h = a_h - i b_h
+                cosine, *sine = np.flatnonzero(basis.order == basis.harmonics[p])
+                blocks[:, cosine, :, cosine] = amplitude.real
+                for column in sine:
+                    blocks[:, column, :, column] = amplitude.real
+                    blocks[:, cosine, :, column] = amplitude.imag
+                    blocks[:, column, :, cosine] = -amplitude.imag
+        return blocks.reshape(len(weighted) * basis.n_coeff, -1)
 
 
 class JacobianProduct:

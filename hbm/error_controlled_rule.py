@@ -1,24 +1,31 @@
 """Error-controlled wear steps, stable for the stiff coupling of pressure and depth.
 
 dw/dZ = r(w) relaxes a pressure peak thousands of times faster than the contact as a whole wears: explicit steps must
-resolve the former or oscillate from node to node. Here a Rosenbrock step of second order is taken with the contact's
-own wear Jacobian; it is L-stable, keeps its order with an approximate Jacobian, and brings a first-order companion as
-error estimate.
-Source  ROS2: Verwer, Spee, Blom, Hundsdorfer 1999, SIAM J. Sci. Comput. 20(4), with gamma = 1 - 1/sqrt(2).
+resolve the former or oscillate from node to node. Here both stages of a second-order, L-stable, stiffly accurate
+Runge-Kutta step are implicit, each of them one balance solve with the gap wearing along (hbm.wearing); a first-order
+companion gives the error estimate.
+Source  SDIRK2: Alexander 1977, SIAM J. Numer. Anal. 14(6), gamma = 1 - 1/sqrt(2)
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.linalg as sla
 
-from hbm.evolution import WearProblem, WearState, assess, first_preload, reason_to_stop, row_of, state_of
-from hbm.wear_history import WearHistory, WearRow, history
+from hbm import newton
+from hbm.evolution import WearProblem, WearState, assess, first_preload, reason_to_stop, row_of, state_of, worn_state
+from hbm.operating_point import point_of
+from hbm.wear_history import LIFE_SHARE, WearHistory, WearRow, history
+from hbm.wearing import WearingBalance
 
 GAMMA = 1 - 1 / np.sqrt(2)
+GROWTH = (0.2, 3.0)  # limits of the ratio of one step to the one before
+TREND = 0.2  # power with which an error that grows from step to step holds the next one back
+LANDING = (0.97, 0.999)  # of the preload at which an event is located, where a step that would pass it must end
+MAX_CORRECTIONS = 12  # solves of a stage
+GAIN_ACCURACY = 1e-9  # of the depth, for laws whose depth per work is not constant
 
 
 @dataclass(frozen=True)
@@ -27,20 +34,6 @@ class Tolerance:
 
     share: float
     scale: float
-
-
-def wear_jacobian(problem: WearProblem, state: WearState) -> np.ndarray:
-    """(n_pair, n_pair) d rate_i / d depth_j [1/cycle] at fixed frequency, by the work that a gap change moves.
-
-    The rate is taken proportional to the friction work of its pair, as the energy law has it and others nearly do.
-    """
-    n_pair = len(state.depth)
-    total = np.zeros((n_pair, n_pair))
-    for duty, point in zip(problem.mission, state.points, strict=True):
-        balance = problem.at_depth(state.depth).with_load(duty.load)
-        total += duty.share * balance.work_slope(point.state)
-    ratio = np.divide(state.rate, state.work, out=np.zeros(n_pair), where=state.work > 0)
-    return ratio[:, None] * total
 
 
 def evolve(
@@ -53,28 +46,28 @@ def evolve(
     """Wear the contact until it is lost, with steps chosen by a local error estimate on depth and on life.
 
     on_row, resume, return : as for the thesis's rule; `step_error` of a row is the estimate over the tolerance
+    Raises  ValueError where the wear law wears pairs that do no friction work
     """
     rows = resume.rows() if resume is not None else []
     if rows and rows[-1].cycles_in_step == 0:
         return history(rows, resume.end if resume is not None else "")
-    n_pair = len(problem.area)
-    end = f"stopped after {max_steps} wear steps"
-    if rows:
-        before = state_of(problem, rows[-1])
-        depth, cycles = rows[-1].depth + rows[-1].worn, rows[-1].cycles + rows[-1].cycles_in_step
-        state = assess(problem, depth, cycles, before)
-        stride = _next_stride(rows[-1].cycles_in_step, rows[-1].step_error)
+    if rows:  # the state after the last step was not kept: take the step again, to the same bits
+        again = rows.pop()
+        state = _step(problem, tolerance, replace(state_of(problem, again), solves=0), rows).after
+        rows.append(again)
     else:
-        state = assess(problem, np.zeros(n_pair), 0.0, None)
-        stride = tolerance.share * tolerance.scale / max(state.rate.max(), 1e-300)
-    while len(rows) < max_steps:
+        state = assess(problem, np.zeros_like(problem.area), 0.0, None)
+    end = f"stopped after {max_steps} wear steps"
+    while len(rows) < max_steps and state is not None:
         reason = reason_to_stop(problem, state, first_preload(problem, rows, state))
         if reason:
-            rows.append(row_of(problem, state, 0.0, np.zeros(n_pair), np.zeros(n_pair)))
+            nothing = np.zeros_like(problem.area)
+            rows.append(row_of(problem, state, 0.0, nothing, nothing, 0.0, np.zeros(1 + len(state.points))))
             end = reason
         else:
-            state, row, stride = _step(problem, tolerance, state, stride)
-            rows.append(row)
+            taken = _step(problem, tolerance, state, rows)
+            rows.append(taken.row)
+            state, end = taken.after, taken.failure or end
         if on_row is not None:
             on_row(rows[-1])
         if reason:
@@ -82,47 +75,192 @@ def evolve(
     return history(rows, end)
 
 
-def _step(
-    problem: WearProblem, tolerance: Tolerance, state: WearState, stride: float
-) -> tuple[WearState, WearRow, float]:
-    """One accepted step from a state: the state after it, its row, and the cycles to try next."""
-    slope = wear_jacobian(problem, state)
-    share = np.divide(state.work, state.rate, out=np.zeros_like(state.work), where=state.rate > 0)
-    work_slope = share[:, None] * slope
-    solves = state.solves
+@dataclass(frozen=True)
+class _Taken:
+    """A step: its row, and the state after it, or why there is none."""
+
+    row: WearRow
+    after: WearState | None
+    failure: str = ""
+
+
+def _step(problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow]) -> _Taken:
+    """One accepted step from a state; where an event would be passed, the step ends at it."""
+    smallest = 1e-9 * tolerance.scale / max(float(state.rate.max()), 1e-300)
+    stride = 0.1 * tolerance.share * tolerance.scale / float(state.rate.max())
+    drift, slopes = np.zeros(len(state.points)), -np.ones(len(state.points))
+    if rows:
+        stride, slopes = float(rows[-1].plan[0]), rows[-1].plan[1:]
+        omega = np.array([point.state.omega for point in state.points])
+        drift = (omega - rows[-1].duty_omega) / (state.cycles - rows[-1].cycles)
+    target = _event(problem, state, rows)
+    solves, longest = state.solves, np.inf
     while True:
-        factor = sla.lu_factor(np.eye(len(slope)) - GAMMA * stride * slope)
-        k1 = sla.lu_solve(factor, state.rate)
-        e1 = state.work + GAMMA * stride * work_slope @ k1
-        middle = assess(problem, np.maximum(state.depth + stride * k1, state.depth), state.cycles + stride, state)
-        solves += middle.solves
-        k2 = sla.lu_solve(factor, middle.rate - 2 * k1)
-        e2 = middle.work - 2 * e1 + GAMMA * stride * work_slope @ k2
-        worn, work = stride * (1.5 * k1 + 0.5 * k2), stride * (1.5 * e1 + 0.5 * e2)
-        # a pair that the linear model would lift off cannot grow: cut off, and what is cut counts as error
-        deviation = 0.5 * stride * (k1 + k2) - np.minimum(worn, 0.0)  # from the first-order companion w + h k1
-        worn, work = np.maximum(worn, 0.0), np.maximum(work, 0.0)
-        error = 4.0 if middle.failure else _error(problem, tolerance, state, stride, worn, deviation)
+        searches = [_Search(slope) for slope in slopes]
+        first, second = _stages(problem, state, stride, drift, searches)
+        slopes = np.array([search.slope for search in searches])
+        solves += first.solves + second.solves
+        if second.failure or first.failure:
+            error, longest = np.inf, stride
+        else:
+            error = _error(problem, tolerance, state, stride, first, second)
         if error <= 1.0:
-            break
-        stride = _next_stride(stride, error)
-        if stride * state.rate.max() < 1e-9 * tolerance.scale:
-            break
-    after = assess(problem, state.depth + worn, state.cycles + stride, state)
-    row = row_of(problem, replace(state, solves=solves), stride, worn, work, error)
-    return after, row, _next_stride(stride, error)
+            preload = problem.balance.preload(second.points[0].state)
+            if preload >= LANDING[0] * target:
+                break
+            longest = stride
+            stride *= _share_to(target, problem.balance.preload(state.points[0].state), preload)
+        else:
+            stride = min(stride * _growth(error), 0.5 * longest if second.failure else np.inf)
+        if stride < smallest:
+            nothing = np.zeros_like(problem.area)
+            plan = np.zeros(1 + len(state.points))
+            failed = row_of(problem, replace(state, solves=solves), 0.0, nothing, nothing, 0.0, plan)
+            return _Taken(failed, None, second.failure or "no wear step is small enough for the tolerance")
+    worn = second.depth - state.depth
+    work = stride * ((1 - GAMMA) * first.work + GAMMA * second.work)
+    trend = (rows[-1].step_error / error) ** TREND if rows and error > 0 else 1.0
+    ratio = float(np.clip(_growth(error) * min(trend, 1.0), *GROWTH))
+    plan = np.array([stride * ratio, *slopes])
+    row = row_of(problem, replace(state, solves=solves), stride, worn, work, error, plan)
+    return _Taken(row, replace(second, solves=0))
+
+
+def _event(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) -> float:
+    """The next preload at which a row is wanted [N]: where life is stated to end, and where the run is to end."""
+    first, now = first_preload(problem, rows, state), problem.balance.preload(state.points[0].state)
+    shares = [share for share in (LIFE_SHARE, problem.lost_below) if share > 0]
+    return max((share * first for share in shares if share * first < now), default=0.0)
+
+
+def _share_to(target: float, start: float, end: float) -> float:
+    """Share of a step after which the preload has fallen from start to just below the target, along its logarithm."""
+    aim = np.mean(LANDING) * target
+    return float(np.clip(np.log(start / aim) / np.log(start / max(end, 1e-3 * target)), 0.05, 0.95))
+
+
+def _stages(
+    problem: WearProblem, state: WearState, stride: float, drift: np.ndarray, searches: Sequence[_Search]
+) -> tuple[WearState, WearState]:
+    """Both stages of a step from a state; the second is the state after it."""
+    omega = np.array([point.state.omega for point in state.points])
+    guess = []
+    for duty, point in zip(problem.mission, state.points, strict=True):
+        balance = problem.at_depth(state.depth).with_load(duty.load)
+        guess.append(point.state.x + balance.gap_response(point.state, GAMMA * stride * state.rate))
+    cycles = state.cycles + GAMMA * stride
+    ahead = GAMMA * stride
+    first = _stage(problem, state, state.depth, ahead, cycles, guess, omega + ahead * drift, searches)
+    if first.failure:
+        return first, replace(first, solves=0)
+    base = state.depth + (1 - GAMMA) / GAMMA * (first.depth - state.depth)
+    guess, further = [], []
+    for before, after in zip(state.points, first.points, strict=True):
+        guess.append(before.state.x + (after.state.x - before.state.x) / GAMMA)
+        further.append(before.state.omega + (after.state.omega - before.state.omega) / GAMMA)
+    return first, _stage(problem, first, base, ahead, state.cycles + stride, guess, np.array(further), searches)
+
+
+def _stage(
+    problem: WearProblem,
+    near: WearState,
+    base: np.ndarray,
+    stretch: float,
+    cycles: float,
+    guess: Sequence[np.ndarray],
+    omega: np.ndarray,
+    searches: Sequence[_Search],
+) -> WearState:
+    """Solve depth = base + stretch rate(depth) with every duty at its site; `near` tells the wear per work to try."""
+    duties = problem.mission
+    unworn = [problem.balance.with_load(duty.load) for duty in duties]
+    gain = _gain(problem, near)
+    accuracy = np.array([duty.site.accuracy for duty in duties])
+    x, solves = np.concatenate(guess, axis=1), 0
+    for search in searches:
+        search.start()
+    while True:
+        balance = WearingBalance(unworn, [duty.share for duty in duties], base, stretch, gain)
+        solution = newton.solve(balance, tuple(omega), x)
+        solves += len(duties)
+        depth = balance.depth(solution.state.x)
+        points, corrections = [], []
+        for w, duty, part in zip(omega, duties, balance.parts(solution.state.x), strict=True):
+            worn = problem.at_depth(depth).with_load(duty.load)
+            state = worn.evaluate(float(w), part)
+            points.append(point_of(duty.site, worn, replace(solution, state=state), 0))
+            if solution.converged:
+                corrections.append(duty.site.correct(worn, state))
+        solves += sum(c.solves for c in corrections)
+        found = worn_state(problem, depth, cycles, points, solves)
+        if not solution.converged:
+            return found
+        after = np.array([s.next(w, c.distance) for s, w, c in zip(searches, omega, corrections, strict=True)])
+        turned = _gain(problem, found)
+        settled = np.all(np.abs(turned - gain) * found.work * stretch <= GAIN_ACCURACY * np.abs(depth).max())
+        if settled and np.all(np.abs(after - omega) <= accuracy * omega):
+            return found
+        if solves > MAX_CORRECTIONS * len(duties):
+            lost = replace(solution, outcome=f"the site of a duty was not found in {MAX_CORRECTIONS} solves")
+            return replace(found, points=tuple(replace(p, solution=replace(lost, state=p.state)) for p in points))
+        x = solution.state.x + balance.follow(solution.state, after - omega)
+        omega, gain = after, turned
+
+
+def _gain(problem: WearProblem, state: WearState) -> np.ndarray:
+    """(n_pair,) wear depth per friction work [m/J]; a pair at rest is taken to wear as the working ones on average."""
+    works = state.work > 0
+    if np.any(state.rate[~works] > 0):
+        raise ValueError(f'wear law "{problem.law}" wears pairs without friction work: take the thesis\'s rule')
+    own = np.divide(problem.spread, problem.area)
+    known = works & (own > 0)
+    factor = np.mean(state.rate[known] / (state.work[known] * own[known])) if known.any() else 1.0
+    return np.divide(state.rate, state.work, out=factor * own, where=works)
+
+
+class _Search:
+    """The frequency at which a miss vanishes, from the misses so far; the miss falls as the frequency rises."""
+
+    def __init__(self, slope: float):
+        self.slope = slope
+        self.start()
+
+    def start(self) -> None:
+        """Forget the points, at another depth, but not the slope."""
+        self._below: tuple[float, float] | None = None
+        self._above: tuple[float, float] | None = None
+        self._last: tuple[float, float] | None = None
+
+    def next(self, omega: float, miss: float) -> float:
+        """The frequency to try after one that missed by `miss`: secant, kept inside what brackets the zero."""
+        if self._last is not None and omega != self._last[0]:
+            slope = (miss - self._last[1]) / (omega - self._last[0])
+            self.slope = slope if slope < -0.1 else self.slope
+        self._last = (omega, miss)
+        if miss > 0:
+            self._below = self._last
+        else:
+            self._above = self._last
+        trial = omega - miss / self.slope
+        if self._below is not None and self._above is not None:
+            low, high = self._below[0], self._above[0]
+            if not min(low, high) < trial < max(low, high):
+                return 0.5 * (low + high)
+            return trial
+        return float(np.clip(trial, 0.97 * omega, 1.03 * omega))
 
 
 def _error(
-    problem: WearProblem, tolerance: Tolerance, state: WearState, stride: float, worn: np.ndarray, deviation: np.ndarray
+    problem: WearProblem, tolerance: Tolerance, state: WearState, stride: float, first: WearState, second: WearState
 ) -> float:
     """Local error over the tolerance: of the deepest deviation, and of the cycles that the same volume takes."""
+    deviation = (1 - GAMMA) * stride * (first.rate - second.rate)
     on_depth = np.abs(deviation).max() / tolerance.scale
-    volume = float(problem.area @ worn)
-    on_life = abs(float(problem.area @ deviation)) / volume * stride / (state.cycles + stride) if volume > 0 else 0.0
+    volume = float(problem.area @ (second.depth - state.depth))
+    on_life = abs(float(problem.area @ deviation)) / volume * stride / second.cycles if volume > 0 else 0.0
     return float(max(on_depth, on_life) / tolerance.share)
 
 
-def _next_stride(stride: float, error: float) -> float:
-    """Step that meets the tolerance by the second power of the step, with a margin and limits."""
-    return stride * float(np.clip(0.85 / np.sqrt(max(error, 1e-10)), 0.2, 5.0))
+def _growth(error: float) -> float:
+    """Ratio of the next step to this one by the second order of the error, with a margin."""
+    return float(np.clip(0.85 / np.sqrt(max(error, 1e-10)), *GROWTH))

@@ -88,20 +88,28 @@ class WearState:
 
 def assess(problem: WearProblem, depth: np.ndarray, cycles: float, before: WearState | None) -> WearState:
     """Solve every duty at a wear depth, warm from a neighbouring state, and apply the wear law."""
-    rate_of = wear_law.load(problem.law).depth_rate
     unloaded = problem.at_depth(depth)
-    points, rate, work, solves = [], np.zeros_like(depth), np.zeros_like(depth), 0
+    points = []
     for i, duty in enumerate(problem.mission):
         balance = unloaded.with_load(duty.load)
         if before is None:
-            point = duty.site.first(balance)
+            points.append(duty.site.first(balance))
         else:
-            point = _neighbour(problem, duty, balance, before.points[i], before.depth, depth)
+            points.append(_neighbour(problem, duty, balance, before.points[i], before.depth, depth))
+    return worn_state(problem, depth, cycles, points, sum(point.solves for point in points))
+
+
+def worn_state(
+    problem: WearProblem, depth: np.ndarray, cycles: float, points: Sequence[OperatingPoint], solves: int
+) -> WearState:
+    """The wear law applied to solved duties."""
+    rate_of = wear_law.load(problem.law).depth_rate
+    rate, work = np.zeros_like(depth), np.zeros_like(depth)
+    for duty, point in zip(problem.mission, points, strict=True):
+        balance = problem.at_depth(depth).with_load(duty.load)
         exposure = wear_law.Exposure(balance, point.state, problem.area, problem.spread, depth, cycles)
         rate += duty.share * rate_of(exposure)
         work += duty.share * exposure.energy
-        solves += point.solves
-        points.append(point)
     return WearState(depth, cycles, tuple(points), rate, work, solves)
 
 
@@ -161,31 +169,24 @@ def row_of(
     worn: np.ndarray,
     work: np.ndarray,
     step_error: float = 0.0,
+    plan: np.ndarray | None = None,
 ) -> WearRow:
     """The history row of a state, with what its step wears [m] and dissipates [J]."""
     balance = problem.at_depth(state.depth).with_load(problem.mission[0].load)
-    solves = state.solves
-    return WearRow.of(
-        balance, state.points, state.depth, state.cycles, cycles_in_step, worn, work, solves, step_error
-    )
+    taken = (cycles_in_step, worn, work, state.solves, step_error, plan)
+    return WearRow.of(balance, state.points, state.depth, state.cycles, *taken)
 
 
 def state_of(problem: WearProblem, row: WearRow) -> WearState:
     """The state that a row was made from, solved points included, so that a resumed run goes on bit for bit."""
     points = []
-    rate, work = np.zeros_like(row.depth), np.zeros_like(row.depth)
-    rate_of = wear_law.load(problem.law).depth_rate
     for i, duty in enumerate(problem.mission):
         balance = problem.at_depth(row.depth).with_load(duty.load)
         x = row.duty_displacement[i].reshape(len(row.depth), -1, balance.basis.n_coeff)
         state = balance.evaluate(float(row.duty_omega[i]), x)
         outcome = newton.Solution(state, newton.CONVERGED, 0, 0, ())
-        response = balance.outputs(state)
-        points.append(OperatingPoint(outcome, row.amplitude, response, 0))
-        exposure = wear_law.Exposure(balance, state, problem.area, problem.spread, row.depth, row.cycles)
-        rate += duty.share * rate_of(exposure)
-        work += duty.share * exposure.energy
-    return WearState(row.depth, row.cycles, tuple(points), rate, work, row.solves)
+        points.append(OperatingPoint(outcome, row.amplitude, balance.outputs(state), 0))
+    return worn_state(problem, row.depth, row.cycles, points, row.solves)
 
 
 def first_preload(problem: WearProblem, rows: Sequence[WearRow], state: WearState) -> float:

@@ -32,8 +32,12 @@ class Excitation:
         return cls(loads)
 
     def check(self, basis: HarmonicBasis, known: Mapping[str, object]) -> None:
-        """Raise ValueError where a load is unknown or its harmonic is not kept."""
+        """Raise ValueError where a load is unknown or no finite number, or its harmonic is not kept."""
+        if self.base is not None and not np.all(np.isfinite(self.base)):
+            raise ValueError("the prescribed motion of body 2 must be finite")
         for (h, name), value in self.loads.items():
+            if not np.isfinite(value):
+                raise ValueError(f"load '{name}' is {value}: give a finite number")
             if name not in known:
                 raise ValueError(f"no load '{name}' in the model: it has {', '.join(sorted(known)) or 'none'}")
             if value != 0 and h not in basis.harmonics:

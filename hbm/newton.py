@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 
-from hbm.balance import HarmonicBalance, State
+from hbm.balance import HarmonicBalance, Linearisation, State
 from hbm.branch import CONVERGED
 
 VANISHING = 1e-6  # size of x, relative to the start, below which a solution counts as zero
 RAMP_STEPS = 12  # Newton steps in one step of the load ramp
 SHORTEST = 4e-4  # share of a Newton step that is tried
+
+
+class Balance(Protocol):
+    """What Newton's method solves; omega is whatever the balance takes for its frequency."""
+
+    def x_lin(self, omega: Any) -> np.ndarray: ...
+
+    def evaluate(self, omega: Any, x: np.ndarray) -> State: ...
+
+    def linearise(self, state: State) -> Linearisation: ...
 
 
 @dataclass(frozen=True)
@@ -50,7 +61,7 @@ def relative_residual(state: State, x_lin: np.ndarray, least: float = 0.0) -> fl
     return float(np.linalg.norm(state.residual) / scale) if scale > 0 else float(np.linalg.norm(state.residual))
 
 
-def solve(balance: HarmonicBalance, omega: float, start: np.ndarray, options: NewtonOptions | None = None) -> Solution:
+def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOptions | None = None) -> Solution:
     """Solve the balance at one frequency.
 
     omega : [rad/s]; start : (n_pair, n_component, n_coeff) first guess [m]
@@ -68,6 +79,8 @@ def solve(balance: HarmonicBalance, omega: float, start: np.ndarray, options: Ne
     for step in range(1, options.max_steps + 1):
         if error <= options.tolerance:
             return Solution(state, CONVERGED, step - 1, products, tuple(history))
+        if not np.isfinite(error):
+            return Solution(state, "the residual is not a finite number", step - 1, products, tuple(history))
         linear = balance.linearise(state)
         target = max(min(forcing, 0.1), 0.3 * options.tolerance / error, 1e-12)
         direction, spent, reached = linear.solve(-state.residual, target, options.max_products)
@@ -87,8 +100,8 @@ def solve(balance: HarmonicBalance, omega: float, start: np.ndarray, options: Ne
 
 
 def _search(
-    balance: HarmonicBalance,
-    omega: float,
+    balance: Balance,
+    omega: Any,
     state: State,
     direction: np.ndarray,
     error: float,
@@ -116,7 +129,8 @@ def _search(
 def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None) -> Solution:
     """Solve without a neighbouring solution: from the stuck response, else by raising the vibration load in steps.
 
-    The ramp halves its step where Newton fails or takes long, as it does when it leaves for another solution; products and steps of the whole way are counted in the Solution.
+    The ramp halves its step where Newton fails or takes long, as it does when it leaves for another solution; products
+    and steps of the whole way are counted in the Solution.
     """
     first = solve(balance, omega, balance.stuck(omega), options)
     if first.converged:

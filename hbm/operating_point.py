@@ -36,6 +36,18 @@ class OperatingPoint:
 
 
 @dataclass(frozen=True)
+class Correction:
+    """How far a solved cycle is from where it is to be taken.
+
+    distance : to the right frequency [rad/s]; dx : d x / d omega (n_pair, n_component, n_coeff) [m s]; solves : spent
+    """
+
+    distance: float
+    dx: np.ndarray
+    solves: int
+
+
+@dataclass(frozen=True)
 class AtFrequency:
     """The cycle at a fixed frequency [rad/s]."""
 
@@ -56,6 +68,15 @@ class AtFrequency:
         if not solution.converged:
             solution, solves = arc_length.solve_along_load(balance, self.omega, self.newton), 2
         return _point(balance, solution, self.output, solves)
+
+    def correct(self, balance: HarmonicBalance, state: State) -> Correction:
+        """The distance of a state to the fixed frequency."""
+        return Correction(self.omega - state.omega, np.zeros_like(state.x), 0)
+
+    @property
+    def accuracy(self) -> float:
+        """Relative accuracy that the frequency is wanted with."""
+        return 0.0
 
 
 @dataclass(frozen=True)
@@ -87,6 +108,16 @@ class AtPeak:
         """Refine from a neighbouring peak."""
         return self._refine(balance, omega, x, 2e-4 * omega)
 
+    def correct(self, balance: HarmonicBalance, state: State) -> Correction:
+        """The distance of a state to the peak, by its slope and as though one mode responded."""
+        here = _Slope.of(balance, Solution(state, CONVERGED, 0, 0, ()), self.output)
+        return Correction(here.distance, here.dx, 0)
+
+    @property
+    def accuracy(self) -> float:
+        """Relative accuracy that the frequency is wanted with."""
+        return self.tolerance
+
     def _refine(self, balance: HarmonicBalance, omega: float, x: np.ndarray, stride: float) -> OperatingPoint:
         def solve(w: float, guess: np.ndarray) -> _Slope:
             solution = newton.solve(balance, w, guess, self.newton)
@@ -105,7 +136,7 @@ class AtPeak:
             if uphill is not None and other is not None:
                 target = _zero(uphill, other)
             elif before is None:
-                target = here.omega + side * stride
+                target = here.omega + (here.distance if abs(here.distance) < 20 * stride else side * stride)
             else:  # extrapolate the slope, never further than a few strides and always uphill
                 reach = abs(here.omega - before.omega)
                 guess = (_zero(before, here) - here.omega) * side
@@ -161,6 +192,18 @@ class BesidePeak:
         found = self._beside(balance, at_peak)
         return replace(found, solves=found.solves + solves)
 
+    def correct(self, balance: HarmonicBalance, state: State) -> Correction:
+        """The distance of a state to the ratio times the frequency of the peak, which is found from it."""
+        solution, solves = self._walk(balance, state.omega, state.omega / self.ratio, state.x)
+        at_peak = self.peak.next(balance, state.omega / self.ratio, solution.state.x)
+        distance = self.ratio * at_peak.state.omega - state.omega
+        return Correction(distance, np.zeros_like(state.x), solves + at_peak.solves)
+
+    @property
+    def accuracy(self) -> float:
+        """Relative accuracy that the frequency is wanted with."""
+        return self.peak.tolerance
+
     def _beside(self, balance: HarmonicBalance, peak: OperatingPoint) -> OperatingPoint:
         omega = peak.state.omega
         solution, solves = self._walk(balance, omega, self.ratio * omega, peak.state.x)
@@ -178,11 +221,15 @@ class BesidePeak:
 
 @dataclass(frozen=True)
 class _Slope:
-    """A solved point with d A^2 / d omega and d x / d omega."""
+    """A solved point with d A^2 / d omega and d x / d omega.
+
+    distance : to the peak [rad/s], were the response that of one mode, y = R / (p - omega)
+    """
 
     solution: Solution
     omega: float
     slope: float
+    distance: float
     dx: np.ndarray
     weight: float = 1.0
 
@@ -191,15 +238,22 @@ class _Slope:
         state = solution.state
         slope_r, slope_y = balance.frequency_slope(state)
         linear = balance.linearise(state)
-        dx = linear.solve(-slope_r, 1e-8)[0]
+        dx = linear.solve_refined(-slope_r, 1e-8)
         dy = slope_y + balance.at(state.omega).outputs(linear.departure_slope(dx))
         row = balance.compliance.output_names.index(output)
         y = balance.outputs(state)[row]
         dynamic = balance.basis.order > 0
-        return cls(solution, state.omega, float(2 * y[dynamic] @ dy[row][dynamic]), dx.reshape(state.x.shape))
+        along, steepness = y[dynamic] @ dy[row][dynamic], dy[row][dynamic] @ dy[row][dynamic]
+        distance = along / steepness if steepness > 0 else 0.0
+        return cls(solution, state.omega, float(2 * along), float(distance), dx.reshape(state.x.shape))
 
     def predict(self, omega: float) -> np.ndarray:
         return self.solution.state.x + (omega - self.omega) * self.dx
+
+
+def point_of(site: Site, balance: HarmonicBalance, solution: Solution, solves: int) -> OperatingPoint:
+    """A solution as the operating point of a site."""
+    return _point(balance, solution, site.peak.output if isinstance(site, BesidePeak) else site.output, solves)
 
 
 def _point(balance: HarmonicBalance, solution: Solution, output: str, solves: int) -> OperatingPoint:

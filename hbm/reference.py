@@ -57,7 +57,7 @@ class DenseBalance:
         for (h, name), value in excitation.loads.items():
             if h in basis.harmonics:
                 amplitudes[:, basis.harmonics.index(h)] += system.loads[name] * value
-        self._force = basis.to_real(amplitudes)
+        self.force = basis.to_real(amplitudes)
 
     def dynamic_stiffness(self, omega: float) -> np.ndarray:
         """(n n_coeff, n n_coeff) linear part, coefficients innermost."""
@@ -81,7 +81,7 @@ class DenseBalance:
         clock = perf_counter()
         linear = self.dynamic_stiffness(omega)
         self.profile.balance += perf_counter() - clock
-        scale = np.linalg.norm(self._force)
+        scale = np.linalg.norm(self.force)
         q = start.ravel().copy()
         outcome = f"not converged in {max_steps} steps"
         steps = 0
@@ -91,7 +91,7 @@ class DenseBalance:
             cycle = contact_law.cycle(p.law, x, p.parameters, basis, p.memory)
             tick = perf_counter()
             self.profile.contact += tick - clock
-            residual = linear @ q - self._force.ravel() + self._spread.T @ cycle.force.ravel()
+            residual = linear @ q - self.force.ravel() + self._spread.T @ cycle.force.ravel()
             if np.linalg.norm(residual) <= tolerance * scale:
                 outcome = CONVERGED
                 self.profile.balance += perf_counter() - tick
@@ -111,7 +111,7 @@ class DenseBalance:
     def coordinates_of(self, omega: float, x: np.ndarray) -> np.ndarray:
         """Reduced coordinates (n, n_coeff) in balance with the contact forces at x, to start or to check from."""
         cycle = contact_law.cycle(self.problem.law, x, self.problem.parameters, self.problem.basis, self.problem.memory)
-        force = self._force.ravel() - self._spread.T @ cycle.force.ravel()
+        force = self.force.ravel() - self._spread.T @ cycle.force.ravel()
         return np.linalg.solve(self.dynamic_stiffness(omega), force).reshape(-1, self.problem.basis.n_coeff)
 
 

@@ -16,7 +16,7 @@ from hbm.balance import HarmonicBalance
 from hbm.branch import Branch
 from hbm.excitation import Excitation
 from hbm.harmonics import HarmonicBasis
-from reduction.cyclic import Damping, ReducedSector, travelling_wave
+from reduction.cyclic import ReducedSector, travelling_wave
 from reduction.model import ReducedModel
 
 
@@ -49,13 +49,12 @@ def on_wheel(excitation: Excitation, engine_order: int, n_sectors: int) -> Excit
 def responses(
     reduced: ReducedSector,
     engine_orders: Iterable[int],
-    damping: Damping | None,
     problem: Callable[[ReducedModel], HarmonicBalance],
     follow: Callable[[HarmonicBalance], Branch],
 ) -> dict[int, Branch]:
     """Response of the wheel to several engine orders.
 
-    damping : as for `travelling_wave`; problem : makes the balance of a model; follow : follows its response
+    problem : makes the balance of a model, damped as it should be; follow : follows its response
     Returns engine order -> branch of sector 0
     """
-    return {order: follow(problem(travelling_wave(reduced, order, damping))) for order in engine_orders}
+    return {order: follow(problem(travelling_wave(reduced, order))) for order in engine_orders}

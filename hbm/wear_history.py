@@ -38,6 +38,7 @@ class WearRow:
     response: np.ndarray
     solves: int
     step_error: float
+    plan: np.ndarray
     work: np.ndarray
     duty_omega: np.ndarray
     duty_displacement: np.ndarray
@@ -54,6 +55,7 @@ class WearRow:
         work: np.ndarray,
         solves: int,
         step_error: float = 0.0,
+        plan: np.ndarray | None = None,
     ) -> WearRow:
         """The row of solved operating points, one per duty; the first one is what the row shows."""
         point = points[0]
@@ -78,6 +80,7 @@ class WearRow:
             response=point.response,
             solves=solves,
             step_error=step_error,
+            plan=np.zeros(0) if plan is None else plan,
             work=work,
             duty_omega=np.array([p.state.omega for p in points]),
             duty_displacement=np.stack([p.state.x.reshape(shape) for p in points]),
@@ -102,6 +105,8 @@ class WearHistory:
     response : (n_row, n_output, n_coeff) Fourier coefficients of the outputs [m]
     solves : (n_row,) harmonic balance solves spent on the row
     step_error : (n_row,) estimated local error of the step over its tolerance; 0 where the rule has no estimate
+    plan : (n_row, n_plan) what the rule tries next: cycles, then d (distance to the site) / d omega of every duty;
+        n_plan is 0 where a rule does not plan
     work : (n_row, n_pair) friction work from this row to the next [J]
     duty_omega, duty_displacement : (n_row, n_duty) [rad/s], (n_row, n_duty, n_contact, n_coeff) [m]: every duty of a
         mission; the fields above show the first
@@ -123,6 +128,7 @@ class WearHistory:
     response: np.ndarray
     solves: np.ndarray
     step_error: np.ndarray
+    plan: np.ndarray
     work: np.ndarray
     duty_omega: np.ndarray
     duty_displacement: np.ndarray

@@ -1,15 +1,18 @@
 """Wear laws: what a law file sees and offers, and how it is found by its name.
 
-A law is a module `hbm/wear/<name>.py` with `depth_rate(exposure) -> (n_pair,)`: total wear depth of each pair per
-vibration cycle [m]. Depth is the sum over both surfaces; `Exposure.coefficient` carries the unit that the law states.
+A law is a module `hbm/wear/<name>.py`, or a file of one's own, with `depth_rate(exposure) -> (n_pair,)`: total wear
+depth of each pair per vibration cycle [m]. Depth is the sum over both surfaces; `Exposure.coefficient` carries the unit
+that the law states.
 """
 
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import pkgutil
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -61,7 +64,29 @@ def names() -> list[str]:
 
 
 def load(name: str) -> ModuleType:
-    """The wear law of this name; raises ValueError with the known names."""
+    """The wear law of this name, or from a file of one's own where the name ends with .py.
+
+    Raises  ValueError for an unknown name or a file that is no wear law
+    """
+    if name.endswith(".py"):
+        return _from_file(Path(name))
     if name not in names():
-        raise ValueError(f"no wear law '{name}': there are {', '.join(names())}")
+        raise ValueError(f"no wear law '{name}': there are {', '.join(names())}, or give a file my_law.py")
     return importlib.import_module(f"hbm.wear.{name}")
+
+
+@cache
+def _from_file(path: Path) -> ModuleType:
+    if not path.is_file():
+        raise ValueError(f"there is no wear law file '{path}'")
+    spec = importlib.util.spec_from_file_location(f"wear_law_{path.stem}", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise ValueError(f"wear law file '{path}' cannot be run: {error}") from error
+    if not callable(getattr(module, "depth_rate", None)):
+        raise ValueError(f"wear law file '{path}' has no function depth_rate(exposure)")
+    return module

@@ -8,7 +8,7 @@ Source  Tamatam 2021, eq. 3.12 to 3.22
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -22,8 +22,6 @@ from fem.system import SecondOrderSystem
 from reduction.craig_bampton import POINT_LOAD, REPORTED_MODES, craig_bampton
 from reduction.linear import stuck_stiffness
 from reduction.model import ReducedModel
-
-Damping = Callable[[SecondOrderSystem], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -76,18 +74,15 @@ def nodal_diameters(
     return np.array(found)
 
 
-def travelling_wave(
-    reduced: ReducedSector, engine_order: int, damping: Damping | None = None, cutoff: float | None = None
-) -> ReducedModel:
+def travelling_wave(reduced: ReducedSector, engine_order: int, cutoff: float | None = None) -> ReducedModel:
     """The model of one sector under a wave of this engine order: harmonic h sees the index h EO modulo N.
 
-    damping : makes the damping matrix of each small system, such as partial(modal_damping, ratio=0.01)
     cutoff : highest frequency [Hz] of the modes that then stand for seam, left shroud and fixed-interface modes (3.20);
         None keeps all these coordinates
     Returns the model whose system and interface are those of harmonic 1; coordinates are the relative displacements,
         then accessories, then the rest; `reconstruct` takes the harmonic. One object serves all harmonics of one index
     """
-    index_of = _Indices(reduced, damping, cutoff)
+    index_of = _Indices(reduced, cutoff)
     n_sectors = reduced.sector.n_sectors
 
     def per_harmonic(h: int) -> tuple[SecondOrderSystem, np.ndarray]:
@@ -103,17 +98,13 @@ def travelling_wave(
     return ReducedModel(system, interface, None, info, per_harmonic, harmonic_basis)
 
 
-def wheel_model(
-    reduced: ReducedSector, damping: Damping | None = None, stiffness: Sequence[float] | None = None
-) -> ReducedModel:
-    """All sectors at once, real and with contacts between all neighbours; arguments as fem.wheel.assemble.
+def wheel_model(reduced: ReducedSector, stiffness: Sequence[float] | None = None) -> ReducedModel:
+    """All sectors at once, real and with contacts between all neighbours; stiffness as in fem.wheel.assemble.
 
     Loads and outputs are named "<name>@<sector>". The basis is left out: sector n moves by
     reduced.basis @ (fem.wheel.sector_maps(reduced.sector)[n] @ q) in its own frame
     """
     system, interface = wheel.assemble(reduced.sector, stiffness)
-    if damping is not None:
-        system = replace(system, damping=damping(system))
     return ReducedModel(system, interface, None, _shared_info(reduced))
 
 
@@ -126,9 +117,8 @@ def _shared_info(reduced: ReducedSector) -> dict[str, object]:
 class _Indices:
     """Small system, contact map and way back T (q = T z) of each harmonic index, each made once."""
 
-    def __init__(self, reduced: ReducedSector, damping: Damping | None, cutoff: float | None):
+    def __init__(self, reduced: ReducedSector, cutoff: float | None):
         self._sector = reduced.sector
-        self._damping = damping
         self._cutoff = cutoff
         self._made: dict[int, tuple[SecondOrderSystem, np.ndarray, np.ndarray]] = {}
 
@@ -138,8 +128,6 @@ class _Indices:
             if self._cutoff is not None:
                 T = T @ condensation(projected(self._sector.system, T), n_masters, self._cutoff)
             system = projected(self._sector.system, T)
-            if self._damping is not None:
-                system = replace(system, damping=self._damping(system))
             self._made[index] = system, np.eye(len(self._sector.left), system.n_dof), T
         return self._made[index]
 

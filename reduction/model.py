@@ -10,6 +10,9 @@ import numpy as np
 from fem.interface import ContactInterface
 from fem.system import SecondOrderSystem
 
+Damping = Callable[[SecondOrderSystem, np.ndarray], np.ndarray | None]
+"""Makes the damping matrix (n, n) [N s/m] of a system whose contact map is (n_contact, n), None for none."""
+
 
 @dataclass(frozen=True)
 class ReducedModel:
@@ -44,6 +47,24 @@ class ReducedModel:
             raise ValueError("this model came as matrices: it has no full field to reconstruct")
         return np.tensordot(basis, q, axes=1)
 
-    def with_damping(self, damping: np.ndarray | None) -> ReducedModel:
-        """The same model with another damping matrix (n, n) [N s/m]."""
-        return replace(self, system=replace(self.system, damping=damping))
+    def with_damping(self, make: Damping) -> ReducedModel:
+        """The same model with another damping: `make` gives the matrix of every system that a harmonic sees.
+
+        Harmonics that shared one system still do
+        """
+        made: dict[int, tuple[SecondOrderSystem, SecondOrderSystem]] = {}  # the key lives as long as its system
+
+        def damped(system: SecondOrderSystem, B: np.ndarray) -> SecondOrderSystem:
+            if id(system) not in made:
+                made[id(system)] = system, replace(system, damping=make(system, B))
+            return made[id(system)][1]
+
+        first, seen = damped(self.system, np.asarray(self.interface.B)), self.per_harmonic
+        if seen is None:
+            return replace(self, system=first)
+
+        def per_harmonic(h: int) -> tuple[SecondOrderSystem, np.ndarray]:
+            system, B = seen(h)
+            return damped(system, B), B
+
+        return replace(self, system=first, per_harmonic=per_harmonic)

@@ -1,49 +1,53 @@
 """A reduced model as an HDF5 file, so that a response needs no mesh.
 
 Layout: /system (mass, stiffness, damping, loads/<name>, outputs/<name>), /interface (points, frames, area, gap, B,
-faces), /basis, /info; attributes format, version at the root, components on /interface.
+faces), /basis, /info; attributes format, version at the root, components on /interface. A model whose harmonics see
+different systems has besides /systems/<i>, like /system with B and basis, each system once, and /harmonics
+(n_harmonic, 2), which of them every stored harmonic sees.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
+import numpy as np
 
 from fem.interface import ContactInterface
 from fem.system import SecondOrderSystem
 from reduction.model import ReducedModel
 
 FORMAT = "tribodyn reduced model"
-VERSION = 1
+VERSION = 2
+DATA = (str, bool, int, float, np.generic, np.ndarray)
 
 
-def save(model: ReducedModel, path: str | Path) -> None:
-    """Write a model; the file appears complete or not at all.
+def save(model: ReducedModel, path: str | Path, harmonics: Sequence[int] = ()) -> None:
+    """Write a model; the file appears complete or not at all. Facts of its info that are no data stay behind.
 
-    Raises  ValueError for a model whose harmonics see different systems: those are a function, not data
+    harmonics : those to store of a model whose harmonics see different systems, such as a travelling wave
+    Raises  ValueError for such a model without harmonics
     """
-    if model.per_harmonic is not None:
-        raise ValueError("this model differs from harmonic to harmonic and cannot be stored; store what it is made of")
+    if model.per_harmonic is not None and not harmonics:
+        raise ValueError("this model differs from harmonic to harmonic: say which harmonics are to be stored")
     path = Path(path)
     partial = path.with_name(path.name + ".partial")
     with h5py.File(partial, "w") as file:
         file.attrs["format"] = FORMAT
         file.attrs["version"] = VERSION
-        system, interface = model.system, model.interface
-        _write(
-            file.create_group("system"),
-            {"mass": system.mass, "stiffness": system.stiffness, "damping": system.damping},
-        )
-        _write(file.create_group("system/loads"), system.loads)
-        _write(file.create_group("system/outputs"), system.outputs)
+        interface = model.interface
+        _write_system(file.create_group("system"), model.system)
+        if model.per_harmonic is not None:
+            _write_harmonics(file, model, harmonics)
         fields = {name: getattr(interface, name) for name in ("points", "frames", "area", "gap", "B", "faces")}
         _write(file.create_group("interface"), fields)
         file["interface"].attrs["components"] = list(interface.components)
         _write(file, {"basis": model.basis})
-        _write(file.create_group("info"), model.info)
+        facts = {name: fact for name, fact in model.info.items() if isinstance(fact, DATA)}
+        _write(file.create_group("info"), facts)
     os.replace(partial, path)
 
 
@@ -64,20 +68,68 @@ def load(path: str | Path) -> ReducedModel:
                 f"'{path}' is a reduced model of version {file.attrs['version']}, but this program reads version "
                 f"{VERSION}; run the reduction again"
             )
-        system = _read(file["system"])
         interface = _read(file["interface"])
-        return ReducedModel(
-            SecondOrderSystem(
-                system["mass"],
-                system["stiffness"],
-                system.get("damping"),
-                _read(file["system/loads"]),
-                _read(file["system/outputs"]),
-            ),
+        model = ReducedModel(
+            _read_system(file["system"]),
             ContactInterface(components=tuple(file["interface"].attrs["components"]), **interface),
             file["basis"][()] if "basis" in file else None,
             _read(file["info"]),
         )
+        return _with_harmonics(file, model) if "harmonics" in file else model
+
+
+def _write_harmonics(file: h5py.File, model: ReducedModel, harmonics: Sequence[int]) -> None:
+    """Each system that one of the harmonics sees, once, and which of them each sees."""
+    seen: dict[int, tuple[int, SecondOrderSystem]] = {}  # the key lives as long as its system
+    table = []
+    for h in sorted(set(harmonics)):
+        system, B = model.at_harmonic(h)
+        if id(system) not in seen:
+            seen[id(system)] = len(seen), system
+            group = file.create_group(f"systems/{seen[id(system)][0]}")
+            _write_system(group, system)
+            _write(group, {"B": B, "basis": model.harmonic_basis(h) if model.harmonic_basis else None})
+        table.append((h, seen[id(system)][0]))
+    file.create_dataset("harmonics", data=np.array(table))
+
+
+def _with_harmonics(file: h5py.File, model: ReducedModel) -> ReducedModel:
+    """The model with the systems of its stored harmonics; any other harmonic is a ValueError."""
+    systems, maps, bases = {}, {}, {}
+    for name, group in file["systems"].items():
+        i = int(name)
+        systems[i], maps[i] = _read_system(group), group["B"][()]
+        bases[i] = group["basis"][()] if "basis" in group else None
+    place = {int(h): int(i) for h, i in file["harmonics"][()]}
+
+    def known(h: int) -> int:
+        if h not in place:
+            held = ", ".join(map(str, place))
+            raise ValueError(f"harmonic {h} of this model is not in its file, which holds {held}: store it too")
+        return place[h]
+
+    def per_harmonic(h: int) -> tuple[SecondOrderSystem, np.ndarray]:
+        return systems[known(h)], maps[known(h)]
+
+    def harmonic_basis(h: int) -> np.ndarray:
+        basis = bases[known(h)]
+        assert basis is not None
+        return basis
+
+    own = all(basis is not None for basis in bases.values())
+    return replace(model, per_harmonic=per_harmonic, harmonic_basis=harmonic_basis if own else None)
+
+
+def _write_system(group: h5py.Group, system: SecondOrderSystem) -> None:
+    _write(group, {"mass": system.mass, "stiffness": system.stiffness, "damping": system.damping})
+    _write(group.create_group("loads"), system.loads)
+    _write(group.create_group("outputs"), system.outputs)
+
+
+def _read_system(group: h5py.Group) -> SecondOrderSystem:
+    matrices = _read(group)
+    loads, outputs = _read(group["loads"]), _read(group["outputs"])
+    return SecondOrderSystem(matrices["mass"], matrices["stiffness"], matrices.get("damping"), loads, outputs)
 
 
 def _write(group: h5py.Group, values: Mapping[str, object]) -> None:

@@ -52,7 +52,9 @@ class Lifting:
     def __init__(self, zeta: float = 0.02, force: float = 0.3, press: float = 1.0, kn: float = 5.0):
         self.zeta, self.force, self.press, self.kn = zeta, force, press, kn
 
-    def balance(self, harmonics: tuple[int, ...] = (0, 1), n_samples: int = 64, how: str = "sampled") -> HarmonicBalance:
+    def balance(
+        self, harmonics: tuple[int, ...] = (0, 1), n_samples: int = 64, how: str = "sampled"
+    ) -> HarmonicBalance:
         parameters = ContactParameters.of(("n",), [[self.kn]])
         excitation = Excitation.of({"normal": self.press}, {1: {"force": self.force}})
         basis = HarmonicBasis(harmonics, n_samples, how)

@@ -1,7 +1,5 @@
 """A wheel of eight coarse shrouded blades, small enough to be solved as a whole."""
 
-from functools import partial
-
 import numpy as np
 
 from fem import cyclic
@@ -83,11 +81,11 @@ def excitation(static=4e3, harmonic=2e3 + 1e3j):
 
 def wave_and_wheel(reduced, engine_order, harmonics=(0, 1, 2, 3), damping=0.01, load=None, stiffness=None):
     """The same problem twice: one sector under a travelling wave, and the whole wheel."""
-    made = partial(modal_damping, ratio=damping) if damping else None
     basis = HarmonicBasis(harmonics, 128)
     load = load or excitation()
-    one = travelling_wave(reduced, engine_order, made)
-    wheel = wheel_model(reduced, made, stiffness)
+    one, wheel = travelling_wave(reduced, engine_order), wheel_model(reduced, stiffness)
+    if damping:
+        one, wheel = (model.with_damping(lambda system, B: modal_damping(system, damping)) for model in (one, wheel))
     k = reduced.sector.interface.stiffness(*STIFFNESS)
     highest = 2 * np.pi * 1000
 

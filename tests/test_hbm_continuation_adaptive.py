@@ -1,4 +1,4 @@
-"""Adaptive points: interpolation error at the tolerance, far fewer points than equidistant ones, jumps that are said."""
+"""Adaptive points: interpolation error at the tolerance, far fewer points than equidistant ones, jumps told."""
 
 from __future__ import annotations
 

@@ -163,7 +163,7 @@ def test_folds_in_the_load_are_extremes_of_the_load_over_amplitude():
 
 
 def test_closed_curve_beside_the_main_one_is_recognised():
-    """Middle and lower response exist together up to the fold in the load; a load that dips below it makes an island."""
+    """Middle and lower response exist together up to the fold in the load; a load that dips below makes an island."""
     omega, balance = 2.0, Duffing().balance()
     branch = arc_length.follow(parameter.load(balance, omega), 0.0, 12.0)
     fold = branch.parameter[list(branch.folds)].max()

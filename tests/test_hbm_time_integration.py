@@ -168,7 +168,7 @@ def test_full_damping_matrix_and_moving_ground():
     model = random_structure(2)
     rng = np.random.default_rng(1)
     a = rng.normal(size=(10, 10))
-    model = model.with_damping(a @ a.T * 20.0)
+    model = model.with_damping(lambda system, B: a @ a.T * 20.0)
     base = np.zeros((6, 3))
     base[:, 1:] = 2e-7 * rng.normal(size=(6, 2))
     parameters = ContactParameters.of(("t1", "t2", "n"), np.full((2, 3), 2e6), friction=1e6)

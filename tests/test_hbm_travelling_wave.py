@@ -169,7 +169,7 @@ def test_responses_to_several_engine_orders(sectors):
         return natural.follow(balance, 2 * np.pi * 1000, 2 * np.pi * 1100, natural.Options(n_points=51))
 
     orders = (1, 3, 7)
-    found = waves.responses(reduced, orders, None, problem, follow)
+    found = waves.responses(reduced, orders, problem, follow)
     assert tuple(found) == orders
     expected = nodal_diameters(reduced.sector, orders, 1, k)[:, 0]
     for order, frequency in zip(orders, expected, strict=True):

@@ -1,7 +1,6 @@
 """The reduced sector: exact where it must be, near the full sector where modes are left out."""
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -17,6 +16,7 @@ from geometry import mesh as mesh_file
 from reduction import cyclic as waves
 from reduction.damping import modal_damping
 from reduction.linear import linear_modes, system_modes
+from reduction.store import load, save
 from tests import small_wheel as small
 
 
@@ -107,8 +107,9 @@ def test_contact_of_fewer_components_leaves_the_others_free(tmp_path):
 
 
 def test_model_of_a_wave(reduced):
-    damping = partial(modal_damping, ratio=0.02)
-    model = waves.travelling_wave(reduced, 3, damping)
+    undamped = waves.travelling_wave(reduced, 3)
+    model = undamped.with_damping(lambda system, B: modal_damping(system, 0.02))
+    assert undamped.at_harmonic(1)[0].damping is None
     n_contact = len(reduced.sector.left)
     for h, index in ((0, 0), (1, 3), (2, 6), (3, 1), (5, 7), (8, 0), (9, 3)):
         system, B = model.at_harmonic(h)
@@ -148,3 +149,27 @@ def test_shared_nodes_of_contact_and_seam_are_one_sentence(reduced):
     broken = replace(reduced.sector, left=np.asarray(reduced.sector.interface.B))
     with pytest.raises(ValueError, match="the right contact face of a cyclic part must be of master nodes"):
         waves.relative_map(broken, 1)
+
+
+def test_wave_survives_its_file(reduced, tmp_path):
+    """Stored harmonic by harmonic: the same matrices, shared where they were, the same way back to the full field."""
+    model = waves.travelling_wave(reduced, 4).with_damping(lambda system, B: modal_damping(system, 0.01))
+    path = tmp_path / "wave.h5"
+    with pytest.raises(ValueError, match="say which harmonics are to be stored"):
+        save(model, path)
+    save(model, path, harmonics=(0, 1, 2, 3))
+    back = load(path)
+    for h in (0, 1, 2, 3):
+        (one, B), (other, B_back) = model.at_harmonic(h), back.at_harmonic(h)
+        assert np.array_equal(B, B_back)
+        for name in ("mass", "stiffness", "damping"):
+            assert np.array_equal(getattr(one, name), getattr(other, name))
+        assert np.array_equal(one.loads["couple"], other.loads["couple"])
+        assert np.array_equal(one.outputs["tip"], other.outputs["tip"])
+        q = np.random.default_rng(h).normal(size=model.at_harmonic(h)[0].n_dof)
+        assert np.array_equal(model.reconstruct(q, h), back.reconstruct(q, h))
+    assert back.at_harmonic(0)[0] is back.at_harmonic(2)[0]  # engine order 4 of 8: even harmonics are in phase
+    assert back.at_harmonic(1)[0] is back.at_harmonic(3)[0]
+    assert back.info["engine_order"] == 4
+    with pytest.raises(ValueError, match="harmonic 5 of this model is not in its file, which holds 0, 1, 2, 3"):
+        back.at_harmonic(5)

@@ -10,9 +10,10 @@ import pytest
 from hbm import newton, stability, time_integration
 from hbm.law import SEPARATES, STICKS
 from hbm.time_integration import Options
-from workflows import leaf_figures, leaf_fit, leaf_study, pipeline, planning, scene_file
+from workflows import leaf_figures, leaf_fit, leaf_record, leaf_study, pipeline, planning, scene_file
 from workflows.leaf_cases import Case, cases, liner
 from workflows.leaf_response import LINER_NODE, respond
+from workflows.leaf_study import KEPT
 from workflows.progress import Progress
 from workflows.references import linear_references
 
@@ -187,15 +188,17 @@ def test_three_solutions_share_a_frequency_and_time_integration_knows_which_are_
 
 
 def test_inclination_leaves_the_ends_or_the_centre_in_contact(tmp_path):
-    for angle, ends in ((3.0, True), (-3.0, False)):
+    for angle, ends in ((4.0, True), (-4.0, False)):
         model = built(tmp_path, f"contact.inclination={angle} deg")
         part, balance = model.part, model.balance
         closed = newton.solve_from_rest(balance, 2 * np.pi * HIGH).state.cycle.status != SEPARATES
         x = np.abs(part.interface.points[:, 0])
         for pairs in part.pairs.values():
             share = x[pairs] / x[pairs].max()
-            centre, end = closed[pairs][share < 1 / 3].mean(), closed[pairs][share > 2 / 3].mean()
-            assert (end > centre + 0.4) if ends else (centre > end + 0.4)
+            centre, end = closed[pairs][share < 1 / 3], closed[pairs][share > 3 / 4]
+            apart, touching = (centre, end) if ends else (end, centre)
+            assert not apart.any()
+            assert touching.any()
 
 
 def test_liner_motion_enters_the_contact_and_the_linear_references():
@@ -233,16 +236,35 @@ def test_the_study_has_its_thirty_configurations_and_writes_what_it_found(tmp_pa
     }  # fmt: skip
     for case in every:
         scene_file.read("leaf_seal", case.overrides)
-    few = [every[0], Case("inclination", "+3°", ("contact.inclination=3 deg",))]
-    studied = leaf_study.study(few, tmp_path)
+    impossible = Case("bow", "impossible", ("contact.plane=", "contact.inclination=1 deg"))
+    few = [every[0], impossible, next(case for case in every if case.label == "+4°")]
+    told = []
+    records = leaf_study.study(few, tmp_path, tell=told.append)
+    assert [record.complete for record in records] == [True, False, True]
+    assert len(told) == 3
     with open(tmp_path / "study.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert [row["group"] for row in rows] == ["liner", "inclination"]
+    assert [row["group"] for row in rows] == ["liner", "bow", "inclination"]
     assert rows[0]["fold_hz"].split() == ["174.74", "132.24"]
-    paths = leaf_study.draw(studied, tmp_path)
-    assert {path.stem for path in paths} == {"summary", "response", "contact", "history", "inclination"}
+    assert rows[0]["end"] == "reached 450 Hz"
+    assert "give its plane" in rows[1]["end"]
+    again = leaf_study.study(few[:2], tmp_path, resume=True)
+    assert again[0].response is None
+    assert again[0].numbers == records[0].numbers
+    np.testing.assert_array_equal(again[0].amplitude, records[0].amplitude)
+    assert leaf_record.load(few[0], scene_file.read("leaf_seal", few[2].overrides).scene, tmp_path / "x") is None
+    assert leaf_record.load(few[0], scene_file.read("leaf_seal", few[2].overrides).scene, tmp_path / KEPT) is None
+    paths = leaf_study.draw(records, tmp_path)
+    drawn = {path.stem for path in paths}
+    assert drawn == {"summary", "response", "contact", "history", "inclination", "chatter"}
     assert all(path.stat().st_size > 20_000 for path in paths)
-    assert set(leaf_figures.chosen_pairs(studied["liner"][0][1]).values()) < set(range(126))
+    assert set(leaf_figures.chosen_pairs(records[0].response).values()) < set(range(126))
+    with open(tmp_path / "chatter.csv", encoding="utf-8") as file:
+        pairs = list(csv.DictReader(file))
+    assert len(pairs) == 5 * 126
+    for pair in pairs:
+        opens = pair["status"] == "stick-separation"
+        assert bool(pair["opening_ms"]) == bool(pair["impact_velocity_mm_s"]) == opens
 
 
 @pytest.mark.parametrize(

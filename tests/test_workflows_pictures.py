@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.synthetic_result import result
-from workflows import plots, render
+from workflows import plots, render, view
 
 
 def assert_not_blank(path: Path) -> None:
@@ -64,10 +64,10 @@ def test_shares_of_the_patch_have_the_area_of_its_faces() -> None:
 def test_swing_is_the_largest_vibration_over_the_cycle() -> None:
     displacement = np.zeros((2, 3, 3))
     displacement[1, 2] = [5.0, 3.0, 4.0]
-    assert np.abs(render.swing(displacement)[1, 2]) == pytest.approx(5.0, rel=2e-3)  # 64 instants of a cycle
-    assert not render.swing(displacement)[0].any()
+    assert np.abs(view.swing(displacement)[1, 2]) == pytest.approx(5.0, rel=2e-3)  # 64 instants of a cycle
+    assert not view.swing(displacement)[0].any()
 
 
 @pytest.mark.parametrize(("value", "nice"), [(1.0, 1.0), (1.99, 1.0), (2.0, 2.0), (7.0, 5.0), (0.3, 0.2), (5e3, 5e3)])
 def test_factors_are_round(value: float, nice: float) -> None:
-    assert render._nice(value) == nice
+    assert view.nice(value) == nice

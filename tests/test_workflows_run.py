@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workflows import pipeline, store
+from workflows import pipeline, plots, store
 from workflows.progress import Progress
 from workflows.result import Result
 from workflows.scene_file import read
+from workflows.summary import summary
 
 ROOT = Path(__file__).parents[1]
 SMALL = [
@@ -187,6 +188,23 @@ def test_a_share_of_no_deflection_is_refused_before_long_work(tmp_path: Path) ->
     with pytest.raises(ValueError, match=r"wear\.step: a share of delta_max needs static loads"):
         pipeline.run(read("beam", [*SMALL, "loads.static.press.value=0 N"]), tmp_path, Progress())
     assert not (tmp_path / "result.h5").exists()
+
+
+def test_curves_of_the_worn_contact_walk_to_the_free_one(finished: Result, tmp_path: Path) -> None:
+    result = pipeline.run(read("beam", [*SMALL, "wear.responses=3"]), tmp_path, Progress())
+    worn = store.load(tmp_path / "result.h5").worn
+    assert worn is not None
+    assert result.wear is not None
+    assert finished.wear is not None
+    assert np.array_equal(result.wear.depth, finished.wear.depth)
+    assert len(worn.row) == 3
+    assert worn.row[-1] == len(finished.wear.cycles) - 1
+    peaks = worn.omega[np.arange(3), np.nanargmax(worn.amplitude, axis=1)] / (2 * np.pi)
+    assert peaks[-1] == pytest.approx(np.atleast_1d(finished.facts["free_hz"])[0], rel=0.05)
+    assert np.all(np.diff(peaks) <= 0)
+    assert summary(result)["surface_volumes_m3"] == pytest.approx([0.5 * summary(result)["volume_m3"]] * 2)
+    drawn = {path.name for path in plots.draw(result, tmp_path)}
+    assert {"frf.png", "depth.png"} <= drawn
 
 
 def test_the_error_controlled_rule_runs_from_a_scene(tmp_path: Path) -> None:

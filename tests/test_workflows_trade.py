@@ -23,14 +23,15 @@ SMALL = (
 def table() -> trade.Table:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(trade, "THESIS_STEPS", (0.4, 0.2))
-        patch.setattr(trade, "REFERENCE_STEPS", (0.1, 0.05))
+        patch.setattr(trade, "FINER_STEPS", (0.05,))
+        patch.setattr(trade, "REFERENCE_TOLERANCES", (0.06, 0.02))
         patch.setattr(trade, "TOLERANCES", (0.3,))
         return trade.wear_step("beam", lambda _: None, SMALL)
 
 
 def test_errors_fall_with_the_step(table: trade.Table) -> None:
     thesis = [row for row in table.rows if row.rule == "thesis"]
-    assert [row.step for row in thesis] == [0.4, 0.2, 0.1, 0.05]
+    assert [row.step for row in thesis] == [0.4, 0.2, 0.05]
     errors = [abs(row.life_error or 0.0) for row in thesis]
     assert errors[-1] < errors[0]
     assert all(row.life_cycles > 0 and 0 < row.depth_m < 0.02 for row in table.rows)

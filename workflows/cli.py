@@ -142,6 +142,7 @@ def trade(
     *,
     knob: Literal["wear_step"] = "wear_step",
     overrides: Overrides = (),
+    out: Path | None = None,
     as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
 ) -> None:
     """Measure what a knob costs and what it is worth, against a finer reference on the same scene.
@@ -152,12 +153,16 @@ def trade(
         Name of a scene or a .toml file.
     knob
         wear_step: table 4.2 of the thesis with life added, and the error-controlled rule.
+    out
+        File for a plot of the errors against the work.
     as_json
         Print JSON for machines.
     """
     from workflows import trade as trading
 
     table = trading.wear_step(scene, _aside, overrides)
+    if out is not None:
+        trading.picture(table).savefig(out)
     print(json.dumps(trading.as_records(table), indent=2) if as_json else trading.as_text(table))
 
 
@@ -203,6 +208,35 @@ def _scaling(quick: bool, out: Path, as_json: bool) -> None:
     else:
         print(measured.as_text(rows))
         print(out)
+
+
+@app.command
+def extremes(
+    *,
+    quick: Annotated[bool, Parameter(negative=())] = False,
+    out: Path = Path("extremes.png"),
+    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+) -> None:
+    """Try the solver at its numerical extremes: each cell converged and checked, or refused with a sentence.
+
+    Parameters
+    ----------
+    quick
+        Every third cell, on smaller models.
+    out
+        File of the picture.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import extremes as table
+    from workflows import extremes_picture
+
+    rows = table.run(quick, _aside)
+    extremes_picture.picture(rows).savefig(out)
+    print(json.dumps(table.as_records(rows), indent=2) if as_json else table.as_text(rows))
+    wrong = table.counts(rows)["wrong"]
+    if wrong:
+        raise RuntimeError(f"{wrong} of {len(rows)} extreme settings ended with a wrong number, see the table")
 
 
 @app.command
@@ -361,7 +395,13 @@ def plan(scene: str, *, overrides: Overrides = ()) -> None:
 
 
 @app.command
-def leaf(work: Literal["fit", "check", "study", "accuracy"], *, out: Path | None = None) -> None:
+def leaf(
+    work: Literal["fit", "check", "study", "accuracy"],
+    *,
+    out: Path | None = None,
+    resume: Annotated[bool, Parameter(negative=())] = False,
+    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+) -> None:
     """What only the leaf seal has: the fit of its dimensions, its parameter study, its accuracy.
 
     Parameters
@@ -371,14 +411,98 @@ def leaf(work: Literal["fit", "check", "study", "accuracy"], *, out: Path | None
         runs some thirty configurations; accuracy holds 1 to 9 harmonics against time integration.
     out
         Folder of tables and pictures; results/leaf_study or results/leaf_accuracy unless told.
+    resume
+        Let a study go on with what is complete in its folder.
+    as_json
+        Print JSON for machines.
     """
     from workflows import leaf_accuracy, leaf_fit, leaf_study
 
-    if work in ("fit", "check"):
-        leaf_fit.run(check_only=work == "check")
+    folder = out or Path("results") / f"leaf_{work}"
+    if resume and work != "study":
+        raise ValueError(f"--resume is for leaf study, leaf {work} has nothing to go on with: run it without")
+    if work == "study":
+        leaf_study.run(folder, resume, as_json)
+    elif work == "accuracy":
+        leaf_accuracy.run(folder, as_json)
     else:
-        chosen = leaf_study if work == "study" else leaf_accuracy
-        chosen.run(out or Path("results") / f"leaf_{work}")
+        leaf_fit.run(work == "check", as_json)
+
+
+@app.command
+def blade(
+    work: Literal["study", "mistuned"],
+    scene: str = "blade",
+    *,
+    overrides: Overrides = (),
+    speed: str | None = None,
+    out: Path | None = None,
+) -> None:
+    """What only a bladed disk has: figures 4.11 to 4.17 and table 4.4 of the thesis beside ours.
+
+    Parameters
+    ----------
+    work
+        study draws nodal diameters, responses to engine orders and to rising forces, and wear for several wear steps;
+        mistuned solves all blades of a small wheel at once, their stiffnesses a few per cent apart.
+    scene
+        Name of a scene with a [wheel] or a .toml file.
+    speed
+        Highest speed of a Campbell diagram, such as 6000rpm; no diagram unless told.
+    out
+        Folder of tables and pictures; results/blade_study unless told.
+    """
+    from workflows import blade_mistuning, blade_study
+
+    highest = None if speed is None else _option("--speed", speed, "Hz")
+    folder = out or Path("results") / f"blade_{work}"
+    if work == "mistuned":
+        written = blade_mistuning.run(scene, overrides, folder)
+    else:
+        written = blade_study.run(scene, overrides, folder, highest, _aside, blade_study.Extent())
+    for path in written:
+        print(path)
+
+
+@app.command
+def rig(
+    work: Literal["fit", "study"],
+    *,
+    column: Annotated[bool, Parameter(negative=())] = False,
+    wear: Annotated[bool, Parameter(negative=())] = False,
+    overrides: Overrides = (),
+    out: Path | None = None,
+    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+) -> None:
+    """What only the fretting rig has: fits of what is not published, and its comparison with the published experiment.
+
+    Parameters
+    ----------
+    work
+        fit looks for joint springs, platform height and damping that give published numbers, and says how well these
+        determine them; study holds every published number and trend against ours, wear to the loss of the preload for
+        three mating heights included.
+    column
+        fit: the section of the column too, minutes.
+    wear
+        fit: the wear coefficient too, from a whole wear run, minutes.
+    out
+        study: folder of table and pictures; results/rig_study unless told.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import rig_fit, rig_study, rig_table
+
+    if work == "fit":
+        fits = rig_fit.run(overrides, column, wear, _aside)
+        print(json.dumps(rig_fit.as_records(fits), indent=2) if as_json else rig_fit.as_text(fits))
+        return
+    table, paths = rig_study.run(out or Path("results") / "rig_study", overrides, _aside)
+    if as_json:
+        print(json.dumps({**rig_table.as_records(table), "files": [str(path) for path in paths]}, indent=2))
+    else:
+        print(rig_table.as_text(table))
+        print(*paths, sep="\n")
 
 
 def _option(name: str, text: str, unit: str) -> float:

@@ -14,8 +14,9 @@ from geometry import mesh as mesh_reader
 from geometry.numbering import REFERENCE_POINTS, permutation
 from hbm.balance import HarmonicBalance
 from hbm.harmonic_choice import HarmonicChoice
-from workflows.references import free_deflection
+from workflows.references import delta_max, free_deflection
 from workflows.result import PartMesh, Patch, Result
+from workflows.scene import PartScene
 from workflows.scene_file import SceneFile
 
 VTK_KIND = {27: ("hexahedron27", "triquadratic_hexahedron"), 10: ("tetra10", "quadratic_tetra")}
@@ -37,7 +38,7 @@ def described(
         "contact_pairs": i.n_pair,
         "harmonics": np.array(balance.basis.harmonics),
         "unknowns": balance.n_unknown,
-        "delta_max_m": float(patch.free_deflection.max()),
+        "delta_max_m": delta_max(file.scene, patch.free_deflection, i.area),
         "compliance_error": balance.compliance.error,
     }
     if part is not None:
@@ -52,6 +53,10 @@ def described(
             "first_omitted_hz": float(str(reduced.info["first_omitted_frequency"])),
             "factorisation": str(reduced.info["factorisation"]),
         }
+    if file.scene.wear is not None:
+        facts["wear_split"] = file.scene.wear.split
+    if isinstance(file.scene, PartScene) and (around := file.scene.wheel) is not None:
+        facts |= {"sectors": around.sectors, "engine_order": around.engine_order, "axis": np.array(around.axis)}
     if choice is not None:
         facts |= {"harmonics_error": choice.estimate.error, "harmonics_choice": choice.outcome}
     mesh = None if part is None else part_mesh(part)

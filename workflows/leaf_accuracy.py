@@ -7,8 +7,9 @@ time are started at each of them.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import matplotlib as mpl
@@ -28,7 +29,7 @@ from workflows.style import BLUE, GREEN, INK, ORANGE, RED, STYLE
 HARMONICS = (1, 3, 5, 9)
 HILL = 5  # harmonics of the solutions whose stability is compared with time integration
 SEARCH = Options(steps=512, tolerance=1e-7, max_periods=400)
-MARCH = replace(SEARCH, accelerate=False, max_periods=800)
+MARCH = replace(SEARCH, accelerate=False, max_periods=800, patience=800)
 LEFT = 0.3  # change of amplitude, relative, that means that a motion has left its branch
 BISECTIONS, BRACKET = 8, 0.02
 
@@ -45,7 +46,7 @@ class Edge:
 class Coexisting:
     """A solution that shares its frequency with others.
 
-    amplitude : of the lower corner by harmonic balance; in_time : after a march that began there [m]
+    amplitude : of the lower corner by harmonic balance; in_time : after a march of `periods` that began there [m]
     stays : whether the march ended where it began; growth : largest real part of Hill's exponents [1/s]
     """
 
@@ -53,6 +54,7 @@ class Coexisting:
     stable: bool
     growth: float
     in_time: float
+    periods: int
     stays: bool
 
 
@@ -122,9 +124,10 @@ def coexisting(response: LeafResponse, low: float, high: float) -> tuple[float, 
         found = []
         for state, one in zip(states, hill, strict=True):
             row = balance.outputs(state)[balance.compliance.output_names.index(LINER_NODE)]
-            ours, theirs = float(np.linalg.norm(row[1:])), amplitude(balance, march(balance, state, omega))
-            stays = abs(theirs / ours - 1) < LEFT
-            found.append(Coexisting(ours, one.stable, float(one.exponents.real.max()), theirs, stays))
+            motion = march(balance, state, omega)
+            ours, theirs = float(np.linalg.norm(row[1:])), amplitude(balance, motion)
+            growth, stays = float(one.exponents.real.max()), abs(theirs / ours - 1) < LEFT
+            found.append(Coexisting(ours, one.stable, growth, theirs, motion.periods, stays))
         return float(omega), found
     return float("nan"), []
 
@@ -135,23 +138,40 @@ def resonance(response: LeafResponse) -> tuple[int, int, float]:
     return upper, lower, float(response.branch.amplitude(LINER_NODE).max())
 
 
-def table(responses: dict[int, LeafResponse], upper: Edge, lower: Edge) -> str:
+def errors(responses: dict[int, LeafResponse], upper: Edge, lower: Edge) -> list[dict[str, float]]:
     """Folds and peak for every number of harmonics, with relative errors against time integration."""
-    lines = ["harmonics  unknowns  upper fold / Hz   error    lower fold / Hz   error     peak / um    error   seconds"]
-    hertz = 2 * np.pi
+    rows = []
     for top, response in responses.items():
         first, second, peak = resonance(response)
         folds = response.branch.omega[[first, second]]
-        cells = [
-            f"{omega / hertz:13.3f} {100 * (omega / edge.omega - 1):+9.3f} %  "
-            for omega, edge in zip(folds, (upper, lower), strict=True)
-        ]
-        error = 100 * (peak / lower.amplitude - 1)
-        lines.append(
-            f"0..{top:<6d} {response.balance.n_unknown:8d} {''.join(cells)} {MICRO * peak:10.2f} {error:+8.2f} % "
-            f"{response.seconds:8.1f}"
+        rows.append(
+            {
+                "harmonics": top,
+                "unknowns": response.balance.n_unknown,
+                "upper_fold_hz": folds[0] / (2 * np.pi),
+                "upper_fold_error": folds[0] / upper.omega - 1,
+                "lower_fold_hz": folds[1] / (2 * np.pi),
+                "lower_fold_error": folds[1] / lower.omega - 1,
+                "peak_m": peak,
+                "peak_error": peak / lower.amplitude - 1,
+                "seconds": response.seconds,
+            }
         )
-    resolution = 2 * BRACKET / 2**BISECTIONS
+    return rows
+
+
+def table(rows: Sequence[dict[str, float]], upper: Edge, lower: Edge) -> str:
+    """The errors as people read them."""
+    lines = ["harmonics  unknowns  upper fold / Hz   error    lower fold / Hz   error     peak / um    error   seconds"]
+    for row in rows:
+        cells = "".join(
+            f"{row[f'{name}_fold_hz']:13.3f} {100 * row[f'{name}_fold_error']:+9.3f} %  " for name in ("upper", "lower")
+        )
+        lines.append(
+            f"0..{row['harmonics']:<6.0f} {row['unknowns']:8.0f} {cells} {MICRO * row['peak_m']:10.2f} "
+            f"{100 * row['peak_error']:+8.2f} % {row['seconds']:8.1f}"
+        )
+    hertz, resolution = 2 * np.pi, 2 * BRACKET / 2**BISECTIONS
     lines.append(
         f"in time   {'':9}{upper.omega / hertz:13.3f}   {'':10}{lower.omega / hertz:15.3f}   {'':10}"
         f"{MICRO * lower.amplitude:12.2f}   folds in time are known to {100 * resolution:.2f} %"
@@ -168,12 +188,12 @@ def figure_of(responses: dict[int, LeafResponse], marks: Sequence[tuple[float, f
         figure = Figure(figsize=(8, 5), layout="constrained")
         axes = figure.subplots()
         for (top, response), color in zip(responses.items(), (RED, ORANGE, GREEN, BLUE), strict=False):
-            height = MICRO * response.branch.amplitude(LINER_NODE)
+            hertz, height = response.branch.frequency, MICRO * response.branch.amplitude(LINER_NODE)
             label = f"harmonics 0..{top}"
             if top <= HILL:  # beyond, the eigenvalue problems get large and tell nothing new
-                draw_curve(axes, response.branch, response.stability.stable, height, color, lw=1.3, label=label)
+                draw_curve(axes, hertz, response.stability.stable, height, color, lw=1.3, label=label)
             else:
-                axes.plot(response.branch.frequency, height, color=color, lw=0.8, label=label)
+                axes.plot(hertz, height, color=color, lw=0.8, label=label)
         omega, height = np.array(marks).T
         axes.plot(omega / (2 * np.pi), MICRO * height, "o", color=INK, ms=5, mfc="none", label="time integration")
         folds = [response.branch.omega[i] for response in responses.values() for i in resonance(response)[:2]]
@@ -184,27 +204,36 @@ def figure_of(responses: dict[int, LeafResponse], marks: Sequence[tuple[float, f
     return figure
 
 
-def run(folder: Path) -> None:
-    """Print the table and draw the curves into a folder."""
+def run(folder: Path, as_json: bool = False) -> None:
+    """Print the table, or JSON for machines, and draw the curves into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "harmonics.png"
     with threadpool_limits(1):
         responses = {top: with_harmonics(top) for top in HARMONICS}
         finest = responses[HARMONICS[-1]]
         first, second, _ = resonance(finest)
         upper, lower = edge(finest, first, high=False), edge(finest, second, high=True)
-        print(table(responses, upper, lower), flush=True)
+        rows = errors(responses, upper, lower)
+        if not as_json:
+            print(table(rows, upper, lower), flush=True)
         hill = responses[HILL]
         folds = [hill.branch.omega[i] for i in resonance(hill)[:2]]
         omega, solutions = coexisting(hill, min(folds), max(folds))
-        print(f"solutions at {omega / (2 * np.pi):.2f} Hz with harmonics 0..{HILL}, amplitude of the lower corner:")
-        for one in solutions:
-            print(
-                f"  {MICRO * one.amplitude:9.2f} um  {'stable' if one.stable else 'unstable':8} by Hill "
-                f"(growth {one.growth:+7.2f} /s), in time {MICRO * one.in_time:9.2f} um: "
-                f"{'stays' if one.stays else 'leaves'}"
-            )
         marks = [(upper.omega, upper.amplitude), (lower.omega, lower.amplitude)]
         marks += [(omega, one.in_time) for one in solutions]
-        path = folder / "harmonics.png"
         figure_of(responses, marks).savefig(path)
-        print(path)
+    hertz = omega / (2 * np.pi)
+    if as_json:
+        edges = {"upper": upper, "lower": lower}
+        in_time = {name: {"hz": one.omega / (2 * np.pi), "m": one.amplitude} for name, one in edges.items()}
+        found = {"hz": hertz, "harmonics": HILL, "solutions": [asdict(one) for one in solutions]}
+        print(json.dumps({"rows": rows, "in_time": in_time, "coexisting": found, "picture": str(path)}, indent=2))
+        return
+    print(f"solutions at {hertz:.2f} Hz with harmonics 0..{HILL}, amplitude of the lower corner:")
+    for one in solutions:
+        print(
+            f"  {MICRO * one.amplitude:9.2f} um  {'stable' if one.stable else 'unstable':8} by Hill "
+            f"(growth {one.growth:+7.2f} /s), after {one.periods} periods in time {MICRO * one.in_time:9.2f} um: "
+            f"{'stays' if one.stays else 'leaves'}"
+        )
+    print(path)

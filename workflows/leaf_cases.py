@@ -20,7 +20,7 @@ LINER: dict[int, tuple[float, complex]] = {  # table 6.1: number -> static and h
 FORCES = (0.1, 0.2, 0.5, 1.0)
 CONTACTS = (5.0, 12.5, 50.0, 100.0)
 SPRINGS = (0.1, 0.5, 2.0, 10.0)
-INCLINATIONS = (-3.0, -1.0, 1.0, 3.0)  # [degree], ours
+INCLINATIONS = (-4.0, -1.0, 1.0, 4.0)  # [degree], ours
 BOWS = (-1.0, -0.3, 0.3, 1.0)  # [mm], ours
 
 

@@ -11,10 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch as Swatch
 
 from hbm.aft import history
-from hbm.branch import Branch
 from hbm.law import SEPARATES, STICKS
-from workflows.leaf_cases import Case
-from workflows.leaf_response import LINER_NODE, LeafResponse
+from workflows.leaf_record import Record
+from workflows.leaf_response import LeafResponse
 from workflows.maps import draw_field, draw_status
 from workflows.references import linear_references
 from workflows.result import Patch
@@ -52,11 +51,13 @@ def response_figure(response: LeafResponse, low: float, high: float) -> Figure:
             mean = MICRO * branch.response[:, row, 0]
             height = MICRO * np.hypot(branch.response[:, row, 1], branch.response[:, row, 2])
             for axes, values in ((still, mean), (moving, height)):
-                draw_curve(axes, branch, response.stability.stable, values, RED)
+                draw_curve(axes, branch.frequency, response.stability.stable, values, RED)
+                lower = 2 if values[points[1]] < values[points[3]] else 4  # neighbours on two branches
                 for number, point in enumerate(points, start=1):
                     axes.plot(branch.frequency[point], values[point], "o", color=INK, ms=4)
+                    beside = (-3, -13) if number == lower else (5, 4)
                     axes.annotate(
-                        str(number), (branch.frequency[point], values[point]), (5, 4), textcoords="offset points"
+                        str(number), (branch.frequency[point], values[point]), beside, textcoords="offset points"
                     )
             moving.set(yscale="log", ylabel="µm")
             moving.set_ylim(0.5 * height.min(), 3 * height.max())
@@ -72,11 +73,13 @@ def response_figure(response: LeafResponse, low: float, high: float) -> Figure:
     return figure
 
 
-def draw_curve(axes: Any, branch: Branch, stable: np.ndarray, values: np.ndarray, color: Any, **options: Any) -> None:
+def draw_curve(
+    axes: Any, frequency: np.ndarray, stable: np.ndarray, values: np.ndarray, color: Any, **options: Any
+) -> None:
     """A response curve, dotted where it is unstable."""
-    axes.plot(branch.frequency, np.where(stable, values, np.nan), color=color, **options)
+    axes.plot(frequency, np.where(stable, values, np.nan), color=color, **options)
     joined = ~stable | np.append(~stable[1:], False) | np.append(False, ~stable[:-1])
-    axes.plot(branch.frequency, np.where(joined, values, np.nan), ":", color=color, lw=1.4)
+    axes.plot(frequency, np.where(joined, values, np.nan), ":", color=color, lw=1.4)
 
 
 def contact_figure(shown: Sequence[tuple[str, LeafResponse, int]]) -> Figure:
@@ -119,9 +122,9 @@ def history_figure(response: LeafResponse, points: Sequence[int], names: Sequenc
     branch, balance = response.branch, response.balance
     angle = np.linspace(0.0, 2 * np.pi, 257)
     functions = balance.basis.functions(angle)
-    pairs = chosen_pairs(response)
+    pairs, shares = chosen_pairs(response), np.append(balance.basis.angle / (2 * np.pi), 1.0)
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(2.7 * len(points) + 1.2, 5.6), layout="constrained")
+        figure = Figure(figsize=(2.7 * len(points) + 2.2, 5.6), layout="constrained")
         grid = figure.subplots(2, len(points), sharex=True, squeeze=False)
         for (above, below), point, name in zip(grid.T, points, names, strict=True):
             outputs = MICRO * branch.response[point] @ functions.T
@@ -131,13 +134,13 @@ def history_figure(response: LeafResponse, points: Sequence[int], names: Sequenc
                 )
             _, force = history(balance.law, response.state(point).x, balance.parameters, balance.basis, balance.memory)
             for (label, pair), color in zip(pairs.items(), (BLUE, GREEN, RED), strict=True):
-                below.plot(balance.basis.angle / (2 * np.pi), force[pair, 0], color=color, label=label)
+                below.plot(shares, np.append(force[pair, 0], force[pair, 0, 0]), color=color, label=label)
             above.set_title(name, fontsize=10, fontweight="normal")
             below.set_xlabel("time / period")
         grid[0, 0].set_ylabel("displacement z / µm")
         grid[1, 0].set_ylabel("contact force / N")
-        grid[0, 0].legend(fontsize=7)
-        grid[1, 0].legend(fontsize=7)
+        for axes in grid[:, -1]:
+            axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 
 
@@ -156,20 +159,42 @@ def chosen_pairs(response: LeafResponse) -> dict[str, int]:
     return found
 
 
-def summary_figure(studied: Mapping[str, Sequence[tuple[Case, LeafResponse]]]) -> Figure:
-    """Response curves of all configurations, one panel for each parameter; dotted where unstable."""
+def summary_figure(records: Sequence[Record]) -> Figure:
+    """Response curves of all configurations, one panel for each parameter, dotted where unstable; and their seconds."""
+    groups: dict[str, list[Record]] = {}
+    for record in records:
+        groups.setdefault(record.case.group, []).append(record)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(14, 8.5), layout="constrained")
-        grid = figure.subplots(2, 4, sharey=True).ravel()
-        for axes, (group, responses) in zip(grid, studied.items(), strict=False):
-            colors = mpl.colormaps["viridis"](np.linspace(0, 0.9, len(responses)))
-            for color, (case, response) in zip(colors, responses, strict=True):
-                height = MICRO * response.branch.amplitude(LINER_NODE)
-                draw_curve(axes, response.branch, response.stability.stable, height, color, lw=1.3, label=case.label)
+        panels = figure.subplots(2, 4).ravel()
+        for axes, (group, members) in zip(panels, groups.items(), strict=False):
+            colors = mpl.colormaps["viridis"](np.linspace(0, 0.9, len(members)))
+            for color, one in zip(colors, members, strict=True):
+                label = one.case.label if one.complete else f"{one.case.label}: incomplete"
+                draw_curve(axes, one.frequency, one.stable, MICRO * one.amplitude, color, lw=1.3, label=label)
             axes.set(yscale="log", title=group, xlabel="frequency / Hz")
             axes.legend(fontsize=7)
-        for axes in grid[len(studied) :]:
-            axes.axis("off")
-        for axes in grid[::4]:
+        amplitudes = MICRO * np.concatenate([record.amplitude for record in records if len(record.amplitude)])
+        for axes in panels[: len(groups)]:
+            axes.set_ylim(0.8 * amplitudes.min(), 2 * amplitudes.max())
+        for axes in panels[: len(groups) : 4]:
             axes.set_ylabel("amplitude of the lower corner / µm")
+        for axes in panels[len(groups) : -1]:
+            axes.axis("off")
+        draw_seconds(panels[-1], groups)
     return figure
+
+
+def draw_seconds(axes: Any, groups: Mapping[str, Sequence[Record]]) -> None:
+    """Processor time of every configuration, one row of marks for each parameter."""
+    total = 0.0
+    for place, (group, members) in enumerate(groups.items()):
+        axes.text(0.03, place, group, fontsize=8, transform=axes.get_yaxis_transform(), va="center")
+        seconds = [one.numbers["seconds"] for one in members if "seconds" in one.numbers]
+        axes.plot(seconds, [place] * len(seconds), "o", color=BLUE, ms=5, alpha=0.7)
+        total += sum(seconds)
+    axes.set(title=f"seconds, in all {total:.0f}", xlabel="processor time of model and curve / s")
+    axes.set_xlim(-0.6 * axes.get_xlim()[1], None)  # room for the names
+    axes.set_xticks([tick for tick in axes.get_xticks() if tick >= 0])
+    axes.set_yticks([])
+    axes.set_ylim(len(groups) - 0.5, -0.5)

@@ -10,7 +10,9 @@ numbers count alike; what remains is what the table allows.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import json
+import sys
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -106,6 +108,17 @@ class Fit:
             ]
             lines.append(f"{mode + 1:4d}" + "".join(cells))
         return "\n".join(line.rstrip() for line in lines)
+
+    def record(self) -> dict[str, Any]:
+        """Ratios, errors and dimensions for machines."""
+        columns = {}
+        for name, ours, errors in zip(PUBLISHED, self.columns / self.unit, self.errors, strict=True):
+            told = [error if ratio else None for ratio, error in zip(PUBLISHED[name], errors.tolist(), strict=True)]
+            columns[name] = {"published": PUBLISHED[name], "ours": ours.tolist(), "error": told}
+        return {
+            "columns": columns, "rms": self.rms, "unit_hz": self.unit, "pin_N_per_m": self.spring,
+            "contact_N_per_m": self.contact, "geometry": asdict(self.parameters),
+        }  # fmt: skip
 
     def toml(self) -> str:
         """Lines for the scene."""
@@ -218,7 +231,7 @@ def fit(scene: PartScene, pin_column: int, max_steps: int = 20) -> Fit:
     return Fit(p, spring, contact, unit, leaf.columns(spring, contact))
 
 
-def run(check_only: bool) -> None:
+def run(check_only: bool, as_json: bool = False) -> None:
     """Fit for every column the pins may stand in and print the best; or just print the leaf as the scene has it."""
     scene = scene_file.read("leaf_seal").part_scene
     with threadpool_limits(1):
@@ -227,8 +240,12 @@ def run(check_only: bool) -> None:
         else:
             fits = [fit(scene, column) for column in PIN_COLUMNS]
             for one in fits:
-                print(f"pins in column {one.parameters.pin_column}: error {100 * one.rms:.2f} % r.m.s.")
+                sentence = f"pins in column {one.parameters.pin_column}: error {100 * one.rms:.2f} % r.m.s."
+                print(sentence, file=sys.stderr)
             found = min(fits, key=lambda one: one.rms)
+    if as_json:
+        print(json.dumps(found.record(), indent=2))
+        return
     print(found.table())
     print(f"error {100 * found.rms:.2f} % r.m.s.; 1.00 is {found.unit:.4g} Hz")
     print(f"contact of both patches over spring of one pin: {found.contact / found.spring:.3g}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -78,7 +78,7 @@ class LeafResponse:
 
         return [
             nearest(0, first, low),
-            nearest(first, peak, 0.5 * (branch.omega[first] + branch.omega[peak])),
+            nearest(first, peak, 0.75 * branch.omega[first] + 0.25 * branch.omega[peak]),
             peak,
             nearest(peak, last, 0.5 * (branch.omega[peak] + branch.omega[last])),
             nearest(last, len(branch.omega) - 1, high),
@@ -110,9 +110,9 @@ class LeafResponse:
 
 
 def respond(file: SceneFile) -> LeafResponse:
-    """Build the model of a configuration and follow its response.
+    """Build the model of a configuration and follow its response as far as it goes, see Branch.end.
 
-    Raises  pipeline.SolveFailed where the curve does not come to its end
+    Raises  pipeline.SolveFailed where not even the first point of the curve is found
     """
     start = time.process_time()
     scene = file.part_scene
@@ -122,8 +122,16 @@ def respond(file: SceneFile) -> LeafResponse:
     balance = pipeline.make_model(scene, part, pipeline.reduce_part(scene, part)).balance
     branch = pipeline.follow_response(scene, balance, lambda done, said: None)
     seconds = time.process_time() - start
-    pipeline.check_branch(branch)
-    assert branch.outcome[-1] == CONVERGED
+    if branch.outcome[-1] != CONVERGED:  # only the last point of a branch may be unsolved
+        if len(branch.omega) == 1:
+            raise pipeline.SolveFailed(f"the frequency response {branch.end}")
+        branch = _without_last(branch)
     pins = {name: spring.stiffness for name, spring in scene.springs.items()}
     leaf = scene.geometry.parameters
     return LeafResponse(part, balance, branch, pins, leaf["pin_width"] * leaf["thickness"], seconds)
+
+
+def _without_last(branch: Branch) -> Branch:
+    """A branch without its last point."""
+    names = ("omega", "response", "contact", "energy", "outcome", "newton_steps", "parameter")
+    return replace(branch, **{name: getattr(branch, name)[:-1] for name in names})

@@ -1,67 +1,33 @@
 """The parameter study of the leaf seal: tribodyn leaf study.
 
 Some thirty configurations, one response curve each, with folds, stability and chattering; a table, the summary of all
-curves, and for the scene itself the pictures of the thesis.
+curves, and for the scene itself the pictures of the thesis. A configuration that fails is told and left behind; every
+one that is done is kept, so that a stopped study can go on.
 """
 
 from __future__ import annotations
 
 import csv
+import json
+import resource
+import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
+from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
-from hbm.law import SEPARATES, STICKS
-from workflows import leaf_figures, scene_file
+from workflows import leaf_figures, leaf_record, scene_file
 from workflows.leaf_cases import Case, cases
-from workflows.leaf_response import LINER_NODE, LeafResponse, respond
+from workflows.leaf_record import COLUMNS, STRUCK_POINT, Record
+from workflows.leaf_response import LeafResponse, respond
+from workflows.style import STATUS
 
-COLUMNS = (
-    "group", "value", "points", "folds", "fold_hz", "unstable_points", "peak_hz", "peak_um",
-    "stick", "stick_separation", "separation", "impact_velocity_mm_s", "least_touching",
-    "impact_work_mJ", "pin_work_mJ", "patch_wear_um", "pin_wear_um", "newton_steps", "seconds",
-)  # fmt: skip
 MAPS = ("inclination", "bow")  # parameters whose contact is drawn
-WEAR_CYCLES = 1e9  # that the depths in the table stand for: some 2000 hours
-STRUCK_POINT = 2  # of the chosen five, where the leaf moves most
-
-
-def row(case: Case, response: LeafResponse) -> dict[str, object]:
-    """The numbers of one configuration; contact is that of the point where the leaf moves most."""
-    branch, point = response.branch, response.chosen()[STRUCK_POINT]
-    chattering, status = response.chatter(point), response.state(point).cycle.status
-    height = branch.amplitude(LINER_NODE)
-    folds = [f"{branch.frequency[i]:.2f}" for i in branch.folds]
-    patches, pins = (1e6 * WEAR_CYCLES * rates.max() for rates in response.wear_rates(point))
-    count = {kind: int(np.sum(status == kind)) for kind in (STICKS, STICKS | SEPARATES, SEPARATES)}
-    return dict(
-        zip(
-            COLUMNS,
-            (
-                case.group,
-                case.label,
-                len(branch.omega),
-                len(folds),
-                " ".join(folds),
-                int(np.sum(~response.stability.stable)),
-                round(float(branch.frequency[height.argmax()]), 2),
-                round(1e6 * float(height.max()), 1),
-                *count.values(),
-                round(1e3 * float(chattering.impact_velocity.max()), 1),
-                round(float(chattering.touching.min()), 3),
-                round(1e3 * float(response.impact_work(point).sum()), 4),
-                round(1e3 * sum(response.pin_work(point).values()), 4),
-                round(float(patches), 3),
-                round(float(pins), 3),
-                int(branch.newton_steps.sum()),
-                round(response.seconds, 2),
-            ),
-            strict=True,
-        )
-    )
+LINEAR_POINT = 4  # of the chosen five
+KEPT = "configurations"  # folder of the records
 
 
 def sizes(response: LeafResponse) -> str:
@@ -72,68 +38,142 @@ def sizes(response: LeafResponse) -> str:
     assert state.cycle.jacobian is not None
     arrays = (state.x, state.cycle.force, state.cycle.jacobian, state.g, state.residual)
     kilobytes = sum(array.nbytes for array in arrays) / 1024
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     return (
         f"{balance.model.system.n_dof} DOFs; {balance.n_unknown} unknowns = {pairs} pairs x "
         f"{len(balance.parameters.components)} component x {basis.n_coeff} coefficients; "
-        f"friction memory {balance.memory.size} numbers; contact state with derivative {kilobytes:.0f} kB"
+        f"friction memory {balance.memory.size} numbers; contact state with derivative {kilobytes:.0f} kB; "
+        f"peak memory of the process {peak:.0f} MB"
     )
 
 
-def study(chosen: Sequence[Case], folder: Path) -> dict[str, list[tuple[Case, LeafResponse]]]:
-    """Run configurations, print and write a row for each as soon as it is done; responses by group."""
-    studied: dict[str, list[tuple[Case, LeafResponse]]] = {}
-    folder.mkdir(parents=True, exist_ok=True)
-    with open(folder / "study.csv", "w", newline="", encoding="utf-8") as file:
+def solve(case: Case) -> Record:
+    """Solve one configuration; what goes wrong stands in the record."""
+    try:
+        return leaf_record.of_response(case, respond(scene_file.read("leaf_seal", case.overrides)))
+    except (ArithmeticError, RuntimeError, ValueError) as error:
+        return leaf_record.of_failure(case, " ".join(str(error).split()))
+
+
+def study(
+    chosen: Sequence[Case], folder: Path, resume: bool = False, tell: Callable[[str], None] = lambda line: None
+) -> list[Record]:
+    """Solve configurations; each is kept and told as soon as it is done.
+
+    resume : take from the folder what is complete there and of the same scene
+    """
+    records: list[Record] = []
+    for case in chosen:
+        scene = scene_file.read("leaf_seal", case.overrides).scene
+        kept = leaf_record.load(case, scene, folder / KEPT) if resume else None
+        record = kept if kept is not None and kept.complete else solve(case)
+        if record is not kept:
+            leaf_record.save(record, scene, folder / KEPT)
+        drawn = case.group in MAPS or not records
+        records.append(record if drawn else replace(record, response=None))  # a model is some megabytes
+        write_table(records, folder / "study.csv")
+        tell("  ".join(f"{record.numbers.get(name, '')!s:{_width(name)}}" for name in COLUMNS))
+    return records
+
+
+def write_table(records: Sequence[Record], path: Path) -> None:
+    """Write the rows of all records."""
+    with open(path, "w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, COLUMNS)
         table.writeheader()
-        for case in chosen:
-            response = respond(scene_file.read("leaf_seal", case.overrides))
-            studied.setdefault(case.group, []).append((case, response))
-            numbers = row(case, response)
-            table.writerow(numbers)
-            file.flush()
-            print("  ".join(f"{numbers[name]!s:{_width(name)}}" for name in COLUMNS), flush=True)
-    return studied
+        table.writerows(record.numbers for record in records)
 
 
 def _width(name: str) -> int:
     return {"group": 19, "value": 9, "fold_hz": 42}.get(name, min(len(name), 8))
 
 
-def draw(studied: dict[str, list[tuple[Case, LeafResponse]]], folder: Path) -> list[Path]:
-    """Write the pictures of a study."""
-    _, scene = studied["liner"][0]
-    low, high = scene.branch.frequency[[0, -1]]
-    points = scene.chosen()
-    names = [f"point {i}: {scene.branch.frequency[point]:.1f} Hz" for i, point in enumerate(points, start=1)]
-    figures = {
-        "summary": leaf_figures.summary_figure(studied),
-        "response": leaf_figures.response_figure(scene, max(low, 0.2 * high), high),
-        "contact": leaf_figures.contact_figure([(n, scene, p) for n, p in zip(names, points, strict=True)]),
-        "history": leaf_figures.history_figure(scene, points, names),
-    }
+def draw(records: Sequence[Record], folder: Path) -> list[Path]:
+    """Write the pictures of a study and the chattering of every pair at the chosen points."""
+    figures: dict[str, Figure] = {"summary": leaf_figures.summary_figure(records)}
+    paths = []
+    scene = _response(records[0])
+    if scene is not None:
+        low, high = scene.branch.frequency[[0, -1]]
+        points = scene.chosen()
+        names = [f"point {i}: {scene.branch.frequency[point]:.1f} Hz" for i, point in enumerate(points, start=1)]
+        figures["response"] = leaf_figures.response_figure(scene, max(low, 0.2 * high), high)
+        figures["contact"] = leaf_figures.contact_figure([(n, scene, p) for n, p in zip(names, points, strict=True)])
+        figures["history"] = leaf_figures.history_figure(scene, points, names)
+        paths.append(folder / "chatter.csv")
+        write_chatter(scene, points, paths[-1])
     for group in MAPS:
         columns = []
-        for case, response in studied.get(group, [])[:: len(studied.get(group, [])) - 1 or 1]:  # the extremes
-            linear, *_ = points = response.chosen()
-            columns.append((f"{case.label}: linear regime", response, linear))
-            columns.append((f"{case.label}: largest motion", response, points[STRUCK_POINT]))
+        of_group = [record for record in records if record.case.group == group]
+        for record in of_group[:: len(of_group) - 1 or 1]:  # the extremes
+            response = _response(record)
+            if response is not None:
+                for name, point in (("beyond resonance", LINEAR_POINT), ("largest motion", STRUCK_POINT)):
+                    columns.append((f"{record.case.label}: {name}", response, response.chosen()[point]))
         if columns:
             figures[group] = leaf_figures.contact_figure(columns)
-    paths = []
     for name, figure in figures.items():
         paths.append(folder / f"{name}.png")
         figure.savefig(paths[-1])
     return paths
 
 
-def run(folder: Path) -> None:
-    """Run the whole study into a folder."""
+def _response(record: Record) -> LeafResponse | None:
+    """The response of a record, solved again where it was read from a file; None where there is none."""
+    return solve(record.case).response if record.response is None and record.complete else record.response
+
+
+def write_chatter(response: LeafResponse, points: Sequence[int], path: Path) -> None:
+    """Write for every pair at points of the curve its instants, times of contact and impact velocities."""
+    face = {pair: name for name, pairs in response.part.pairs.items() for pair in range(pairs.start, pairs.stop)}
+    at = response.part.interface.points
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow(
+            ("point", "hz", "patch", "pair", "x_mm", "y_mm", "status", "contact_ms", "touching")
+            + ("opening_ms", "closing_ms", "impact_velocity_mm_s")
+        )
+        for number, point in enumerate(points, start=1):
+            found, status = response.chatter(point), response.state(point).cycle.status
+            for pair, name in face.items():
+                instants = (found.opening[pair], found.closing[pair], found.approach[pair])
+                table.writerow(
+                    (number, f"{response.branch.frequency[point]:.3f}", name, pair)
+                    + tuple(f"{1e3 * value:.3f}" for value in at[pair, :2])
+                    + (STATUS[int(status[pair])][0], f"{1e3 * found.contact_duration[pair]:.4f}")
+                    + (f"{found.touching[pair]:.4f}",)
+                    + tuple(" ".join(f"{1e3 * value:.4f}" for value in values) for values in instants)
+                )
+
+
+def run(folder: Path, resume: bool = False, as_json: bool = False) -> None:
+    """Run the whole study into a folder and print its table, or JSON for machines."""
     started, clock = time.perf_counter(), time.process_time()
-    print("  ".join(f"{name:{_width(name)}}" for name in COLUMNS))
+    folder.mkdir(parents=True, exist_ok=True)
+
+    def tell(line: str) -> None:
+        print(line, file=sys.stderr if as_json else sys.stdout, flush=True)
+
+    tell("  ".join(f"{name:{_width(name)}}" for name in COLUMNS))
     with threadpool_limits(1):
-        studied = study(cases(scene_file.read("leaf_seal").part_scene), folder)
-        print(sizes(studied["liner"][0][1]))
-        for path in draw(studied, folder):
-            print(path)
-    print(f"{time.perf_counter() - started:.0f} s, of which {time.process_time() - clock:.0f} s of processor time")
+        records = study(cases(scene_file.read("leaf_seal").part_scene), folder, resume, tell)
+        first = _response(records[0])
+        paths = draw([replace(records[0], response=first), *records[1:]], folder)
+        allocated = "" if first is None else sizes(first)
+    total = {
+        "configurations": len(records),
+        "incomplete": sum(not record.complete for record in records),
+        "curve_seconds": round(sum(record.numbers.get("seconds", 0.0) for record in records), 1),
+        "seconds": round(time.perf_counter() - started, 1),
+        "processor_seconds": round(time.process_time() - clock, 1),
+    }
+    if as_json:
+        rows = [record.numbers for record in records]
+        print(json.dumps({"rows": rows, **total, "sizes": allocated, "files": [str(p) for p in paths]}, indent=2))
+        return
+    print(allocated, *paths, sep="\n")
+    print(
+        f"{total['configurations']} configurations, {total['incomplete']} incomplete; models and curves "
+        f"{total['curve_seconds']} s of processor time, with stability and pictures {total['processor_seconds']} s, "
+        f"{total['seconds']} s by the clock"
+    )

@@ -15,12 +15,15 @@ from workflows.result import Patch, Result
 from workflows.style import PRESSURE_MAP, STATUS, STYLE, WEAR_MAP
 
 
-def patch_maps(result: Result) -> Figure:
-    """Depth after the step, status over the cycle and mean pressure of the step, one column for each chosen step."""
+def patch_maps(result: Result, rows: np.ndarray | None = None) -> Figure:
+    """Depth after the step, status over the cycle and mean pressure of the step, one column for each chosen step.
+
+    rows : wear rows to show, those of the result unless told
+    """
     wear, patch = result.wear, result.patch
     assert wear is not None
     assert patch is not None
-    rows = result.shown_rows()
+    rows = result.shown_rows() if rows is None else rows
     depth = 1e3 * np.stack([result.depth_after(row) for row in rows])
     pressure = 1e-6 * wear.normal_force[rows] / patch.area
     aspect = float(np.clip(np.ptp(patch.flat[:, 1]) / np.ptp(patch.flat[:, 0]), 0.3, 2.0))

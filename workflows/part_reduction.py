@@ -1,4 +1,4 @@
-"""From a part to its reduced model: masters, relative coordinates, prescribed static displacement."""
+"""From a part to its reduced model: masters, relative coordinates, prescribed displacement, a sector of a wheel."""
 
 from __future__ import annotations
 
@@ -6,9 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
+import fem.part
+from fem import cyclic
+from fem.cyclic import Sector
+from fem.material import Material
 from fem.part import Part
+from fem.prestress import spinning
 from fem.springs import Spring
 from reduction.craig_bampton import craig_bampton
+from reduction.cyclic import ReducedSector, reduce_sector, travelling_wave
 from reduction.model import ReducedModel
 from reduction.prescribed import StaticReaction, prescribe
 from reduction.relative import relative
@@ -17,8 +23,27 @@ from workflows.scene import PartScene
 REACTION = "reaction"  # where the facts of a model keep its StaticReaction
 
 
+def material(scene: PartScene) -> Material:
+    """What the part is made of."""
+    return Material(scene.material.young, scene.material.poisson, scene.material.density)
+
+
+def contacts(scene: PartScene, alone: bool = False) -> list[fem.part.Contact]:
+    """The contact of every face; alone : without what it meets, as it is in a sector before the wheel is closed."""
+    c = scene.contact
+    opposite = None if alone else c.opposite
+    return [
+        fem.part.Contact(
+            face, c.t1, opposite, c.components, c.gap, c.vertices_only, c.plane, c.inclination
+        )
+        for face in c.groups
+    ]
+
+
 def reduce(scene: PartScene, part: Part) -> ReducedModel:
     """The part on its contact, load and prescribed nodes and a few modes; not damped yet, nothing prescribed yet."""
+    if scene.wheel is not None:
+        return travelling_wave(reduced_sector(scene, part), scene.wheel.engine_order)
     wanted, system, interface, back = scene.reduction, part.system, part.interface, None
     held = [part.dofs(given.group, given.axis) for given in scene.prescribed.values()]
     if held and len(part.held):
@@ -27,6 +52,25 @@ def reduce(scene: PartScene, part: Part) -> ReducedModel:
         system, interface, back = relative(system, interface)
     reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, np.concatenate([[], *held]).astype(int))
     return reduced if back is None else replace(reduced, basis=back @ reduced.basis)
+
+
+def sector(scene: PartScene, part: Part) -> Sector:
+    """The full sector of the scene's wheel, stiffened by its stress where the wheel spins.
+
+    Raises  ValueError where its faces do not match those of its neighbours
+    """
+    wheel = scene.wheel
+    assert wheel is not None
+    cut = cyclic.cut_from(part, contacts(scene), wheel.sectors, wheel.seam, wheel.axis)
+    if not wheel.speed:
+        return cut
+    tie = cyclic.seam_map(cut, 0)
+    return replace(cut, system=spinning(part, material(scene), wheel.axis, 2 * np.pi * wheel.speed, tie).system)
+
+
+def reduced_sector(scene: PartScene, part: Part) -> ReducedSector:
+    """The sector on its shroud, seam and load nodes and a few modes: what serves every engine order."""
+    return reduce_sector(sector(scene, part), scene.reduction.modes, scene.reduction.cutoff)
 
 
 def with_prescribed(scene: PartScene, part: Part, reduced: ReducedModel) -> ReducedModel:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,10 @@ from threadpoolctl import threadpool_limits
 import fem.part
 from fem.constraints import Clamp, NoMeanRotation
 from fem.interface import COMPONENTS
-from fem.loads import Load, NodalForce, Pressure
-from fem.material import Material
+from fem.loads import Centrifugal, Load, NodalForce, Pressure
 from fem.part import Part
 from fem.springs import Spring
+from fem.system import SecondOrderSystem
 from geometry import mesh as mesh_reader
 from geometry import parts
 from hbm import continuation, error_controlled_rule, law, thesis_rule, wear_law
@@ -35,15 +36,14 @@ from reduction.damping import modal_damping, rayleigh
 from reduction.held import hold
 from reduction.linear import stuck_stiffness
 from reduction.model import ReducedModel
-from workflows import curve, matrix_model, part_reduction, store
+from workflows import curve, matrix_model, part_reduction, references, store, worn_responses
 from workflows.contact_surfaces import surface_gap
 from workflows.description import described
 from workflows.fields import displacement_fields, hysteresis_loops
 from workflows.matrix_scene import MatrixScene
 from workflows.progress import Progress
-from workflows.references import linear_references
 from workflows.result import Patch, Result
-from workflows.scene import HIGHEST, PartScene, Place, Scene, StaticLoad, unknown_key
+from workflows.scene import CENTRIFUGAL, HIGHEST, PartScene, Place, Scene, StaticLoad, unknown_key
 from workflows.scene_file import SceneFile
 
 OUTPUT = "response"
@@ -74,7 +74,7 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
     Raises  ValueError: the scene asks for what cannot be, SolveFailed: after what was computed is kept
     """
     scene, clock = file.scene, Clock(earlier)
-    check_names(scene)
+    check_names(scene, file.folder)
     keep = Keeper(folder / "result.h5", clock)
     with threadpool_limits(scene.solver.threads):
         model = build(file, folder, progress, harmonics_of(earlier))
@@ -90,13 +90,22 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
                 frf = follow_response(scene, model.balance, advance)
             with progress.stage("linear references"):
                 low, high = scene.response.references or scene.response.frequency
-                references = linear_references(model.balance, OUTPUT, 2 * np.pi * low, 2 * np.pi * high)
-            result = keep(replace(result, frf=frf, references=references, state="response computed"))
+                linear = references.linear_references(model.balance, OUTPUT, 2 * np.pi * low, 2 * np.pi * high)
+            result = keep(replace(result, frf=frf, references=linear, state="response computed"))
         check_branch(result.frf)
         result = keep(judged(scene, model.balance, result, progress))
         if wears(scene):
             with progress.track("wear") as advance:
-                result = wear_down(scene, model, result, keep, advance)
+                result = wear_down(file, model, result, keep, advance)
+        if scene.wear is not None and scene.wear.responses and result.wear_steps:
+            with progress.track("responses of the worn contact") as advance:
+
+                def again(worn: HarmonicBalance) -> Branch:
+                    return follow_response(scene, worn, lambda done, text: None)
+
+                count = scene.wear.responses
+                curves = worn_responses.curves(result, model.balance, count, again, advance)
+                result = keep(replace(result, worn=curves))
         state = "complete" if result.wear is None else f"complete: {result.wear.end}"
         return keep(replace(result, state=state))
 
@@ -161,12 +170,19 @@ def is_complete(result: Result, scene: Scene) -> bool:
     return not stopped or result.wear_steps >= scene.wear.max_steps
 
 
-def check_names(scene: Scene) -> None:
+def check_names(scene: Scene, folder: Path) -> None:
     """Raise ValueError where a scene names a law or a method that does not exist, before anything is built."""
     law.check_components(law.load(scene.contact.law), scene.contact.components)
     response_options(scene)
     if scene.wear is not None:
-        wear_law.load(scene.wear.law)
+        wear_law.load(law_of(scene, folder))
+
+
+def law_of(scene: Scene, folder: Path) -> str:
+    """Name of the wear law of a scene that stands in `folder`, or path of its file."""
+    assert scene.wear is not None
+    name = scene.wear.law
+    return str(folder / name) if name.endswith(".py") else name
 
 
 def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]]:
@@ -182,27 +198,23 @@ def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]
 
 def make_part(scene: PartScene, mesh: Any, node_sets: dict[str, np.ndarray]) -> Part:
     """Mass, stiffness, loads, outputs and contact of the mesh, held where the scene says."""
-    contact, response = scene.contact, scene.response
+    loads = {name: make_load(load) for name, load in {**scene.loads.static, **scene.loads.harmonic}.items()}
+    if scene.wheel is not None and scene.wheel.speed:
+        loads[CENTRIFUGAL] = Centrifugal(scene.wheel.axis)
     return fem.part.build(
         mesh,
         node_sets,
-        Material(scene.material.young, scene.material.poisson, scene.material.density),
+        part_reduction.material(scene),
         clamps(scene),
-        [
-            fem.part.Contact(
-                face, contact.t1, contact.opposite, contact.components, contact.gap, contact.vertices_only,
-                contact.plane, contact.inclination,
-            )
-            for face in contact.groups
-        ],
-        {name: make_load(load) for name, load in {**scene.loads.static, **scene.loads.harmonic}.items()},
+        part_reduction.contacts(scene, alone=scene.wheel is not None),
+        loads,
         {
             name: NodalForce(output.group, output.direction)
-            for name, output in {OUTPUT: response, **response.others}.items()
+            for name, output in {OUTPUT: scene.response, **scene.response.others}.items()
         },
         springs=springs(scene),
         held=[] if scene.geometry.no_turning is None else [NoMeanRotation(scene.geometry.no_turning)],
-    )  # fmt: skip
+    )
 
 
 def with_surfaces(scene: PartScene, part: Part, folder: Path) -> tuple[Part, tuple[str, ...]]:
@@ -237,21 +249,19 @@ def reduce_part(scene: PartScene, part: Part) -> ReducedModel:
 
 def damped(scene: Scene, reduced: ReducedModel) -> ReducedModel:
     """The model with the scene's damping; raises ValueError where its files hold another one."""
-    damping = damping_matrix(scene, reduced)
     if reduced.system.damping is None:
-        return reduced.with_damping(damping)
-    if damping is not None:
+        return reduced.with_damping(partial(damping_matrix, scene, contact_stiffness(scene, reduced)))
+    if scene.damping.given:
         raise ValueError("the files of the model hold a damping matrix: leave [damping] out, or the matrix")
     return reduced
 
 
-def damping_matrix(scene: Scene, reduced: ReducedModel) -> np.ndarray | None:
-    """Damping matrix (n, n) [N s/m] of the reduced model, None where the scene has no damping."""
-    damping, system = scene.damping, reduced.system
+def damping_matrix(scene: Scene, springs: np.ndarray, system: SecondOrderSystem, B: np.ndarray) -> np.ndarray | None:
+    """Damping matrix (n, n) [N s/m] of a system with its contact map and springs, None where the scene has none."""
+    damping = scene.damping
     if damping.modal is not None:
         if damping.state == "stuck":
-            K = stuck_stiffness(system.stiffness, reduced.interface.B, contact_stiffness(scene, reduced))
-            system = replace(system, stiffness=K)
+            system = replace(system, stiffness=stuck_stiffness(system.stiffness, B, springs))
         return modal_damping(system, damping.modal)
     if damping.mass is not None or damping.stiffness is not None:
         return rayleigh(system, damping.mass or 0.0, damping.stiffness or 0.0)
@@ -297,6 +307,8 @@ def excite(scene: Scene, base: np.ndarray | None) -> Excitation:
     loads: dict[tuple[int, str], complex] = {(0, name): load.amplitude for name, load in scene.loads.static.items()}
     if isinstance(scene, PartScene):
         loads |= {(0, name): given.displacement for name, given in scene.prescribed.items()}
+        if scene.wheel is not None and scene.wheel.speed:
+            loads[0, CENTRIFUGAL] = (2 * np.pi * scene.wheel.speed) ** 2
     for name, load in scene.loads.harmonic.items():
         loads[load.harmonic, name] = load.amplitude * np.exp(1j * load.phase)
     return Excitation(loads, base)
@@ -362,9 +374,10 @@ def check_branch(branch: Branch | None) -> None:
 
 
 def wear_down(
-    scene: Scene, model: Model, result: Result, keep: Keeper, advance: Callable[[float, str], None]
+    file: SceneFile, model: Model, result: Result, keep: Keeper, advance: Callable[[float, str], None]
 ) -> Result:
     """Wear until contact is lost; every step is kept as soon as it is done."""
+    scene = file.scene
     assert scene.wear is not None
     assert result.patch is not None
     patch, wear = result.patch, scene.wear
@@ -378,7 +391,9 @@ def wear_down(
         advance(done, f"step {len(rows)}, {row.cycles + row.cycles_in_step:.3g} cycles, {row.preload:.4g} N")
 
     duties = mission(scene)
-    problem = WearProblem(model.balance, duties, wear.law, wear.coefficient, patch.area, wear.lost_below)
+    problem = WearProblem(
+        model.balance, duties, law_of(scene, file.folder), wear.coefficient, patch.area, wear.lost_below
+    )
     limit = step_limit(scene, patch)
     if wear.rule == "thesis":
         worn = thesis_rule.evolve(problem, limit, wear.max_steps, on_row, result.wear)
@@ -422,7 +437,7 @@ def step_limit(scene: Scene, patch: Patch) -> float:
     step = scene.wear.step
     if scene.wear.rule == "thesis" and step is not None and step.depth is not None:
         return step.depth
-    delta_max = float(patch.free_deflection.max())
+    delta_max = references.delta_max(scene, patch.free_deflection, patch.area)
     if not (np.isfinite(delta_max) and delta_max > 0):
         raise ValueError(
             "wear.step: a share of delta_max needs static loads that press the contact of a part held without it; "
@@ -475,9 +490,10 @@ class Keeper:
 def same_problem(first: Scene, second: Scene) -> str:
     """Empty where one scene's result can be gone on from by the other, else the first key that differs.
 
-    What is drawn, how many wear steps are wanted and how many threads work may differ.
+    What is drawn, how many wear steps are wanted, how their result is told and how many threads work may differ.
     """
-    ignored: dict[str, Any] = {"scene": True, "pictures": True, "solver": {"threads"}, "wear": {"max_steps"}}
+    ignored: dict[str, Any] = {"scene": True, "pictures": True, "solver": {"threads"}}
+    ignored["wear"] = {"max_steps", "responses", "split"}
     return _difference(first.model_dump(exclude=ignored), second.model_dump(exclude=ignored))
 
 

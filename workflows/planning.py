@@ -75,7 +75,7 @@ class Plan:
 def plan(file: SceneFile) -> Plan:
     """Plan a scene; raises ValueError for what the run would refuse after reading the mesh."""
     scene = file.scene
-    check_names(scene)
+    check_names(scene, file.folder)
     elements = nodes = 0
     if isinstance(scene, MatrixScene):
         reduced = matrix_model.make(scene, file.folder)
@@ -134,7 +134,8 @@ def _contact(scene: PartScene, mesh: object, node_sets: dict[str, np.ndarray], f
     axes = np.arange(3)
     if contact.plane is not None and contact.components == ("n",):
         axes = np.flatnonzero(contact.plane)
-    masters = [(side[:, None] * 3 + axes).ravel() for side in nodes]
+    masters = [(side[:, None] * 3 + axes).ravel() for side in (nodes[:1] if scene.reduction.relative else nodes)]
+    masters += [named(node_sets, given.group) * 3 + "xyz".index(given.axis) for given in scene.prescribed.values()]
     touched = [(named(node_sets, group)[:, None] * 3 + np.flatnonzero(axis)).ravel() for group, axis in points]
     masters += [dofs for dofs in touched if len(dofs) <= POINT_LOAD]
     pairs = sum(len(side) for side in nodes[: len(contact.groups)])

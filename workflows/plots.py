@@ -65,6 +65,10 @@ def frequency_response(result: Result) -> Figure:
                 vmax=scale_cycles * shown_cycles(wear), label="cycle at each wear step",
             )  # fmt: skip
             figure.colorbar(dots, ax=axes, label=f"vibration cycles{unit_cycles}", pad=0.02)
+            if result.worn is not None:
+                colors = mpl.colormaps[WEAR_MAP](wear.cycles[result.worn.row] / shown_cycles(wear))
+                for omega, amplitude, color in zip(result.worn.omega, result.worn.amplitude, colors, strict=True):
+                    axes.plot(omega / (2 * np.pi), scale * amplitude, color=color, lw=1.2)
         axes.set(yscale="log", xlabel="frequency / Hz", ylabel=f"amplitude / {unit}", title="Frequency response")
         axes.legend(loc="best", fontsize=9)
     return figure
@@ -137,10 +141,10 @@ def preload_against_cycles(result: Result) -> Figure:
 
 
 def depth_against_cycles(result: Result) -> Figure:
-    """Largest, mean and smallest wear depth of the patch against cycles."""
+    """Largest, mean and smallest wear depth of the patch, and the worn part of its area, against cycles."""
     wear, patch = _wear(result), result.patch
     assert patch is not None
-    with axes_of() as (figure, axes):
+    with axes_of(7.2, 5.6, rows=2) as (figure, (axes, below)):
         scale_cycles = _cycle_axis(axes, wear)
         unit, scale = length_unit(wear.depth.max())
         x = scale_cycles * wear.cycles
@@ -151,7 +155,19 @@ def depth_against_cycles(result: Result) -> Figure:
         axes.plot(x, scale * wear.depth.min(1), color=GREEN, label="smallest")
         axes.set(ylabel=f"total wear depth / {unit}", title="Wear depth")
         axes.legend(loc="best", fontsize=9)
+        axes.set_xlabel("")
+        _cycle_axis(below, wear)
+        below.plot(x, 1e6 * worn_area(wear.depth, patch.area), color=ORANGE)
+        below.set(ylabel="worn area / mm²", ylim=(0, 1.05e6 * patch.area.sum()))
     return figure
+
+
+def worn_area(depth: np.ndarray, area: np.ndarray) -> np.ndarray:
+    """(n_row,) area of the pairs that have worn a thousandth of the depth that is largest in the end [m2].
+
+    depth : (n_row, n_pair) [m]; area : (n_pair,) [m2]
+    """
+    return (depth > 1e-3 * depth[-1].max()) @ area
 
 
 def energy_against_cycles(result: Result) -> Figure:

@@ -9,6 +9,7 @@ from hbm.balance import HarmonicBalance
 from hbm.branch import amplitude
 from reduction.linear import stuck_stiffness
 from workflows.result import References
+from workflows.scene import PartScene, Scene
 
 POINTS = 401
 MODES = 100
@@ -22,6 +23,17 @@ def linear_references(balance: HarmonicBalance, output: str, start: float, stop:
     omega = np.linspace(start, stop, POINTS)
     stuck = _amplitudes(balance, balance.parameters.stiffness, output, omega)
     return References(omega, _amplitudes(balance, None, output, omega), stuck)
+
+
+def delta_max(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:
+    """The depth that wear steps are a share of: largest approach of the pairs without their contact [m].
+
+    approach : (n_pair,) as `free_deflection`; area : (n_pair,) [m2]
+    Of a wheel: mean over the area of the displacement of one face, half the approach of two (Tamatam 2021, 4.3.1)
+    """
+    if isinstance(scene, PartScene) and scene.wheel is not None:
+        return float(0.5 * approach @ area / area.sum())
+    return float(approach.max())
 
 
 def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: str, omega: np.ndarray) -> np.ndarray:

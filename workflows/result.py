@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from hbm.branch import Branch
 from hbm.evolution import LOST
@@ -51,6 +52,10 @@ class Patch:
     def flat(self) -> np.ndarray:
         """(n_pair, 2) positions in the mean tangential plane, from the middle of the patch [m]."""
         return np.asarray((self.points - self.points.mean(0)) @ self.frames.mean(0)[:2].T)
+
+    def moved(self, mesh: np.ndarray, points: np.ndarray, frames: np.ndarray) -> Patch:
+        """The same patch elsewhere on the part, at the nodes of the mesh (n_node, 3) [m] nearest to its points."""
+        return replace(self, nodes=cKDTree(mesh).query(points)[1], points=points, frames=frames)
 
     def shares(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Cut every face into one quadrangle for each of its corners, to show what has one value for each pair.
@@ -144,6 +149,20 @@ class Loops:
 
 
 @dataclass(frozen=True)
+class WornResponses:
+    """Response curves of the worn contact.
+
+    row : (n_curve,) rows of the wear history whose depth the curves have
+    omega, amplitude : (n_curve, n_curve_point) [rad/s], of the first output [m]; nan after the end of a curve and where
+        a point did not converge
+    """
+
+    row: np.ndarray
+    omega: np.ndarray
+    amplitude: np.ndarray
+
+
+@dataclass(frozen=True)
 class Result:
     """A run, finished or not.
 
@@ -163,6 +182,7 @@ class Result:
     stability: CurveStability | None = None
     bounds: ShearBounds | None = None
     wear: WearHistory | None = None
+    worn: WornResponses | None = None
     fields: Fields | None = None
     loops: Loops | None = None
 

@@ -35,8 +35,10 @@ from workflows.scene_fields import (
     WearCoefficient,
     quantity,
 )
+from workflows.scene_wheel import Wheel
 from workflows.units import to_si
 
+CENTRIFUGAL = "centrifugal"
 HIGHEST = 15  # harmonic that kept = "auto" may keep
 
 
@@ -313,6 +315,11 @@ class Damping(Table):
             raise ValueError("expected either modal, or mass and stiffness, and not both")
         return self
 
+    @property
+    def given(self) -> bool:
+        """Whether there is any."""
+        return not (self.modal is None and self.mass is None and self.stiffness is None)
+
 
 class WearStep(Table):
     """Largest depth that one wear step may add: a share of delta_max, or a depth [m]."""
@@ -368,9 +375,14 @@ class Wear(Table):
     rule : "thesis" takes `step`, "error_controlled" takes `tolerance`, its local error as a share
     lost_below : share of the first preload at which the run ends; 0 waits until the last touch ends
     at, mission : one place where all cycles are taken, or a list of duties that share them
+    law : name of a wear law, or a file my_law.py beside the scene
+    split : share of the depth that the scene's own part loses, or the first of two faces; the rest wears the other one
+    responses : curves of the worn contact, evenly spread over what is worn
     """
 
     law: str = "energy"
+    split: Annotated[Number, Field(ge=0, le=1)] = 0.5
+    responses: Annotated[StrictInt, Field(ge=0, le=100)] = 0
     coefficient: Annotated[WearCoefficient, Field(ge=0)]
     rule: Literal["thesis", "error_controlled"] = "thesis"
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 0.01
@@ -435,6 +447,26 @@ class PartScene(Scene):
     loads: Loads[StaticLoad, HarmonicLoad]
     response: PartResponse
     reduction: Reduction
+    wheel: Wheel | None = None
+
+    @model_validator(mode="after")
+    def _what_a_sector_is(self) -> PartScene:
+        if self.wheel is None:
+            return self
+        if self.contact.opposite is None or not isinstance(self.contact.group, str):
+            raise ValueError("wheel: the contact needs one group, the right face, and its opposite, the left one")
+        for key, has in (
+            ("contact.plane", self.contact.plane is not None),
+            ("motion", bool(self.motion)),
+            ("prescribed", bool(self.prescribed)),
+            ("reduction.relative", self.reduction.relative),
+            ("geometry.no_turning", self.geometry.no_turning is not None),
+        ):
+            if has:
+                raise ValueError(f"{key} has no meaning for a sector of a wheel: leave it out")
+        if CENTRIFUGAL in (*self.loads.static, *self.loads.harmonic):
+            raise ValueError(f"loads: {CENTRIFUGAL} is the load that wheel.speed makes: give yours another name")
+        return self
 
     @model_validator(mode="after")
     def _one_prescribed(self) -> PartScene:

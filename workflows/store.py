@@ -18,7 +18,17 @@ import numpy as np
 
 from hbm.branch import Branch
 from hbm.wear_history import WearHistory
-from workflows.result import CurveStability, Fields, Loops, PartMesh, Patch, References, Result, ShearBounds
+from workflows.result import (
+    CurveStability,
+    Fields,
+    Loops,
+    PartMesh,
+    Patch,
+    References,
+    Result,
+    ShearBounds,
+    WornResponses,
+)
 
 FORMAT = "tribodyn result 1"
 
@@ -91,9 +101,18 @@ SCHEMA: dict[str, tuple[type, dict[str, tuple[tuple[str, ...], str]]]] = {
             "response": (("row", "output", "coefficient"), "m"),
             "solves": (("row",), ""),
             "step_error": (("row",), ""),
+            "plan": (("row", "plan"), ""),
             "work": (("row", "pair"), "J"),
             "duty_omega": (("row", "duty"), "rad/s"),
             "duty_displacement": (("row", "duty", "contact", "coefficient"), "m"),
+        },
+    ),
+    "worn": (
+        WornResponses,
+        {
+            "row": (("curve",), ""),
+            "omega": (("curve", "curve_point"), "rad/s"),
+            "amplitude": (("curve", "curve_point"), "m"),
         },
     ),
     "fields": (

@@ -7,8 +7,12 @@ from typing import Any
 import numpy as np
 
 from hbm.branch import CONVERGED
+from hbm.harmonics import HarmonicBasis
+from hbm.wear_events import events
 from hbm.wear_history import LIFE_SHARE, cycles_to_preload
 from workflows.result import Result
+
+EVENT_SAMPLES = 256  # of a cycle, to see whether a pair opens
 
 
 def summary(result: Result) -> dict[str, Any]:
@@ -16,6 +20,8 @@ def summary(result: Result) -> dict[str, Any]:
 
     depth_max_m, depth_mean_m : largest, and mean over the area of, the total wear depth
     cycles : vibration cycles so far; separated_cycles : the same if the last touch has ended, else None
+    first_lift_cycles, first_loss_cycles : until a closed pair first opens in the cycle, until a pair touches no more
+    surface_volumes_m3 : worn off the scene's own part or first face, and off the other one
     life_cycles : until the preload had fallen to LIFE_SHARE of its first value, None if it has not
     energy_J, volume_m3 : friction work and worn volume, accumulated
     wear_steps, hbm_solves : steps taken and balance solves spent on wear
@@ -35,19 +41,25 @@ def summary(result: Result) -> dict[str, Any]:
 
 def _wear(result: Result) -> dict[str, Any]:
     names = ["depth_max_m", "depth_mean_m", "cycles", "separated_cycles", "life_cycles"]
-    names += ["energy_J", "volume_m3", "hbm_solves"]
+    names += ["first_lift_cycles", "first_loss_cycles", "energy_J", "volume_m3", "surface_volumes_m3", "hbm_solves"]
     wear, patch = result.wear, result.patch
     if wear is None or patch is None or not len(wear.cycles):
         return dict.fromkeys(names)
     depth, cycles = result.depth_after(-1), result.cycles_after(-1)
+    volume, split = float(depth @ patch.area), float(np.squeeze(result.facts.get("wear_split", 0.5)))
+    basis = HarmonicBasis(tuple(int(h) for h in np.atleast_1d(result.facts["harmonics"])), EVENT_SAMPLES)
+    when = events(wear, patch.components, patch.gap, basis)
     return {
+        "first_lift_cycles": None if when is None else when.first_lift,
+        "first_loss_cycles": None if when is None else when.first_loss,
+        "surface_volumes_m3": [split * volume, (1 - split) * volume],
         "depth_max_m": float(depth.max()),
         "depth_mean_m": float(depth @ patch.area / patch.area.sum()),
         "cycles": cycles,
         "separated_cycles": cycles if result.contact_lost else None,
         "life_cycles": cycles_to_preload(wear),
         "energy_J": float(wear.work.sum()),
-        "volume_m3": float(depth @ patch.area),
+        "volume_m3": volume,
         "hbm_solves": int(wear.solves.sum()),
         "wear_end": wear.end,
     }
@@ -113,6 +125,8 @@ def lines(result: Result) -> list[tuple[str, str]]:
         ("model", _sizes(numbers["full_dofs"], numbers["model_dofs"])),
         ("contact", f"{numbers['contact_pairs']} node pairs, {numbers['unknowns']} unknowns"),
     ]
+    if "sectors" in result.facts:
+        shown.append(("wheel", "{sectors} sectors, engine order {engine_order}".format(**result.facts)))
     if numbers["free_hz"]:
         shown.append(("free modes", ", ".join(f"{hertz:.2f}" for hertz in numbers["free_hz"][:4]) + " Hz"))
     if numbers["delta_max_m"] is not None:
@@ -135,16 +149,22 @@ def lines(result: Result) -> list[tuple[str, str]]:
         life = "contact not lost" if numbers["separated_cycles"] is None else "contact lost"
         if numbers["life_cycles"] is not None:
             life += f"; life until {100 * LIFE_SHARE:g} % of the preload: {numbers['life_cycles']:.4g}"
+        happened = [("first opening", numbers["first_lift_cycles"]), ("first pair lost", numbers["first_loss_cycles"])]
+        shown += [(name, f"after {count:.4g} cycles") for name, count in happened if count is not None]
         shown += [
             ("preload", pair("preload_N", 1, "N")),
             ("cycles", f"{numbers['cycles']:.4g} ({life})"),
             ("wear depth", f"{deepest:.4f} mm largest, {mean:.4f} mm mean"),
-            ("worn volume", f"{1e9 * numbers['volume_m3']:.5g} mm3"),
+            ("worn volume", f"{1e9 * numbers['volume_m3']:.5g} mm3, of it {_volumes(numbers['surface_volumes_m3'])}"),
             ("friction work", f"{numbers['energy_J']:.5g} J"),
             ("wear steps", f"{numbers['wear_steps']} with {numbers['hbm_solves']} balance solves"),
         ]
     shown.append(("computing", f"{numbers['seconds']:.1f} s"))
     return shown
+
+
+def _volumes(volumes: list[float]) -> str:
+    return f"{1e9 * volumes[0]:.4g} on the part, {1e9 * volumes[1]:.4g} on what it rubs on"
 
 
 def _sizes(full: int | None, model: int | None) -> str:

@@ -8,7 +8,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import process_time
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
 from hbm import error_controlled_rule, thesis_rule
@@ -16,18 +18,14 @@ from hbm.evolution import WearProblem
 from hbm.wear_history import LIFE_SHARE, WearHistory, cycles_to_preload
 from workflows import pipeline, scene_file
 from workflows.progress import Progress
-from workflows.references import free_deflection
+from workflows.published import WEAR_STEPS
+from workflows.references import delta_max, free_deflection
+from workflows.style import BLUE, GREY, ORANGE, STYLE
 
-THESIS_STEPS = (0.1, 0.05, 0.02, 0.01, 0.005)  # of delta_max, table 4.2
-REFERENCE_STEPS = (0.0025, 0.00125)
-TOLERANCES = (0.1, 0.03)
-PUBLISHED = {  # table 4.2: wear iterations, seconds on four cores, depth [mm], error in depth
-    0.1: (130, 14220, 6.9668, 0.0899),
-    0.05: (183, 21600, 6.6260, 0.0366),
-    0.02: (291, 37020, 6.4849, 0.0145),
-    0.01: (411, 58200, 6.4230, 0.0049),
-    0.005: (577, 70320, 6.3919, 0.0),
-}
+THESIS_STEPS = (0.1, 0.05, 0.02, 0.01, 0.005)  # of delta_max, tables 4.2 and 4.4
+FINER_STEPS = (0.0025,)  # ours
+TOLERANCES = (0.1, 0.03, 0.01)
+REFERENCE_TOLERANCES = (0.003, 0.001)
 
 
 @dataclass(frozen=True)
@@ -55,7 +53,10 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows with their reference: the two finest thesis runs and what their difference says of the reference itself."""
+    """Rows with their reference, which two finer runs of the error-controlled rule extrapolate.
+
+    depth_uncertainty, life_uncertainty : relative difference of the reference to the finest run
+    """
 
     scene: str
     rows: tuple[Row, ...]
@@ -74,12 +75,13 @@ def wear_step(scene: str, say: Callable[[str], None], overrides: tuple[str, ...]
         raise ValueError(f"scene {file.name} has no [wear]: there is no wear step to trade")
     problem, delta = _problem(file)
     with threadpool_limits(1):
-        fine = [_measure(problem, delta, "thesis", step, say) for step in REFERENCE_STEPS]
-        rows = [_measure(problem, delta, "thesis", step, say) for step in THESIS_STEPS]
+        fine = [_measure(problem, delta, "error_controlled", step, say) for step in REFERENCE_TOLERANCES]
+        rows = [_measure(problem, delta, "thesis", step, say) for step in (*THESIS_STEPS, *FINER_STEPS)]
         rows += [_measure(problem, delta, "error_controlled", tolerance, say) for tolerance in TOLERANCES]
-    # first order in the step: the limit lies as far beyond the finest as the two finest differ
-    depth = 2 * fine[1].depth_m - fine[0].depth_m
-    life = 2 * fine[1].life_cycles - fine[0].life_cycles
+    # second order in the step, whose square the tolerance bounds: errors are proportional to the tolerance
+    beyond = REFERENCE_TOLERANCES[1] / (REFERENCE_TOLERANCES[0] - REFERENCE_TOLERANCES[1])
+    depth = fine[1].depth_m + beyond * (fine[1].depth_m - fine[0].depth_m)
+    life = fine[1].life_cycles + beyond * (fine[1].life_cycles - fine[0].life_cycles)
     reference = replace(fine[1], depth_m=depth, life_cycles=life, step=0.0)
 
     def judged(row: Row) -> Row:
@@ -101,8 +103,9 @@ def _problem(file: scene_file.SceneFile) -> tuple[WearProblem, float]:
         model = pipeline.build(file, Path(folder), Progress())
     wear, area = scene.wear, model.reduced.interface.area
     duties = pipeline.mission(scene)
-    problem = WearProblem(model.balance, duties, wear.law, wear.coefficient, area, lost_below=0.9 * LIFE_SHARE)
-    return problem, float(free_deflection(model.balance).max())
+    law = pipeline.law_of(scene, file.folder)
+    problem = WearProblem(model.balance, duties, law, wear.coefficient, area, lost_below=LIFE_SHARE)
+    return problem, delta_max(scene, free_deflection(model.balance), area)
 
 
 def _measure(problem: WearProblem, delta: float, rule: str, step: float, say: Callable[[str], None]) -> Row:
@@ -161,6 +164,26 @@ def as_records(table: Table) -> list[dict[str, object]]:
     return [asdict(row) for row in table.rows]
 
 
+def picture(table: Table) -> Figure:
+    """Work and precision of both rules: error in life and in depth against balance solves."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(9, 3.8), layout="constrained")
+        panes = figure.subplots(1, 2, sharex=True)
+        for pane, name, asked in zip(panes, ("life", "depth"), (1e-2, 1e-3), strict=True):
+            for rule, colour in (("thesis", ORANGE), ("error_controlled", BLUE)):
+                rows = sorted((r for r in table.rows if r.rule == rule), key=lambda r: r.hbm_solves)
+                error = [abs(getattr(r, f"{name}_error")) for r in rows]
+                pane.loglog([r.hbm_solves for r in rows], error, "o-", color=colour, label=rule.replace("_", "-"))
+                for row, height in zip(rows, error, strict=True):
+                    at = (row.hbm_solves, height)
+                    pane.annotate(f"{100 * row.step:g} %", at, (3, 4), textcoords="offset points", fontsize=7)
+            pane.axhline(asked, color=GREY, linestyle=":", linewidth=1)
+            pane.set(title=f"{table.scene}: error in {name}", xlabel="harmonic balance solves")
+        panes[0].set_ylabel("relative error")
+        panes[0].legend(title="wear rule, step or tolerance")
+    return figure
+
+
 def as_text(table: Table) -> str:
     """The table for people, the published one beside it."""
     lines = [
@@ -168,7 +191,8 @@ def as_text(table: Table) -> str:
         "error   roughness"
     ]
     for row in table.rows:
-        steps, seconds, depth, _ = PUBLISHED.get(row.step, (None,) * 4) if row.rule == "thesis" else (None,) * 4
+        published = WEAR_STEPS.get(table.scene, {}) if row.rule == "thesis" else {}
+        steps, seconds, depth, _ = published.get(row.step, (None,) * 4)
         lines.append(
             f"{row.rule:17} {100 * row.step:5.3g} % {row.wear_steps:6d} {_bracket(steps, 'd'):8} {row.hbm_solves:6d} "
             f"{row.seconds:8.1f} {_bracket(seconds, 'd'):9} {1e3 * row.depth_m:8.4f} {_bracket(depth, '.4f'):9} "
@@ -178,7 +202,7 @@ def as_text(table: Table) -> str:
     lines.append(
         f"reference: {1e3 * table.reference.depth_m:.4f} mm (to {100 * table.depth_uncertainty:.2f} %), "
         f"{table.reference.life_cycles:.4g} cycles (to {100 * table.life_uncertainty:.2f} %), extrapolated from the "
-        f"thesis's rule at {', '.join(f'{100 * s:g} %' for s in REFERENCE_STEPS)}"
+        f"error-controlled rule at {', '.join(f'{100 * s:g} %' for s in REFERENCE_TOLERANCES)}"
     )
     left = f"{100 * LIFE_SHARE:g} % of the first preload is left"
     lines.append(f"life and depth where {left}; the thesis's depth where the contact has separated")

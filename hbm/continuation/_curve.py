@@ -219,8 +219,8 @@ def _corner_value(segment: Segment) -> float:
 def _share(segment: Segment, weight: list[float], settled: bool) -> float:
     """Where between its ends to look for the fold of a segment, 0..1.
 
-    Round a corner it is on the longer leg, close to where the tangents meet, so that both legs get short in turn and the
-    meeting point settles; there at last. Elsewhere it is the secant's zero of the tangent's share in the parameter.
+    Round a corner it is on the longer leg, close to where the tangents meet, so that both legs get short in turn and
+    the meeting point settles; there at last. Elsewhere it is the secant's zero of the tangent's share in the parameter.
     """
     if segment.angle > KINK_ANGLE:
         a, b, _ = segment.corner

@@ -1,0 +1,231 @@
+"""Fit named parameters to measured numbers, within bounds, and say how well the numbers determine them.
+
+Nothing is tuned in silence: a fit keeps the predictions before and after it, which parameters ended at a bound, how
+each number depends on each parameter, and how far the numbers leave the parameters open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.optimize import least_squares
+
+AT_BOUND = 1e-3  # of the width of the bounds: nearer than this counts as at the bound
+DIFFERENCE = 1e-3  # step of the derivatives, in the scaled unknowns
+OPEN = 0.3  # relative standard error beyond which a parameter counts as not determined
+
+Prediction = Callable[[Mapping[str, float]], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that is looked for. low, high : bounds; starts : one or several; unit : of all of them, for the report.
+
+    ratio : the unknown is its logarithm, for positive numbers known to their order only; else it counts in `high - low`
+    """
+
+    name: str
+    low: float
+    high: float
+    starts: tuple[float, ...]
+    unit: str = ""
+    ratio: bool = True
+
+    def __post_init__(self) -> None:
+        if not (self.low < self.high and all(self.low <= start <= self.high for start in self.starts) and self.starts):
+            raise ValueError(f"parameter {self.name}: give bounds low < high and starts between them")
+        if self.ratio and self.low <= 0:
+            raise ValueError(f"parameter {self.name}: a ratio needs bounds above 0, not {self.low}")
+
+    def scaled(self, value: float) -> float:
+        """Its unknown."""
+        return float(np.log(value)) if self.ratio else value / (self.high - self.low)
+
+    def value(self, unknown: float) -> float:
+        """The parameter of an unknown."""
+        return float(np.clip(np.exp(unknown) if self.ratio else unknown * (self.high - self.low), self.low, self.high))
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A measured number, above 0. weight : of its logarithmic residual ln(predicted / measured)."""
+
+    name: str
+    value: float
+    unit: str = ""
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What a fit found.
+
+    origin, values : (n_parameter,) before and after; before, after : (n_measured,) predictions there
+    sensitivity : (n_measured, n_parameter) d ln(predicted) / d ln(parameter), or / d parameter in widths of its bounds
+    deviation : (n_parameter,) standard error in the same units, from what the fit leaves; inf where nothing tells
+    """
+
+    parameters: tuple[Parameter, ...]
+    measured: tuple[Measured, ...]
+    values: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    sensitivity: np.ndarray
+    deviation: np.ndarray
+    evaluations: int
+    origin: np.ndarray
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the relative errors that are left."""
+        return float(np.sqrt(np.mean(np.log(self.after / _values(self.measured)) ** 2)))
+
+    def named(self) -> dict[str, float]:
+        """The parameters found."""
+        return {p.name: float(v) for p, v in zip(self.parameters, self.values, strict=True)}
+
+    def verdict(self, i: int) -> str:
+        """What can be said about a parameter, in words."""
+        p, value = self.parameters[i], self.values[i]
+        width = p.scaled(p.high) - p.scaled(p.low)
+        bounds = (("lower", p.low), ("upper", p.high))
+        bound = next((w for w, b in bounds if abs(p.scaled(value) - p.scaled(b)) < AT_BOUND * width), None)
+        if bound is not None:
+            return f"at its {bound} bound"
+        if self.deviation[i] > OPEN:
+            return "not determined by these numbers"
+        if len(self.measured) <= len(self.parameters):
+            return "as many numbers as parameters: no error to tell its own from"
+        return f"+- {100 * self.deviation[i]:.2g} %" + ("" if p.ratio else " of the bounds' width")
+
+    def record(self) -> dict[str, object]:
+        """The same as the report, for machines; what is open is None."""
+        return {
+            "parameters": [
+                {
+                    "name": p.name, "unit": p.unit, "low": p.low, "high": p.high, "before": float(self.origin[i]),
+                    "found": float(self.values[i]), "verdict": self.verdict(i),
+                    "deviation": float(self.deviation[i]) if np.isfinite(self.deviation[i]) else None,
+                }
+                for i, p in enumerate(self.parameters)
+            ],
+            "numbers": [
+                {
+                    "name": m.name, "unit": m.unit, "measured": m.value, "before": float(self.before[i]),
+                    "after": float(self.after[i]), "sensitivity": [float(s) for s in self.sensitivity[i]],
+                }
+                for i, m in enumerate(self.measured)
+            ],
+            "rms": self.rms, "evaluations": self.evaluations,
+        }  # fmt: skip
+
+    def report(self) -> str:
+        """Tables of parameters, of numbers before and after, and of sensitivities."""
+        lines = [f"{'parameter':24}{'before':>12}{'found':>12}  {'unit':8}verdict"]
+        for i, p in enumerate(self.parameters):
+            lines.append(f"{p.name:24}{self.origin[i]:12.4g}{self.values[i]:12.4g}  {p.unit:8}{self.verdict(i)}")
+        names = "".join(f"{p.name:>{max(14, len(p.name) + 2)}}" for p in self.parameters)
+        lines += ["", f"{'number':30}{'measured':>10}{'before':>10}{'after':>10}{'error':>9}   sensitivity to{names}"]
+        for i, m in enumerate(self.measured):
+            error = f"{100 * (self.after[i] / m.value - 1):+.1f} %"
+            slopes = "".join(
+                f"{self.sensitivity[i, j]:{max(14, len(p.name) + 2)}.3f}" for j, p in enumerate(self.parameters)
+            )
+            name = f"{m.name} [{m.unit}]" if m.unit else m.name
+            lines.append(
+                f"{name:30}{m.value:10.4g}{self.before[i]:10.4g}{self.after[i]:10.4g}{error:>9}   {'':14}{slopes}"
+            )
+        lines.append(f"root mean square of the errors: {100 * self.rms:.2f} %; {self.evaluations} evaluations")
+        return "\n".join(lines)
+
+
+def fit(
+    parameters: Sequence[Parameter],
+    measured: Sequence[Measured],
+    predict: Prediction,
+    before: Mapping[str, float] | None = None,
+) -> Identification:
+    """Least squares of logarithmic residuals, from every combination of starts; the best is kept.
+
+    predict : parameters by name -> (n_measured,) predictions, above 0
+    before : the parameters as they were, for the report; the first starts unless told
+    Raises  ValueError where a prediction at a start is not a positive number, or a measured number is not
+    Source  bounded trust region: Branch, Coleman, Li 1999, as in scipy.optimize.least_squares
+    """
+    parameters, measured = tuple(parameters), tuple(measured)
+    target, weight = _values(measured), np.array([m.weight for m in measured])
+    if not (target > 0).all():
+        raise ValueError("an identification needs measured numbers above 0")
+    count = 0
+
+    def predicted(unknowns: np.ndarray) -> np.ndarray:
+        nonlocal count
+        count += 1
+        values = {p.name: p.value(float(u)) for p, u in zip(parameters, unknowns, strict=True)}
+        found = np.asarray(predict(values), dtype=float)
+        if found.shape != target.shape or not (found > 0).all():
+            raise ValueError(
+                f"the model predicts {found.tolist()} instead of {len(target)} numbers above 0: narrow the bounds"
+            )
+        return found
+
+    def residual(unknowns: np.ndarray) -> np.ndarray:
+        return weight * np.log(predicted(unknowns) / target)
+
+    low, high = np.array([p.scaled(p.low) for p in parameters]), np.array([p.scaled(p.high) for p in parameters])
+    best = None
+    for start in product(*(p.starts for p in parameters)):
+        first = np.array([p.scaled(v) for p, v in zip(parameters, start, strict=True)])
+        inside = np.clip(first, low + 1e-6 * (high - low), high - 1e-6 * (high - low))
+        found = least_squares(residual, inside, bounds=(low, high), diff_step=_steps(inside))
+        if best is None or found.cost < best.cost:
+            best = found
+    assert best is not None
+    first_values = {p.name: p.starts[0] for p in parameters} if before is None else before
+    origin = np.array([p.scaled(first_values[p.name]) for p in parameters])
+    slope = _slope(predicted, best.x, low, high)
+    return Identification(
+        parameters,
+        measured,
+        np.array([p.value(float(u)) for p, u in zip(parameters, best.x, strict=True)]),
+        predicted(origin),
+        predicted(best.x),
+        slope,
+        _deviation(weight[:, None] * slope, float(np.sum(best.fun**2))),
+        count,
+        np.array([first_values[p.name] for p in parameters]),
+    )
+
+
+def _values(measured: Sequence[Measured]) -> np.ndarray:
+    return np.array([m.value for m in measured])
+
+
+def _steps(unknowns: np.ndarray) -> np.ndarray:
+    """Relative steps that make absolute ones of DIFFERENCE."""
+    return DIFFERENCE / np.maximum(np.abs(unknowns), DIFFERENCE)
+
+
+def _slope(
+    predicted: Callable[[np.ndarray], np.ndarray], at: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """d ln(predicted) / d unknown (n_measured, n_parameter) by differences that stay within the bounds."""
+    columns = []
+    for j, step in enumerate(np.eye(len(at)) * DIFFERENCE):
+        up, down = np.minimum(at + step, high), np.maximum(at - step, low)
+        columns.append(np.log(predicted(up) / predicted(down)) / (up - down)[j])
+    return np.stack(columns, axis=1)
+
+
+def _deviation(slope: np.ndarray, squares: float) -> np.ndarray:
+    """Standard errors of the parameters: the residual's variance carried through the linearised problem."""
+    n, k = slope.shape
+    values, vectors = np.linalg.eigh(slope.T @ slope)
+    variance = squares / max(n - k, 1)
+    weak = values <= 1e-12 * max(values.max(), 1e-300)
+    spread = np.where(weak, np.inf, variance / np.where(weak, 1.0, values))
+    share = vectors**2
+    return np.sqrt(np.sum(np.where(share > 1e-12, share, 0.0) * np.where(share > 1e-12, spread, 0.0), axis=1))

@@ -1,0 +1,23 @@
+"""The fretting rig beside the published experiment and simulation: tribodyn rig study."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from workflows import rig_cases, rig_figures, rig_table, scene_file
+
+
+def run(
+    folder: Path, overrides: Sequence[str], tell: Callable[[str], None]
+) -> tuple[rig_table.Table, list[Path]]:
+    """Compute the study of the rig's scene with changes, and write its table and pictures into a folder.
+
+    tell : called with a sentence on what is under way
+    """
+    study = rig_cases.compute(scene_file.read("rig", overrides), tell)
+    table = rig_table.table(study)
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "comparison.md"
+    path.write_text(rig_table.as_text(table), encoding="utf-8")
+    return table, [path, *rig_figures.draw(study, folder)]
