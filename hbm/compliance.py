@@ -145,9 +145,8 @@ class CompliancePoint:
         """G g: (n_contact, n_coeff) relative displacement [m] under contact forces g (n_contact, n_coeff) [N]."""
         if self.compliance.shared_real:
             return self._apply_shared_real(g)
-        contacts = slice(0, self.compliance.n_contact)
-        modal, still = y @ x.left, self.compliance.basis.has_static
-        return all_harmonics.gathered(modal, moved, higher, n, x.n_port, x.unit, self._ratio, still)
+        contacts, basis = slice(0, self.compliance.n_contact), self.compliance.basis
+        return basis.to_real(self._through_ports(basis.to_complex(g), contacts, contacts))
 
     def _apply_shared_real(self, g: np.ndarray) -> np.ndarray:
         """The same for one real system: every matrix meets all harmonics in one real product."""
