@@ -139,7 +139,8 @@ def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptio
     factor, stride = 0.0, 0.25
     start = balance.with_load(0.0).stuck(omega)
     last = solve(balance.with_load(0.0), omega, start, options)
-    short = replace(options or NewtonOptions(), max_steps=RAMP_STEPS)
+    options = options or NewtonOptions()
+    short = replace(options, max_steps=min(options.max_steps, RAMP_STEPS))
     while last.converged and stride > 1e-3:
         target = min(1.0, factor + stride)
         trial = solve(balance.with_load(target * balance.load_factor), omega, last.state.x, short)
