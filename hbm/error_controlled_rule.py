@@ -24,6 +24,7 @@ GAMMA = 1 - 1 / np.sqrt(2)
 GROWTH = (0.2, 3.0)  # limits of the ratio of one step to the one before
 TREND = 0.2  # power with which an error that grows from step to step holds the next one back
 LANDING = (0.97, 0.999)  # of the preload at which an event is located, where a step that would pass it must end
+FAINTEST = 1e-4  # share of the first preload below which the last touch is noise of Newton's tolerance
 MAX_CORRECTIONS = 12  # solves of a stage
 GAIN_ACCURACY = 1e-9  # of the depth, for laws whose depth per work is not constant
 
@@ -45,9 +46,11 @@ def evolve(
 ) -> WearHistory:
     """Wear the contact until it is lost, with steps chosen by a local error estimate on depth and on life.
 
-    on_row, resume, return : as for the thesis's rule; `step_error` of a row is the estimate over the tolerance
+    on_row, resume, return : as for the thesis's rule; `step_error` of a row is its estimate over the tolerance. The
+    last touch of a vibrating contact does not end in finite time: FAINTEST ends the run where `lost_below` does not.
     Raises  ValueError where the wear law wears pairs that do no friction work
     """
+    problem = replace(problem, lost_below=max(problem.lost_below, FAINTEST))
     rows = resume.rows() if resume is not None else []
     if rows and rows[-1].cycles_in_step == 0:
         return history(rows, resume.end if resume is not None else "")

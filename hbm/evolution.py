@@ -128,8 +128,12 @@ def _neighbour(
     if point.solution.converged:
         return point
     x, solves = _carry(before, omega, known.state.x, opening)
+    solves += point.solves
     again = duty.site.next(balance, omega, x)
-    return OperatingPoint(again.solution, again.amplitude, again.response, again.solves + point.solves + solves)
+    if not again.solution.converged:  # the neighbour's branch has ended: look as at the start
+        solves += again.solves
+        again = duty.site.first(balance)
+    return OperatingPoint(again.solution, again.amplitude, again.response, again.solves + solves)
 
 
 def _carry(before: HarmonicBalance, omega: float, x: np.ndarray, opening: np.ndarray) -> tuple[np.ndarray, int]:

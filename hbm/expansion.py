@@ -15,7 +15,6 @@ Source  block elimination of modal coordinates (ours); static correction of trun
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import scipy.linalg as sla
@@ -28,8 +27,15 @@ CANDIDATES = ((24, 3), (48, 3), (96, 3), (96, 4), (192, 4), (192, 6))  # modes a
 ALL_MODES_BELOW = 1500  # coordinates up to which all modes are computed at once
 
 
+NO_DISTANCE = 1e-13  # of a frequency from an undamped resonance, relative: the response is rounding alone
+
+
 class SingularStuckSystem(ValueError):
     """The structure can move as a rigid body even with every contact stuck."""
+
+
+class UndampedResonance(ValueError):
+    """The response of the stuck structure is infinite at this frequency."""
 
 
 class Expansion:
@@ -64,9 +70,9 @@ class Expansion:
         )
         try:
             factor = sla.cho_factor(stuck)
+            lam, phi = _modes(stuck, mass, n if n < ALL_MODES_BELOW else CANDIDATES[-1][0])
         except np.linalg.LinAlgError:
             raise loose from None
-        lam, phi = sla.eigh(stuck, mass, subset_by_index=None if n < ALL_MODES_BELOW else (0, CANDIDATES[-1][0] - 1))
         # a rigid mode comes out of the eigenvalue problem as rounding of the stiffest ones, of either sign
         if lam[0] <= n * np.finfo(float).eps * np.max(np.diag(stuck).real / np.diag(mass).real):
             raise loose
@@ -122,7 +128,13 @@ class Expansion:
         for k, t in enumerate(self.t):
             core = core - s ** (k + 2) * t
         core = core + np.diag(self.lam + s * s)
-        return PortCompliance(self, s, core)
+        factor, pivots, _ = sla.lapack.zgetrf(core)
+        if s != 0 and np.abs(np.diag(factor)).min() < NO_DISTANCE * abs(s) ** 2:
+            raise UndampedResonance(
+                f"the stuck structure has an undamped resonance at {abs(s) / (2 * np.pi):.6g} Hz, where its response "
+                "is infinite: give it damping or take another frequency"
+            )
+        return PortCompliance(self, s, factor, pivots)
 
     def _measure_error(self, s: complex) -> float:
         mass, damping, stuck = self._system
@@ -131,29 +143,38 @@ class Expansion:
         return float(np.abs(self.at(s).apply(probe) - exact).max() / np.abs(exact).max())
 
 
+def _modes(stiffness: np.ndarray, mass: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The lowest modes: squared frequencies (count,) and shapes (n, count) of unit modal mass.
+
+    They come from the compliance's side, M phi = nu K phi: rounding is then relative to the softest mode, however much
+    stiffer the contact springs are, and what it does to stiff ones is as small as their share in the compliance.
+    """
+    n = len(mass)
+    nu, phi = sla.eigh(mass, stiffness, subset_by_index=None if count >= n else (n - count, n - 1))
+    nu, phi = nu[::-1], phi[:, ::-1]
+    lam = 1.0 / np.maximum(nu, np.finfo(float).eps ** 2 * nu[0])  # without mass: as good as rigid
+    return lam, phi * np.sqrt(lam)
+
+
 @dataclass(frozen=True)
 class PortCompliance:
-    """D(s)^-1 between ports at one s: sum_k s^k W_k + L core^-1 L', with core = S(s); ratio = s / s_max."""
+    """D(s)^-1 between ports at one s: sum_k s^k W_k + L S(s)^-1 L'; factor and pivots : S(s) = P L U."""
 
     expansion: Expansion
     s: complex
-    core: np.ndarray
+    factor: np.ndarray
+    pivots: np.ndarray
 
     @property
     def ratio(self) -> complex:
         """s over the largest one asked for."""
         return self.s / self.expansion.s_unit
 
-    @cached_property
-    def _factor(self) -> tuple[np.ndarray, np.ndarray]:
-        lu, pivots, _ = sla.lapack.zgetrf(self.core)
-        return lu, pivots
-
     def through_core(self, z: np.ndarray) -> np.ndarray:
         """S(s)^-1 z for modal forces z (n_mode, ...)."""
         if self.s == 0:
             return (z.T / self.expansion.lam).T
-        solution: np.ndarray = sla.lapack.zgetrs(*self._factor, z)[0]
+        solution: np.ndarray = sla.lapack.zgetrs(self.factor, self.pivots, z)[0]
         return solution.reshape(z.shape)
 
     def apply(self, force: np.ndarray, columns: slice = slice(None), rows: slice = slice(None)) -> np.ndarray:

@@ -27,11 +27,16 @@ class Balance(Protocol):
 
 @dataclass(frozen=True)
 class NewtonOptions:
-    """tolerance : of the residual over the displacement; max_steps : Newton steps; max_products : per direction."""
+    """How exactly and how long Newton works.
+
+    tolerance : of the residual over the displacement; max_steps : Newton steps; max_products : per direction
+    krylov : largest relative residual of a direction; the forcing term asks for less where Newton is fast
+    """
 
     tolerance: float = 1e-8
     max_steps: int = 40
     max_products: int = 300
+    krylov: float = 0.1
 
 
 @dataclass(frozen=True)
@@ -56,9 +61,9 @@ class Solution:
 
 
 def relative_residual(state: State, x_lin: np.ndarray, least: float = 0.0) -> float:
-    """|R| / max(|x|, |x_lin|, least), Euclidean; invariant to the units of length and force."""
+    """|R| / max(|x|, |x_lin|, least), Euclidean, 1 where only these vanish; invariant to the units."""
     scale = max(float(np.linalg.norm(state.x)), float(np.linalg.norm(x_lin)), least)
-    return float(np.linalg.norm(state.residual) / scale) if scale > 0 else float(np.linalg.norm(state.residual))
+    return float(np.linalg.norm(state.residual) / scale) if scale > 0 else float(state.residual.any())
 
 
 def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOptions | None = None) -> Solution:
@@ -82,11 +87,19 @@ def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOption
         if not np.isfinite(error):
             return Solution(state, "the residual is not a finite number", step - 1, products, tuple(history))
         linear = balance.linearise(state)
-        target = max(min(forcing, 0.1), 0.3 * options.tolerance / error, 1e-12)
-        direction, spent, reached = linear.solve(-state.residual, target, options.max_products)
+        target = max(min(forcing, options.krylov), 0.3 * options.tolerance / error, 1e-12)
+        try:
+            with np.errstate(over="raise"):
+                direction, spent, reached = linear.solve(-state.residual, target, options.max_products)
+        except FloatingPointError:  # a slope too steep for the single precision of the products
+            spent, reached = 0, np.inf
         products += spent
         if reached > max(10 * target, 0.5):  # Krylov stalled: the direct way
-            direction = np.linalg.solve(linear.dense(), -state.residual.ravel()).reshape(state.residual.shape)
+            try:
+                direction = np.linalg.solve(linear.dense(), -state.residual.ravel()).reshape(state.residual.shape)
+            except np.linalg.LinAlgError:  # nothing holds the contact in some direction
+                why = f"singular Jacobian at relative residual {error:.1e}"
+                return Solution(state, why, step, products, tuple(history))
         state, new_error = _search(balance, omega, state, direction, error, x_lin, least)
         history.append(new_error)
         if new_error >= error * (1 - 1e-10):

@@ -33,7 +33,6 @@ class WearRow:
     status: np.ndarray
     omega: float
     amplitude: float
-    displacement: np.ndarray
     force: np.ndarray
     response: np.ndarray
     solves: int
@@ -42,6 +41,11 @@ class WearRow:
     work: np.ndarray
     duty_omega: np.ndarray
     duty_displacement: np.ndarray
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """(n_contact, n_coeff) of the first duty [m]."""
+        return self.duty_displacement[0]
 
     @classmethod
     def of(
@@ -75,7 +79,6 @@ class WearRow:
             status=state.cycle.status,
             omega=state.omega,
             amplitude=point.amplitude,
-            displacement=state.x.reshape(shape),
             force=state.cycle.force.reshape(shape),
             response=point.response,
             solves=solves,
@@ -101,7 +104,7 @@ class WearHistory:
     status : (n_row, n_pair) bits over one cycle: 1 sticks, 2 slips, 4 separates
     omega : (n_row,) frequency of the cycle [rad/s]
     amplitude : (n_row,) vibration amplitude of the response output [m]
-    displacement, force : (n_row, n_pair * n_component, n_coeff) Fourier coefficients at the contact [m], [N]
+    force : (n_row, n_pair * n_component, n_coeff) Fourier coefficients at the contact [N]
     response : (n_row, n_output, n_coeff) Fourier coefficients of the outputs [m]
     solves : (n_row,) harmonic balance solves spent on the row
     step_error : (n_row,) estimated local error of the step over its tolerance; 0 where the rule has no estimate
@@ -123,7 +126,6 @@ class WearHistory:
     status: np.ndarray
     omega: np.ndarray
     amplitude: np.ndarray
-    displacement: np.ndarray
     force: np.ndarray
     response: np.ndarray
     solves: np.ndarray
@@ -133,6 +135,11 @@ class WearHistory:
     duty_omega: np.ndarray
     duty_displacement: np.ndarray
     end: str
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """(n_row, n_pair * n_component, n_coeff) Fourier coefficients at the contact, first duty [m]."""
+        return self.duty_displacement[:, 0]
 
     def rows(self) -> list[WearRow]:
         """The rows one by one."""

@@ -75,7 +75,6 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
         status=np.where(t[:, None] * np.ones(n_pair) < 0.6, 3, 6).astype(np.int64),
         omega=omega_row,
         amplitude=np.hypot(row_response[:, 0, 1], row_response[:, 0, 2]),
-        displacement=displacement,
         force=1e6 * displacement,
         response=row_response,
         solves=np.full(n_row, 4),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import signal
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.killed_runs import go_on
 from workflows import pipeline, plots, store
 from workflows.progress import Progress
 from workflows.result import Result
@@ -24,7 +26,9 @@ SMALL = [
     "geometry.n_height=1",
     "reduction.modes=4",
     "response.points=25",
+    "wear.rule=thesis",
     "wear.step=30 %",
+    "wear.lost_below=0",
 ]
 COMMAND = [sys.executable, "-m", "workflows.cli", "run", "beam", "--no-pictures"]
 
@@ -114,11 +118,43 @@ def test_killed_runs_resume_to_the_same_bits(finished: Result, tmp_path: Path) -
     process = start(tmp_path, "--resume")
     _, err = process.communicate()
     assert process.returncode == 0, err
-    resumed = store.load(path)
-    assert resumed.state == finished.state
+    assert_same_wear(store.load(path), finished)
+
+
+@pytest.mark.parametrize("rule", ["thesis", "error_controlled"])
+def test_ten_kills_at_random_moments_change_no_bit(rule: str, tmp_path: Path) -> None:
+    overrides = (*SMALL, f"wear.rule={rule}", "wear.step=40 %", "wear.tolerance=0.2", "wear.lost_below=0.01")
+    whole = pipeline.run(read("beam", overrides), tmp_path, Progress())
+    assert whole.wear is not None
+    server = multiprocessing.get_context("forkserver")
+    server.set_forkserver_preload(["tests.killed_runs"])
+    path, kills, rng = tmp_path / "killed" / "result.h5", 0, np.random.default_rng(7)
+    path.parent.mkdir()
+    longest = 2.0
+    while kills < 10:
+        process = server.Process(target=go_on, args=(path.parent, overrides))
+        clock = time.monotonic()
+        process.start()
+        process.join(rng.uniform(0.0, longest))
+        if process.is_alive():
+            process.kill()
+            process.join()
+            kills += 1
+            if path.exists():
+                assert store.load(path).state.startswith(("model built", "response computed", "unfinished", "complete"))
+        else:  # it came to its end: once more from the start, with shorter lives
+            longest = 0.8 * (time.monotonic() - clock)
+            assert_same_wear(store.load(path), whole)
+            path.unlink()
+    pipeline.run(read("beam", overrides), path.parent, Progress(), store.load(path) if path.exists() else None)
+    assert_same_wear(store.load(path), whole)
+
+
+def assert_same_wear(resumed: Result, whole: Result) -> None:
+    assert resumed.state == whole.state
     assert resumed.wear is not None
-    for name in ("cycles", "depth", "energy", "preload", "omega", "displacement", "force", "solves"):
-        assert np.array_equal(getattr(resumed.wear, name), getattr(finished.wear, name)), name
+    for name in ("cycles", "depth", "energy", "preload", "omega", "displacement", "force", "solves", "plan"):
+        assert np.array_equal(getattr(resumed.wear, name), getattr(whole.wear, name)), name
 
 
 def test_ctrl_c_keeps_what_was_computed_and_says_where(tmp_path: Path) -> None:
@@ -129,7 +165,7 @@ def test_ctrl_c_keeps_what_was_computed_and_says_where(tmp_path: Path) -> None:
     assert process.returncode == 130
     assert err.count("\n") == 1
     assert str(tmp_path / "result.h5") in err
-    assert err.endswith("--set 'wear.step=30 %' --resume.\n")
+    assert err.endswith("--set wear.lost_below=0 --resume.\n")
     wear = store.load(tmp_path / "result.h5").wear
     assert wear is not None
     assert len(wear.cycles) >= 2

@@ -22,7 +22,7 @@ WRONG = {
     "wear.step=5 N": ["wear.step", "share of delta_max"],
     "wear.at=somewhere": ["wear.at", '"peak"'],
     "wear.at=3 mm of peak": ["wear.at", '"98 % of peak"'],
-    "wear.step=": ["wear", "step", "thesis"],
+    'wear={law="energy", coefficient="2e3 um3/J"}': ["wear", "step", "thesis"],
     "wear.rule=guess": ["wear.rule", "'thesis'"],
     "wear.max_steps=-1": ["wear.max_steps", "at least 0"],
     "harmonics.kept=[0, 3.5]": ["harmonics.kept[1]", "whole number"],

@@ -20,7 +20,9 @@ SMALL = [
     "reduction.modes=4",
     "response.points=20",
     "response.frequency=['380 Hz', '1000 Hz']",
+    "wear.rule=thesis",
     "wear.step=30 %",
+    "wear.lost_below=0",
     "wear.max_steps=2",
     "harmonics.kept=[0, 1, 2, 3]",
 ]

@@ -20,7 +20,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hbm.branch import Branch, amplitude
-from hbm.continuation import natural
 from workflows import blade_model, plots, scene_file
 from workflows.blade_figures import shades
 from workflows.blade_model import Blade
@@ -82,12 +81,14 @@ def deviations(n_sectors: int, spread: float = SPREAD, seed: int = SEED) -> np.n
     return np.asarray(1 + spread * drawn / drawn.std())
 
 
-def respond(blade: Blade, stiffness: Sequence[float]) -> Mistuned:
-    """Response of a wheel over the scene's range to its engine order, beside blades alike."""
-    low, high = (2 * np.pi * hertz for hertz in blade.scene.response.frequency)
-    options = natural.Options(blade.scene.response.points)
-    branch = natural.follow(blade.whole_wheel(stiffness), low, high, options)
-    alike = natural.follow(blade.wave(), low, high, options)
+def respond(blade: Blade, stiffness: Sequence[float], tolerance: float = 3e-3) -> Mistuned:
+    """Response of a wheel over the scene's range to its engine order, beside blades alike.
+
+    tolerance : of the curves between their points. Raises  SolveFailed
+    """
+    frequency = blade.scene.response.frequency
+    branch = blade_model.follow(blade.whole_wheel(stiffness), frequency, tolerance)
+    alike = blade_model.follow(blade.wave(), frequency, tolerance)
     rows = [branch.output_names.index(f"{OUTPUT}@{n}") for n in range(len(stiffness))]
     return Mistuned(np.asarray(stiffness), branch, amplitude(branch.response[:, rows]), alike)
 

@@ -14,12 +14,16 @@ import numpy as np
 from fem.cyclic import Sector
 from fem.part import Part
 from hbm.balance import HarmonicBalance
+from hbm.branch import Branch
+from hbm.continuation import adaptive
 from hbm.law import ContactParameters
 from hbm.travelling_wave import on_wheel
 from reduction.cyclic import ReducedSector, nodal_diameters, reduce_sector, travelling_wave, wheel_model
 from workflows import part_reduction, pipeline
 from workflows.scene import PartScene
 from workflows.scene_file import SceneError, SceneFile
+
+MAX_POINTS = 1000  # of a response
 
 
 @dataclass(frozen=True)
@@ -92,6 +96,18 @@ class Blade:
         scene = self.scene.model_copy(update={"wheel": wheel.model_copy(update={"speed": speed})})
         file = replace(self.file, scene=scene)
         return assembled(file, self.part.mesh, dict(self.part.node_sets))
+
+
+def follow(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: float) -> Branch:
+    """The response over a range [Hz], its points as dense as the tolerance of the curve between them asks.
+
+    Raises  SolveFailed where the curve does not come to the end of the range
+    """
+    low, high = (2 * np.pi * hertz for hertz in frequency)
+    branch = adaptive.follow(balance, low, high, adaptive.Options(tolerance=tolerance, max_points=MAX_POINTS))
+    if not branch.end.startswith("reached"):
+        raise pipeline.SolveFailed(f"the frequency response {branch.end}")
+    return branch
 
 
 def build(file: SceneFile) -> Blade:

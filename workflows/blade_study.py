@@ -18,7 +18,6 @@ from threadpoolctl import threadpool_limits
 from hbm import thesis_rule
 from hbm.balance import HarmonicBalance
 from hbm.branch import Branch
-from hbm.continuation import adaptive
 from hbm.evolution import WearProblem
 from hbm.wear_history import WearHistory, cycles_to_preload
 from workflows import blade_figures, blade_model, pipeline, scene_file
@@ -139,8 +138,7 @@ def critical_speeds(speeds: np.ndarray, frequency: np.ndarray, order: int) -> li
 def respond(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: float) -> Curve:
     """The response over a range [Hz]."""
     low, high = (2 * np.pi * hertz for hertz in frequency)
-    branch = adaptive.follow(balance, low, high, adaptive.Options(tolerance=tolerance))
-    return Curve(branch, linear_references(balance, OUTPUT, low, high))
+    return Curve(blade_model.follow(balance, frequency, tolerance), linear_references(balance, OUTPUT, low, high))
 
 
 def span(blade: Blade, order: int) -> tuple[float, float]:

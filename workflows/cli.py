@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import cyclopts
 from cyclopts import Parameter
 
-from workflows import scene_file
+from workflows import cli_studies, scene_file
+from workflows.cli_studies import Overrides, aside
 
 if TYPE_CHECKING:
     from workflows.result import Result
@@ -27,10 +28,8 @@ app = cyclopts.App(
     version_flags=["--version"],
     suppress_keyboard_interrupt=False,
 )
-Overrides = Annotated[
-    tuple[str, ...],
-    Parameter(name="--set", negative=(), consume_multiple=False, help="Change a key of the scene: section.key=value."),
-]
+for command in (cli_studies.trade, cli_studies.converge, cli_studies.extremes):
+    app.command(command)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -60,6 +59,8 @@ def run(
     scene: str,
     *,
     overrides: Overrides = (),
+    accuracy: str | None = None,
+    table: Path | None = None,
     out: Path | None = None,
     resume: Annotated[bool, Parameter(negative=())] = False,
     pictures: Annotated[bool, Parameter(negative="--no-pictures")] = True,
@@ -70,6 +71,10 @@ def run(
     ----------
     scene
         Name of a scene (see `tribodyn list`) or a .toml file.
+    accuracy
+        Relative error wanted, such as "1 %": the cheapest settings that promise it by the scene's trade are taken.
+    table
+        The trade to go by; results/NAME/trade.json or the one that comes with the program unless told.
     out
         Folder of the result; results/NAME unless told.
     resume
@@ -78,11 +83,16 @@ def run(
         Draw curves, maps and renders when done.
     """
     from workflows import pipeline
+    from workflows.accuracy import tuned
     from workflows.progress import console_progress
 
-    file = scene_file.read(scene, overrides)
-    folder = out or Path("results") / file.name
     progress = console_progress()
+    if accuracy is None:
+        file = scene_file.read(scene, overrides)
+    else:
+        file, promise = tuned(scene, overrides, _option("--accuracy", accuracy, ""), table)
+        progress.say(promise.sentence)
+    folder = out or Path("results") / file.name
     path = folder / "result.h5"
     earlier = _earlier(path, file) if resume else None
     if earlier is not None and pipeline.is_complete(earlier, file.scene):
@@ -93,18 +103,13 @@ def run(
         try:
             result = pipeline.run(file, folder, progress, earlier)
         except KeyboardInterrupt:
-            raise KeyboardInterrupt(_kept(path, scene, overrides)) from None
+            raise KeyboardInterrupt(_kept(path, scene, file.overrides)) from None
         except pipeline.SolveFailed as failure:
             raise pipeline.SolveFailed(f"{failure}; what was computed before is kept in {path}") from None
     _print_summary(result)
     progress.say(f"result: {path}")
     if pictures:
         _draw(result, folder / "pictures")
-
-
-def _aside(sentence: str) -> None:
-    """Progress of a study, beside what it prints."""
-    print(sentence, file=sys.stderr, flush=True)
 
 
 def _earlier(path: Path, file: scene_file.SceneFile) -> Result | None:
@@ -137,36 +142,6 @@ def list_() -> None:
 
 
 @app.command
-def trade(
-    scene: str,
-    *,
-    knob: Literal["wear_step"] = "wear_step",
-    overrides: Overrides = (),
-    out: Path | None = None,
-    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
-) -> None:
-    """Measure what a knob costs and what it is worth, against a finer reference on the same scene.
-
-    Parameters
-    ----------
-    scene
-        Name of a scene or a .toml file.
-    knob
-        wear_step: table 4.2 of the thesis with life added, and the error-controlled rule.
-    out
-        File for a plot of the errors against the work.
-    as_json
-        Print JSON for machines.
-    """
-    from workflows import trade as trading
-
-    table = trading.wear_step(scene, _aside, overrides)
-    if out is not None:
-        trading.picture(table).savefig(out)
-    print(json.dumps(trading.as_records(table), indent=2) if as_json else trading.as_text(table))
-
-
-@app.command
 def bench(
     *,
     quick: Annotated[bool, Parameter(negative=())] = False,
@@ -192,7 +167,7 @@ def bench(
     if scaling:
         _scaling(quick, out, as_json)
         return
-    rows = benchmark.run(quick, _aside)
+    rows = benchmark.run(quick, aside)
     print(json.dumps(benchmark.as_records(rows), indent=2) if as_json else benchmark.as_text(rows))
 
 
@@ -208,35 +183,6 @@ def _scaling(quick: bool, out: Path, as_json: bool) -> None:
     else:
         print(measured.as_text(rows))
         print(out)
-
-
-@app.command
-def extremes(
-    *,
-    quick: Annotated[bool, Parameter(negative=())] = False,
-    out: Path = Path("extremes.png"),
-    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
-) -> None:
-    """Try the solver at its numerical extremes: each cell converged and checked, or refused with a sentence.
-
-    Parameters
-    ----------
-    quick
-        Every third cell, on smaller models.
-    out
-        File of the picture.
-    as_json
-        Print JSON for machines.
-    """
-    from workflows import extremes as table
-    from workflows import extremes_picture
-
-    rows = table.run(quick, _aside)
-    extremes_picture.picture(rows).savefig(out)
-    print(json.dumps(table.as_records(rows), indent=2) if as_json else table.as_text(rows))
-    wrong = table.counts(rows)["wrong"]
-    if wrong:
-        raise RuntimeError(f"{wrong} of {len(rows)} extreme settings ended with a wrong number, see the table")
 
 
 @app.command
@@ -459,7 +405,7 @@ def blade(
     if work == "mistuned":
         written = blade_mistuning.run(scene, overrides, folder)
     else:
-        written = blade_study.run(scene, overrides, folder, highest, _aside, blade_study.Extent())
+        written = blade_study.run(scene, overrides, folder, highest, aside, blade_study.Extent())
     for path in written:
         print(path)
 
@@ -494,10 +440,10 @@ def rig(
     from workflows import rig_fit, rig_study, rig_table
 
     if work == "fit":
-        fits = rig_fit.run(overrides, column, wear, _aside)
+        fits = rig_fit.run(overrides, column, wear, aside)
         print(json.dumps(rig_fit.as_records(fits), indent=2) if as_json else rig_fit.as_text(fits))
         return
-    table, paths = rig_study.run(out or Path("results") / "rig_study", overrides, _aside)
+    table, paths = rig_study.run(out or Path("results") / "rig_study", overrides, aside)
     if as_json:
         print(json.dumps({**rig_table.as_records(table), "files": [str(path) for path in paths]}, indent=2))
     else:

@@ -30,7 +30,9 @@ def described(
     """The result before anything was solved: where it comes from and what is modelled; part None for matrices."""
     reduced, i = balance.model, balance.model.interface
     nodes = np.full(i.n_pair, -1) if part is None else cKDTree(part.points).query(i.points)[1]
-    patch = Patch(i.components, nodes, i.points, i.frames, i.area, i.gap, i.faces, free_deflection(balance))
+    wears = file.scene.wear is not None
+    free = free_deflection(balance) if wears else np.full(i.n_pair, np.nan)
+    patch = Patch(i.components, nodes, i.points, i.frames, i.area, i.gap, i.faces, free)
     facts: dict[str, str | int | float | np.ndarray] = {
         "full_dofs": int(str(reduced.info["n_full"])),
         "model_dofs": reduced.system.n_dof,
@@ -38,7 +40,6 @@ def described(
         "contact_pairs": i.n_pair,
         "harmonics": np.array(balance.basis.harmonics),
         "unknowns": balance.n_unknown,
-        "delta_max_m": delta_max(file.scene, patch.free_deflection, i.area),
         "compliance_error": balance.compliance.error,
     }
     if part is not None:
@@ -53,13 +54,15 @@ def described(
             "first_omitted_hz": float(str(reduced.info["first_omitted_frequency"])),
             "factorisation": str(reduced.info["factorisation"]),
         }
+    if "n_interface_modes" in reduced.info:
+        facts |= {"interface_modes": int(str(reduced.info["n_interface_modes"]))}
     if file.scene.wear is not None:
-        facts["wear_split"] = file.scene.wear.split
+        facts |= {"delta_max_m": delta_max(file.scene, free, i.area), "wear_split": file.scene.wear.split}
     if isinstance(file.scene, PartScene) and (around := file.scene.wheel) is not None:
         facts |= {"sectors": around.sectors, "engine_order": around.engine_order, "axis": np.array(around.axis)}
     if choice is not None:
         facts |= {"harmonics_error": choice.estimate.error, "harmonics_choice": choice.outcome}
-    mesh = None if part is None else part_mesh(part)
+    mesh = part_mesh(part) if part is not None and wears and file.scene.pictures.renders else None
     return Result(provenance(file), facts, "model built", patch=patch, part=mesh)
 
 

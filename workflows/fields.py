@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from fem.part import Part
@@ -9,7 +11,24 @@ from hbm import aft
 from hbm.balance import HarmonicBalance
 from hbm.recovery import full_displacement
 from hbm.wear_history import WearRow
-from workflows.result import Fields, Loops
+from workflows.result import Fields, Loops, Result
+from workflows.scene import Scene
+
+
+def with_shown(scene: Scene, result: Result, balance: HarmonicBalance, part: Part | None) -> Result:
+    """The result of a wear run with the fields and loops that the pictures of the scene show, and no others.
+
+    balance : the unworn problem under the load that the rows of the result come from
+    """
+    assert result.wear is not None
+    if not result.wear_steps:
+        return result
+    rows, numbers = result.wear.rows(), replace(result, fields=None).shown_rows()
+    if scene.pictures.renders and part is not None:
+        result = replace(result, fields=displacement_fields(balance, part, rows, numbers))
+    if scene.pictures.plots and any(component != "n" for component in scene.contact.components):
+        result = replace(result, loops=hysteresis_loops(balance, rows, numbers))
+    return result
 
 
 def displacement_fields(balance: HarmonicBalance, part: Part, rows: list[WearRow], numbers: np.ndarray) -> Fields:

@@ -15,6 +15,7 @@ from fem.prestress import spinning
 from fem.springs import Spring
 from reduction.craig_bampton import craig_bampton
 from reduction.cyclic import ReducedSector, reduce_sector, travelling_wave
+from reduction.interface_modes import interface_modes
 from reduction.model import ReducedModel
 from reduction.prescribed import StaticReaction, prescribe
 from reduction.relative import relative
@@ -50,7 +51,16 @@ def reduce(scene: PartScene, part: Part) -> ReducedModel:
         raise ValueError("prescribed: a part whose turning is held cannot have prescribed nodes; hold it by springs")
     if wanted.relative:
         system, interface, back = relative(system, interface)
-    reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, np.concatenate([[], *held]).astype(int))
+    extra = np.concatenate([[], *held]).astype(int)
+    reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, extra)
+    if wanted.interface_modes is not None:
+        masters = np.asarray(reduced.info["masters"])
+        touched = np.flatnonzero(np.abs(np.asarray(reduced.interface.B)[:, : len(masters)]).max(axis=0))
+        keep = np.union1d(np.delete(masters, touched), extra)
+        if wanted.interface_keep is not None:
+            named = [part.dofs(group, axis) for group in wanted.interface_keep for axis in "xyz"]
+            keep = np.union1d(np.intersect1d(np.concatenate([[], *named]), masters), extra)
+        reduced = interface_modes(reduced, wanted.interface_modes, keep.astype(int))
     return reduced if back is None else replace(reduced, basis=back @ reduced.basis)
 
 

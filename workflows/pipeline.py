@@ -37,9 +37,10 @@ from reduction.held import hold
 from reduction.linear import stuck_stiffness
 from reduction.model import ReducedModel
 from workflows import curve, matrix_model, part_reduction, references, store, worn_responses
+from workflows.budget import with_budget
 from workflows.contact_surfaces import surface_gap
 from workflows.description import described
-from workflows.fields import displacement_fields, hysteresis_loops
+from workflows.fields import with_shown
 from workflows.matrix_scene import MatrixScene
 from workflows.progress import Progress
 from workflows.result import Patch, Result
@@ -106,6 +107,8 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
                 count = scene.wear.responses
                 curves = worn_responses.curves(result, model.balance, count, again, advance)
                 result = keep(replace(result, worn=curves))
+        with progress.stage("error budget"):
+            result = with_budget(file, model.balance, result)
         state = "complete" if result.wear is None else f"complete: {result.wear.end}"
         return keep(replace(result, state=state))
 
@@ -364,7 +367,7 @@ def response_range(scene: Scene) -> tuple[float, float]:
 
 def newton_options(scene: Scene) -> NewtonOptions:
     """How exactly every balance is solved."""
-    return NewtonOptions(tolerance=scene.solver.tolerance)
+    return NewtonOptions(tolerance=scene.solver.tolerance, krylov=scene.solver.krylov)
 
 
 def check_branch(branch: Branch | None) -> None:
@@ -400,7 +403,7 @@ def wear_down(
     else:
         tolerance = error_controlled_rule.Tolerance(wear.tolerance, limit)
         worn = error_controlled_rule.evolve(problem, tolerance, wear.max_steps, on_row, result.wear)
-    result = with_pictures_of(replace(result, wear=worn), model, duties[0])
+    result = with_shown(scene, replace(result, wear=worn), model.balance.with_load(duties[0].load), model.part)
     if worn.end.startswith("solve failed"):
         keep(replace(result, state=worn.end))
         raise SolveFailed(f"wear step {len(worn.cycles)}: {worn.end}")
@@ -445,20 +448,6 @@ def step_limit(scene: Scene, patch: Patch) -> float:
         )
     share = step.share if scene.wear.rule == "thesis" and step is not None else None
     return delta_max if share is None else share * delta_max
-
-
-def with_pictures_of(result: Result, model: Model, duty: Duty) -> Result:
-    """The result with displacement fields and hysteresis loops of the rows that pictures show."""
-    assert result.wear is not None
-    if not result.wear_steps:
-        return result
-    rows, numbers = result.wear.rows(), replace(result, fields=None).shown_rows()
-    balance = model.balance.with_load(duty.load)
-    return replace(
-        result,
-        fields=None if model.part is None else displacement_fields(balance, model.part, rows, numbers),
-        loops=hysteresis_loops(balance, rows, numbers),
-    )
 
 
 class Clock:

@@ -28,7 +28,7 @@ DENSE_SECONDS = 3e-9  # for each cubed coordinate of the reduced model, all eige
 SOLVE_SECONDS = 6e-8  # of a balance solve, for each squared contact coordinate and harmonic coefficient
 SOLVES_AT_PEAK = 10
 LIKELY = tuple(range(8))  # harmonics where a scene leaves the choice
-EQUIVALENT_SHARE = 0.3  # the step of the thesis's rule that takes as many steps as the error-controlled one does
+CONTROLLED_STEPS, CONTROLLED_EXPONENT = 23, -0.4  # at a tolerance of 5 %; beam scene
 STEPS_AT_ONE_PERCENT, STEPS_EXPONENT = 411, -0.5  # to loss of contact; Tamatam 2021, table 4.2
 
 
@@ -148,8 +148,10 @@ def _wear(scene: Scene) -> tuple[int | None, int]:
         return 0, 0
     most, share = scene.wear.max_steps, None if scene.wear.step is None else scene.wear.step.share
     if scene.wear.rule == "error_controlled":
-        share = EQUIVALENT_SHARE
-    likely = most if share is None else round(STEPS_AT_ONE_PERCENT * (100 * share) ** STEPS_EXPONENT)
+        share = scene.wear.tolerance
+        likely = round(CONTROLLED_STEPS * (share / 0.05) ** CONTROLLED_EXPONENT)
+    else:
+        likely = most if share is None else round(STEPS_AT_ONE_PERCENT * (100 * share) ** STEPS_EXPONENT)
     steps = min(most, likely)
     solves = 0
     for place in [duty.at for duty in scene.wear.mission] or [scene.wear.at]:

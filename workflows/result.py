@@ -36,7 +36,7 @@ class Patch:
     components : contact components in the order of the history's rows
     nodes : (n_pair,) node of the part at each pair, -1 where there is no mesh
     points, frames, area, gap, faces : as in fem.interface.ContactInterface
-    free_deflection : (n_pair,) normal approach under the static loads with body 2 absent [m]
+    free_deflection : (n_pair,) normal approach under the static loads with body 2 absent, nan without wear [m]
     """
 
     components: tuple[str, ...]

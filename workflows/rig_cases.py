@@ -1,7 +1,8 @@
 """What the study of the fretting rig computes: everything that the thesis tells about its rig in numbers or as a trend.
 
 Frequencies before and after the fit of the joints, the prescribed height, energy per cycle against shaker force, wear
-to the loss of the preload for three mating heights, responses and loops at five stages of wear.
+to the loss of the preload for three mating heights, responses and loops at five stages of wear, and whether these
+cycles are those that time integration finds.
 """
 
 from __future__ import annotations
@@ -20,8 +21,9 @@ from workflows import pipeline, rig_fit
 from workflows.references import linear_references
 from workflows.result import Patch, References
 from workflows.rig_joints import Joints, joints_of
-from workflows.rig_model import Cycle, Rig
+from workflows.rig_model import Cycle, Rig, cycle_of
 from workflows.rig_published import MATING_HEIGHTS, STUCK_COMPLEX, TABLE_5_3
+from workflows.rig_time import InTime, in_time
 from workflows.rig_wear import RigWear, loop, wear_down
 from workflows.scene_file import SceneFile
 
@@ -43,10 +45,11 @@ class Height:
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage of wear: row of the history, share of the volume; response 240 to 450 Hz; loop as `rig_wear.loop`."""
+    """A stage of wear: row of the history; its cycle, and the same in time; response; loop as `rig_wear.loop`."""
 
     row: int
-    share: float
+    cycle: Cycle
+    in_time: InTime
     response: Branch
     sliding: np.ndarray
     friction: np.ndarray
@@ -132,12 +135,14 @@ def apart(rig: Rig, references: References) -> float:
 
 def _stage(rig: Rig, run: RigWear, share: float, tell: Callable[[str], None]) -> Stage:
     row = run.nearest(share)
-    worn = rig.with_opening(run.history.depth[row]).model()
-    tell(f"response after {run.history.cycles[row]:.3g} cycles")
+    worn = rig.with_opening(run.history.depth[row])
+    balance = worn.model().balance
+    tell(f"response and time integration after {run.history.cycles[row]:.3g} cycles")
     low, high = pipeline.response_range(rig.scene)
-    options = Options(newton=pipeline.newton_options(rig.scene))
-    response = arc_length.follow(worn.balance, low, high, options)
-    return Stage(row, share, response, *loop(rig.model().balance, run.history, row))
+    response = arc_length.follow(balance, low, high, Options(newton=pipeline.newton_options(rig.scene)))
+    x = run.history.displacement[row].reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
+    cycle = cycle_of(balance, balance.evaluate(rig.omega, x), rig.height)
+    return Stage(row, cycle, in_time(worn, cycle), response, *loop(rig.model().balance, run.history, row))
 
 
 def solved(branch: Branch) -> np.ndarray:

@@ -46,11 +46,24 @@ class Trend:
 
 
 @dataclass(frozen=True)
+class Check:
+    """A stage of wear by harmonic balance and by time integration, as `rig_time.InTime`; energies [J], preloads [N]."""
+
+    cycles: float
+    preload_at_rest: float
+    energy: float
+    energy_in_time: float | None
+    amplitude_difference: float | None
+    outcome: str
+
+
+@dataclass(frozen=True)
 class Table:
     """seconds : of processor time of the whole study."""
 
     numbers: tuple[Number, ...]
     trends: tuple[Trend, ...]
+    checks: tuple[Check, ...]
     seconds: float
 
 
@@ -58,7 +71,13 @@ def table(study: Study) -> Table:
     """Everything compared."""
     numbers = [*_frequencies(study), *_energies(study), *_lives(study)]
     trends = [*_statics(study), *_first_contact(study), *_evolution(study), *_responses(study.stages, study)]
-    return Table(tuple(numbers), tuple(trends), study.seconds)
+    return Table(tuple(numbers), tuple(trends), tuple(_check(study.runs[0], s) for s in study.stages), study.seconds)
+
+
+def _check(run: RigWear, stage: Stage) -> Check:
+    time = stage.in_time
+    cycles, rest = float(run.history.cycles[stage.row]), float(run.rest[stage.row])
+    return Check(cycles, rest, stage.cycle.energy, time.energy, time.amplitude, time.outcome)
 
 
 def _frequencies(study: Study) -> list[Number]:
@@ -227,6 +246,15 @@ def as_text(found: Table) -> str:
     ]
     lines += ["", "| | published | ours | agrees |", "|---|---|---|---|"]
     lines += [f"| {t.topic} | {t.published} | {t.ours} | {'yes' if t.agrees else 'no'} |" for t in found.trends]
+    lines += ["", "| 10^6 cycles | preload at rest, N | energy, uJ | in time, uJ | amplitude | time integration |"]
+    lines += ["|---|---|---|---|---|---|"]
+    for c in found.checks:
+        energy = "-" if c.energy_in_time is None else f"{1e6 * c.energy_in_time:.0f}"
+        amplitude = "-" if c.amplitude_difference is None else f"{100 * c.amplitude_difference:+.2g} %"
+        lines.append(
+            f"| {c.cycles / MILLION:.3g} | {c.preload_at_rest:.1f} | {1e6 * c.energy:.0f} | {energy} | {amplitude} "
+            f"| {c.outcome} |"
+        )
     lines += ["", f"{found.seconds:.0f} s of processor time, one thread"]
     return "\n".join(lines) + "\n"
 
@@ -234,4 +262,5 @@ def as_text(found: Table) -> str:
 def as_records(found: Table) -> dict[str, object]:
     """For machines."""
     numbers = [{**asdict(n), "difference": n.difference} for n in found.numbers]
-    return {"numbers": numbers, "trends": [asdict(t) for t in found.trends], "seconds": found.seconds}
+    return {"numbers": numbers, "trends": [asdict(t) for t in found.trends],
+            "checks": [asdict(c) for c in found.checks], "seconds": found.seconds}  # fmt: skip

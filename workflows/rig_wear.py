@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hbm import aft, error_controlled_rule, newton, thesis_rule
+from hbm import aft, error_controlled_rule, thesis_rule
 from hbm.balance import HarmonicBalance
-from hbm.evolution import Duty, WearProblem
+from hbm.evolution import Duty, WearProblem, WearState, assess
 from hbm.operating_point import AtFrequency
 from hbm.wear_history import WearHistory
 from hbm.wear_history import history as joined
@@ -93,10 +93,11 @@ def wear_down(rig: Rig, shift: float, tell: Callable[[str], None]) -> RigWear:
     balance, still = rig.model().balance, rig.with_force(0.0).model().balance
     site = AtFrequency(pipeline.OUTPUT, rig.omega, pipeline.newton_options(rig.scene))
     area = rig.plain.interface.area
-    problem = WearProblem(balance, (Duty(site),), wear.law, wear.coefficient, area)
+    problem, quiet = (WearProblem(b, (Duty(site),), wear.law, wear.coefficient, area) for b in (balance, still))
     limit = pipeline.step_limit(rig.scene, rig.patch(balance))
     history: WearHistory | None = None
     rest: list[float] = []
+    resting: WearState | None = None
     while True:
         count = min(len(rest) + STRIDE, wear.max_steps)
         if wear.rule == "thesis":
@@ -106,7 +107,11 @@ def wear_down(rig: Rig, shift: float, tell: Callable[[str], None]) -> RigWear:
             history = error_controlled_rule.evolve(problem, tolerance, count, resume=history)
         if history.end.startswith("solve failed"):
             raise NoSolution(f"mating height {shift * 1e6:+.3g} um, wear step {len(history.cycles)}: {history.end}")
-        rest += [preload_at_rest(still, rig.omega, depth) for depth in history.depth[len(rest) :]]
+        for depth in history.depth[len(rest) :]:
+            resting = assess(quiet, depth, 0.0, resting)
+            if resting.failure:
+                raise NoSolution(f"mating height {shift * 1e6:+.3g} um, at rest, step {len(rest)}: {resting.failure}")
+            rest.append(still.preload(resting.points[0].state))
         tell(
             f"mating height {shift * 1e6:+.3g} um: step {len(rest)}, {history.cycles[-1]:.3g} cycles, "
             f"preload {rest[-1]:.3g} N at rest"
@@ -120,15 +125,6 @@ def wear_down(rig: Rig, shift: float, tell: Callable[[str], None]) -> RigWear:
     points = rig.plain.interface.points
     in_plane = (points - points.mean(axis=0))[:, :2]
     return RigWear(shift, kept, np.array(rest[:rows]), area, in_plane, end, time.process_time() - clock)
-
-
-def preload_at_rest(still: HarmonicBalance, omega: float, depth: np.ndarray) -> float:
-    """Normal force of the contact [N] at a wear depth (n_pair,) [m] when nothing shakes; raises NoSolution."""
-    balance = still.with_gap(still.parameters.gap + depth)
-    solution = newton.solve_from_rest(balance, omega)
-    if not solution.converged:
-        raise NoSolution(f"the rig at rest: {solution.outcome}")
-    return balance.preload(solution.state)
 
 
 def history_of(history: WearHistory, rows: int) -> WearHistory:

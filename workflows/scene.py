@@ -242,12 +242,23 @@ class Reduction(Table):
     """Craig-Bampton: how many fixed-interface modes, or up to which frequency.
 
     relative : keep the relative displacement of node pairs instead of both nodes
+    interface_modes : replace the masters by so many characteristic constraint modes
+    interface_keep : groups whose masters stay physical all the same, [] for none (SCC); unless told, every master that
+        does not belong to the contact stays (SCCe)
     """
 
     method: Literal["craig_bampton"] = "craig_bampton"
     relative: StrictBool = False
     modes: Annotated[StrictInt, Field(ge=0)] | None = None
     cutoff: Annotated[Frequency, Field(gt=0)] | None = None
+    interface_modes: Annotated[StrictInt, Field(ge=1)] | None = None
+    interface_keep: tuple[str, ...] | None = None
+
+    @model_validator(mode="after")
+    def _interface(self) -> Reduction:
+        if self.interface_modes is None and self.interface_keep is not None:
+            raise ValueError("expected interface_keep only with interface_modes")
+        return self
 
     @model_validator(mode="after")
     def _one_truncation(self) -> Reduction:
@@ -414,9 +425,13 @@ class Pictures(Table):
 
 
 class Solver(Table):
-    """Newton's tolerance on the contact displacement relative to its size, and threads of the linear algebra."""
+    """Newton's tolerance on the contact displacement relative to its size, and threads of the linear algebra.
+
+    krylov : how exactly each Newton direction is solved, at the least
+    """
 
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-8
+    krylov: Annotated[Number, Field(gt=0, lt=1)] = 0.1
     threads: Annotated[StrictInt, Field(ge=1)] = 1
 
 
@@ -460,7 +475,9 @@ class PartScene(Scene):
             ("motion", bool(self.motion)),
             ("prescribed", bool(self.prescribed)),
             ("reduction.relative", self.reduction.relative),
+            ("reduction.interface_modes", self.reduction.interface_modes is not None),
             ("geometry.no_turning", self.geometry.no_turning is not None),
+            ("response.stability", self.response.stability),  # perturbations see other waves than the solution does
         ):
             if has:
                 raise ValueError(f"{key} has no meaning for a sector of a wheel: leave it out")

@@ -96,7 +96,6 @@ SCHEMA: dict[str, tuple[type, dict[str, tuple[tuple[str, ...], str]]]] = {
             "status": (("row", "pair"), ""),
             "omega": (("row",), "rad/s"),
             "amplitude": (("row",), "m"),
-            "displacement": (("row", "contact", "coefficient"), "m"),
             "force": (("row", "contact", "coefficient"), "N"),
             "response": (("row", "output", "coefficient"), "m"),
             "solves": (("row",), ""),

@@ -10,6 +10,7 @@ from hbm.branch import CONVERGED
 from hbm.harmonics import HarmonicBasis
 from hbm.wear_events import events
 from hbm.wear_history import LIFE_SHARE, cycles_to_preload
+from workflows import budget
 from workflows.result import Result
 
 EVENT_SAMPLES = 256  # of a cycle, to see whether a pair opens
@@ -27,6 +28,7 @@ def summary(result: Result) -> dict[str, Any]:
     wear_steps, hbm_solves : steps taken and balance solves spent on wear
     peak_hz, peak_m, preload_N : [first, last] of the wear run, or the peak of the response curve without one
     seconds : of computing, interrupted runs included
+    error_budget : what each discretisation contributes, see workflows.budget.Entry
     """
     numbers: dict[str, Any] = {"state": result.state, "finished": result.state.startswith("complete")}
     numbers |= {"seconds": result.facts.get("seconds"), "wear_steps": result.wear_steps}
@@ -36,6 +38,7 @@ def summary(result: Result) -> dict[str, Any]:
     numbers |= _curve(result)
     free = result.facts.get("free_hz")
     numbers["free_hz"] = None if free is None else [float(hertz) for hertz in np.atleast_1d(free)]
+    numbers["error_budget"] = budget.of_result(result)
     return {name: _finite(value) for name, value in numbers.items()}
 
 
@@ -159,6 +162,7 @@ def lines(result: Result) -> list[tuple[str, str]]:
             ("friction work", f"{numbers['energy_J']:.5g} J"),
             ("wear steps", f"{numbers['wear_steps']} with {numbers['hbm_solves']} balance solves"),
         ]
+    shown += budget.lines(result)
     shown.append(("computing", f"{numbers['seconds']:.1f} s"))
     return shown
 

@@ -1,0 +1,88 @@
+"""Interface reduction: the contact DOFs of a Craig-Bampton model become a few characteristic constraint modes.
+
+SCC: modes of the boundary block (K_mm, M_mm) of the reduced model replace all masters. SCCe: chosen physical DOFs stay,
+the other masters become static shapes of those, and modes with those held; it is Craig and Bampton once more, on the
+boundary block. With all modes kept both are a change of variables and lose nothing. Contact forces act through the
+modes, so that the contact is too stiff for displacements they lack. Modes of the free boundary serve best: with those
+of the stuck one, which rest where the contact is stiff, the beam scene needs ten times as many (measured).
+Source  SCC: Castanier, Tan and Pierre, AIAA Journal 39(6), 2001; SCCe as in Tamatam 2021, appendix A
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.linalg as sla
+
+from fem.modes import modes
+from fem.system import SecondOrderSystem
+from reduction.model import ReducedModel
+
+STALE = ("free_frequency_error", "stuck_frequency", "stuck_frequency_error")  # told of the model before
+
+
+def interface_modes(model: ReducedModel, n_modes: int, keep: np.ndarray | None = None) -> ReducedModel:
+    """Reduce the masters of a Craig-Bampton model to n_modes characteristic constraint modes.
+
+    model : from reduction.craig_bampton, masters first; n_modes : at most the number of masters that do not stay
+    keep : DOFs of the full system, masters all of them, that stay physical (SCCe); none for SCC
+    Returns the model in coordinates: kept masters in ascending order, interface modes, fixed-interface modes. Besides
+        the facts of the model, info has masters (those kept), n_interface_modes and interface_omitted_frequency [Hz]
+    Raises  ValueError for a model that differs from harmonic to harmonic, DOFs that are no masters, too many modes, or
+        a boundary that can move rigidly with the kept DOFs held
+    """
+    if model.per_harmonic is not None:
+        raise ValueError("interface modes need a model that is the same for all harmonics: leave interface_modes out")
+    masters = np.asarray(model.info["masters"], dtype=int)
+    kept = np.unique(np.asarray([] if keep is None else keep, dtype=int))
+    if not np.all(np.isin(kept, masters)):
+        raise ValueError("interface modes: only DOFs that are masters of the reduction can be kept")
+    n_m, n = len(masters), model.system.n_dof
+    a, b = np.flatnonzero(np.isin(masters, kept)), np.flatnonzero(~np.isin(masters, kept))
+    if not 0 < n_modes <= len(b):
+        raise ValueError(f"interface modes: {n_modes} were asked of {len(b)} contact DOFs; ask for 1 to {len(b)}")
+    K = np.asarray(model.system.stiffness)
+    omega, phi = modes(K[np.ix_(b, b)], model.system.mass[np.ix_(b, b)], min(n_modes + 1, len(b)))
+
+    basis = np.zeros((n, len(a) + n_modes + n - n_m))
+    basis[a, np.arange(len(a))] = 1.0
+    if len(a):
+        basis[np.ix_(b, np.arange(len(a)))] = _static_shapes(K, a, b)
+    basis[np.ix_(b, len(a) + np.arange(n_modes))] = phi[:, :n_modes]
+    basis[np.arange(n_m, n), np.arange(len(a) + n_modes, basis.shape[1])] = 1.0
+    facts = {name: fact for name, fact in model.info.items() if name not in STALE}
+    omitted = float(omega[n_modes]) / (2 * np.pi) if n_modes < len(b) else np.inf
+    facts |= {"masters": masters[a], "n_masters": len(a)}
+    facts |= {"n_interface_modes": n_modes, "interface_omitted_frequency": omitted}
+    return replace(_projected(model, basis), info=facts)
+
+
+def _static_shapes(K: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """-K_bb^-1 K_ba, static shapes of the boundary for unit displacements of what is kept."""
+    try:
+        return -sla.cho_solve(sla.cho_factor(K[np.ix_(b, b)]), K[np.ix_(b, a)])
+    except np.linalg.LinAlgError:
+        raise ValueError(
+            "interface modes: the contact can move rigidly with the kept DOFs held; keep more, or none"
+        ) from None
+
+
+def _projected(model: ReducedModel, basis: np.ndarray) -> ReducedModel:
+    """The model in coordinates p, q = basis @ p."""
+    s = model.system
+    system = SecondOrderSystem(
+        _congruent(basis, s.mass),
+        _congruent(basis, s.stiffness),
+        None if s.damping is None else _congruent(basis, s.damping),
+        {name: basis.T @ load for name, load in s.loads.items()},
+        {name: basis.T @ row for name, row in s.outputs.items()},
+    )
+    interface = replace(model.interface, B=np.asarray(model.interface.B) @ basis)
+    full = None if model.basis is None else model.basis @ basis
+    return replace(model, system=system, interface=interface, basis=full)
+
+
+def _congruent(basis: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    product = basis.T @ matrix @ basis
+    return (product + product.T) / 2

@@ -1,0 +1,183 @@
+"""Trade of the knobs of a small beam, the promise of `run --accuracy`, grids and their limit, the error budget."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from workflows import accuracy, budget, cli, converge, knob_trade, knobs, scene_file, store, trade_table
+from workflows.measure import measure
+from workflows.result import Result
+from workflows.trade_table import Row, Trade
+
+SMALL = (
+    "geometry.n_length=4",
+    "geometry.n_height=1",
+    "geometry.n_patch=3",
+    "response.points=30",
+    "harmonics.samples=64",
+)
+NO_WEAR = (*SMALL, "wear=")
+TRADED = ("modes", "samples", "newton", "points")
+
+
+@pytest.fixture(scope="module")
+def table() -> Trade:
+    return knob_trade.run("beam", TRADED, NO_WEAR, lambda text: None)
+
+
+def set_of(overrides: tuple[str, ...]) -> list[str]:
+    return [word for text in overrides for word in ("--set", text)]
+
+
+def test_each_knob_is_held_against_its_finest_setting(table: Trade) -> None:
+    assert table.knobs == TRADED
+    for knob in TRADED:
+        rows = table.of(knob)
+        assert [row.reference for row in rows] == [False] * (len(rows) - 1) + [True]
+        assert all(row.outcome == "converged" and row.seconds > 0 and row.memory > 1e7 for row in rows)
+        errors = [abs(row.errors["peak_m"] or 0.0) for row in rows]
+        assert errors[-1] == 0.0
+        assert errors[-2] <= errors[0] + 1e-12
+    order = table.order("points", "peak_m")
+    assert order is not None
+    assert 0.8 < order < 5  # second, but for where the points happen to lie about the peak
+
+
+def test_the_table_survives_its_file(table: Trade, tmp_path: Path) -> None:
+    path = tmp_path / "trade.json"
+    trade_table.save(table, path)
+    again = trade_table.load(path)
+    assert knob_trade.as_records(again) == knob_trade.as_records(table)
+    assert json.loads(path.read_text())["key"] == table.key
+    path.write_text("[]")
+    with pytest.raises(ValueError, match="no trade table of this version"):
+        trade_table.load(path)
+
+
+def test_accuracy_meets_what_it_promises(table: Trade, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Settings for a wanted error, run by the command, against the finest setting of every knob at once."""
+    path, wanted = tmp_path / "trade.json", 0.02
+    trade_table.save(table, path)
+    words = ["run", "beam", *set_of(NO_WEAR), "--accuracy", "2 %", "--table", str(path), "--no-pictures"]
+    cli.app([*words, "--out", str(tmp_path)], result_action="return_value")
+    assert "expected error" in capsys.readouterr().out
+    result = store.load(tmp_path / "result.h5")
+    finest = tuple(text for knob in table.knobs for text in table.of(knob)[-1].overrides)
+    reference = measure(scene_file.read("beam", (*NO_WEAR, *finest)))
+    chosen = result.provenance["overrides"].splitlines()
+    file = scene_file.read("beam", chosen)
+    promised = measure(file, refined=False)
+    for quantity in ("peak_hz", "peak_m", "energy_J", "preload_N"):
+        ours, theirs = promised.values[quantity], reference.values[quantity]
+        assert ours is not None
+        assert ours == pytest.approx(theirs, rel=wanted), quantity
+    assert result.frf is not None
+    assert result.frf.amplitude("response").max() == pytest.approx(reference.values["peak_m"], rel=wanted)
+    choice = accuracy.choose(table, wanted)
+    assert choice.error <= wanted
+    assert choice.seconds <= accuracy.choose(table, wanted / 2).seconds
+
+
+def test_a_table_of_another_scene_is_refused(table: Trade, tmp_path: Path) -> None:
+    path = tmp_path / "trade.json"
+    trade_table.save(table, path)
+    with pytest.raises(ValueError, match="was measured on another scene"):
+        accuracy.tuned("beam", (*NO_WEAR, "contact.friction=0.4"), 0.02, path)
+    with pytest.raises(ValueError, match="more than the trade of beam can promise"):
+        accuracy.choose(table, 1e-9)
+
+
+def test_a_knob_that_the_scene_has_not_is_refused() -> None:
+    with pytest.raises(ValueError, match="the scene has the knobs fe_mesh, contact_grid, nodes, modes"):
+        knob_trade.run("beam", ("wheels",), NO_WEAR, lambda text: None)
+    known = {scene: knobs.knobs_of(scene_file.read(scene), knobs.study_of(scene)) for scene in scene_file.names()}
+    has = {scene: {knob.name for knob in found} for scene, found in known.items()}
+    assert {"wear", "friction", "interface_rank"} <= has["beam"]
+    assert not {"wear", "friction", "points"} & has["leaf_seal"]
+    assert "interface_rank" not in has["blade"]
+
+
+def test_every_setting_of_every_knob_is_a_scene() -> None:
+    for scene in scene_file.names():
+        study = knobs.study_of(scene)
+        for knob in knobs.knobs_of(scene_file.read(scene, study.base), study):
+            for setting in knob.settings:
+                assert scene_file.read(scene, (*study.base, *setting.overrides)).name == scene
+        for ladder in study.ladders:
+            for setting in ladder.settings:
+                scene_file.read(scene, (*ladder.base, *setting.overrides))
+
+
+def made_up(knob: str, cost: float, error: float, reference: bool) -> Row:
+    values = dict.fromkeys(trade_table.QUANTITIES)
+    errors = {**values, "peak_m": error}
+    label = f"{knob}={cost:g}"
+    return Row(knob, label, cost, (label,), values, errors, cost, 0.0, "converged", reference, True)
+
+
+def test_the_cheapest_combination_is_found() -> None:
+    rows = [made_up("a", 1, 0.1, False), made_up("a", 2, 0.004, False), made_up("a", 9, 0.0, True)]
+    rows += [made_up("b", 3, 0.002, False), made_up("b", 4, 0.001, False), made_up("b", 8, 0.0, True)]
+    trade = Trade("made up", "", (), 4.0, tuple(rows))
+    assert accuracy.choose(trade, 0.01).overrides == ("a=2", "b=3")
+    assert accuracy.choose(trade, 0.2).overrides == ("a=1", "b=3")
+    assert [row.setting for row in trade_table.pareto(trade.of("a"), "peak_m")] == ["a=1", "a=2", "a=9"]
+    assert accuracy.advice(trade)[0].startswith("for 1 % on amplitude use a=2, b=3: ")
+
+
+def test_limit_of_a_known_power() -> None:
+    size = np.array([3.0, 5.0, 9.0, 17.0])
+    for order in (1.0, 2.0):
+        found = converge.limit_of(size, 7.0 + 3.0 * (1 / (size - 1)) ** order)
+        assert found.value == pytest.approx(7.0, rel=1e-4)
+        assert found.order == pytest.approx(order, abs=0.02)
+    unsettled = converge.limit_of(size, np.array([1.0, 1.2, 0.9, 1.1]))
+    assert np.isnan(unsettled.order)
+    assert unsettled.uncertainty == pytest.approx(0.3 / 1.1)
+
+
+def test_a_linear_field_is_carried_exactly() -> None:
+    fine = np.array([[x, y] for x in np.linspace(0, 1, 7) for y in np.linspace(0, 2, 6)])
+    coarse = np.array([[0.0, 0.0], [0.31, 1.3], [1.0, 2.0]])
+    plane = np.array([2.0, -3.0])
+    assert converge.on_grid(fine, fine @ plane + 1, coarse) == pytest.approx(coarse @ plane + 1)
+
+
+def test_grids_of_the_beam(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["converge", "beam", "--most", "9", "--json", "--out", str(tmp_path)]
+    words += set_of((*NO_WEAR[:2], "wear="))
+    cli.app([*words, *set_of(("reduction.modes=4", "response.points=25"))], result_action="return_value")
+    rows = [row for row in json.loads(capsys.readouterr().out) if row["ladder"] == "contact_grid"]
+    assert [row["size"] for row in rows] == [5, 7, 9]
+    maps = [row["map_difference"] for row in rows]
+    assert maps[0] > maps[1] > 0
+    assert maps[2] is None
+    assert (tmp_path / "converge_beam_contact_grid.png").stat().st_size > 10_000
+
+
+def test_the_budget_of_a_run(tmp_path: Path) -> None:
+    words = ["run", "beam", *set_of(SMALL), "--set", "wear.max_steps=2", "--no-pictures", "--out", str(tmp_path)]
+    cli.app(words, result_action="return_value")
+    result = store.load(tmp_path / "result.h5")
+    found = {entry["source"]: entry for entry in budget.of_result(result)}
+    assert {"modes", "harmonics", "samples", "newton", "points", "wear steps", "compliance"} <= set(found)
+    assert found["newton"]["error"] < 1e-5
+    assert found["samples"]["error"] < 1e-4
+    assert 0 < found["points"]["error"] < 0.05
+    shown = dict(budget.lines(result))
+    assert "estimate" in shown["  harmonics"]
+    # more harmonics, less left to them
+    wide = scene_file.read("beam", (*SMALL, "wear=", "harmonics.kept=[0, 1, 2, 3, 4, 5]"))
+    assert wide.scene.harmonics.kept[-1] == 5
+
+
+def test_the_budget_says_where_no_life_can_be_stated() -> None:
+    entries = [{"source": "wear steps", "quantity": "life", "error": 0.8, "by": "estimate"}]
+    result = Result({}, {budget.FACT: json.dumps(entries)}, "complete")
+    assert "no life can be stated" in dict(budget.lines(result))["  wear steps"]
+    assert replace(made_up("a", 1, 0.1, False), outcome="solve failed").worst == np.inf

@@ -1,0 +1,122 @@
+"""Words of the command `tribodyn` that measure accuracy: trade, converge, extremes."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+Overrides = Annotated[
+    tuple[str, ...],
+    Parameter(name="--set", negative=(), consume_multiple=False, help="Change a key of the scene: section.key=value."),
+]
+Knobs = Annotated[tuple[str, ...], Parameter(name="--knob", negative=(), consume_multiple=False)]
+Json = Annotated[bool, Parameter(name="--json", negative=())]
+
+
+def aside(sentence: str) -> None:
+    """Progress of a study, beside what it prints."""
+    print(sentence, file=sys.stderr, flush=True)
+
+
+def trade(
+    scene: str,
+    *,
+    knob: Knobs = (),
+    overrides: Overrides = (),
+    most: int = 99,
+    out: Path | None = None,
+    as_json: Json = False,
+) -> None:
+    """Measure what each knob costs and what it is worth, against a finer reference on the same scene.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene or a .toml file.
+    knob
+        Knob to measure, can be repeated; all that the scene has unless told. wear_step alone is table 4.2 of the
+        thesis with life added.
+    most
+        Settings of each knob, the finest ones.
+    out
+        Table to write (.json), its plot beside it (.png); results/NAME/trade.json unless told.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import accuracy, knob_trade, trade_picture, trade_table
+    from workflows import trade as wear_step
+
+    if knob == ("wear_step",):
+        table = wear_step.wear_step(scene, aside, overrides)
+        if out is not None:
+            wear_step.picture(table).savefig(out)
+        print(json.dumps(wear_step.as_records(table), indent=2) if as_json else wear_step.as_text(table))
+        return
+    found = knob_trade.run(scene, knob, overrides, aside, most)
+    path = out or Path("results") / found.scene / "trade.json"
+    trade_table.save(found, path)
+    trade_picture.picture(found).savefig(path.with_suffix(".png"))
+    if as_json:
+        print(json.dumps(knob_trade.as_records(found), indent=2))
+    else:
+        print(knob_trade.as_text(found))
+        print(*accuracy.advice(found), path, path.with_suffix(".png"), sep="\n")
+
+
+def converge(
+    scene: str, *, overrides: Overrides = (), most: float = 99, out: Path | None = None, as_json: Json = False
+) -> None:
+    """Refine the contact grid and the mesh until the answers settle, and say which grid a per cent needs.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene with a study of its grids.
+    most
+        Finest grid, in nodes along the patch.
+    out
+        Folder of the plots; results/NAME unless told.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import converge as study
+
+    found = study.run(scene, overrides, most, aside)
+    folder = out or Path("results") / found[0].scene
+    folder.mkdir(parents=True, exist_ok=True)
+    pictures = [folder / f"converge_{one.scene}_{one.ladder}.png" for one in found]
+    for one, path in zip(found, pictures, strict=True):
+        study.picture(one).savefig(path)
+    if as_json:
+        print(json.dumps(study.as_records(found), indent=2))
+    else:
+        print(study.as_text(found), *pictures, sep="\n")
+
+
+def extremes(
+    *, quick: Annotated[bool, Parameter(negative=())] = False, out: Path = Path("extremes.png"), as_json: Json = False
+) -> None:
+    """Try the solver at its numerical extremes: each cell converged and checked, or refused with a sentence.
+
+    Parameters
+    ----------
+    quick
+        Every third cell, on smaller models.
+    out
+        File of the picture.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import extremes as table
+    from workflows import extremes_picture
+
+    rows = table.run(quick, aside)
+    extremes_picture.picture(rows).savefig(out)
+    print(json.dumps(table.as_records(rows), indent=2) if as_json else table.as_text(rows))
+    wrong = table.counts(rows)["wrong"]
+    if wrong:
+        raise RuntimeError(f"{wrong} of {len(rows)} extreme settings ended with a wrong number, see the table")

@@ -1,0 +1,167 @@
+"""The knobs of a scene that trade speed for accuracy: each a list of overrides from coarse to a finer reference."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hbm import law
+from workflows.scene import PartScene, Scene
+from workflows.scene_file import SceneFile
+
+STUDIES = Path(__file__).parent / "studies"
+TOPS = (1, 3, 5)  # highest harmonic kept
+SAMPLES = (32, 64, 256)
+NEWTON = (1e-2, 1e-4, 1e-6, 1e-10)
+KRYLOV = (0.5, 1e-2, 1e-8)
+POINTS = (10, 20, 40, 80, 320)
+RANKS = (3, 6, 12, 24)
+WEAR_STEPS = (0.1, 0.05)  # of delta_max
+WEAR_TOLERANCES = (0.3, 0.1, 0.03, 0.01)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One position of a knob: overrides of the scene, and how fine it is, larger is finer; nan has no measure."""
+
+    size: float
+    overrides: tuple[str, ...]
+
+    @property
+    def label(self) -> str:
+        """The overrides without their sections."""
+        parts = [text.partition("=") for text in self.overrides]
+        return ", ".join(f"{key.rpartition('.')[2]}={value}" for key, _, value in parts)
+
+
+@dataclass(frozen=True)
+class Knob:
+    """A knob of a scene.
+
+    settings : from coarse to the reference, which is the last
+    tunable : whether finer is closer to the truth, so that a wanted accuracy may choose it; else it is another model
+    wears : whether it has a say in wear; refined : whether the peak is refined, or is the highest point of the curve
+    """
+
+    name: str
+    settings: tuple[Setting, ...]
+    tunable: bool = True
+    wears: bool = True
+    refined: bool = True
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """Grids or meshes of a convergence study; base : overrides; life_up_to : size up to which the contact is worn."""
+
+    name: str
+    settings: tuple[Setting, ...]
+    base: tuple[str, ...]
+    life_up_to: float
+
+
+@dataclass(frozen=True)
+class Study:
+    """How a scene is studied.
+
+    base : overrides that make its trade affordable; knobs : that only its geometry has
+    ladders : grids and meshes of its convergence study
+    """
+
+    base: tuple[str, ...] = ()
+    knobs: tuple[Knob, ...] = ()
+    ladders: tuple[Ladder, ...] = ()
+
+
+def study_of(name: str) -> Study:
+    """The study that comes with a scene of this name; an empty one where none does."""
+    path = STUDIES / f"{name}.toml"
+    if not path.is_file():
+        return Study()
+    text = path.read_text(encoding="utf-8")
+    table = tomllib.loads(text)
+    knobs = tuple(Knob(knob, _settings(given)) for knob, given in table.get("knobs", {}).items())
+    ladders = tuple(
+        Ladder(ladder, _settings(given), tuple(given.get("base", ())), float(given.get("life_up_to", 0)))
+        for ladder, given in table.get("converge", {}).items()
+    )
+    return Study(tuple(table.get("base", ())), knobs, ladders)
+
+
+def _settings(table: dict[str, Any]) -> tuple[Setting, ...]:
+    pairs = zip(table["sizes"], table["set"], strict=True)
+    return tuple(Setting(float(size), tuple(texts)) for size, texts in pairs)
+
+
+def knobs_of(file: SceneFile, study: Study) -> tuple[Knob, ...]:
+    """The knobs that a scene has: those of its study, then those that any scene may have."""
+    scene = file.scene
+    found = [*study.knobs]
+    if isinstance(scene, PartScene):
+        found += _of_a_part(scene)
+    found += [*_of_harmonics(scene)]
+    found.append(_numbers("newton", "solver.tolerance", NEWTON))
+    found.append(_numbers("krylov", "solver.krylov", KRYLOV))
+    if scene.response.method == "natural":
+        settings = tuple(Setting(n, (f"response.points={n}",)) for n in POINTS)
+        found.append(Knob("points", settings, wears=False, refined=False))
+    if scene.wear is not None and scene.wear.max_steps > 0:
+        rule = 'wear.rule="error_controlled"'
+        controlled = tuple(Setting(1 / t, (rule, f"wear.tolerance={t:g}")) for t in WEAR_TOLERANCES)
+        thesis = tuple(Setting(1 / s, ('wear.rule="thesis"', f"wear.step={s:g}")) for s in WEAR_STEPS)
+        found.append(Knob("wear", controlled))
+        found.append(Knob("wear_thesis", (*thesis, controlled[-1]), tunable=False))
+    return tuple(found)
+
+
+def chosen(known: Sequence[Knob], names: Sequence[str]) -> tuple[Knob, ...]:
+    """Knobs by name, all where none is named; raises ValueError for one that the scene does not have."""
+    missing = [name for name in names if name not in {knob.name for knob in known}]
+    if missing:
+        raise ValueError(f'--knob {missing[0]}: the scene has the knobs {", ".join(knob.name for knob in known)}')
+    return tuple(knob for knob in known if not names or knob.name in names)
+
+
+def _of_a_part(scene: PartScene) -> list[Knob]:
+    found = []
+    if scene.contact.plane is None and not scene.surfaces:
+        corners = Setting(1.0, ("contact.vertices_only=true",))
+        found.append(Knob("nodes", (corners, Setting(2.0, ("contact.vertices_only=false",))), tunable=False))
+    modes = scene.reduction.modes
+    if modes:
+        counts = sorted({0, modes // 3, modes, 3 * modes})
+        found.append(Knob("modes", tuple(Setting(n, (f"reduction.modes={n}",)) for n in counts)))
+    if scene.wheel is not None:
+        return found
+    ranks = tuple(Setting(n, (f"reduction.interface_modes={n}",)) for n in RANKS)
+    found.append(Knob("interface_rank", (*ranks, Setting(float("nan"), ("reduction.interface_modes=",)))))
+    return found
+
+
+def _of_harmonics(scene: Scene) -> list[Knob]:
+    needed = {load.harmonic for load in scene.loads.harmonic.values()} | set(scene.harmonics.kept[:1]) & {0}
+    tops = [top for top in TOPS if top >= max(needed)]
+    first = 0 if 0 in needed or scene.harmonics.automatic else 1
+    more = ("harmonics.samples=128",) if scene.harmonics.samples < 128 else ()
+    kept = tuple(Setting(top, (f"harmonics.kept={list(range(first, top + 1))}", *more)) for top in tops)
+    found = [Knob("harmonics", kept)] if len(kept) > 1 else []
+    if hasattr(law.load(scene.contact.law), "located"):
+        top = max(scene.harmonics.kept, default=1)
+        sampled = tuple(
+            Setting(n, (f"harmonics.samples={n}", 'harmonics.transitions="sampled"')) for n in SAMPLES if n > 2 * top
+        )
+        located = Setting(float("nan"), ("harmonics.samples=256", 'harmonics.transitions="located"'))
+        found.append(Knob("samples", (*sampled, located)))
+    if scene.contact.components == ("t1", "t2", "n") and scene.contact.law == "jenkins":
+        common = ("harmonics.samples=256", 'harmonics.transitions="sampled"')
+        names = ("jenkins", "coulomb_planar")  # directions that know nothing of each other, or one planar slider
+        laws = tuple(Setting(i, (f'contact.law="{name}"', *common)) for i, name in enumerate(names))
+        found.append(Knob("friction", laws, tunable=False))
+    return found
+
+
+def _numbers(name: str, key: str, values: tuple[float, ...]) -> Knob:
+    return Knob(name, tuple(Setting(1 / value, (f"{key}={value:g}",)) for value in values))

@@ -1,0 +1,37 @@
+"""The trade as a picture: what each setting of each knob costs against what it is worth."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from workflows.style import GREY, INK, STYLE
+from workflows.trade_table import NAMES, QUANTITIES, Trade, pareto
+
+SHOWN = ("peak_m", "energy_J", "life_cycles")
+FLOOR = 1e-8  # errors below this are drawn here
+MARKERS = "osD^v<>PX*hp"
+
+
+def picture(trade: Trade) -> Figure:
+    """Error in amplitude, energy and life, as far as there are any, against seconds; the Pareto front as a line."""
+    shown = [q for q in SHOWN if any(row.errors[q] is not None for row in trade.rows)]
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(4.2 * len(shown) + 1.6, 4.0), layout="constrained")
+        panes = figure.subplots(1, len(shown), squeeze=False)[0]
+        colours = mpl.colormaps["tab20"].colors  # type: ignore[attr-defined]
+        for pane, quantity in zip(panes, shown, strict=True):
+            for i, knob in enumerate(trade.knobs):
+                rows = [row for row in trade.of(knob) if not row.reference and row.errors[quantity] is not None]
+                error = [max(abs(row.errors[quantity] or 0.0), FLOOR) for row in rows]
+                style = {"color": colours[i % 20], "marker": MARKERS[i % len(MARKERS)], "linestyle": "none"}
+                pane.plot([row.seconds for row in rows], error, label=knob.replace("_", " "), markersize=5, **style)
+            front = [row for row in pareto(trade.rows, quantity) if not row.reference]
+            at = [max(abs(row.errors[quantity] or 0.0), FLOOR) for row in front]
+            pane.plot([row.seconds for row in front], at, color=INK, linewidth=0.8, zorder=0)
+            pane.axhline(0.01, color=GREY, linestyle=":", linewidth=1)
+            name = NAMES[QUANTITIES.index(quantity)]
+            pane.set(xscale="log", yscale="log", xlabel="seconds of one processor", title=f"{trade.scene}: {name}")
+        panes[0].set_ylabel("relative error against the knob's reference")
+        panes[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
+    return figure

@@ -1,0 +1,154 @@
+"""The table of a trade: what each setting of each knob costs and how far it is off, kept in a file."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hbm.branch import CONVERGED
+from workflows.knobs import study_of
+from workflows.scene import Scene
+
+FORMAT = "tribodyn trade 1"
+TRADES = Path(__file__).parent / "trades"
+ROUNDING = 1e-9  # relative difference below which no order can be told
+QUANTITIES = ("peak_hz", "peak_m", "energy_J", "preload_N", "depth_m", "life_cycles")
+NAMES = ("peak frequency", "amplitude", "energy", "preload", "depth", "life")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One setting of a knob.
+
+    size : of the setting, larger is finer, nan without a measure; overrides : of the scene
+    values : by QUANTITIES in SI units, None where there is none; errors : relative to the knob's reference
+    seconds : of one processor; memory : largest of the process [bytes]; outcome : "converged" or a sentence
+    reference : whether this is the setting that the others are held against
+    """
+
+    knob: str
+    setting: str
+    size: float
+    overrides: tuple[str, ...]
+    values: dict[str, float | None]
+    errors: dict[str, float | None]
+    seconds: float
+    memory: float
+    outcome: str
+    reference: bool
+    tunable: bool
+
+    @property
+    def worst(self) -> float:
+        """Largest relative error of all quantities; inf where the setting failed."""
+        known = [abs(error) for error in self.errors.values() if error is not None]
+        return max(known, default=0.0) if self.outcome == CONVERGED else float("inf")
+
+
+@dataclass(frozen=True)
+class Trade:
+    """All rows of a scene.
+
+    scene : name; key : of the scene and its study, so that a table of another scene is told; base : overrides under
+    which all was measured; base_seconds : of the scene with them
+    """
+
+    scene: str
+    key: str
+    base: tuple[str, ...]
+    base_seconds: float
+    rows: tuple[Row, ...]
+
+    @property
+    def knobs(self) -> tuple[str, ...]:
+        """Names of the knobs, in order."""
+        return tuple(dict.fromkeys(row.knob for row in self.rows))
+
+    def of(self, knob: str) -> tuple[Row, ...]:
+        """Rows of a knob, the reference last."""
+        return tuple(row for row in self.rows if row.knob == knob)
+
+    def order(self, knob: str, quantity: str) -> float | None:
+        """Observed order: minus the slope of log error over log size; None where errors are too few or rounding."""
+        points = [(row.size, abs(row.errors[quantity] or 0.0)) for row in self.of(knob) if not row.reference]
+        usable = [(size, error) for size, error in points if np.isfinite(size) and size > 0 and error > ROUNDING]
+        if len(usable) < 2:
+            return None
+        size, error = np.log(np.array(usable)).T
+        return float(-np.polyfit(size, error, 1)[0])
+
+
+def key_of(name: str, scene: Scene) -> str:
+    """A short name of everything in a scene that its trade depends on; the knobs themselves are not among it.
+
+    name : of the scene, whose study has knobs of its own
+    """
+    said = scene.model_dump(mode="json", exclude={"scene": True, "pictures": True, "solver": True})
+    own = {text.partition("=")[0] for k in study_of(name).knobs for s in k.settings for text in s.overrides}
+    for key in {*KNOB_KEYS, *own}:
+        section, _, last = key.partition(".")
+        for table in (said.get(section), (said.get(section) or {}).get("parameters")):
+            if isinstance(table, dict):
+                table.pop(last, None)
+    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()[:16]
+
+
+# set by knobs that any scene may have, so that they do not make another scene
+KNOB_KEYS = (
+    *(f"reduction.{key}" for key in ("modes", "interface_modes", "interface_keep")),
+    *(f"harmonics.{key}" for key in ("kept", "samples", "transitions", "tolerance", "highest")),
+    *(f"wear.{key}" for key in ("rule", "step", "tolerance", "max_steps")),
+    "response.points",
+)
+
+
+def pareto(rows: Iterable[Row], quantity: str) -> list[Row]:
+    """Rows that no other row beats in both seconds and error, the fastest first."""
+    front: list[Row] = []
+    best = float("inf")
+    for row in sorted((r for r in rows if r.errors.get(quantity) is not None), key=lambda r: r.seconds):
+        error = abs(row.errors[quantity] or 0.0)
+        if error < best:
+            front.append(row)
+            best = error
+    return front
+
+
+def save(trade: Trade, path: Path) -> None:
+    """Write a trade as JSON."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps({"format": FORMAT, **plain(asdict(trade))}, indent=1) + "\n", encoding="utf-8")
+
+
+def load(path: Path) -> Trade:
+    """Read what `save` wrote; raises ValueError for anything else."""
+    try:
+        said = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        raise ValueError(f'there is no trade table "{path}": make one with tribodyn trade SCENE --out {path}') from None
+    if not isinstance(said, dict) or said.get("format") != FORMAT:
+        raise ValueError(f'"{path}" is no trade table of this version: make it again with tribodyn trade SCENE')
+    rows = [
+        Row(**{f.name: row[f.name] for f in fields(Row)} | {"overrides": tuple(row["overrides"]), "size": _size(row)})
+        for row in said["rows"]
+    ]
+    return Trade(said["scene"], said["key"], tuple(said["base"]), said["base_seconds"], tuple(rows))
+
+
+def _size(row: dict[str, Any]) -> float:
+    return float("nan") if row["size"] is None else float(row["size"])
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON has it: nan and inf become None."""
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
