@@ -214,7 +214,8 @@ class CompliancePoint:
                     blocks[:, column, :, column] = amplitude.real
                     blocks[:, cosine, :, column] = amplitude.imag
                     blocks[:, column, :, cosine] = -amplitude.imag
-        return blocks.reshape(len(weighted) * basis.n_coeff, -1)
+        size = len(weighted) * basis.n_coeff
+        return blocks.reshape(size, size)
 
 
 class JacobianProduct:
