@@ -73,7 +73,7 @@ class _Points:
         u = np.zeros((len(own) // self.n_component, n_duty, self.n_component, n_duty, r))
         a = np.zeros((n_duty, size, n_duty, size))
         for i, (shapes, compliance) in enumerate(parts):
-            u[:, i, :, i] = shapes.reshape(-1, self.n_component, r)
+            u[:, i, :, i] = shapes.reshape(len(u), self.n_component, r)
             a[i, :, i] = compliance
         return u.reshape(len(rows), n_duty * r), a.reshape(n_duty * size, n_duty * size)
 
