@@ -9,6 +9,7 @@ Source  design of tribodyn; x_lin and G in hbm.compliance; f_c from a contact la
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -216,24 +217,59 @@ class Linearisation:
         self.rows = (self.active[:, None] * n_comp + np.arange(n_comp)).ravel()
         self._dg = np.ascontiguousarray(dg[self.active])
         self._shape = (n_pair * n_comp, n_coeff)
-        self._balance = balance
-        self._omega = state.omega
-        self._product = balance.at(state.omega).jacobian_product(self.rows)
+        self._point = balance.at(state.omega)
+        self._product = self._point.jacobian_product(self.rows)
 
     def departure_slope(self, direction: np.ndarray) -> np.ndarray:
         """dg/dx . direction: (n_contact, n_coeff)."""
         out = np.zeros(self._shape)
         if len(self.rows):
-            out[self.rows] = self._g_slope(direction[self.rows])
+            out[self.rows] = self.g_slope(direction[self.rows])
         return out
 
-    def _g_slope(self, active_direction: np.ndarray) -> np.ndarray:
+    def g_slope(self, active_direction: np.ndarray) -> np.ndarray:
+        """dg/dx . direction on the rows of active pairs, both (n_active_rows, n_coeff)."""
         shape = active_direction.shape
         return np.matmul(self._dg, active_direction.reshape(len(self.active), -1, 1)).reshape(shape)
 
     def product(self, d: np.ndarray) -> np.ndarray:
         """(I - G dg/dx) d on the rows of active pairs, d (n_active_rows, n_coeff)."""
-        return d - self._product(self._g_slope(d))
+        return d - self._product(self.g_slope(d))
+
+    def precondition(self, d: np.ndarray) -> np.ndarray:
+        """An approximate solution of (I - G dg/dx) p = d on the rows of active pairs, by the coarse part of G."""
+        if self._coarse_inverse is None:
+            return d
+        u, inverse = self._coarse_inverse
+        return d + u @ (inverse @ (u.T @ self.g_slope(d)).ravel()).reshape(u.shape[1], -1)
+
+    @cached_property
+    def _coarse_inverse(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """U and (I - A U^T D U)^-1 A; None where there is no coarse part or it is singular."""
+        if self.coarse is None:
+            return None
+        u, a, matrix = self.coarse
+        try:
+            return u, np.linalg.solve(matrix, a)
+        except np.linalg.LinAlgError:
+            return None
+
+    @cached_property
+    def coarse(self) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """U (n_active_rows, r) and A, I - A U^T D U (r n_coeff, r n_coeff), where G ~ U A U^T; None where r = 0.
+
+        With D = dg/dx the inverse of I - U A U^T D is I + U (I - A U^T D U)^-1 A U^T D (Woodbury).
+        """
+        u, a = self._point.coarse_part(self.rows)
+        r, m = u.shape[1], self._shape[1]
+        if r == 0:
+            return None
+        n, n_comp = len(self.active), len(self.rows) // len(self.active)
+        single = u.astype(np.float32)
+        d = self._dg.reshape(n, n_comp, m, n_comp, m).transpose(0, 1, 2, 4, 3).astype(np.float32, order="C")
+        through = np.matmul(d.reshape(n, -1, n_comp), single.reshape(n, n_comp, r)).reshape(n * n_comp, -1)
+        projected = (single.T @ through).reshape(r, m, m, r).transpose(0, 1, 3, 2).reshape(r * m, r * m)
+        return u, a, np.eye(r * m) - a @ projected
 
     def spread(self, d: np.ndarray, rhs: np.ndarray) -> np.ndarray:
         """The solution of (I - G dg/dx) d = rhs in all rows (n_contact, n_coeff) from that in the active rows."""
@@ -242,8 +278,8 @@ class Linearisation:
         if len(self.rows) == 0:
             return rhs.copy()
         g = np.zeros(self._shape)
-        g[self.rows] = self._g_slope(d)
-        full = rhs + self._balance.at(self._omega).apply(g)
+        g[self.rows] = self.g_slope(d)
+        full = rhs + self._point.apply(g)
         full[self.rows] = d
         return full
 
@@ -256,16 +292,20 @@ class Linearisation:
             return rhs.copy(), 0, 0.0
         shape = (len(self.rows), self._shape[1])
         d, spent, reached = gmres(
-            lambda v: self.product(v.reshape(shape)).ravel(), rhs[self.rows].ravel(), tolerance, max_products
+            lambda v: self.product(v.reshape(shape)).ravel(),
+            rhs[self.rows].ravel(),
+            tolerance,
+            max_products,
+            lambda v: self.precondition(v.reshape(shape)).ravel(),
         )
         return self.spread(d.reshape(shape), rhs), spent, reached
 
     def solve_refined(self, rhs: np.ndarray, tolerance: float) -> np.ndarray:
         """As `solve`, but its products are of single precision: refined with the exact one to the tolerance."""
         d, _, _ = self.solve(rhs, max(tolerance, 1e-6))
-        point, size = self._balance.at(self._omega), float(np.linalg.norm(rhs))
+        size = float(np.linalg.norm(rhs))
         for _ in range(4):
-            residual = rhs - d + point.apply(self.departure_slope(d))
+            residual = rhs - d + self._point.apply(self.departure_slope(d))
             error = float(np.linalg.norm(residual))
             if error <= tolerance * size:
                 break
@@ -275,7 +315,7 @@ class Linearisation:
     def dense(self) -> np.ndarray:
         """The Jacobian as a matrix (n_contact * n_coeff, same), column by column; for checks and as fallback."""
         n = self._shape[0] * self._shape[1]
-        point = self._balance.at(self._omega)
+        point = self._point
         eye = np.eye(n).reshape(n, *self._shape)
         columns = [(e - point.apply(self.departure_slope(e))).ravel() for e in eye]
         return np.stack(columns, axis=1)

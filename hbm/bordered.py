@@ -9,6 +9,7 @@ values compare; the border acts on the active rows only, which is enough: a dire
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,7 +91,8 @@ def solve(
         moved = linear.product(v[:-1].reshape(shape)).ravel() if len(rows) else v[:-1]
         return np.append(moved + v[-1] * column, row @ v)
 
-    y, spent, reached = gmres(product, right, tolerance, max_products)
+    precondition = _coarse_inverse(linear, column, row) if len(rows) else None
+    y, spent, reached = gmres(product, right, tolerance, max_products, precondition)
     if not reached <= max(10 * tolerance, 0.5):  # stalled: the direct way
         matrix = np.stack([product(e) for e in np.eye(len(right))], axis=1)
         spent += len(right)
@@ -103,6 +105,33 @@ def solve(
     dp = float(y[-1]) * metric.width
     d = linear.spread(y[:-1].reshape(shape) * metric.length, rhs[0] - slope * dp)
     return Direction(d, dp), spent
+
+
+def _coarse_inverse(
+    linear: Linearisation, column: np.ndarray, row: np.ndarray
+) -> Callable[[np.ndarray], np.ndarray] | None:
+    """The inverse of the bordered system with the coarse part of G alone, regular at folds as the whole is."""
+    if linear.coarse is None:
+        return None
+    u, a, matrix = linear.coarse
+    shape = (len(u), len(column) // len(u))
+
+    def inner(d: np.ndarray) -> np.ndarray:
+        found: np.ndarray = a @ (u.T @ linear.g_slope(d.reshape(shape))).ravel()
+        return found
+
+    edge = (u.T @ row[:-1].reshape(shape)).ravel()
+    corner = row[-1] - row[:-1] @ column
+    try:
+        inverse = np.linalg.inv(np.block([[matrix, inner(column)[:, None]], [edge, corner]]))
+    except np.linalg.LinAlgError:
+        return None
+
+    def apply(v: np.ndarray) -> np.ndarray:
+        y = inverse @ np.append(inner(v[:-1]), v[-1] - row[:-1] @ v[:-1])
+        return np.append(v[:-1] - y[-1] * column + (u @ y[:-1].reshape(u.shape[1], -1)).ravel(), y[-1])
+
+    return apply
 
 
 def tangent(

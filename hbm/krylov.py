@@ -7,13 +7,19 @@ from collections.abc import Callable
 import numba
 import numpy as np
 
+FEW = 16  # products for which room is made at first
+
 
 def gmres(
-    product: Callable[[np.ndarray], np.ndarray], b: np.ndarray, tolerance: float, max_products: int
+    product: Callable[[np.ndarray], np.ndarray],
+    b: np.ndarray,
+    tolerance: float,
+    max_products: int,
+    precondition: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> tuple[np.ndarray, int, float]:
     """Solve A x = b by GMRES without restart, orthogonalised twice.
 
-    product : A times a vector (n,)
+    product : A times a vector (n,); precondition : an approximate inverse of A, applied from the right
     Returns x, products spent, relative residual reached
     Source  Saad and Schultz 1986
     """
@@ -21,15 +27,15 @@ def gmres(
     if beta == 0.0:
         return np.zeros_like(b), 0, 0.0
     size = min(max_products, len(b))
-    v = np.empty((size + 1, len(b)))
-    h = np.zeros((size + 1, size))
+    v = np.empty((min(size, FEW) + 1, len(b)))
+    h = np.zeros((size, size))
     v[0] = b / beta
     cs, sn = np.zeros(size), np.zeros(size)
     rhs = np.zeros(size + 1)
     rhs[0] = beta
     k = 0
     for k in range(1, size + 1):
-        w = product(v[k - 1])
+        w = product(v[k - 1] if precondition is None else precondition(v[k - 1]))
         span = v[:k]
         coefficients = span @ w
         w = w - coefficients @ span
@@ -44,13 +50,16 @@ def gmres(
             break
         if abs(rhs[k]) <= tolerance * beta or norm <= 1e-14 * radius:
             break
+        if k == len(v):
+            v = np.concatenate([v, np.empty((min(k, size + 1 - k), len(b)))])
         v[k] = w / norm
     if k == 0:
         return np.zeros_like(b), 1, 1.0
     y = np.zeros(k)
     for i in range(k - 1, -1, -1):
         y[i] = (rhs[i] - h[i, i + 1 : k] @ y[i + 1 :]) / h[i, i]
-    return y @ v[:k], k, abs(rhs[k]) / beta
+    x = y @ v[:k]
+    return x if precondition is None else precondition(x), k, abs(rhs[k]) / beta
 
 
 @numba.njit(cache=True)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
 
 from hbm.balance import HarmonicBalance, Linearisation, State
 from hbm.branch import CONVERGED
+
+VANISHING = 1e-6  # size of x, relative to the start, below which a solution counts as zero
+RAMP_STEPS = 12  # Newton steps in one step of the load ramp
+SHORTEST = 4e-4  # share of a Newton step that is tried
 
 
 class Balance(Protocol):
@@ -56,9 +60,9 @@ class Solution:
         return self.outcome == CONVERGED
 
 
-def relative_residual(state: State, x_lin: np.ndarray) -> float:
-    """|R| / max(|x|, |x_lin|), Euclidean, 1 where only these vanish; invariant to the units of length and force."""
-    scale = max(np.linalg.norm(state.x), np.linalg.norm(x_lin))
+def relative_residual(state: State, x_lin: np.ndarray, least: float = 0.0) -> float:
+    """|R| / max(|x|, |x_lin|, least), Euclidean, 1 where only these vanish; invariant to the units."""
+    scale = max(float(np.linalg.norm(state.x)), float(np.linalg.norm(x_lin)), least)
     return float(np.linalg.norm(state.residual) / scale) if scale > 0 else float(state.residual.any())
 
 
@@ -72,9 +76,10 @@ def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOption
     options = options or NewtonOptions()
     x_lin = balance.x_lin(omega)
     state = balance.evaluate(omega, start)
-    error = relative_residual(state, x_lin)
+    least = VANISHING * float(np.linalg.norm(start))
+    error = relative_residual(state, x_lin, least)
     history = [error]
-    forcing = 1e-2
+    forcing = 1e-3
     products = 0
     for step in range(1, options.max_steps + 1):
         if error <= options.tolerance:
@@ -95,7 +100,7 @@ def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOption
             except np.linalg.LinAlgError:  # nothing holds the contact in some direction
                 why = f"singular Jacobian at relative residual {error:.1e}"
                 return Solution(state, why, step, products, tuple(history))
-        state, new_error = _search(balance, omega, state, direction, error, x_lin)
+        state, new_error = _search(balance, omega, state, direction, error, x_lin, least)
         history.append(new_error)
         if new_error >= error * (1 - 1e-10):
             if new_error <= options.tolerance:
@@ -108,26 +113,37 @@ def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOption
 
 
 def _search(
-    balance: Balance, omega: Any, state: State, direction: np.ndarray, error: float, x_lin: np.ndarray
+    balance: Balance,
+    omega: Any,
+    state: State,
+    direction: np.ndarray,
+    error: float,
+    x_lin: np.ndarray,
+    least: float,
 ) -> tuple[State, float]:
-    """Backtrack until the residual falls; the derivative has kinks, so the best trial is kept if none falls enough."""
+    """Backtrack until the residual falls; the derivative has kinks, so the best trial is kept if none falls enough.
+
+    Source  parabola through |R|^2, its slope and the last trial, Kelley 1995, 8.3.1
+    """
     best, best_error = state, error
     length = 1.0
-    for _ in range(12):
+    while length > SHORTEST:
         trial = balance.evaluate(omega, state.x + length * direction.reshape(state.x.shape))
-        trial_error = relative_residual(trial, x_lin)
+        trial_error = relative_residual(trial, x_lin, least)
         if trial_error < best_error:
             best, best_error = trial, trial_error
         if trial_error <= (1 - 0.1 * length) * error:
             return trial, trial_error
-        length *= 0.5
+        bend = (trial_error / error) ** 2 - 1 + 2 * length  # |R|^2 / |R_0|^2 = 1 - 2 l + bend (l / length)^2
+        length *= float(np.clip(length / bend, 0.25, 0.5)) if bend > 0 else 0.5
     return best, best_error
 
 
 def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None) -> Solution:
     """Solve without a neighbouring solution: from the stuck response, else by raising the vibration load in steps.
 
-    The ramp halves its step where it fails; products and steps of the whole way are counted in the Solution.
+    The ramp halves its step where Newton fails or takes long, as it does when it leaves for another solution; products
+    and steps of the whole way are counted in the Solution.
     """
     first = solve(balance, omega, balance.stuck(omega), options)
     if first.converged:
@@ -136,9 +152,11 @@ def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptio
     factor, stride = 0.0, 0.25
     start = balance.with_load(0.0).stuck(omega)
     last = solve(balance.with_load(0.0), omega, start, options)
+    options = options or NewtonOptions()
+    short = replace(options, max_steps=min(options.max_steps, RAMP_STEPS))
     while last.converged and stride > 1e-3:
         target = min(1.0, factor + stride)
-        trial = solve(balance.with_load(target * balance.load_factor), omega, last.state.x, options)
+        trial = solve(balance.with_load(target * balance.load_factor), omega, last.state.x, short)
         steps, products = steps + trial.steps, products + trial.products
         if trial.converged:
             factor, last, stride = target, trial, 1.5 * stride

@@ -175,7 +175,7 @@ def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int 
     m = min(n_modes, len(frequencies))
     n_contact = balance.compliance.n_contact
     phi, rest = expansion.b[:n_contact, :m], expansion.b[:n_contact, m:]
-    static = expansion.w0 + (rest / expansion.lam[m:]) @ rest.T
+    static = expansion.w0[:n_contact, :n_contact] + (rest / expansion.lam[m:]) @ rest.T
     coupling = _contact_in_modes(_departure_slope(balance, state, basis), phi, static)
     nc = basis.n_coeff
     unit = np.eye(nc)

@@ -56,10 +56,26 @@ class _Points:
 
     def jacobian_product(self, rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """`apply` from and to the rows of whole pairs."""
-        pairs = rows.reshape(-1, len(self.points) * self.n_component)[:, 0] // (len(self.points) * self.n_component)
-        own = (pairs[:, None] * self.n_component + np.arange(self.n_component)).ravel()
-        products = [p.jacobian_product(own) for p in self.points]
+        products = [p.jacobian_product(self._own_rows(rows)) for p in self.points]
         return lambda v: self.join([f(part) for f, part in zip(products, self.split(v), strict=True)])
+
+    def _own_rows(self, rows: np.ndarray) -> np.ndarray:
+        """Contact rows of one duty that belong to rows of whole pairs."""
+        pairs = rows.reshape(-1, len(self.points) * self.n_component)[:, 0] // (len(self.points) * self.n_component)
+        return (pairs[:, None] * self.n_component + np.arange(self.n_component)).ravel()
+
+    def coarse_part(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """That of every duty, one after the other; see `CompliancePoint.coarse_part`."""
+        n_duty = len(self.points)
+        own = self._own_rows(rows)
+        parts = [p.coarse_part(own) for p in self.points]
+        r, size = parts[0][0].shape[1], len(parts[0][1])
+        u = np.zeros((len(own) // self.n_component, n_duty, self.n_component, n_duty, r))
+        a = np.zeros((n_duty, size, n_duty, size))
+        for i, (shapes, compliance) in enumerate(parts):
+            u[:, i, :, i] = shapes.reshape(len(u), self.n_component, r)
+            a[i, :, i] = compliance
+        return u.reshape(len(rows), n_duty * r), a.reshape(n_duty * size, n_duty * size)
 
 
 class WearingBalance:

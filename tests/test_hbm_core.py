@@ -7,9 +7,10 @@ import pytest
 
 from fem.system import SecondOrderSystem
 from hbm import newton
-from hbm.compliance import ContactCompliance, SingularStuckSystem
+from hbm.compliance import ContactCompliance
 from hbm.continuation import natural
 from hbm.excitation import Excitation
+from hbm.expansion import SingularStuckSystem
 from hbm.harmonics import HarmonicBasis
 from hbm.newton import NewtonOptions
 from hbm.operating_point import AtPeak

@@ -8,8 +8,8 @@ import pytest
 from hbm import newton, time_integration
 from hbm.balance import HarmonicBalance
 from hbm.chatter import chatter, sign_changes
-from hbm.compliance import SingularStuckSystem
 from hbm.excitation import Excitation
+from hbm.expansion import SingularStuckSystem
 from hbm.harmonics import HarmonicBasis
 from hbm.law import SEPARATES, STICKS, ContactParameters
 from hbm.newton import NewtonOptions

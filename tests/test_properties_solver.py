@@ -20,9 +20,9 @@ from hbm import error_controlled_rule, newton, thesis_rule
 from hbm.aft import CycleNotPeriodic
 from hbm.balance import HarmonicBalance, State
 from hbm.branch import CONVERGED
-from hbm.compliance import SingularStuckSystem, UndampedResonance
 from hbm.continuation import arc_length, natural
 from hbm.evolution import Duty, WearProblem
+from hbm.expansion import SingularStuckSystem, UndampedResonance
 from hbm.newton import NewtonOptions
 from hbm.operating_point import AtFrequency
 from hbm.wear_history import WearHistory

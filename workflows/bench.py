@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -40,7 +40,8 @@ class Row:
     """One line of the benchmark.
 
     harmonics : such as "0+3", 0 to 3; unknowns : of the dense algorithm, and of ours at the contact
-    seconds : of the whole response curve by the compliance form; newton_steps : of it
+    seconds : of the whole response curve by the compliance form, of the processor on one thread and of the clock on
+        two; newton_steps : of it
     ratio : seconds of the dense algorithm over ours on the same dense_points; dense_seconds : of these
     max_difference : of the contact displacement, both refined to rounding, relative to its largest value
     contact, balance, direction : share of our time by routine; thesis_seconds : published, one core, or None
@@ -99,9 +100,10 @@ def _measure(balance: HarmonicBalance, harmonics: str, threads: int, windows: tu
     low, high = pipeline.response_range(scene_file.read("beam", ()).scene)
     options = natural.Options(POINTS, newton=NewtonOptions(TOLERANCE))
     natural.follow(balance, high, high * 0.999, replace(options, n_points=2))  # compiles outside the clock
-    times = [perf_counter()]
-    branch = natural.follow(balance, high, low, options, lambda done, wanted: times.append(perf_counter()))
-    seconds = perf_counter() - times[0]
+    now = process_time if threads == 1 else perf_counter  # other work on the machine does not count
+    times = [now()]
+    branch = natural.follow(balance, high, low, options, lambda done, wanted: times.append(now()))
+    seconds = now() - times[0]
     per_point = np.diff(times)  # the first entry holds the first two points
     profiler = cProfile.Profile()
     profiler.runcall(natural.follow, balance, high, low, options)
@@ -115,10 +117,10 @@ def _measure(balance: HarmonicBalance, harmonics: str, threads: int, windows: tu
     for start in starts:
         q = _refined(balance, dense, branch.omega, branch.contact, wanted[start - 3 : start])
         for i in range(start, start + length):
-            clock = perf_counter()
+            clock = now()
             guess = natural.extrapolate(wanted[i - 3 : i], q[-3:], wanted[i])
             solution = dense.solve(wanted[i], guess, TOLERANCE)
-            dense_seconds += perf_counter() - clock
+            dense_seconds += now() - clock
             own_seconds += per_point[i - 1]
             q.append(solution.q)
         exact = newton.solve(balance, wanted[start + length - 1], solution.x, NewtonOptions(1e-12)).state.x

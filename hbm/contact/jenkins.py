@@ -15,6 +15,9 @@ from hbm.law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
 
 COMPONENTS = (("t1", "t2", "n"), ("t1", "n"), ("t2", "n"))
 
+OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3  # kinds of samples; slip by its sense
+SIDE = np.array([0.0, 0.0, 1.0, -1.0])  # sign of T in slip
+
 located = transitions.cycle
 
 
@@ -81,9 +84,9 @@ def cycle(
 @numba.njit(cache=True)
 def _cycle(x, p, memory, phi, product, single, force, jac, status):
     n_pair, n_comp, n_time = x.shape
-    n_coeff = phi.shape[1]
     t = n_comp - 1
     want = jac.shape[0] > 0
+    kind, slider = np.empty(n_time, np.int8), np.empty(n_time)
     for i in range(n_pair):
         kn, mu, gap = p[i, t], p[i, 3], p[i, 4]
         bits = 0
@@ -96,114 +99,102 @@ def _cycle(x, p, memory, phi, product, single, force, jac, status):
         if n_open > 0:
             bits |= SEPARATES
         if want and n_open < n_time:
-            _add_normal(kn, n_open, i, t, force, product, jac)
-        if n_open < n_time:
-            for c in range(t):
-                bits |= _tangential(p[i, c], mu, kn, i, c, t, memory[i, c], x, phi, product, single, force, jac)
-        else:
-            for c in range(t):
+            _add_normal(kn, n_open, force[i, t], product, t, jac[i])
+        for c in range(t):
+            if n_open == n_time:
                 force[i, c, :] = 0.0
+                continue
+            origin, sense = _march(p[i, c], mu, memory[i, c], x[i, c], force[i, t], force[i, c], kind, slider)
+            for j in range(n_time):
+                bits |= STICKS if kind[j] == STICK else 0 if kind[j] == OPEN else SLIPS
+            if want:
+                _add_tangential(p[i, c], mu * kn, kind, origin, sense, c, t, phi, product, single, jac[i])
         status[i] = bits
-    return n_coeff
 
 
 @numba.njit(cache=True)
-def _add_normal(kn, n_open, i, t, force, product, jac):
+def _add_normal(kn, n_open, N, product, t, jac):
     """d N / d v : k_n while closed."""
-    n_time = force.shape[2]
+    n_time = N.size
     m = product.shape[1]
     o = t * m
     if n_open == 0:
         for a in range(m):
-            jac[i, o + a, o + a] = kn
+            jac[o + a, o + a] = kn
         return
     j = 0
     while j < n_time:
-        if force[i, t, j] <= 0.0:
+        if N[j] <= 0.0:
             j += 1
             continue
         start = j
-        while j < n_time and force[i, t, j] > 0.0:
+        while j < n_time and N[j] > 0.0:
             j += 1
         for a in range(m):
             for b in range(m):
-                jac[i, o + a, o + b] += kn * (product[j, a, b] - product[start, a, b])
+                jac[o + a, o + b] += kn * (product[j, a, b] - product[start, a, b])
 
 
 @numba.njit(cache=True)
-def _tangential(kt, mu, kn, i, c, t, w0, x, phi, product, single, force, jac):
-    """One slider over two cycles: the first settles the memory (the period map is a clamp), the second is kept.
+def _march(kt, mu, w, u, N, T, kind, slider):
+    """One slider over its periodic cycle: force T, kind of every sample and slider position after it.
 
-    `origin` is the sample where the present stick began, `side` the sign of the slip before it (0: separation).
+    The period map is a clamp, so the first cycle settles the memory; the second is marched until it meets the first.
+    Returns the last sample of the first cycle that does not stick, which decides where the slider stands, and its kind;
+    -1 where the slider stands where the load path left it
     """
-    n_time = x.shape[2]
-    want = jac.shape[0] > 0
-    w = w0
-    origin = -1  # no transition met yet: the slider stands where the load path left it
-    side = 0.0
-    for j in range(n_time):
-        N = force[i, t, j]
-        if N <= 0.0:
-            w = x[i, c, j]
-            origin, side = j, 0.0
-        else:
-            T = kt * (x[i, c, j] - w)
-            if abs(T) > mu * N:
-                side = 1.0 if T > 0.0 else -1.0
-                w = x[i, c, j] - side * mu * N / kt
-                origin = j
-    bits = 0
-    start = 0
-    kind, kind_origin, kind_side = -1, -1, 0.0  # of the running segment: 0 separation, 1 stick, 2 slip
-    for j in range(n_time + 1):
-        now = -1
-        if j < n_time:
-            N = force[i, t, j]
-            if N <= 0.0:
-                now = 0
-                w = x[i, c, j]
-                force[i, c, j] = 0.0
-                origin, side = j, 0.0
+    origin, sense = -1, OPEN
+    for turn in range(2):
+        for j in range(u.size):
+            if N[j] <= 0.0:
+                w, T[j], kind[j] = u[j], 0.0, OPEN
             else:
-                T = kt * (x[i, c, j] - w)
-                if abs(T) > mu * N:
-                    now = 2
-                    side = 1.0 if T > 0.0 else -1.0
-                    T = side * mu * N
-                    w = x[i, c, j] - T / kt
-                    origin = j
-                    bits |= SLIPS
+                pull, limit = kt * (u[j] - w), mu * N[j]
+                if pull > limit:
+                    T[j], kind[j] = limit, FORWARD
+                    w = u[j] - limit / kt
+                elif pull < -limit:
+                    T[j], kind[j] = -limit, BACKWARD
+                    w = u[j] + limit / kt
                 else:
-                    now = 1
-                    bits |= STICKS
-                force[i, c, j] = T
-        if now == kind and (now != 2 or side == kind_side):
-            continue
-        if want and kind > 0:
-            _add_tangential(kind, kt, mu * kn * kind_side, i, c, t, start, j, kind_origin, phi, product, single, jac)
-        start, kind, kind_origin, kind_side = j, now, origin, side
-    return bits
+                    T[j], kind[j] = pull, STICK
+            if turn == 1 and slider[j] == w:
+                break
+            slider[j] = w
+            if turn == 0 and kind[j] != STICK:
+                origin, sense = j, kind[j]
+    return origin, sense
 
 
 @numba.njit(cache=True)
-def _add_tangential(kind, kt, slope, i, c, t, start, stop, origin, phi, product, single, jac):
-    """d T / d u and d T / d v of one segment of samples [start, stop)."""
-    m = product.shape[1]
-    n_time = phi.shape[0]
+def _add_tangential(kt, slope, kind, origin, sense, c, t, phi, product, single, jac):
+    """d T / d u and d T / d v of one slider, one segment of samples of the same kind after the other.
+
+    `origin` is the sample where the present stick began, `side` the slope of the slip before it (0: separation).
+    """
+    n_time, m = phi.shape
     o, on = c * m, t * m
-    if kind == 2:
+    if origin < 0:
         for a in range(m):
-            for b in range(m):
-                jac[i, o + a, on + b] += slope * (product[stop, a, b] - product[start, a, b])
+            jac[o + a, o + a] = kt
         return
-    if origin < 0 and start == 0 and stop == n_time:
-        for a in range(m):
-            jac[i, o + a, o + a] = kt
-        return
-    for a in range(m):
-        weight = single[stop, a] - single[start, a]
-        for b in range(m):
-            jac[i, o + a, o + b] += kt * (product[stop, a, b] - product[start, a, b])
-            if origin >= 0:
-                jac[i, o + a, o + b] -= kt * weight * phi[origin, b]
-                jac[i, o + a, on + b] += slope * weight * phi[origin, b]
+    side = slope * SIDE[sense]
+    start = 0
+    for j in range(1, n_time + 1):
+        now = kind[start]
+        if j < n_time and kind[j] == now:
+            continue
+        first, last = product[start], product[j]
+        if now == STICK:
+            for a in range(m):
+                weight = single[j, a] - single[start, a]
+                for b in range(m):
+                    jac[o + a, o + b] += kt * (last[a, b] - first[a, b] - weight * phi[origin, b])
+                    jac[o + a, on + b] += side * weight * phi[origin, b]
+        else:
+            origin, side = j - 1, slope * SIDE[now]
+            if now != OPEN:
+                for a in range(m):
+                    for b in range(m):
+                        jac[o + a, on + b] += side * (last[a, b] - first[a, b])
+        start = j

@@ -14,6 +14,7 @@ from hbm.newton import NewtonOptions, Solution
 from hbm.parameter import Parameter
 
 DEGREE = 2  # of the extrapolating polynomial
+APART = 0.5  # least distance of its points, in steps
 
 
 @dataclass(frozen=True)
@@ -68,8 +69,19 @@ def _step(path: Parameter, builder: BranchBuilder, value: float, options: Option
 
 
 def predict(builder: BranchBuilder, value: float) -> np.ndarray:
-    """Extrapolation of the last points to a value of the parameter: (n_pair, n_component, n_coeff) [m]."""
-    return extrapolate(np.array(builder.value[-DEGREE - 1 :]), builder.x[-DEGREE - 1 :], value)
+    """Extrapolation of the last points to a value of the parameter: (n_pair, n_component, n_coeff) [m].
+
+    Points closer together than half of the step, as halved steps leave them, would blow up their differences.
+    """
+    apart = APART * abs(value - builder.value[-1])
+    chosen = [len(builder.value) - 1]
+    for i in reversed(range(chosen[0])):
+        if len(chosen) > DEGREE:
+            break
+        if abs(builder.value[i] - builder.value[chosen[-1]]) >= apart:
+            chosen.append(i)
+    known = chosen[::-1]
+    return extrapolate(np.array([builder.value[i] for i in known]), [builder.x[i] for i in known], value)
 
 
 def extrapolate(known: np.ndarray, values: Sequence[np.ndarray] | np.ndarray, at: float) -> np.ndarray:

@@ -1,0 +1,221 @@
+"""Dynamic compliance of one stuck system between its ports, expanded in low modes and powers of s = i h w.
+
+The contact springs, stuck and closed, are part of the linear system: K_s = K + B^T k B, so that it depends neither on
+the load nor on wear. Its lowest modes Phi carry the dynamics; the rest is expanded in powers of s:
+
+    D(s)^-1 = W(s) + L(s) S(s)^-1 L'(s),   W(s) = sum_k s^k W_k,   W_0 = K_s^-1 - Phi Lambda^-1 Phi^H,
+    W_k = -W_0 (C W_(k-1) + M W_(k-2)),    L(s) = (I - s W(s) C) Phi,
+    S(s) = Lambda + s C_m + s^2 - s^2 Phi^H C W(s) C Phi,
+
+which holds for any Hermitian damping matrix; the error falls like (|s| / omega_next)^order and is measured against a
+direct solve. What s multiplies is small beside W_0 and Phi: single precision keeps it exact enough.
+Source  block elimination of modal coordinates (ours); static correction of truncated modes as in MacNeal 1971.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as sla
+
+from fem.system import SecondOrderSystem
+
+RESOLUTION = 5e-10  # relative error allowed in the expansion at the highest frequency asked for
+ROUNDING = 1e-7  # largest error that may be rounding
+CANDIDATES = ((24, 3), (48, 3), (96, 3), (96, 4), (192, 4), (192, 6))  # modes and powers of s tried in turn
+ALL_MODES_BELOW = 1500  # coordinates up to which all modes are computed at once
+
+
+NO_DISTANCE = 1e-13  # of a frequency from an undamped resonance, relative: the response is rounding alone
+
+
+class SingularStuckSystem(ValueError):
+    """The structure can move as a rigid body even with every contact stuck."""
+
+
+class UndampedResonance(ValueError):
+    """The response of the stuck structure is infinite at this frequency."""
+
+
+class Expansion:
+    """D(s)^-1 between ports (contacts, loads, outputs) of one stuck system; see the module text.
+
+    system : dense, b : (n_contact, n) contact map, stiffness : (n_contact,) stuck contact springs [N/m]
+    ports : (n_port, n) rows; contact rows first
+    s_max : largest h w that will be asked for [rad/s]
+    w0 : (n_port, n_port) W_0; b : (n_port, m) modes; e : (order - 2, n_port, m) W_k C Phi s_max^(k+1) at the ports,
+        all three views of `columns` = [w0, b, e_0, ...]
+    w0_single, b_single : those of the contacts in single precision
+    higher : order - 1 matrices (n_port, n_port) W_k s_max^k / unit, views of `single`, which holds them side by side
+    error : relative, at s_max, against a direct solve
+    Raises  SingularStuckSystem
+    """
+
+    def __init__(
+        self, system: SecondOrderSystem, b: np.ndarray, stiffness: np.ndarray, ports: np.ndarray, s_max: float
+    ):
+        self.n_port, self._n_contact = len(ports), len(b)
+        self.s_unit = s_max or 1.0
+        mass = np.asarray(system.mass)
+        damping = np.zeros_like(mass) if system.damping is None else np.asarray(system.damping)
+        stuck = np.asarray(system.stiffness) + b.conj().T @ (stiffness[:, None] * b)
+        stuck = 0.5 * (stuck + stuck.conj().T)
+        self._system = (mass, damping, stuck)
+        self._ports = ports
+        n = len(mass)
+        loose = SingularStuckSystem(
+            "the part can move as a rigid body even with all contacts stuck: clamp it, add a spring, "
+            "or raise the contact stiffness"
+        )
+        try:
+            factor = sla.cho_factor(stuck)
+            lam, phi = _modes(stuck, mass, n if n < ALL_MODES_BELOW else CANDIDATES[-1][0])
+        except np.linalg.LinAlgError:
+            raise loose from None
+        # a rigid mode comes out of the eigenvalue problem as rounding of the stiffest ones, of either sign
+        if lam[0] <= n * np.finfo(float).eps * np.max(np.diag(stuck).real / np.diag(mass).real):
+            raise loose
+        before = np.inf
+        last = (len(lam), 1 if len(lam) == n else 8)
+        for m, order in (*(c for c in CANDIDATES if c[0] < len(lam)), last):
+            self._build(lam[:m], phi[:, :m], factor, order)
+            self.error = self._measure_error(1j * s_max)
+            # near a resonance rounding of the direct solve itself is what remains: more modes would not help
+            if self.error <= RESOLUTION or 0.5 * before < self.error < ROUNDING:
+                break
+            before = self.error
+        del self._system, self._ports
+
+    def _build(self, lam: np.ndarray, phi: np.ndarray, factor: tuple[np.ndarray, bool], order: int) -> None:
+        mass, damping, _ = self._system
+        cphi = damping @ phi
+        full = len(lam) == len(mass)
+
+        def quasi_static(y: np.ndarray) -> np.ndarray:  # W_0 y
+            return sla.cho_solve(factor, y, check_finite=False) - phi @ ((phi.conj().T @ y) / lam[:, None])
+
+        p, ports = self.n_port, self._ports
+        right = np.concatenate([ports.conj().T, cphi], axis=1)
+        y_before, y = np.zeros_like(right), np.zeros_like(right) if full else quasi_static(right)
+        self.order, self.n_mode, m = order, len(lam), len(lam)
+        n_e = max(order - 2, 0)
+        self.columns = np.empty((p, p + m * (1 + n_e)), y.dtype)
+        self.w0, self.b = self.columns[:, :p], self.columns[:, p : p + m]
+        self.e = [self.columns[:, p + m * (k + 1) : p + m * (k + 2)] for k in range(n_e)]
+        self.single = np.empty((p, p * (order - 1)), np.complex64 if np.iscomplexobj(y) else np.float32)
+        self.higher = [self.single[:, p * k : p * (k + 1)] for k in range(order - 1)]
+        self.t = np.empty((n_e, m, m), y.dtype)
+        self.w0[:] = ports @ y[:, :p]
+        self.b[:] = ports @ phi
+        # the largest compliance, so that no unit of length or force leaves the range of single precision
+        self.unit = float(np.max(np.diag(self.w0).real + (np.abs(self.b) ** 2 / lam).sum(axis=1))) or 1.0
+        for k in range(order - 1):
+            if k < n_e:
+                self.e[k][:] = ports @ y[:, p:] * self.s_unit ** (k + 1)
+                self.t[k] = cphi.conj().T @ y[:, p:]
+            y_before, y = y, -quasi_static(damping @ y + mass @ y_before)
+            self.higher[k][:] = ports @ y[:, :p] * (self.s_unit ** (k + 1) / self.unit)
+        self.left = np.ascontiguousarray(self.columns[:, p:].T)
+        self.lam = lam
+        self.c = phi.conj().T @ cphi
+        n = self._n_contact
+        self.w0_single, self.b_single = (a.astype(self.single.dtype) for a in (self.w0[:n, :n], self.b[:n]))
+
+    def at(self, s: complex) -> PortCompliance:
+        """The compliance at s = i h w."""
+        core = s * self.c
+        for k, t in enumerate(self.t):
+            core = core - s ** (k + 2) * t
+        core = core + np.diag(self.lam + s * s)
+        factor, pivots, _ = sla.lapack.zgetrf(core)
+        if s != 0 and np.abs(np.diag(factor)).min() < NO_DISTANCE * abs(s) ** 2:
+            raise UndampedResonance(
+                f"the stuck structure has an undamped resonance at {abs(s) / (2 * np.pi):.6g} Hz, where its response "
+                "is infinite: give it damping or take another frequency"
+            )
+        return PortCompliance(self, s, factor, pivots)
+
+    def _measure_error(self, s: complex) -> float:
+        mass, damping, stuck = self._system
+        probe = np.random.default_rng(0).normal(size=(self.n_port, 2))
+        exact = self._ports @ np.linalg.solve(stuck + s * damping + s * s * mass, self._ports.conj().T @ probe)
+        return float(np.abs(self.at(s).apply(probe) - exact).max() / np.abs(exact).max())
+
+
+def _modes(stiffness: np.ndarray, mass: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The lowest modes: squared frequencies (count,) and shapes (n, count) of unit modal mass.
+
+    They come from the compliance's side, M phi = nu K phi: rounding is then relative to the softest mode, however much
+    stiffer the contact springs are, and what it does to stiff ones is as small as their share in the compliance.
+    """
+    n = len(mass)
+    nu, phi = sla.eigh(mass, stiffness, subset_by_index=None if count >= n else (n - count, n - 1))
+    nu, phi = nu[::-1], phi[:, ::-1]
+    lam = 1.0 / np.maximum(nu, np.finfo(float).eps ** 2 * nu[0])  # without mass: as good as rigid
+    return lam, phi * np.sqrt(lam)
+
+
+@dataclass(frozen=True)
+class PortCompliance:
+    """D(s)^-1 between ports at one s: sum_k s^k W_k + L S(s)^-1 L'; factor and pivots : S(s) = P L U."""
+
+    expansion: Expansion
+    s: complex
+    factor: np.ndarray
+    pivots: np.ndarray
+
+    @property
+    def ratio(self) -> complex:
+        """s over the largest one asked for."""
+        return self.s / self.expansion.s_unit
+
+    def through_core(self, z: np.ndarray) -> np.ndarray:
+        """S(s)^-1 z for modal forces z (n_mode, ...)."""
+        if self.s == 0:
+            return (z.T / self.expansion.lam).T
+        solution: np.ndarray = sla.lapack.zgetrs(self.factor, self.pivots, z)[0]
+        return solution.reshape(z.shape)
+
+    def apply(self, force: np.ndarray, columns: slice = slice(None), rows: slice = slice(None)) -> np.ndarray:
+        """Displacement of the ports in `rows` under forces (n, ...) at the ports in `columns`."""
+        x, ratio = self.expansion, self.ratio
+        z = _product(x.b[columns].conj().T, force).astype(complex)
+        for k, e in enumerate(x.e, start=1):
+            z -= ratio**k * _product(e[columns].conj().T, force)
+        y = self.through_core(z)
+        out = _product(x.b[rows], y) + _product(x.w0[rows, columns], force)
+        for k, e in enumerate(x.e, start=1):
+            out -= ratio**k * _product(e[rows], y)
+        for k, w in enumerate(x.higher, start=1):
+            out += x.unit * ratio**k * _product(w[rows, columns], force)
+        return out
+
+    def slope(self, force: np.ndarray) -> np.ndarray:
+        """d (apply) / d s of all ports under forces (n_port,)."""
+        x, s, ratio = self.expansion, self.s, self.ratio
+        z, dz = _product(x.b.conj().T, force).astype(complex), np.zeros(len(x.lam), complex)
+        d_core = 2 * s * np.eye(len(x.lam)) + x.c
+        for k, (e, t) in enumerate(zip(x.e, x.t, strict=True), start=1):
+            part = _product(e.conj().T, force)
+            z -= ratio**k * part
+            dz -= k * ratio ** (k - 1) / x.s_unit * part
+            d_core = d_core - (k + 1) * s**k * t
+        y = self.through_core(z)
+        dy = self.through_core(dz - d_core @ y)
+        out = _product(x.b, dy)
+        for k, e in enumerate(x.e, start=1):
+            out -= _product(e, ratio**k * dy + k * ratio ** (k - 1) / x.s_unit * y)
+        for k, w in enumerate(x.higher, start=1):
+            out += x.unit * k * ratio ** (k - 1) / x.s_unit * _product(w, force)
+        return out
+
+
+def _product(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """matrix @ vector in the precision of the matrix, without widening a real matrix to complex."""
+    if np.iscomplexobj(matrix):
+        return matrix @ vector.astype(matrix.dtype)
+    if not np.iscomplexobj(vector):
+        return matrix @ vector.astype(matrix.dtype)
+    real, imag = np.ascontiguousarray(vector.real, matrix.dtype), np.ascontiguousarray(vector.imag, matrix.dtype)
+    return (matrix @ real).astype(float) + 1j * (matrix @ imag)
