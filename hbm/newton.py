@@ -142,26 +142,28 @@ def _search(
 def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None) -> Solution:
     """Solve without a neighbouring solution: from the stuck response, else by raising the vibration load in steps.
 
-    The ramp halves its step where Newton fails or takes long, as it does when it leaves for another solution; products
-    and steps of the whole way are counted in the Solution.
+    The ramp halves its step where Newton fails or takes long, as it does when it leaves for another solution; only
+    where that ends does Newton get its time. Products and steps of the whole way are counted in the Solution.
     """
     first = solve(balance, omega, balance.stuck(omega), options)
     if first.converged:
         return first
     steps, products = first.steps, first.products
-    factor, stride = 0.0, 0.25
+    factor = 0.0
     start = balance.with_load(0.0).stuck(omega)
     last = solve(balance.with_load(0.0), omega, start, options)
     options = options or NewtonOptions()
-    short = replace(options, max_steps=min(options.max_steps, RAMP_STEPS))
-    while last.converged and stride > 1e-3:
-        target = min(1.0, factor + stride)
-        trial = solve(balance.with_load(target * balance.load_factor), omega, last.state.x, short)
-        steps, products = steps + trial.steps, products + trial.products
-        if trial.converged:
-            factor, last, stride = target, trial, 1.5 * stride
-            if factor == 1.0:
-                return Solution(last.state, CONVERGED, steps, products, last.history)
-        else:
-            stride *= 0.5
+    for patience in (min(options.max_steps, RAMP_STEPS), options.max_steps):
+        stride = 0.25
+        while last.converged and stride > 1e-3:
+            target = min(1.0, factor + stride)
+            loaded = balance.with_load(target * balance.load_factor)
+            trial = solve(loaded, omega, last.state.x, replace(options, max_steps=patience))
+            steps, products = steps + trial.steps, products + trial.products
+            if trial.converged:
+                factor, last, stride = target, trial, 1.5 * stride
+                if factor == 1.0:
+                    return Solution(last.state, CONVERGED, steps, products, last.history)
+            else:
+                stride *= 0.5
     return Solution(first.state, f"{first.outcome}; load ramp stopped at {factor:.0%}", steps, products, first.history)

@@ -26,7 +26,8 @@ def step_error(history: WearHistory, tolerance: float | None = None) -> StepErro
 
     A step of Z cycles at the rate of its beginning is off by half the change of the rate over the step. The changes of
     all pairs count without their sign: rates that go back and forth between neighbours are a sign of steps too long.
-    The error-controlled rule has measured each of its steps; its local errors are summed.
+    The error-controlled rule has measured each of its steps by a first-order companion of its second-order one; the
+    largest stands for the whole run. On the beam (tolerance 6, 2, 0.5 %) life was off by a third of that.
     """
     lost = np.flatnonzero(history.preload < LIFE_SHARE * history.preload[0])
     last = int(lost[0]) if len(lost) else len(history.cycles) - 1  # row where the counted steps end
@@ -36,11 +37,8 @@ def step_error(history: WearHistory, tolerance: float | None = None) -> StepErro
         return StepError(0.0, 0.0)
     cycles = history.cycles_in_step[taken]
     if tolerance is not None:
-        # the rule measures a step against all cycles passed at its end, and against the depth scale
-        local = tolerance * history.step_error[taken]
-        passed = history.cycles[taken] + cycles
-        by_rule = float((local * passed).sum() / passed[-1])
-        return StepError(by_rule, float(local.sum()))
+        largest = float(tolerance * history.step_error[taken].max())
+        return StepError(largest, largest)
     before, after = history.energy[taken], history.energy[taken + 1]
     change = np.abs(after - before).sum(axis=1) / (total[taken] + total[taken + 1])
     share, share_after = before / total[taken, None], _shares(after)
