@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import null_space
 
-from fem.system import SecondOrderSystem
 from reduction.craig_bampton import REPORTED_MODES
 from reduction.linear import linear_modes
 from reduction.model import ReducedModel
+from reduction.projection import projected
 
 # facts about frequencies of the model before; the free ones are told anew
 STALE = ("free_frequency_error", "stuck_frequency", "stuck_frequency_error")
@@ -30,21 +30,7 @@ def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:
         raise ValueError("motions can be held only in a model that was reduced from one mesh for all harmonics")
     held = rows @ model.basis
     N = null_space(held / np.linalg.norm(held, axis=1, keepdims=True))
-    s = model.system
-    system = SecondOrderSystem(
-        _congruent(N, s.mass),
-        _congruent(N, s.stiffness),
-        None if s.damping is None else _congruent(N, s.damping),
-        {name: N.T @ load for name, load in s.loads.items()},
-        {name: N.T @ row for name, row in s.outputs.items()},
-    )
-    interface = replace(model.interface, B=np.asarray(model.interface.B) @ N)
-    held_model = replace(model, system=system, interface=interface, basis=model.basis @ N)
+    held_model = projected(model, N)
     facts = {name: fact for name, fact in model.info.items() if name not in STALE}
     frequency, _ = linear_modes(held_model, n=min(REPORTED_MODES, N.shape[1]))
     return replace(held_model, info={**facts, "free_frequency": frequency})
-
-
-def _congruent(N: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    product = N.T @ matrix @ N
-    return (product + product.T) / 2

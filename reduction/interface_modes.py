@@ -16,8 +16,8 @@ import numpy as np
 import scipy.linalg as sla
 
 from fem.modes import modes
-from fem.system import SecondOrderSystem
 from reduction.model import ReducedModel
+from reduction.projection import projected
 
 STALE = ("free_frequency_error", "stuck_frequency", "stuck_frequency_error")  # told of the model before
 
@@ -55,7 +55,7 @@ def interface_modes(model: ReducedModel, n_modes: int, keep: np.ndarray | None =
     omitted = float(omega[n_modes]) / (2 * np.pi) if n_modes < len(b) else np.inf
     facts |= {"masters": masters[a], "n_masters": len(a)}
     facts |= {"n_interface_modes": n_modes, "interface_omitted_frequency": omitted}
-    return replace(_projected(model, basis), info=facts)
+    return replace(projected(model, basis), info=facts)
 
 
 def _static_shapes(K: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -66,23 +66,3 @@ def _static_shapes(K: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         raise ValueError(
             "interface modes: the contact can move rigidly with the kept DOFs held; keep more, or none"
         ) from None
-
-
-def _projected(model: ReducedModel, basis: np.ndarray) -> ReducedModel:
-    """The model in coordinates p, q = basis @ p."""
-    s = model.system
-    system = SecondOrderSystem(
-        _congruent(basis, s.mass),
-        _congruent(basis, s.stiffness),
-        None if s.damping is None else _congruent(basis, s.damping),
-        {name: basis.T @ load for name, load in s.loads.items()},
-        {name: basis.T @ row for name, row in s.outputs.items()},
-    )
-    interface = replace(model.interface, B=np.asarray(model.interface.B) @ basis)
-    full = None if model.basis is None else model.basis @ basis
-    return replace(model, system=system, interface=interface, basis=full)
-
-
-def _congruent(basis: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    product = basis.T @ matrix @ basis
-    return (product + product.T) / 2
