@@ -156,6 +156,8 @@ def test_a_linear_field_is_carried_exactly() -> None:
     coarse = np.array([[0.0, 0.0], [0.31, 1.3], [1.0, 2.0]])
     plane = np.array([2.0, -3.0])
     assert converge.on_grid(fine, fine @ plane + 1, coarse) == pytest.approx(coarse @ plane + 1)
+    beyond = coarse * (1 + 1e-15) + 1e-16  # the rim of a coarser grid, by rounding outside of the finer one
+    assert converge.on_grid(fine, fine @ plane + 1, beyond) == pytest.approx(coarse @ plane + 1)
 
 
 def test_grids_of_the_beam(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

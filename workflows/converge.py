@@ -178,7 +178,9 @@ def limit_of(size: Sequence[float], values: Sequence[Sequence[float]]) -> Limit:
 
 def on_grid(fine: np.ndarray, field: np.ndarray, coarse: np.ndarray) -> np.ndarray:
     """A field (n_fine,) at fine (n_fine, 2) carried to the nodes coarse (n_coarse, 2): linear, nearest at the rim."""
-    inside = LinearNDInterpolator(fine, field)(coarse)
+    centre = fine.mean(axis=0)
+    within = centre + (1 - 1e-9) * (coarse - centre)  # rounding must not put the rim outside
+    inside = LinearNDInterpolator(fine, field)(within)
     return np.where(np.isnan(inside), NearestNDInterpolator(fine, field)(coarse), inside)
 
 
@@ -234,7 +236,7 @@ def _cell(row: Row, quantity: str) -> str:
 
 
 def _order(limit: Limit) -> str:
-    return "not settled" if np.isnan(limit.order) else f"order {limit.order:.1f}"
+    return "scattered" if np.isnan(limit.order) else f"order {limit.order:.1f}"
 
 
 def _grid(row: Row | None) -> str:
@@ -260,8 +262,8 @@ def picture(study: Study) -> Figure:
         panes = figure.subplots(1, 2 + len(some), width_ratios=[1.7] + [1] * (1 + len(some)), squeeze=False)[0]
         _draw_errors(panes[0], study)
         work = finest.energy / finest.area
-        drawn = _map(panes[1], finest, work, {"cmap": "viridis"})
-        figure.colorbar(drawn, ax=panes[1], label="work per cycle and area, J/m²", location="bottom")
+        drawn = _map(panes[1], finest, 1e-3 * work, {"cmap": "viridis"})
+        figure.colorbar(drawn, ax=panes[1], label="work per cycle and area, kJ/m²", location="bottom")
         reach = max(float(work.max()), 1e-300)
         offs = [(one.energy / one.area - on_grid(finest.patch, work, one.patch)) / reach for one in some]
         most = max((float(np.quantile(np.abs(off), MOST_SHOWN)) for off in offs), default=0.0) or 1.0
