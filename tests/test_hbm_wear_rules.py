@@ -53,18 +53,19 @@ def test_wear_inside_the_balance_has_the_derivative_of_finite_differences(proble
     balances = [problem.balance, problem.balance.with_load(0.6)]
     omega = (420.0, 450.0)
     gain = np.full(N_PAIR, 1e-9) / problem.area
-    wearing = WearingBalance(balances, (0.3, 0.7), np.array([0.0, 1e-6, 2e-6, 0.0]), 3000.0, gain)
+    base = np.array([0.0, 1e-6, 2e-6, 0.0])
+    wearing = WearingBalance(balances, (0.3, 0.7), base, 3000.0, gain, base)
     parts = [newton.solve(b, w, b.stuck(w)).state.x for b, w in zip(balances, omega, strict=True)]
     solution = newton.solve(wearing, omega, np.concatenate(parts, axis=1))
     assert solution.converged
-    x, depth = solution.state.x, wearing.depth(solution.state.x)
+    x, depth = solution.state.x, wearing.evaluate(omega, solution.state.x).depth
     work = np.zeros(N_PAIR)
     for balance, share, w, part in zip(balances, (0.3, 0.7), omega, wearing.parts(x), strict=True):
         worn = balance.with_gap(balance.parameters.gap + depth)
         state = worn.evaluate(w, part)
         assert newton.relative_residual(state, worn.x_lin(w)) < 1e-8  # every duty is solved at the common depth
         work += share * worn.energy(state)
-    assert depth == pytest.approx(wearing.base + 3000.0 * gain * work, rel=1e-12)
+    assert depth == pytest.approx(base + 3000.0 * gain * work, rel=1e-12)
     assert depth.max() > 1e-5
     direction = np.random.default_rng(1).normal(size=x.shape) * 1e-6 * np.abs(x).max()
     fore, back = (wearing.evaluate(omega, x + sign * direction).residual for sign in (1, -1))
