@@ -12,14 +12,8 @@ from hbm.branch import CONVERGED
 
 VANISHING = 1e-6  # size of x, relative to the start, below which a solution counts as zero
 RAMP_STEPS = 12  # Newton steps in one step of the load ramp
-SHORTEST = 4e-4  # share of a Newton step that is tried
 FORCE_ACCURACY = 1e-4  # of the contact forces, wanted where these stretch their springs far less than x is large
 FINEST = 1e-12  # residual over the displacement that is asked for at most
-
-
-class _Springs(Protocol):
-    @property
-    def k(self) -> np.ndarray: ...
 
 
 class Balance(Protocol):
@@ -41,12 +35,16 @@ class NewtonOptions:
 
     tolerance : of the residual over the displacement; max_steps : Newton steps; max_products : per direction
     krylov : largest relative residual of a direction; the forcing term asks for less where Newton is fast
+    shortest : share of a Newton step that is tried
+    slowest : residual over that of two steps before from which on the solve is given up; 1 goes on while it falls
     """
 
     tolerance: float = 1e-8
     max_steps: int = 40
     max_products: int = 300
     krylov: float = 0.1
+    shortest: float = 4e-4
+    slowest: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -116,7 +114,7 @@ def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOption
             except np.linalg.LinAlgError:  # nothing holds the contact in some direction
                 why = f"singular Jacobian at relative residual {error:.1e}"
                 return Solution(state, why, step, products, tuple(history))
-        state, new_error = _search(balance, omega, state, direction, error, x_lin, least)
+        state, new_error = _search(balance, omega, state, direction, error, x_lin, least, options.shortest)
         history.append(new_error)
         if new_error >= error * (1 - 1e-10):
             if new_error <= options.tolerance:
@@ -124,6 +122,8 @@ def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOption
             return Solution(state, f"no descent from relative residual {error:.1e}", step, products, tuple(history))
         forcing = 0.5 * (new_error / error) ** 1.5
         error = new_error
+        if step > 1 and error > max(options.slowest * history[-3], options.tolerance):
+            return Solution(state, f"slow descent at relative residual {error:.1e}", step, products, tuple(history))
     outcome = CONVERGED if error <= options.tolerance else f"not converged in {options.max_steps} steps: {error:.1e}"
     return Solution(state, outcome, len(history) - 1, products, tuple(history))
 
@@ -147,6 +147,7 @@ def _search(
     error: float,
     x_lin: np.ndarray,
     least: float,
+    shortest: float,
 ) -> tuple[State, float]:
     """Backtrack until the residual falls; the derivative has kinks, so the best trial is kept if none falls enough.
 
@@ -154,7 +155,7 @@ def _search(
     """
     best, best_error = state, error
     length = 1.0
-    while length > SHORTEST:
+    while length > shortest:
         trial = balance.evaluate(omega, state.x + length * direction.reshape(state.x.shape))
         trial_error = relative_residual(trial, x_lin, least)
         if trial_error < best_error:
