@@ -16,6 +16,11 @@ FORCE_ACCURACY = 1e-4  # of the contact forces, wanted where these stretch their
 FINEST = 1e-12  # residual over the displacement that is asked for at most
 
 
+class _Springs(Protocol):
+    @property
+    def k(self) -> np.ndarray: ...
+
+
 class Balance(Protocol):
     """What Newton's method solves; omega is whatever the balance takes for its frequency."""
 
