@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from workflows import accuracy, budget, cli, converge, knob_trade, knobs, scene_file, store, trade_table
+from workflows.limit import limit_of
 from workflows.measure import measure
 from workflows.result import Result
 from workflows.trade_table import Row, Trade
@@ -34,18 +35,36 @@ def set_of(overrides: tuple[str, ...]) -> list[str]:
     return [word for text in overrides for word in ("--set", text)]
 
 
-def test_each_knob_is_held_against_its_finest_setting(table: Trade) -> None:
+def test_each_knob_is_held_against_where_it_tends_to(table: Trade) -> None:
     assert table.knobs == TRADED
     for knob in TRADED:
         rows = table.of(knob)
-        assert [row.reference for row in rows] == [False] * (len(rows) - 1) + [True]
         assert all(row.outcome == "converged" and row.seconds > 0 and row.memory > 1e7 for row in rows)
-        errors = [abs(row.errors["peak_m"] or 0.0) for row in rows]
-        assert errors[-1] == 0.0
-        assert errors[-2] <= errors[0] + 1e-12
-    order = table.order("points", "peak_m")
-    assert order is not None
-    assert 0.8 < order < 5  # second, but for where the points happen to lie about the peak
+        errors = [accuracy.error_of(rows, place, "peak_m") for place in range(len(rows))]
+        assert errors[-1] <= errors[0]
+        assert errors[-1] < 1e-4
+    assert table.of("points")[-1].setting == "refined peak"
+    assert not table.of("points")[-1].tunable
+    assert all(error == 0 for error in table.of("points")[-1].errors.values() if error is not None)
+
+
+def test_where_values_tend_to() -> None:
+    for order in (1.0, 2.0, 3.0):
+        sizes = [2.0, 4.0, 6.0, 8.0]
+        found = limit_of(sizes, [5 + 3 * size**-order for size in sizes])
+        assert found.value == pytest.approx(5, rel=1e-9)
+        assert found.order == pytest.approx(order, rel=1e-6)
+        assert found.doubt == pytest.approx(0.25 * 3 * 8**-order / 5, rel=1e-6)
+    alternating = limit_of([1, 2, 4], [1.1, 0.97, 1.01])
+    assert (alternating.value, alternating.doubt) == (1.01, pytest.approx(0.04 / 1.01))
+    unsettled = limit_of([1, 2, 4], [1.0, 1.1, 1.3])
+    assert (unsettled.value, unsettled.doubt) == (1.3, pytest.approx(0.3 / 1.3))
+    assert limit_of([1, 3], [1.3, 1.1]).doubt == pytest.approx(0.1 / 1.1)  # of first order
+    assert limit_of([1], [1.3]).doubt == np.inf
+    exact = limit_of([1, 2, np.nan], [1.04, 1.01, 1.0])
+    assert (exact.value, exact.doubt) == (1.0, 0.0)
+    assert exact.order == pytest.approx(2)
+    assert limit_of([1e4, 1e6, 1e8], [1.0, 1.0, 1.0]).doubt == 0.0
 
 
 def test_the_table_survives_its_file(table: Trade, tmp_path: Path) -> None:
@@ -83,12 +102,58 @@ def test_accuracy_meets_what_it_promises(table: Trade, tmp_path: Path, capsys: p
     assert choice.seconds <= accuracy.choose(table, wanted / 2).seconds
 
 
+LEAF = ("geometry.n_column=11", "geometry.pin_column=2", 'response.frequency=["150 Hz", "200 Hz"]')
+BLADE = ("geometry.n_along=3", "geometry.n_up=3", "wear=", "response.points=30")
+RIG = ("geometry.n_contact_length=3", "geometry.n_contact_width=3", 'response.frequency=["290 Hz", "292 Hz"]', "wear=")
+COARSE = {"beam": (*SMALL, 'wear.at="700 Hz"'), "blade": BLADE, "leaf_seal": LEAF, "rig": RIG}
+ASKED = {"beam": ("wear", "10 % of life, depth"), "blade": ("samples", "1 %"), "leaf_seal": ("newton", "1 %")}
+
+
+@pytest.mark.parametrize("scene", sorted(COARSE))
+def test_a_promise_is_checked_against_finer_settings(
+    scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    knob, wanted = ASKED.get(scene, ("krylov", "1 %"))
+    path = tmp_path / "trade.json"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(knobs, "WEAR_TOLERANCES", (0.3, 0.1))
+        trade_table.save(knob_trade.run(scene, (knob,), COARSE[scene], lambda text: None, 2), path)
+    words = ["trade", scene, *set_of(COARSE[scene]), "--out", str(path), "--check", wanted]
+    cli.app(words, result_action="return_value")
+    assert capsys.readouterr().out.rstrip().endswith("promise kept")
+
+
+def test_a_broken_promise_ends_with_code_1(table: Trade, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A table that takes coarse points for exact."""
+    path, nothing = tmp_path / "trade.json", {name: 0.0 for name in trade_table.QUANTITIES}
+    rows = [row for row in table.of("points") if row.tunable]
+    trade_table.save(replace(table, rows=(replace(rows[0], errors=nothing), *rows[1:])), path)
+    with pytest.raises(SystemExit) as left:
+        cli.main(["trade", "beam", *set_of(NO_WEAR), "--out", str(path), "--check", "0.1 % of peak frequency"])
+    assert left.value.code == 1
+    assert "BROKEN" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("asked", "sentence"),
+    [
+        ("1 kg", "--accuracy"),
+        ("0 %", "above 0"),
+        ("1 % of beauty", '"beauty" is none of peak frequency, amplitude'),
+    ],
+)
+def test_an_accuracy_that_means_nothing_is_refused(asked: str, sentence: str) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        accuracy.parsed(asked)
+    assert accuracy.parsed("1 % of life, energy") == (0.01, ("life_cycles", "energy_J"))
+
+
 def test_a_table_of_another_scene_is_refused(table: Trade, tmp_path: Path) -> None:
     path = tmp_path / "trade.json"
     trade_table.save(table, path)
     with pytest.raises(ValueError, match="was measured on another scene"):
         accuracy.tuned("beam", (*NO_WEAR, "contact.friction=0.4"), 0.02, path)
-    with pytest.raises(ValueError, match="more than the trade of beam can promise"):
+    with pytest.raises(ValueError, match=r"more than the trade of beam can promise: .* of knob points leaves"):
         accuracy.choose(table, 1e-9)
 
 
@@ -98,7 +163,9 @@ def test_a_knob_that_the_scene_has_not_is_refused() -> None:
     known = {scene: knobs.knobs_of(scene_file.read(scene), knobs.study_of(scene)) for scene in scene_file.names()}
     has = {scene: {knob.name for knob in found} for scene, found in known.items()}
     assert {"wear", "friction", "interface_rank"} <= has["beam"]
-    assert not {"wear", "friction", "points"} & has["leaf_seal"]
+    assert not {"wear", "friction", "nodes"} & has["leaf_seal"]
+    assert all({"fe_mesh", "contact_grid", "harmonics", "samples", "points"} <= found for found in has.values())
+    assert all({"wear", "wear_thesis", "friction"} <= has[scene] for scene in ("beam", "blade", "rig"))
     assert "interface_rank" not in has["blade"]
 
 
@@ -114,16 +181,17 @@ def test_every_setting_of_every_knob_is_a_scene() -> None:
                     scene_file.read(scene, (*ladder.base, *setting.overrides, *placement))
 
 
-def made_up(knob: str, cost: float, error: float, reference: bool) -> Row:
-    values = dict.fromkeys(trade_table.QUANTITIES)
-    errors = {**values, "peak_m": error}
+def made_up(knob: str, cost: float, error: float) -> Row:
+    values: dict[str, float | None] = {**dict.fromkeys(trade_table.QUANTITIES), "peak_m": 1 + error}
+    errors: dict[str, float | None] = {**dict.fromkeys(trade_table.QUANTITIES), "peak_m": error}
     label = f"{knob}={cost:g}"
-    return Row(knob, label, cost, (label,), values, errors, cost, 0.0, "converged", reference, True)
+    doubts = {name: None if e is None else 0.0 for name, e in errors.items()}
+    return Row(knob, label, cost, (label,), values, errors, doubts, cost, cost / 4, 0.0, "converged", True)
 
 
 def test_the_cheapest_combination_is_found() -> None:
-    rows = [made_up("a", 1, 0.1, False), made_up("a", 2, 0.004, False), made_up("a", 9, 0.0, True)]
-    rows += [made_up("b", 3, 0.002, False), made_up("b", 4, 0.001, False), made_up("b", 8, 0.0, True)]
+    rows = [made_up("a", 1, 0.1), made_up("a", 2, 0.004), made_up("a", 9, 0.0)]
+    rows += [made_up("b", 3, 0.002), made_up("b", 4, 0.001), made_up("b", 8, 0.0)]
     trade = Trade("made up", "", (), 4.0, tuple(rows))
     assert accuracy.choose(trade, 0.01).overrides == ("a=2", "b=3")
     assert accuracy.choose(trade, 0.2).overrides == ("a=1", "b=3")
@@ -233,7 +301,7 @@ def test_the_budget_says_where_no_life_can_be_stated() -> None:
     entries = [{"source": "wear steps", "quantity": "life", "error": 0.8, "by": "estimate"}]
     result = Result({}, {budget.FACT: json.dumps(entries)}, "complete")
     assert "no life can be stated" in dict(budget.lines(result))["  wear steps"]
-    assert replace(made_up("a", 1, 0.1, False), outcome="solve failed").worst == np.inf
+    assert replace(made_up("a", 1, 0.1), outcome="solve failed").worst == np.inf
 
 
 def test_tables_that_come_with_the_program_can_be_read() -> None:
