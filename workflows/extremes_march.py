@@ -28,7 +28,7 @@ def force_error(balance: HarmonicBalance, state: State) -> tuple[float, float]:
     u = state.x @ phi.T
     force = _march(balance, u)
     weight = np.where(order == 0, 1.0, 2.0) / n
-    found = (force * 1.0) @ (phi * weight)
+    found = force @ (phi * weight)
     k, mu = balance.parameters.stiffness, balance.parameters.friction
     gap = balance.parameters.gap
     across = np.abs(u).max(axis=2)
