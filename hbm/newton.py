@@ -12,10 +12,20 @@ from hbm.branch import CONVERGED
 
 VANISHING = 1e-6  # size of x, relative to the start, below which a solution counts as zero
 RAMP_STEPS = 12  # Newton steps in one step of the load ramp
+FORCE_ACCURACY = 1e-4  # of the contact forces, wanted where these stretch their springs far less than x is large
+FINEST = 1e-12  # residual over the displacement that is asked for at most
+
+
+class _Springs(Protocol):
+    @property
+    def k(self) -> np.ndarray: ...
 
 
 class Balance(Protocol):
     """What Newton's method solves; omega is whatever the balance takes for its frequency."""
+
+    @property
+    def compliance(self) -> _Springs: ...
 
     def x_lin(self, omega: Any) -> np.ndarray: ...
 
@@ -73,7 +83,9 @@ def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOption
     """Solve the balance at one frequency.
 
     omega : [rad/s]; start : (n_pair, n_component, n_coeff) first guess [m]
-    Returns a Solution; its state is the best met, also where it did not converge
+    Returns a Solution; its state is the best met, also where it did not converge. Where a contact barely touches while
+    it swings far, a residual small beside x is not small beside the stretch of its springs: Newton then goes on until
+    it is, as far as rounding lets it
     Source  inexact Newton with the forcing term of Eisenstat and Walker 1996, choice 2
     """
     options = options or NewtonOptions()
@@ -85,19 +97,23 @@ def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOption
     forcing = 1e-3
     products = 0
     for step in range(1, options.max_steps + 1):
-        if error <= options.tolerance:
+        wanted = min(options.tolerance, _finer(balance, state, x_lin, least))
+        if error <= wanted:
             return Solution(state, CONVERGED, step - 1, products, tuple(history))
         if not np.isfinite(error):
             return Solution(state, "the residual is not a finite number", step - 1, products, tuple(history))
         linear = balance.linearise(state)
-        target = max(min(forcing, options.krylov), 0.3 * options.tolerance / error, 1e-12)
+        target = max(min(forcing, options.krylov), 0.3 * wanted / error, 1e-12)
         try:
             with np.errstate(over="raise"):
                 direction, spent, reached = linear.solve(-state.residual, target, options.max_products)
         except FloatingPointError:  # a slope too steep for the single precision of the products
             spent, reached = 0, np.inf
         products += spent
-        if reached > max(10 * target, 0.5):  # Krylov stalled: the direct way
+        stalled = reached > max(10 * target, 0.5)
+        if stalled and error <= options.tolerance:
+            break
+        if stalled:  # the direct way
             try:
                 direction = np.linalg.solve(linear.dense(), -state.residual.ravel()).reshape(state.residual.shape)
             except np.linalg.LinAlgError:  # nothing holds the contact in some direction
@@ -115,6 +131,17 @@ def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOption
             return Solution(state, f"slow descent at relative residual {error:.1e}", step, products, tuple(history))
     outcome = CONVERGED if error <= options.tolerance else f"not converged in {options.max_steps} steps: {error:.1e}"
     return Solution(state, outcome, len(history) - 1, products, tuple(history))
+
+
+def _finer(balance: Balance, state: State, x_lin: np.ndarray, least: float) -> float:
+    """The relative residual that leaves the contact forces FORCE_ACCURACY; infinite where nothing touches."""
+    k = balance.compliance.k[:, None]
+    stretch = np.divide(state.cycle.force.reshape(state.g.shape), k, out=np.zeros_like(state.g), where=k > 0)
+    size = float(np.linalg.norm(stretch))
+    if size == 0.0:
+        return np.inf
+    scale = max(float(np.linalg.norm(state.x)), float(np.linalg.norm(x_lin)), least)
+    return max(FORCE_ACCURACY * size / scale, FINEST)
 
 
 def _search(

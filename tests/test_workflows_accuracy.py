@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from workflows import accuracy, budget, cli, converge, knob_trade, knobs, scene_file, store, trade_table
+from workflows.limit import limit_of
 from workflows.measure import measure
 from workflows.result import Result
 from workflows.trade_table import Row, Trade
@@ -34,18 +35,36 @@ def set_of(overrides: tuple[str, ...]) -> list[str]:
     return [word for text in overrides for word in ("--set", text)]
 
 
-def test_each_knob_is_held_against_its_finest_setting(table: Trade) -> None:
+def test_each_knob_is_held_against_where_it_tends_to(table: Trade) -> None:
     assert table.knobs == TRADED
     for knob in TRADED:
         rows = table.of(knob)
-        assert [row.reference for row in rows] == [False] * (len(rows) - 1) + [True]
         assert all(row.outcome == "converged" and row.seconds > 0 and row.memory > 1e7 for row in rows)
-        errors = [abs(row.errors["peak_m"] or 0.0) for row in rows]
-        assert errors[-1] == 0.0
-        assert errors[-2] <= errors[0] + 1e-12
-    order = table.order("points", "peak_m")
-    assert order is not None
-    assert 0.8 < order < 5  # second, but for where the points happen to lie about the peak
+        errors = [accuracy.error_of(rows, place, "peak_m") for place in range(len(rows))]
+        assert errors[-1] <= errors[0]
+        assert errors[-1] < 1e-4
+    assert table.of("points")[-1].setting == "refined peak"
+    assert not table.of("points")[-1].tunable
+    assert all(error == 0 for error in table.of("points")[-1].errors.values() if error is not None)
+
+
+def test_where_values_tend_to() -> None:
+    for order in (1.0, 2.0, 3.0):
+        sizes = [2.0, 4.0, 6.0, 8.0]
+        found = limit_of(sizes, [5 + 3 * size**-order for size in sizes])
+        assert found.value == pytest.approx(5, rel=1e-9)
+        assert found.order == pytest.approx(order, rel=1e-6)
+        assert found.doubt == pytest.approx(0.25 * 3 * 8**-order / 5, rel=1e-6)
+    alternating = limit_of([1, 2, 4], [1.1, 0.97, 1.01])
+    assert (alternating.value, alternating.doubt) == (1.01, pytest.approx(0.04 / 1.01))
+    unsettled = limit_of([1, 2, 4], [1.0, 1.1, 1.3])
+    assert (unsettled.value, unsettled.doubt) == (1.3, pytest.approx(0.3 / 1.3))
+    assert limit_of([1, 3], [1.3, 1.1]).doubt == pytest.approx(0.1 / 1.1)  # of first order
+    assert limit_of([1], [1.3]).doubt == np.inf
+    exact = limit_of([1, 2, np.nan], [1.04, 1.01, 1.0])
+    assert (exact.value, exact.doubt) == (1.0, 0.0)
+    assert exact.order == pytest.approx(2)
+    assert limit_of([1e4, 1e6, 1e8], [1.0, 1.0, 1.0]).doubt == 0.0
 
 
 def test_the_table_survives_its_file(table: Trade, tmp_path: Path) -> None:
@@ -83,12 +102,58 @@ def test_accuracy_meets_what_it_promises(table: Trade, tmp_path: Path, capsys: p
     assert choice.seconds <= accuracy.choose(table, wanted / 2).seconds
 
 
+LEAF = ("geometry.n_column=11", "geometry.pin_column=2", 'response.frequency=["150 Hz", "200 Hz"]')
+BLADE = ("geometry.n_along=3", "geometry.n_up=3", "wear=", "response.points=30")
+RIG = ("geometry.n_contact_length=3", "geometry.n_contact_width=3", 'response.frequency=["290 Hz", "292 Hz"]', "wear=")
+COARSE = {"beam": (*SMALL, 'wear.at="700 Hz"'), "blade": BLADE, "leaf_seal": LEAF, "rig": RIG}
+ASKED = {"beam": ("wear", "10 % of life, depth"), "blade": ("samples", "1 %"), "leaf_seal": ("newton", "1 %")}
+
+
+@pytest.mark.parametrize("scene", sorted(COARSE))
+def test_a_promise_is_checked_against_finer_settings(
+    scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    knob, wanted = ASKED.get(scene, ("krylov", "1 %"))
+    path = tmp_path / "trade.json"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(knobs, "WEAR_TOLERANCES", (0.3, 0.1))
+        trade_table.save(knob_trade.run(scene, (knob,), COARSE[scene], lambda text: None, 2), path)
+    words = ["trade", scene, *set_of(COARSE[scene]), "--out", str(path), "--check", wanted]
+    cli.app(words, result_action="return_value")
+    assert capsys.readouterr().out.rstrip().endswith("promise kept")
+
+
+def test_a_broken_promise_ends_with_code_1(table: Trade, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A table that takes coarse points for exact."""
+    path, nothing = tmp_path / "trade.json", {name: 0.0 for name in trade_table.QUANTITIES}
+    rows = [row for row in table.of("points") if row.tunable]
+    trade_table.save(replace(table, rows=(replace(rows[0], errors=nothing), *rows[1:])), path)
+    with pytest.raises(SystemExit) as left:
+        cli.main(["trade", "beam", *set_of(NO_WEAR), "--out", str(path), "--check", "0.1 % of peak frequency"])
+    assert left.value.code == 1
+    assert "BROKEN" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("asked", "sentence"),
+    [
+        ("1 kg", "--accuracy"),
+        ("0 %", "above 0"),
+        ("1 % of beauty", '"beauty" is none of peak frequency, amplitude'),
+    ],
+)
+def test_an_accuracy_that_means_nothing_is_refused(asked: str, sentence: str) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        accuracy.parsed(asked)
+    assert accuracy.parsed("1 % of life, energy") == (0.01, ("life_cycles", "energy_J"))
+
+
 def test_a_table_of_another_scene_is_refused(table: Trade, tmp_path: Path) -> None:
     path = tmp_path / "trade.json"
     trade_table.save(table, path)
     with pytest.raises(ValueError, match="was measured on another scene"):
         accuracy.tuned("beam", (*NO_WEAR, "contact.friction=0.4"), 0.02, path)
-    with pytest.raises(ValueError, match="more than the trade of beam can promise"):
+    with pytest.raises(ValueError, match=r"more than the trade of beam can promise: .* of knob points leaves"):
         accuracy.choose(table, 1e-9)
 
 
@@ -98,7 +163,9 @@ def test_a_knob_that_the_scene_has_not_is_refused() -> None:
     known = {scene: knobs.knobs_of(scene_file.read(scene), knobs.study_of(scene)) for scene in scene_file.names()}
     has = {scene: {knob.name for knob in found} for scene, found in known.items()}
     assert {"wear", "friction", "interface_rank"} <= has["beam"]
-    assert not {"wear", "friction", "points"} & has["leaf_seal"]
+    assert not {"wear", "friction", "nodes"} & has["leaf_seal"]
+    assert all({"fe_mesh", "contact_grid", "harmonics", "samples", "points"} <= found for found in has.values())
+    assert all({"wear", "wear_thesis", "friction"} <= has[scene] for scene in ("beam", "blade", "rig"))
     assert "interface_rank" not in has["blade"]
 
 
@@ -110,19 +177,21 @@ def test_every_setting_of_every_knob_is_a_scene() -> None:
                 assert scene_file.read(scene, (*study.base, *setting.overrides)).name == scene
         for ladder in study.ladders:
             for setting in ladder.settings:
-                scene_file.read(scene, (*ladder.base, *setting.overrides))
+                for placement in ((), *ladder.placements):
+                    scene_file.read(scene, (*ladder.base, *setting.overrides, *placement))
 
 
-def made_up(knob: str, cost: float, error: float, reference: bool) -> Row:
-    values = dict.fromkeys(trade_table.QUANTITIES)
-    errors = {**values, "peak_m": error}
+def made_up(knob: str, cost: float, error: float) -> Row:
+    values: dict[str, float | None] = {**dict.fromkeys(trade_table.QUANTITIES), "peak_m": 1 + error}
+    errors: dict[str, float | None] = {**dict.fromkeys(trade_table.QUANTITIES), "peak_m": error}
     label = f"{knob}={cost:g}"
-    return Row(knob, label, cost, (label,), values, errors, cost, 0.0, "converged", reference, True)
+    doubts = {name: None if e is None else 0.0 for name, e in errors.items()}
+    return Row(knob, label, cost, (label,), values, errors, doubts, cost, cost / 4, 0.0, "converged", True)
 
 
 def test_the_cheapest_combination_is_found() -> None:
-    rows = [made_up("a", 1, 0.1, False), made_up("a", 2, 0.004, False), made_up("a", 9, 0.0, True)]
-    rows += [made_up("b", 3, 0.002, False), made_up("b", 4, 0.001, False), made_up("b", 8, 0.0, True)]
+    rows = [made_up("a", 1, 0.1), made_up("a", 2, 0.004), made_up("a", 9, 0.0)]
+    rows += [made_up("b", 3, 0.002), made_up("b", 4, 0.001), made_up("b", 8, 0.0)]
     trade = Trade("made up", "", (), 4.0, tuple(rows))
     assert accuracy.choose(trade, 0.01).overrides == ("a=2", "b=3")
     assert accuracy.choose(trade, 0.2).overrides == ("a=1", "b=3")
@@ -131,14 +200,23 @@ def test_the_cheapest_combination_is_found() -> None:
 
 
 def test_limit_of_a_known_power() -> None:
-    size = np.array([3.0, 5.0, 9.0, 17.0])
+    size = [3.0, 5.0, 9.0, 17.0]
     for order in (1.0, 2.0):
-        found = converge.limit_of(size, 7.0 + 3.0 * (1 / (size - 1)) ** order)
+        found = converge.limit_of(size, [[7.0 + 3.0 * (1 / (n - 1)) ** order] for n in size])
         assert found.value == pytest.approx(7.0, rel=1e-4)
         assert found.order == pytest.approx(order, abs=0.02)
-    unsettled = converge.limit_of(size, np.array([1.0, 1.2, 0.9, 1.1]))
+
+
+def test_a_limit_of_scattered_values_is_as_uncertain_as_they_are() -> None:
+    unsettled = converge.limit_of([3.0, 5.0, 9.0, 17.0], [[1.0], [1.2], [0.9], [1.1]])
     assert np.isnan(unsettled.order)
-    assert unsettled.uncertainty == pytest.approx(0.3 / 1.1)
+    assert unsettled.value == pytest.approx(1.05)
+    assert unsettled.uncertainty == pytest.approx(0.15 / 1.05)
+    # three that settle, but by less than where the nodes happen to lie makes out
+    by_chance = converge.limit_of([3.0, 5.0, 9.0], [[1.04, 1.06], [1.02, 0.97], [1.01]])
+    assert np.isnan(by_chance.order)
+    assert by_chance.value == pytest.approx((0.97 + 1.06) / 2)
+    assert converge.limit_of([3.0, 5.0, 9.0], [[1.04], [1.02, 1.019], [1.01]]).order == pytest.approx(1.0, abs=0.02)
 
 
 def test_a_linear_field_is_carried_exactly() -> None:
@@ -160,13 +238,34 @@ def test_grids_of_the_beam(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert (tmp_path / "converge_beam_contact_grid.png").stat().st_size > 10_000
 
 
+def grid_row(n: int, worst: float, own: bool = False) -> converge.Row:
+    none = dict.fromkeys(trade_table.QUANTITIES)
+    one = {**none, "peak_m": worst}
+    return converge.Row(n, f"n={n}", own, n * n, {**none, "peak_m": 1.0}, one, one, 0.1, 1.0, "converged")
+
+
+def test_the_grid_that_is_needed_is_the_first_from_which_all_are_good() -> None:
+    rows = (grid_row(3, 0.004), grid_row(5, 0.02), grid_row(7, 0.008, own=True), grid_row(9, 0.001))
+    limits = {"peak_m": converge.Limit(1.0, np.nan, 1e-3)}
+    study = converge.Study("made up", "grid", rows, limits, ())
+    needed = study.needed("peak_m")
+    assert needed is not None
+    assert needed.setting == "n=7"
+    assert study.needed("peak_m", 1e-4) is None
+    text = converge.as_text([study])
+    assert "1 % on amplitude needs n=7 (49 pairs) or finer; the limit is known to 0.1 %" in text
+    assert "the grid of the scene, n=7 (49 pairs), is good for 1 % on all: amplitude 0.8 %" in text
+    poor = replace(study, rows=(grid_row(3, 0.03, own=True), *rows[1:]))
+    assert "n=3 (9 pairs), misses 1 % on amplitude: amplitude 3 %" in converge.as_text([poor])
+
+
 def test_the_budget_of_a_run(tmp_path: Path) -> None:
     words = ["run", "beam", *set_of(SMALL), "--set", "wear.max_steps=2", "--no-pictures", "--out", str(tmp_path)]
     cli.app(words, result_action="return_value")
     result = store.load(tmp_path / "result.h5")
     found = {entry["source"]: entry for entry in budget.of_result(result)}
-    assert {"modes", "harmonics", "samples", "newton", "points", "wear steps", "compliance"} <= set(found)
-    assert found["newton"]["error"] < 1e-5
+    assert {"modes", "harmonics", "samples", "newton, krylov", "points", "wear steps", "compliance"} <= set(found)
+    assert found["newton, krylov"]["error"] < 1e-5
     assert found["samples"]["error"] < 1e-4
     assert 0 < found["points"]["error"] < 0.05
     shown = dict(budget.lines(result))
@@ -176,11 +275,31 @@ def test_the_budget_of_a_run(tmp_path: Path) -> None:
     assert wide.scene.harmonics.kept[-1] == 5
 
 
+def test_what_no_estimator_covers_is_known_from_the_trade() -> None:
+    """A grid that was not measured itself has the error of the next coarser one."""
+    table = trade_table.load(trade_table.TRADES / "beam.json")
+    file = scene_file.read("beam")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(budget.accuracy, "table_of", lambda _: table)
+        found = list(budget._of_trade(file))
+        grid = next(e for e in found if e.source == "contact grid" and e.quantity == "amplitude")
+        assert grid.by.startswith("trade: ")
+        assert grid.error is not None
+        assert 0 < grid.error < 0.02
+        mesh = next(e for e in found if e.source == "fe mesh" and e.quantity == "amplitude")
+        assert mesh.by.endswith("trade: n_length=12, n_height=4")
+        assert all(entry.error is not None for entry in found)
+        coarse = scene_file.read("beam", ("geometry.n_patch=3", "geometry.n_height=1"))
+        mesh = next(e for e in budget._of_trade(coarse) if e.source == "fe mesh")
+        assert mesh.error is None
+        assert "finer settings alone" in mesh.by
+
+
 def test_the_budget_says_where_no_life_can_be_stated() -> None:
     entries = [{"source": "wear steps", "quantity": "life", "error": 0.8, "by": "estimate"}]
     result = Result({}, {budget.FACT: json.dumps(entries)}, "complete")
     assert "no life can be stated" in dict(budget.lines(result))["  wear steps"]
-    assert replace(made_up("a", 1, 0.1, False), outcome="solve failed").worst == np.inf
+    assert replace(made_up("a", 1, 0.1), outcome="solve failed").worst == np.inf
 
 
 def test_tables_that_come_with_the_program_can_be_read() -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from hbm.branch import CONVERGED
 from workflows.scene_file import SceneFile, read
 from workflows.trade_table import NAMES, QUANTITIES, TRADES, Row, Trade, key_of, load
+from workflows.units import to_si
 
 OF_WEAR = ("depth_m", "life_cycles")
 MARGIN = 0.7  # of the wanted error that the knobs together may use up: they were measured one by one
@@ -18,11 +19,16 @@ MARGIN = 0.7  # of the wanted error that the knobs together may use up: they wer
 
 @dataclass(frozen=True)
 class Choice:
-    """One row for each knob; error : sum of their errors in the worst quantity; seconds : to expect."""
+    """One row for each knob; errors : by quantity, the sum over the knobs; seconds : to expect."""
 
     rows: tuple[Row, ...]
-    error: float
+    errors: dict[str, float]
     seconds: float
+
+    @property
+    def error(self) -> float:
+        """Of the worst quantity."""
+        return max(self.errors.values(), default=0.0)
 
     @property
     def overrides(self) -> tuple[str, ...]:
@@ -33,70 +39,114 @@ class Choice:
     def sentence(self) -> str:
         """What is promised and by which settings."""
         settings = ", ".join(row.setting for row in self.rows)
-        return f"settings {settings}: expected error {self.error:.2g}, about {self.seconds:.2g} s of one processor"
+        errors = ", ".join(f"{_name(quantity)} {error:.1e}" for quantity, error in self.errors.items())
+        return f"settings {settings}: expected error {errors}; about {self.seconds:.2g} s of one processor"
+
+
+def parsed(text: str) -> tuple[float, tuple[str, ...]]:
+    """A wanted accuracy such as "1 %" or "1 % of life, peak frequency": relative error and quantities.
+
+    Raises  ValueError with one sentence
+    """
+    number, _, names = text.partition(" of ")
+    try:
+        wanted = to_si(number.strip(), "")
+    except ValueError as wrong:
+        raise ValueError(f'--accuracy "{text}": {wrong}') from None
+    if wanted <= 0:
+        raise ValueError(f'--accuracy "{text}": an error is above 0, such as "1 %"')
+    asked = [name.strip() for name in names.split(",")] if names else list(NAMES)
+    for name in asked:
+        if name not in NAMES:
+            raise ValueError(f'--accuracy "{text}": "{name}" is none of {", ".join(NAMES)}')
+    return wanted, tuple(QUANTITIES[NAMES.index(name)] for name in asked)
 
 
 def choose(trade: Trade, wanted: float, quantities: Sequence[str] = QUANTITIES) -> Choice:
     """The cheapest settings whose errors add up to less than the wanted one, in every quantity.
 
     wanted : relative error, above 0; quantities : that matter, out of trade_table.QUANTITIES
-    Errors of different knobs are added without their signs; times are taken to multiply, each over the median of its
-    knob. From the finest settings each step coarsens the knob that saves most time for the error it adds.
-    Raises  ValueError where even the finest settings do not meet it
+    Errors of different knobs are added without their signs; times are taken to multiply, each over the base's. From
+    the most accurate settings each step coarsens the knob that saves most time for the error it adds.
+    Raises  ValueError where even the most accurate settings do not meet it
     """
-    options = {knob: _usable(trade.of(knob)) for knob in trade.knobs}
-    ladders = {knob: rows for knob, rows in options.items() if rows}
-    usual = {knob: float(np.median([row.seconds for row in rows])) for knob, rows in ladders.items()}
-    place = {knob: len(rows) - 1 for knob, rows in ladders.items()}
+    asked = [q for q in quantities if any(row.values[q] is not None for row in trade.rows)]
+    if not asked:
+        raise ValueError(f"the trade of {trade.scene} has no {' or '.join(map(_name, quantities))}")
+    ladders = {knob: rows for knob in trade.knobs if (rows := _usable(trade.of(knob), asked))}
+
+    def errors(places: dict[str, int]) -> dict[str, float]:
+        return {q: sum(error_of(ladders[k], i, q) for k, i in places.items()) for q in asked}
 
     def total(places: dict[str, int]) -> float:
-        return max(sum(error_of(ladders[k], i, q) for k, i in places.items()) for q in quantities)
+        return max(errors(places).values())
 
     def seconds(places: dict[str, int]) -> float:
-        spent = trade.base_seconds
-        for k, i in places.items():
-            spent *= ladders[k][i].seconds / usual[k]
-        return spent
+        return trade.base_seconds * float(np.prod([ladders[k][i].share for k, i in places.items()]))
 
-    if total(place) > MARGIN * wanted:
-        raise ValueError(
-            f"an accuracy of {wanted:.3g} is more than the trade of {trade.scene} can promise: its finest settings are "
-            f"good to {total(place) / MARGIN:.2g}; measure a finer one with tribodyn trade {trade.scene}"
-        )
+    def worst(rows: Sequence[Row], place: int) -> float:
+        return max(error_of(rows, place, q) for q in asked)
+
+    place = {k: min(range(len(rows)), key=lambda i, rows=rows: worst(rows, i)) for k, rows in ladders.items()}  # type: ignore[misc]
+    if not total(place) <= MARGIN * wanted:
+        raise ValueError(_refusal(trade.scene, wanted, errors(place), ladders, place))
     while True:
-        trials = [{**place, knob: i} for knob, top in place.items() for i in range(top)]
+        trials = [{**place, knob: i} for knob, rows in ladders.items() for i in range(len(rows)) if i != place[knob]]
         allowed = [t for t in trials if total(t) <= MARGIN * wanted and seconds(t) < seconds(place)]
         if not allowed:
             break
         place = max(allowed, key=lambda t: (1 - seconds(t) / seconds(place)) / max(total(t) - total(place), 1e-9))
-    return Choice(tuple(ladders[k][i] for k, i in place.items()), total(place), seconds(place))
+    return Choice(tuple(ladders[k][i] for k, i in place.items()), errors(place), seconds(place))
 
 
-def _usable(rows: Sequence[Row]) -> list[Row]:
-    """Settings of a knob that may be chosen, from coarse to fine; none of a knob that is another model."""
+def _refusal(
+    scene: str, wanted: float, errors: dict[str, float], ladders: dict[str, list[Row]], place: dict[str, int]
+) -> str:
+    """Which knob is to blame for which quantity."""
+    quantity = max(errors, key=lambda q: errors[q])
+    shares = {knob: error_of(ladders[knob], i, quantity) for knob, i in place.items()}
+    knob = max(shares, key=lambda k: shares[k])
+    met = [_name(q) for q, error in errors.items() if error <= MARGIN * wanted]
+    least = f"{errors[quantity] / MARGIN:.2g}" if np.isfinite(errors[quantity]) else "no number"
+    instead = f', or ask for --accuracy "{100 * wanted:.3g} % of {", ".join(met)}"' if met else ""
+    return (
+        f"an accuracy of {wanted:.3g} is more than the trade of {scene} can promise: {_name(quantity)} is known to "
+        f"{least}, of which {ladders[knob][place[knob]].setting} of knob {knob} leaves {shares[knob]:.2g}; "
+        f"give that knob finer settings in workflows/studies/{scene}.toml and measure them with tribodyn trade {scene}"
+        f"{instead}"
+    )
+
+
+def _name(quantity: str) -> str:
+    return NAMES[QUANTITIES.index(quantity)]
+
+
+def _usable(rows: Sequence[Row], asked: Sequence[str]) -> list[Row]:
+    """Settings of a knob that may be chosen; none of a knob that is another model, or has no say in what is asked."""
+    quantities = {"energy_J" if q in OF_WEAR else q for q in asked} | set(asked)
+    if all(row.values[q] is None for row in rows for q in quantities):
+        return []
     return [row for row in rows if row.tunable and row.outcome == CONVERGED]
 
 
 def error_of(rows: Sequence[Row], place: int, quantity: str) -> float:
-    """Error of a setting; a reference is off by what a first-order knob leaves of the error of the setting before it.
+    """Error of a setting, with what is doubtful about the limit of its knob; 0 where the knob has no say in it.
 
-    A reference without a size, such as located transitions, is exact.
+    A knob whose settings were not worn is judged by its energy: life is in proportion to the work per cycle.
     """
-    row = rows[place]
-    if quantity in OF_WEAR and all(other.errors[quantity] is None for other in rows):
-        quantity = "energy_J"  # the contact was not worn for this knob: life is in proportion to the work per cycle
-    if not row.reference:
-        return abs(row.errors[quantity] or 0.0)
-    if not place or not np.isfinite(row.size):
+    if quantity in OF_WEAR and all(other.values[quantity] is None for other in rows):
+        quantity = "energy_J"
+    if all(other.values[quantity] is None for other in rows):
         return 0.0
-    return abs(rows[place - 1].errors[quantity] or 0.0) * max(rows[place - 1].size, 0.0) / row.size
+    error, doubt = rows[place].errors[quantity], rows[place].doubts[quantity]
+    return float("inf") if error is None or doubt is None else abs(error) + doubt
 
 
 def advice(trade: Trade, wanted: float = 0.01) -> list[str]:
     """One line for each quantity that the scene has: what to use for a wanted error, and what it takes."""
     lines = []
     for quantity, name in zip(QUANTITIES, NAMES, strict=True):
-        if not any(row.errors[quantity] is not None for row in trade.rows):
+        if not any(row.values[quantity] is not None for row in trade.rows):
             continue
         try:
             found = choose(trade, wanted, [quantity])
@@ -127,7 +177,7 @@ def table_of(file: SceneFile, path: Path | None = None) -> Trade:
     raise ValueError(f"no trade was measured for {file.name}: measure it with tribodyn trade {file.name}")
 
 
-def tuned(name: str, overrides: Sequence[str], wanted: float, path: Path | None = None) -> tuple[SceneFile, Choice]:
-    """The scene with the cheapest settings that promise a relative error, and the choice."""
-    choice = choose(table_of(read(name, overrides), path), wanted)
+def tuned(name: str, overrides: Sequence[str], wanted: str, path: Path | None = None) -> tuple[SceneFile, Choice]:
+    """The scene with the cheapest settings that promise an accuracy as `parsed` reads it, and the choice."""
+    choice = choose(table_of(read(name, overrides), path), *parsed(wanted))
     return read(name, (*overrides, *choice.overrides)), choice

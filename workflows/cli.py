@@ -72,7 +72,7 @@ def run(
     scene
         Name of a scene (see `tribodyn list`) or a .toml file.
     accuracy
-        Relative error wanted, such as "1 %": the cheapest settings that promise it by the scene's trade are taken.
+        Relative error wanted, such as "1 %" or "1 % of life, energy": the cheapest settings that promise it are taken.
     table
         The trade to go by; results/NAME/trade.json or the one that comes with the program unless told.
     out
@@ -90,7 +90,7 @@ def run(
     if accuracy is None:
         file = scene_file.read(scene, overrides)
     else:
-        file, promise = tuned(scene, overrides, _option("--accuracy", accuracy, ""), table)
+        file, promise = tuned(scene, overrides, accuracy, table)
         progress.say(promise.sentence)
     folder = out or Path("results") / file.name
     path = folder / "result.h5"

@@ -29,9 +29,10 @@ def trade(
     overrides: Overrides = (),
     most: int = 99,
     out: Path | None = None,
+    check: str | None = None,
     as_json: Json = False,
 ) -> None:
-    """Measure what each knob costs and what it is worth, against a finer reference on the same scene.
+    """Measure what each knob costs and what it is worth, against where it tends to on the same scene.
 
     Parameters
     ----------
@@ -44,10 +45,14 @@ def trade(
         Settings of each knob, the finest ones.
     out
         Table to write (.json), its plot beside it (.png); results/NAME/trade.json unless told.
+    check
+        Measure no table, but run what `run --accuracy` would choose for this accuracy, such as "1 %" or "1 % of
+        life", against a run that is finer in every knob; exit code 1 where the promise is broken. --out: the table
+        to go by.
     as_json
         Print JSON for machines.
     """
-    from workflows import accuracy, knob_trade, trade_picture, trade_table
+    from workflows import accuracy, knob_trade, promise, trade_picture, trade_table
     from workflows import trade as wear_step
 
     if knob == ("wear_step",):
@@ -55,6 +60,12 @@ def trade(
         if out is not None:
             wear_step.picture(table).savefig(out)
         print(json.dumps(wear_step.as_records(table), indent=2) if as_json else wear_step.as_text(table))
+        return
+    if check is not None:
+        kept = promise.check(scene, overrides, check, out, aside)
+        print(promise.as_json(kept) if as_json else promise.as_text(kept))
+        if not kept.kept:
+            sys.exit(1)
         return
     path = out or Path("results") / Path(scene).stem / "trade.json"
     earlier = trade_table.load(path) if knob and path.exists() else None

@@ -1,4 +1,4 @@
-"""The trade of a scene: every setting of every knob against the finest of that knob, with what it costs."""
+"""The trade of a scene: every setting of every knob against where that knob tends to, with what it costs."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import Any
 from hbm.branch import CONVERGED
 from workflows import scene_file
 from workflows.knobs import Knob, Setting, chosen, knobs_of, study_of
+from workflows.limit import limit_of
 from workflows.measure import Measured, measure
-from workflows.trade_table import NAMES, QUANTITIES, Row, Trade, key_of, plain
+from workflows.trade_table import NAMES, QUANTITIES, Row, Trade, key_of, known_of, plain
 
 BASE = "base"
 
@@ -26,7 +27,7 @@ def run(
 ) -> Trade:
     """Measure knobs of a scene, all that it has where none is named.
 
-    overrides : of the scene, on top of its study's base; most : settings of each knob, the reference included
+    overrides : of the scene, on top of its study's base; most : settings of each knob, the finest ones
     keep : called after each knob with what is there
     earlier : table of the same scene, whose other knobs are taken over
     Raises  ValueError for a knob that the scene does not have
@@ -37,14 +38,18 @@ def run(
     file = scene_file.read(scene, base)
     knobs = chosen(knobs_of(file, study), names)
     measure(file, wears=False)  # compiles what the others only use
-    once = measure(file)
+    response, once = measure(file, wears=False), measure(file)
     say(f"{BASE}: {once.seconds:.1f} s, {once.outcome}")
     found = Trade(file.name, key_of(name, scene_file.read(scene, overrides).scene), base, once.seconds, ())
     if earlier is not None and (earlier.key, earlier.base) == (found.key, found.base):
         measured = {knob.name for knob in knobs}
         found = replace(found, rows=tuple(row for row in earlier.rows if row.knob not in measured))
     for knob in knobs:
-        rows = _rows_of(scene, knob, knob.settings[-most:], base, say)
+        rows = []
+        for row in _rows_of(scene, knob, knob.settings[-most:], base, say):
+            worn = row.values["life_cycles"] is not None or once.values["life_cycles"] is None
+            less = 0.0 if worn else once.seconds - response.seconds
+            rows.append(replace(row, share=(row.seconds + less) / once.seconds))
         found = replace(found, rows=(*found.rows, *rows))
         keep(found)
     return found
@@ -53,39 +58,59 @@ def run(
 def _rows_of(
     scene: str, knob: Knob, settings: Sequence[Setting], base: tuple[str, ...], say: Callable[[str], None]
 ) -> list[Row]:
-    found: list[tuple[Setting, Measured]] = []
+    found = []
     for setting in settings:
         file = scene_file.read(scene, (*base, *setting.overrides))
         try:
-            measured = measure(file, knob.wears, knob.refined)
+            measured = measure(file, knob.wears(setting), setting.refined)
         except ValueError as refusal:  # such as more interface modes than there are contact DOFs
             say(f"{knob.name}: {setting.label}: left out: {refusal}")
             continue
         say(f"{knob.name}: {setting.label}: {measured.seconds:.1f} s, {measured.outcome}")
-        found.append((setting, measured))
-    if not found:
-        return []
-    reference = found[-1][1].values
-    return [
-        Row(
-            knob=knob.name,
-            setting=setting.label,
-            size=setting.size,
-            overrides=setting.overrides,
-            values=measured.values,
-            errors={name: _relative(measured.values[name], reference[name]) for name in QUANTITIES},
-            seconds=measured.seconds,
-            memory=measured.memory,
-            outcome=measured.outcome,
-            reference=setting is found[-1][0],
-            tunable=knob.tunable,
-        )
-        for setting, measured in found
-    ]
+        found.append(_row(knob, setting, measured))
+    return judged(found)
 
 
-def _relative(value: float | None, reference: float | None) -> float | None:
-    return None if value is None or not reference else value / reference - 1
+def _row(knob: Knob, setting: Setting, measured: Measured) -> Row:
+    unknown: dict[str, float | None] = dict.fromkeys(QUANTITIES)
+    return Row(
+        knob=knob.name,
+        setting=setting.label,
+        size=setting.size,
+        overrides=setting.overrides,
+        values=measured.values,
+        errors=unknown,
+        doubts=unknown,
+        seconds=measured.seconds,
+        share=1.0,
+        memory=measured.memory,
+        outcome=measured.outcome,
+        tunable=knob.tunable and bool(setting.overrides),
+    )
+
+
+def judged(rows: Sequence[Row]) -> list[Row]:
+    """The rows of a knob with their errors, and with what is doubtful about the limit that these are relative to.
+
+    A setting that is finer than all that were worn counts as good as the finest of those.
+    """
+    known = {name: known_of(rows, name) for name in QUANTITIES}
+    limits = {name: limit_of(*zip(*points, strict=True)) for name, points in known.items() if points}
+    found: list[Row] = []
+    for row in rows:
+        errors: dict[str, float | None] = {}
+        for name in QUANTITIES:
+            value = row.values[name]
+            coarser = [r.errors[name] for r in found if r.values[name] is not None and r.outcome == CONVERGED]
+            if name not in limits:
+                errors[name] = None
+            elif value is not None:
+                errors[name] = value / limits[name].value - 1
+            else:
+                errors[name] = coarser[-1] if coarser and row.outcome == CONVERGED else None
+        doubts = {name: None if errors[name] is None else limits[name].doubt for name in QUANTITIES}
+        found.append(replace(row, errors=errors, doubts=doubts))
+    return found
 
 
 def as_records(trade: Trade) -> list[dict[str, Any]]:
@@ -95,26 +120,28 @@ def as_records(trade: Trade) -> list[dict[str, Any]]:
 
 
 def as_text(trade: Trade) -> str:
-    """The table for people: errors in per cent of the reference of each knob."""
-    lines = [f"{'knob':15} {'setting':46} {'seconds':>7} {'MB':>6} " + " ".join(f"{name:>14}" for name in NAMES)]
+    """The table for people: errors in per cent of the limit of each knob; ~ with what is doubtful about that limit."""
+    lines = [f"{'knob':15} {'setting':46} {'seconds':>7} {'MB':>6} " + " ".join(f"{name:>16}" for name in NAMES)]
     for knob in trade.knobs:
         for row in trade.of(knob):
             cells = [_cell(row, name) for name in QUANTITIES]
             head = f"{knob:15} {row.setting[:46]:46} {row.seconds:7.2f} {row.memory / 1e6:6.0f} "
-            lines.append(head + " ".join(f"{cell:>14}" for cell in cells) + _failure(row))
+            lines.append(head + " ".join(f"{cell:>16}" for cell in cells) + _failure(row))
         orders = [trade.order(knob, name) for name in QUANTITIES]
         if any(order is not None for order in orders):
             cells = ["" if order is None else f"order {order:.1f}" for order in orders]
-            lines.append(f"{knob:15} {'':46} {'':7} {'':6} " + " ".join(f"{cell:>14}" for cell in cells))
+            lines.append(f"{knob:15} {'':46} {'':7} {'':6} " + " ".join(f"{cell:>16}" for cell in cells))
     lines.append(f"every knob alone on {trade.scene} with {'; '.join(trade.base) or 'nothing changed'}")
+    lines.append("errors from where the knob tends to, behind ~ the doubt in that")
     return "\n".join(lines)
 
 
 def _cell(row: Row, quantity: str) -> str:
-    value, error = row.values[quantity], row.errors[quantity]
-    if value is None:
+    error, doubt = row.errors[quantity], row.doubts[quantity]
+    if error is None or doubt is None or row.values[quantity] is None:
         return ""
-    return f"{value:.6g}" if row.reference or error is None else f"{100 * error:+.3g} %"
+    known = f"{100 * error:+.3g}" if error else "0"
+    return f"{known} ~{100 * doubt:.2g} %" if doubt else f"{known} %"
 
 
 def _failure(row: Row) -> str:

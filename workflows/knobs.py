@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,26 +14,36 @@ from workflows.scene import PartScene, Scene
 from workflows.scene_file import SceneFile
 
 STUDIES = Path(__file__).parent / "studies"
-TOPS = (1, 3, 5)  # highest harmonic kept
+TOPS = (1, 3, 5, 7, 9, 13)  # highest harmonic kept
+WORN_TOP = 5  # more harmonics take minutes to wear
 SAMPLES = (32, 64, 256)
-NEWTON = (1e-2, 1e-4, 1e-6, 1e-9)
-KRYLOV = (0.5, 1e-2, 1e-8)
-POINTS = (10, 20, 40, 80, 320)
+NEWTON = (1e-4, 1e-6, 1e-8)
+KRYLOV = (0.5, 0.1, 1e-6)
+POINTS = (20, 40, 80, 160, 320, 640)
+ARCS = (0.25, 0.1, 0.04, 0.016)  # longest arc and turn of the tangent in one step
+CUTOFFS = (0.25, 0.5, 1, 2)  # over that of the scene
 RANKS = (3, 6, 12, 24)
 WEAR_STEPS = (0.1, 0.05)  # of delta_max
-WEAR_TOLERANCES = (0.3, 0.1, 0.03, 0.01)
+WEAR_TOLERANCES = (0.3, 0.1, 0.03, 0.01, 0.003)
+EXACT = float("nan")  # size of a setting that leaves no error
 
 
 @dataclass(frozen=True)
 class Setting:
-    """One position of a knob: overrides of the scene, and how fine it is, larger is finer; nan has no measure."""
+    """One position of a knob: overrides of the scene, and how fine it is: its error falls with a power of size.
+
+    refined : whether the peak is refined, or is the highest point of the curve, as a run states it
+    """
 
     size: float
     overrides: tuple[str, ...]
+    refined: bool = True
 
     @property
     def label(self) -> str:
         """The overrides without their sections."""
+        if not self.overrides:
+            return "refined peak"
         parts = [text.partition("=") for text in self.overrides]
         return ", ".join(f"{key.rpartition('.')[2]}={value}" for key, _, value in parts)
 
@@ -41,39 +52,54 @@ class Setting:
 class Knob:
     """A knob of a scene.
 
-    settings : from coarse to the reference, which is the last
+    settings : from coarse to the finest, which is the last
     tunable : whether finer is closer to the truth, so that a wanted accuracy may choose it; else it is another model
-    wears : whether it has a say in wear; refined : whether the peak is refined, or is the highest point of the curve
+    worn_up_to : size up to which depth and life are measured too
     """
 
     name: str
     settings: tuple[Setting, ...]
     tunable: bool = True
-    wears: bool = True
-    refined: bool = True
+    worn_up_to: float = math.inf
+
+    def wears(self, setting: Setting) -> bool:
+        """Whether depth and life of a setting are measured."""
+        return self.worn_up_to > 0 and not setting.size > self.worn_up_to
 
 
 @dataclass(frozen=True)
 class Ladder:
-    """Grids or meshes of a convergence study; base : overrides; life_up_to : size up to which the contact is worn."""
+    """Grids or meshes of a convergence study.
+
+    base : overrides; life_up_to : size up to which the contact is worn
+    placements : overrides that put the nodes elsewhere; every setting up to size `placed_up_to` is measured with each
+    """
 
     name: str
     settings: tuple[Setting, ...]
     base: tuple[str, ...]
     life_up_to: float
+    placements: tuple[tuple[str, ...], ...] = ()
+    placed_up_to: float = 0.0
 
 
 @dataclass(frozen=True)
 class Study:
     """How a scene is studied.
 
-    base : overrides that make its trade affordable; knobs : that only its geometry has
+    base : overrides that make its trade affordable; knobs : that only its geometry has, or with settings of its own
     ladders : grids and meshes of its convergence study
+    unworn : knobs whose depth and life are not measured, because that takes too long
+    check, check_worn : overrides that a promised accuracy is checked against, beside the finest setting of every knob;
+        of its response, and of its depth and life
     """
 
     base: tuple[str, ...] = ()
     knobs: tuple[Knob, ...] = ()
     ladders: tuple[Ladder, ...] = ()
+    unworn: tuple[str, ...] = ()
+    check: tuple[str, ...] = ()
+    check_worn: tuple[str, ...] = ()
 
 
 def study_of(name: str) -> Study:
@@ -83,12 +109,23 @@ def study_of(name: str) -> Study:
         return Study()
     text = path.read_text(encoding="utf-8")
     table = tomllib.loads(text)
-    knobs = tuple(Knob(knob, _settings(given)) for knob, given in table.get("knobs", {}).items())
+    knobs = tuple(
+        Knob(knob, _settings(given), worn_up_to=float(given.get("worn_up_to", math.inf)))
+        for knob, given in table.get("knobs", {}).items()
+    )
     ladders = tuple(
-        Ladder(ladder, _settings(given), tuple(given.get("base", ())), float(given.get("life_up_to", 0)))
+        Ladder(
+            ladder,
+            _settings(given),
+            tuple(given.get("base", ())),
+            float(given.get("life_up_to", 0)),
+            tuple(tuple(texts) for texts in given.get("placements", ())),
+            float(given.get("placed_up_to", 0)),
+        )
         for ladder, given in table.get("converge", {}).items()
     )
-    return Study(tuple(table.get("base", ())), knobs, ladders)
+    said = {name: tuple(table.get(name, ())) for name in ("base", "unworn", "check", "check_worn")}
+    return Study(knobs=knobs, ladders=ladders, **said)
 
 
 def _settings(table: dict[str, Any]) -> tuple[Setting, ...]:
@@ -97,24 +134,36 @@ def _settings(table: dict[str, Any]) -> tuple[Setting, ...]:
 
 
 def knobs_of(file: SceneFile, study: Study) -> tuple[Knob, ...]:
-    """The knobs that a scene has: those of its study, then those that any scene may have."""
+    """The knobs that a scene has: those of its study, then those that any scene may have and the study has not."""
+    own = {knob.name for knob in study.knobs}
+    found = (*study.knobs, *(knob for knob in _of_any(file) if knob.name not in own))
+    return tuple(replace(knob, worn_up_to=0.0) if knob.name in study.unworn else knob for knob in found)
+
+
+def _of_any(file: SceneFile) -> list[Knob]:
     scene = file.scene
-    found = [*study.knobs]
+    found: list[Knob] = []
     if isinstance(scene, PartScene):
         found += _of_a_part(scene)
     found += [*_of_harmonics(scene)]
-    found.append(_numbers("newton", "solver.tolerance", NEWTON, wears=False))
-    found.append(_numbers("krylov", "solver.krylov", KRYLOV, wears=False))
+    found.append(_numbers("newton", "solver.tolerance", NEWTON))
+    found.append(_numbers("krylov", "solver.krylov", KRYLOV))
+    finer: list[tuple[float, tuple[str, ...]]] = []
     if scene.response.method == "natural":
-        settings = tuple(Setting(n, (f"response.points={n}",)) for n in POINTS)
-        found.append(Knob("points", settings, wears=False, refined=False))
+        finer = [(n, (f"response.points={n}",)) for n in POINTS]
+    if scene.response.method == "arc_length":
+        finer = [(1 / a, tuple(f"response.options.{key}={a:g}" for key in ("step", "max_step", "angle"))) for a in ARCS]
+    if finer:  # wear finds its own peak
+        settings = tuple(Setting(size, texts, refined=False) for size, texts in finer)
+        found.append(Knob("points", (*settings, Setting(EXACT, ())), worn_up_to=0))
     if scene.wear is not None and scene.wear.max_steps > 0:
         rule = 'wear.rule="error_controlled"'
         controlled = tuple(Setting(1 / t, (rule, f"wear.tolerance={t:g}")) for t in WEAR_TOLERANCES)
         thesis = tuple(Setting(1 / s, ('wear.rule="thesis"', f"wear.step={s:g}")) for s in WEAR_STEPS)
         found.append(Knob("wear", controlled))
-        found.append(Knob("wear_thesis", (*thesis, controlled[-1]), tunable=False))
-    return tuple(found)
+        finest = Setting(EXACT, controlled[-1].overrides)
+        found.append(Knob("wear_thesis", (*thesis, finest), tunable=False))
+    return found
 
 
 def chosen(known: Sequence[Knob], names: Sequence[str]) -> tuple[Knob, ...]:
@@ -129,15 +178,18 @@ def _of_a_part(scene: PartScene) -> list[Knob]:
     found = []
     if scene.contact.plane is None and not scene.surfaces:
         corners = Setting(1.0, ("contact.vertices_only=true",))
-        found.append(Knob("nodes", (corners, Setting(2.0, ("contact.vertices_only=false",))), tunable=False))
+        found.append(Knob("nodes", (corners, Setting(EXACT, ("contact.vertices_only=false",))), tunable=False))
     modes = scene.reduction.modes
     if modes:
         counts = sorted({0, modes // 3, modes, 3 * modes})
         found.append(Knob("modes", tuple(Setting(n, (f"reduction.modes={n}",)) for n in counts)))
+    if scene.reduction.cutoff:
+        cutoffs = [factor * scene.reduction.cutoff for factor in CUTOFFS]
+        found.append(Knob("modes", tuple(Setting(c, (f"reduction.cutoff={c:g}",)) for c in cutoffs)))
     if scene.wheel is not None:
         return found
     ranks = tuple(Setting(n, (f"reduction.interface_modes={n}",)) for n in RANKS)
-    found.append(Knob("interface_rank", (*ranks, Setting(float("nan"), ("reduction.interface_modes=",)))))
+    found.append(Knob("interface_rank", (*ranks, Setting(EXACT, ("reduction.interface_modes=",)))))
     return found
 
 
@@ -147,21 +199,21 @@ def _of_harmonics(scene: Scene) -> list[Knob]:
     first = 0 if 0 in needed or scene.harmonics.automatic else 1
     more = ("harmonics.samples=128",) if scene.harmonics.samples < 128 else ()
     kept = tuple(Setting(top, (f"harmonics.kept={list(range(first, top + 1))}", *more)) for top in tops)
-    found = [Knob("harmonics", kept, wears=False)] if len(kept) > 1 else []
+    found = [Knob("harmonics", kept, worn_up_to=WORN_TOP)] if len(kept) > 1 else []
     if hasattr(law.load(scene.contact.law), "located"):
         top = max(scene.harmonics.kept, default=1)
         sampled = tuple(
             Setting(n, (f"harmonics.samples={n}", 'harmonics.transitions="sampled"')) for n in SAMPLES if n > 2 * top
         )
-        located = Setting(float("nan"), ("harmonics.samples=256", 'harmonics.transitions="located"'))
-        found.append(Knob("samples", (*sampled, located), wears=False))
+        located = ("harmonics.samples=128", 'harmonics.transitions="located"')
+        found.append(Knob("samples", (*sampled, Setting(EXACT, located))))
     if scene.contact.components == ("t1", "t2", "n") and scene.contact.law == "jenkins":
         common = ("harmonics.samples=256", 'harmonics.transitions="sampled"')
         names = ("jenkins", "coulomb_planar")  # directions that know nothing of each other, or one planar slider
-        laws = tuple(Setting(i, (f'contact.law="{name}"', *common)) for i, name in enumerate(names))
-        found.append(Knob("friction", laws, tunable=False, wears=False))
+        laws = tuple(Setting(EXACT, (f'contact.law="{name}"', *common)) for name in names)
+        found.append(Knob("friction", laws, tunable=False, worn_up_to=0))
     return found
 
 
-def _numbers(name: str, key: str, values: tuple[float, ...], wears: bool = True) -> Knob:
-    return Knob(name, tuple(Setting(1 / value, (f"{key}={value:g}",)) for value in values), wears=wears)
+def _numbers(name: str, key: str, values: tuple[float, ...]) -> Knob:
+    return Knob(name, tuple(Setting(1 / value, (f"{key}={value:g}",)) for value in values))

@@ -19,7 +19,7 @@ from hbm.operating_point import OperatingPoint
 from hbm.wear_history import LIFE_SHARE, WearHistory, cycles_to_preload
 from workflows import pipeline
 from workflows.progress import Progress
-from workflows.references import free_deflection
+from workflows.references import delta_max, free_deflection
 from workflows.scene_file import SceneFile
 from workflows.trade_table import QUANTITIES
 
@@ -87,7 +87,7 @@ def wear(file: SceneFile, model: pipeline.Model) -> WearHistory:
     assert wanted is not None
     area, duties = model.reduced.interface.area, pipeline.mission(file.scene)
     problem = WearProblem(balance, duties, wanted.law, wanted.coefficient, area, lost_below=LIFE_SHARE)
-    scale = float(free_deflection(balance).max())
+    scale = delta_max(file.scene, free_deflection(balance), area)
     if wanted.rule == "thesis":
         assert wanted.step is not None
         share = wanted.step.share

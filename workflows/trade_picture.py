@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
@@ -23,11 +24,11 @@ def picture(trade: Trade) -> Figure:
         colours = mpl.colormaps["tab20"].colors  # type: ignore[attr-defined]
         for pane, quantity in zip(panes, shown, strict=True):
             for i, knob in enumerate(trade.knobs):
-                rows = [row for row in trade.of(knob) if not row.reference and row.errors[quantity] is not None]
+                rows = [row for row in trade.of(knob) if row.errors[quantity] is not None and np.isfinite(row.size)]
                 error = [max(abs(row.errors[quantity] or 0.0), FLOOR) for row in rows]
                 style = {"color": colours[i % 20], "marker": MARKERS[i % len(MARKERS)], "linestyle": "none"}
                 pane.plot([row.seconds for row in rows], error, label=knob.replace("_", " "), markersize=5, **style)
-            front = [row for row in pareto(trade.rows, quantity) if not row.reference]
+            front = pareto((row for row in trade.rows if np.isfinite(row.size)), quantity)
             at = [max(abs(row.errors[quantity] or 0.0), FLOOR) for row in front]
             pane.plot([row.seconds for row in front], at, color=INK, linewidth=0.8, zorder=0)
             pane.set_xscale("log")  # before its formatter
@@ -35,6 +36,6 @@ def picture(trade: Trade) -> Figure:
             pane.xaxis.set_minor_formatter(NullFormatter())
             name = NAMES[QUANTITIES.index(quantity)]
             pane.set(yscale="log", xlabel="seconds of one processor", title=f"{trade.scene}: {name}")
-        panes[0].set_ylabel("relative error against the knob's reference")
+        panes[0].set_ylabel("relative error from where the knob tends to")
         panes[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
     return figure

@@ -13,11 +13,11 @@ import numpy as np
 
 from hbm.branch import CONVERGED
 from workflows.knobs import study_of
+from workflows.limit import limit_of
 from workflows.scene import Scene
 
-FORMAT = "tribodyn trade 1"
+FORMAT = "tribodyn trade 2"
 TRADES = Path(__file__).parent / "trades"
-ROUNDING = 1e-9  # relative difference below which no order can be told
 QUANTITIES = ("peak_hz", "peak_m", "energy_J", "preload_N", "depth_m", "life_cycles")
 NAMES = ("peak frequency", "amplitude", "energy", "preload", "depth", "life")
 
@@ -26,10 +26,11 @@ NAMES = ("peak frequency", "amplitude", "energy", "preload", "depth", "life")
 class Row:
     """One setting of a knob.
 
-    size : of the setting, larger is finer, nan without a measure; overrides : of the scene
-    values : by QUANTITIES in SI units, None where there is none; errors : relative to the knob's reference
-    seconds : of one processor; memory : largest of the process [bytes]; outcome : "converged" or a sentence
-    reference : whether this is the setting that the others are held against
+    size : of the setting, larger is finer, nan where it is exact; overrides : of the scene
+    values : by QUANTITIES in SI units, None where there is none
+    errors : relative to where the knob's values tend to; doubts : how far off that limit itself may be
+    seconds : of one processor; share : of the seconds of the base, asked for the same answers
+    memory : largest of the process [bytes]; outcome : "converged" or a sentence
     """
 
     knob: str
@@ -38,10 +39,11 @@ class Row:
     overrides: tuple[str, ...]
     values: dict[str, float | None]
     errors: dict[str, float | None]
+    doubts: dict[str, float | None]
     seconds: float
+    share: float
     memory: float
     outcome: str
-    reference: bool
     tunable: bool
 
     @property
@@ -71,17 +73,21 @@ class Trade:
         return tuple(dict.fromkeys(row.knob for row in self.rows))
 
     def of(self, knob: str) -> tuple[Row, ...]:
-        """Rows of a knob, the reference last."""
+        """Rows of a knob, the finest last."""
         return tuple(row for row in self.rows if row.knob == knob)
 
     def order(self, knob: str, quantity: str) -> float | None:
-        """Observed order: minus the slope of log error over log size; None where errors are too few or rounding."""
-        points = [(row.size, abs(row.errors[quantity] or 0.0)) for row in self.of(knob) if not row.reference]
-        usable = [(size, error) for size, error in points if np.isfinite(size) and size > 0 and error > ROUNDING]
-        if len(usable) < 2:
-            return None
-        size, error = np.log(np.array(usable)).T
-        return float(-np.polyfit(size, error, 1)[0])
+        """Observed order of convergence of the finest settings; None where they are too few or do not settle."""
+        known = known_of(self.of(knob), quantity)
+        order = limit_of(*zip(*known, strict=True)).order if known else float("nan")
+        return order if np.isfinite(order) else None
+
+
+def known_of(rows: Iterable[Row], quantity: str) -> list[tuple[float, float]]:
+    """Size and value of the rows that say a quantity, from coarse to fine."""
+    return [
+        (row.size, value) for row in rows if row.outcome == CONVERGED and (value := row.values[quantity]) is not None
+    ]
 
 
 def key_of(name: str, scene: Scene) -> str:
@@ -101,10 +107,11 @@ def key_of(name: str, scene: Scene) -> str:
 
 # set by knobs that any scene may have, so that they do not make another scene
 KNOB_KEYS = (
-    *(f"reduction.{key}" for key in ("modes", "interface_modes", "interface_keep")),
+    *(f"reduction.{key}" for key in ("modes", "cutoff", "interface_modes", "interface_keep")),
     *(f"harmonics.{key}" for key in ("kept", "samples", "transitions", "tolerance", "highest")),
     *(f"wear.{key}" for key in ("rule", "step", "tolerance", "max_steps")),
     "response.points",
+    "response.options",
 )
 
 

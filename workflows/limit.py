@@ -1,0 +1,83 @@
+"""Where the answers of a knob tend to as it gets finer, and how much of that is doubtful."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+ORDERS = (0.5, 4.0)  # slower is not taken for settling; faster is not relied on
+SAFETY = 0.25  # of the extrapolated remainder that stays in doubt (Roache: a factor of 1.25 on three grids)
+SMALLEST = 1e-3  # size of a setting that leaves all out
+ROUNDING = 1e-9  # relative difference that means nothing
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Where values tend to.
+
+    order : observed, nan where they do not settle monotonically or are too few
+    doubt : how far off the limit itself may be, relative to it
+    """
+
+    value: float
+    order: float
+    doubt: float
+
+
+def limit_of(size: Sequence[float], value: Sequence[float]) -> Limit:
+    """The limit of values whose error falls with a power of the size, judged by the last three.
+
+    size : rising, the last one nan where that setting is exact; value : the last one not 0
+    Three that settle monotonically are extrapolated with their observed order. Three that alternate and come closer
+    have their limit between the last two. Else the last one stands, and the spread of the three is its doubt. Two are
+    taken to be of first order; one says nothing about itself, which is an infinite doubt.
+    Source  Roache, J. Fluids Eng. 116, 1994
+    """
+    last = value[-1]
+    if not np.isfinite(size[-1]):
+        return Limit(last, _slope(size[:-1], [abs(v / last - 1) for v in value[:-1]]), 0.0)
+    if len(value) == 1:
+        return Limit(last, float("nan"), float("inf"))
+    h, v = 1 / np.maximum(size[-3:], SMALLEST), np.array(value[-3:], dtype=float)
+    steps = np.diff(v)
+    near = np.abs(steps) <= ROUNDING * abs(last)
+    if near[-1] and (near.all() or len(v) == 3):
+        return Limit(last, float("nan"), float(abs(steps[-1] / last)))
+    if len(v) == 2:
+        return Limit(last, float("nan"), float(abs(steps[0] / last) * h[1] / (h[0] - h[1])))
+    ratio = steps[0] / steps[1]
+    if ratio > 0 and (order := _order(h, ratio)) >= ORDERS[0]:
+        p = min(order, ORDERS[1])
+        rest = steps[1] * h[2] ** p / (h[1] ** p - h[2] ** p)
+        return Limit(float(last + rest), order, float(SAFETY * abs(rest / (last + rest))))
+    if ratio < -1:
+        return Limit(last, float("nan"), float(abs(steps[1] / last)))
+    return Limit(last, float("nan"), float(np.ptp(v) / abs(last)))
+
+
+def _order(h: np.ndarray, ratio: float) -> float:
+    """p with (h0^p - h1^p) / (h1^p - h2^p) = ratio, nan below 0.01."""
+    low, high = 0.01, 60.0
+
+    def excess(p: float) -> float:
+        # in powers of h0, so that fine tolerances do not underflow
+        a, b = (h[1] / h[0]) ** p, (h[2] / h[0]) ** p
+        return float((1 - a) / max(a - b, 1e-300) - ratio)
+
+    if excess(low) > 0:
+        return float("nan")
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (low, middle) if excess(middle) > 0 else (middle, high)
+    return low
+
+
+def _slope(size: Sequence[float], error: Sequence[float]) -> float:
+    """Order by the last two errors, nan where they are rounding."""
+    known = [(s, e) for s, e in zip(size, error, strict=True) if s > 0 and e > ROUNDING][-2:]
+    if len(known) < 2:
+        return float("nan")
+    (s0, e0), (s1, e1) = known
+    return float(np.log(e0 / e1) / np.log(s1 / s0))
