@@ -18,13 +18,14 @@ from hbm import newton
 from hbm.evolution import WearProblem, WearState, assess, first_preload, reason_to_stop, row_of, state_of, worn_state
 from hbm.operating_point import point_of
 from hbm.wear_history import LIFE_SHARE, WearHistory, WearRow, history
-from hbm.wearing import WearingBalance
+from hbm.wearing import WearingBalance, WornState
 
 GAMMA = 1 - 1 / np.sqrt(2)
 GROWTH = (0.2, 3.0)  # limits of the ratio of one step to the one before
 TREND = 0.2  # power with which an error that grows from step to step holds the next one back
 LANDING = (0.97, 0.999)  # of the preload at which an event is located, where a step that would pass it must end
 FAINTEST = 1e-4  # share of the first preload below which the last touch is noise of Newton's tolerance
+LEAPS = 0.01 * 3.0 ** np.arange(5)  # depths of steps over the end of a branch, of the tolerance, tried in turn
 MAX_CORRECTIONS = 12  # solves of a stage
 GAIN_ACCURACY = 1e-9  # of the depth, for laws whose depth per work is not constant
 
@@ -53,7 +54,7 @@ def evolve(
     problem = replace(problem, lost_below=max(problem.lost_below, FAINTEST))
     rows = resume.rows() if resume is not None else []
     if rows and rows[-1].cycles_in_step == 0:
-        return history(rows, resume.end if resume is not None else "")
+        rows.pop()  # the end, without the sentence that says why: come to it again
     if rows:  # the state after the last step was not kept: take the step again, to the same bits
         again = rows.pop()
         state = _step(problem, tolerance, replace(state_of(problem, again), solves=0), rows).after
@@ -89,10 +90,11 @@ class _Taken:
 
 def _step(problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow]) -> _Taken:
     """One accepted step from a state; where an event would be passed, the step ends at it."""
-    smallest = 1e-9 * tolerance.scale / max(float(state.rate.max()), 1e-300)
-    stride = 0.1 * tolerance.share * tolerance.scale / float(state.rate.max())
+    smallest = 1e-9 * tolerance.scale / float(state.rate.max())
+    leap = LEAPS[0] * tolerance.share * tolerance.scale / float(state.rate.max())
+    stride = 10 * leap
     drift, slopes = np.zeros(len(state.points)), -np.ones(len(state.points))
-    if rows:
+    if rows and rows[-1].plan[0] > 0:
         stride, slopes = float(rows[-1].plan[0]), rows[-1].plan[1:]
         omega = np.array([point.state.omega for point in state.points])
         drift = (omega - rows[-1].duty_omega) / (state.cycles - rows[-1].cycles)
@@ -115,11 +117,8 @@ def _step(problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Se
             stride *= _share_to(target, problem.balance.preload(state.points[0].state), preload)
         else:
             stride = min(stride * _growth(error), 0.5 * longest if second.failure else np.inf)
-        if stride < smallest:
-            nothing = np.zeros_like(problem.area)
-            plan = np.zeros(1 + len(state.points))
-            failed = row_of(problem, replace(state, solves=solves), 0.0, nothing, nothing, 0.0, plan)
-            return _Taken(failed, None, second.failure or "no wear step is small enough for the tolerance")
+        if stride < (leap if second.failure else smallest):
+            return _leap(problem, replace(state, solves=solves), leap, second.failure, rows)
     worn = second.depth - state.depth
     work = stride * ((1 - GAMMA) * first.work + GAMMA * second.work)
     trend = (rows[-1].step_error / error) ** TREND if rows and error > 0 else 1.0
@@ -127,6 +126,28 @@ def _step(problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Se
     plan = np.array([stride * ratio, *slopes])
     row = row_of(problem, replace(state, solves=solves), stride, worn, work, error, plan)
     return _Taken(row, replace(second, solves=0))
+
+
+def _leap(
+    problem: WearProblem, state: WearState, stride: float, failure: str, rows: Sequence[WearRow]
+) -> _Taken:
+    """An explicit step over the end of a branch, behind which the site is looked for as at the start.
+
+    The response folds, or the tracked peak merges with a valley: no solution follows on the one here. A step that did
+    not get over it is followed by a longer one, until one would be longer than the tolerance.
+    """
+    nothing = np.zeros_like(problem.area)
+    plan = np.zeros(1 + len(state.points))
+    tried = next((i for i, row in enumerate(reversed(rows)) if row.plan[0] > 0), len(rows))
+    if failure and tried < len(LEAPS):
+        stride *= LEAPS[tried] / LEAPS[0]
+        worn = stride * state.rate
+        after = assess(problem, state.depth + worn, state.cycles + stride, None)
+        if not after.failure:
+            return _Taken(row_of(problem, state, stride, worn, stride * state.work, 1.0, plan), after)
+        failure = after.failure
+    failed = row_of(problem, state, 0.0, nothing, nothing, 0.0, plan)
+    return _Taken(failed, None, failure or "no wear step is small enough for the tolerance")
 
 
 def _event(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) -> float:
@@ -179,14 +200,17 @@ def _stage(
     unworn = [problem.balance.with_load(duty.load) for duty in duties]
     gain = _gain(problem, near)
     accuracy = np.array([duty.site.accuracy for duty in duties])
-    x, solves = np.concatenate(guess, axis=1), 0
+    x, depth = np.concatenate(guess, axis=1), near.depth + stretch * near.rate
+    solves = rounds = 0
     for search in searches:
         search.start()
     while True:
-        balance = WearingBalance(unworn, [duty.share for duty in duties], base, stretch, gain)
-        solution = newton.solve(balance, tuple(omega), x)
-        solves += len(duties)
-        depth = balance.depth(solution.state.x)
+        balance = WearingBalance(unworn, [duty.share for duty in duties], base, stretch, gain, depth)
+        solution = newton.solve(balance, tuple(omega), x, duties[0].site.newton)
+        solves, rounds = solves + len(duties), rounds + 1
+        worn_at = solution.state
+        assert isinstance(worn_at, WornState)
+        depth = worn_at.depth
         points, corrections = [], []
         for w, duty, part in zip(omega, duties, balance.parts(solution.state.x), strict=True):
             worn = problem.at_depth(depth).with_load(duty.load)
@@ -203,10 +227,10 @@ def _stage(
         settled = np.all(np.abs(turned - gain) * found.work * stretch <= GAIN_ACCURACY * np.abs(depth).max())
         if settled and np.all(np.abs(after - omega) <= accuracy * omega):
             return found
-        if solves > MAX_CORRECTIONS * len(duties):
+        if rounds > MAX_CORRECTIONS:
             lost = replace(solution, outcome=f"the site of a duty was not found in {MAX_CORRECTIONS} solves")
             return replace(found, points=tuple(replace(p, solution=replace(lost, state=p.state)) for p in points))
-        x = solution.state.x + balance.follow(solution.state, after - omega)
+        x = solution.state.x + balance.follow(worn_at, after - omega)
         omega, gain = after, turned
 
 

@@ -12,11 +12,20 @@ from hbm.branch import CONVERGED
 
 VANISHING = 1e-6  # size of x, relative to the start, below which a solution counts as zero
 RAMP_STEPS = 12  # Newton steps in one step of the load ramp
-SHORTEST = 4e-4  # share of a Newton step that is tried
+FORCE_ACCURACY = 1e-4  # of the contact forces, wanted where these stretch their springs far less than x is large
+FINEST = 1e-12  # residual over the displacement that is asked for at most
+
+
+class _Springs(Protocol):
+    @property
+    def k(self) -> np.ndarray: ...
 
 
 class Balance(Protocol):
     """What Newton's method solves; omega is whatever the balance takes for its frequency."""
+
+    @property
+    def compliance(self) -> _Springs: ...
 
     def x_lin(self, omega: Any) -> np.ndarray: ...
 
@@ -31,12 +40,16 @@ class NewtonOptions:
 
     tolerance : of the residual over the displacement; max_steps : Newton steps; max_products : per direction
     krylov : largest relative residual of a direction; the forcing term asks for less where Newton is fast
+    shortest : share of a Newton step that is tried
+    slowest : residual over that of two steps before from which on the solve is given up; 1 goes on while it falls
     """
 
     tolerance: float = 1e-8
     max_steps: int = 40
     max_products: int = 300
     krylov: float = 0.1
+    shortest: float = 4e-4
+    slowest: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -70,7 +83,9 @@ def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOption
     """Solve the balance at one frequency.
 
     omega : [rad/s]; start : (n_pair, n_component, n_coeff) first guess [m]
-    Returns a Solution; its state is the best met, also where it did not converge
+    Returns a Solution; its state is the best met, also where it did not converge. Where a contact barely touches while
+    it swings far, a residual small beside x is not small beside the stretch of its springs: Newton then goes on until
+    it is, as far as rounding lets it
     Source  inexact Newton with the forcing term of Eisenstat and Walker 1996, choice 2
     """
     options = options or NewtonOptions()
@@ -82,25 +97,29 @@ def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOption
     forcing = 1e-3
     products = 0
     for step in range(1, options.max_steps + 1):
-        if error <= options.tolerance:
+        wanted = min(options.tolerance, _finer(balance, state, x_lin, least))
+        if error <= wanted:
             return Solution(state, CONVERGED, step - 1, products, tuple(history))
         if not np.isfinite(error):
             return Solution(state, "the residual is not a finite number", step - 1, products, tuple(history))
         linear = balance.linearise(state)
-        target = max(min(forcing, options.krylov), 0.3 * options.tolerance / error, 1e-12)
+        target = max(min(forcing, options.krylov), 0.3 * wanted / error, 1e-12)
         try:
             with np.errstate(over="raise"):
                 direction, spent, reached = linear.solve(-state.residual, target, options.max_products)
         except FloatingPointError:  # a slope too steep for the single precision of the products
             spent, reached = 0, np.inf
         products += spent
-        if reached > max(10 * target, 0.5):  # Krylov stalled: the direct way
+        stalled = reached > max(10 * target, 0.5)
+        if stalled and error <= options.tolerance:
+            break
+        if stalled:  # the direct way
             try:
                 direction = np.linalg.solve(linear.dense(), -state.residual.ravel()).reshape(state.residual.shape)
             except np.linalg.LinAlgError:  # nothing holds the contact in some direction
                 why = f"singular Jacobian at relative residual {error:.1e}"
                 return Solution(state, why, step, products, tuple(history))
-        state, new_error = _search(balance, omega, state, direction, error, x_lin, least)
+        state, new_error = _search(balance, omega, state, direction, error, x_lin, least, options.shortest)
         history.append(new_error)
         if new_error >= error * (1 - 1e-10):
             if new_error <= options.tolerance:
@@ -108,8 +127,21 @@ def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOption
             return Solution(state, f"no descent from relative residual {error:.1e}", step, products, tuple(history))
         forcing = 0.5 * (new_error / error) ** 1.5
         error = new_error
+        if step > 1 and error > max(options.slowest * history[-3], options.tolerance):
+            return Solution(state, f"slow descent at relative residual {error:.1e}", step, products, tuple(history))
     outcome = CONVERGED if error <= options.tolerance else f"not converged in {options.max_steps} steps: {error:.1e}"
     return Solution(state, outcome, len(history) - 1, products, tuple(history))
+
+
+def _finer(balance: Balance, state: State, x_lin: np.ndarray, least: float) -> float:
+    """The relative residual that leaves the contact forces FORCE_ACCURACY; infinite where nothing touches."""
+    k = balance.compliance.k[:, None]
+    stretch = np.divide(state.cycle.force.reshape(state.g.shape), k, out=np.zeros_like(state.g), where=k > 0)
+    size = float(np.linalg.norm(stretch))
+    if size == 0.0:
+        return np.inf
+    scale = max(float(np.linalg.norm(state.x)), float(np.linalg.norm(x_lin)), least)
+    return max(FORCE_ACCURACY * size / scale, FINEST)
 
 
 def _search(
@@ -120,6 +152,7 @@ def _search(
     error: float,
     x_lin: np.ndarray,
     least: float,
+    shortest: float,
 ) -> tuple[State, float]:
     """Backtrack until the residual falls; the derivative has kinks, so the best trial is kept if none falls enough.
 
@@ -127,7 +160,7 @@ def _search(
     """
     best, best_error = state, error
     length = 1.0
-    while length > SHORTEST:
+    while length > shortest:
         trial = balance.evaluate(omega, state.x + length * direction.reshape(state.x.shape))
         trial_error = relative_residual(trial, x_lin, least)
         if trial_error < best_error:

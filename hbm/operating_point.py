@@ -13,8 +13,11 @@ import numpy as np
 from hbm import newton
 from hbm.balance import HarmonicBalance, State
 from hbm.branch import CONVERGED, amplitude
-from hbm.continuation import arc_length, natural
+from hbm.continuation import adaptive, arc_length
 from hbm.newton import NewtonOptions, Solution
+
+SCAN_TOLERANCE = 0.03  # of the response between the points of the first search
+COARSEST = 0.05  # longest step of the first search, share of its range
 
 
 @dataclass(frozen=True)
@@ -83,7 +86,8 @@ class AtFrequency:
 class AtPeak:
     """The cycle at the resonance peak of an output.
 
-    start, stop : range that the first search scans [rad/s], n_scan : its points; it starts at `start`
+    start, stop : range that the first search scans [rad/s], from `start` on; n_scan : its steps where nothing bends are
+        up to five times as long as of so many points
     tolerance : relative, on the frequency of the peak
     """
 
@@ -95,12 +99,15 @@ class AtPeak:
     newton: NewtonOptions = field(default_factory=NewtonOptions)
 
     def first(self, balance: HarmonicBalance) -> OperatingPoint:
-        """Scan the range, then refine its highest point."""
-        branch = natural.follow(balance, self.start, self.stop, natural.Options(self.n_scan, newton=self.newton))
+        """Scan the range, points dense where the response bends, then refine its highest point."""
+        step = min(1 / self.n_scan, COARSEST)
+        scan = adaptive.Options(SCAN_TOLERANCE, step, min(5 * step, COARSEST), 1e-3 * step, newton=self.newton)
+        branch = adaptive.follow(balance, self.start, self.stop, scan)
         height = branch.amplitude(self.output, balance.basis.has_static)
         best = int(np.argmax(np.where([o == CONVERGED for o in branch.outcome], height, -1.0)))
         x = branch.contact[best].reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
-        width = abs(self.stop - self.start) / (self.n_scan - 1)
+        near = branch.omega[max(best - 1, 0) : best + 2]
+        width = float(np.ptp(near)) / max(len(near) - 1, 1)
         found = self._refine(balance, branch.omega[best], x, 0.5 * width)
         return OperatingPoint(found.solution, found.amplitude, found.response, found.solves + len(branch.omega))
 
@@ -129,6 +136,7 @@ class AtPeak:
             return _point(balance, here.solution, self.output, solves)
         resolution = self.tolerance * omega
         uphill = other = None  # the latest points on either side of the zero, once it is bracketed
+        climbed: bool | None = None  # whether the last point inside the bracket replaced `uphill`
         before: _Slope | None = None
         best = here
         while solves < 60:
@@ -156,12 +164,13 @@ class AtPeak:
             if there.slope * here.slope <= 0 and uphill is None:
                 uphill, other = here, there
             elif uphill is not None and other is not None:
-                if there.slope * uphill.slope > 0:
-                    other = replace(other, weight=0.5 * other.weight)  # Illinois: an end that stays loses weight
-                    uphill = there
+                climbs = there.slope * uphill.slope > 0
+                kept = 0.5 if climbs == climbed else 1.0  # Illinois: an end that stays twice loses weight
+                if climbs:
+                    uphill, other = there, replace(other, weight=kept * other.weight)
                 else:
-                    uphill = replace(uphill, weight=0.5 * uphill.weight)
-                    other = there
+                    uphill, other = replace(uphill, weight=kept * uphill.weight), there
+                climbed = climbs
             before, here = here, there
             if abs(there.slope) <= abs(best.slope):
                 best = there
@@ -180,6 +189,11 @@ class BesidePeak:
 
     peak: AtPeak
     ratio: float
+
+    @property
+    def newton(self) -> NewtonOptions:
+        """How exactly and how long Newton works."""
+        return self.peak.newton
 
     def first(self, balance: HarmonicBalance) -> OperatingPoint:
         """Find the peak, then go to the ratio."""

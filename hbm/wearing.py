@@ -26,6 +26,16 @@ ROUNDING = 4e-16
 
 
 @dataclass(frozen=True)
+class WornState(State):
+    """A state with the wear depth that goes with its x.
+
+    depth : (n_pair,) [m]
+    """
+
+    depth: np.ndarray
+
+
+@dataclass(frozen=True)
 class _Springs:
     """The stuck springs of all duties, as the linearised balance reads them."""
 
@@ -84,6 +94,7 @@ class WearingBalance:
     balances : one per duty, over the same contact and with the gap before any wear; shares : of the cycles
     base : (n_pair,) depth at no work [m]; cycles : that the stage stands for
     gain : (n_pair,) depth per friction work [m/J]
+    guess : (n_pair,) depth to look from [m]; each search starts where the last one ended
     x and State run over the duties of a pair, then its components: (n_pair, n_duty * n_component, n_coeff); frequencies
     are a tuple, one per duty.
     """
@@ -95,8 +106,10 @@ class WearingBalance:
         base: np.ndarray,
         cycles: float,
         gain: np.ndarray,
+        guess: np.ndarray,
     ):
         self.balances, self.shares, self.base, self.cycles, self.gain = balances, shares, base, cycles, gain
+        self._guess = np.maximum(guess, base)
         first = balances[0]
         self._n_component = len(first.parameters.components)
         spread = first.compliance.k.reshape(-1, 1, self._n_component)
@@ -116,31 +129,27 @@ class WearingBalance:
         """x of every duty from the joined one."""
         return [np.ascontiguousarray(part) for part in np.split(x, len(self.balances), axis=1)]
 
-    def evaluate(self, omega: tuple[float, ...], x: np.ndarray) -> State:
+    def evaluate(self, omega: tuple[float, ...], x: np.ndarray) -> WornState:
         """The balance at x, every pair at the depth that its own work wears."""
-        _, cycle = self._wear_along(x)
+        depth, cycle = self._wear_along(x)
         flat = x.reshape(-1, x.shape[2])
         g = self.compliance.k[:, None] * flat - cycle.force.reshape(flat.shape)
         residual = flat - self.x_lin(omega) - self.at(omega).apply(g)
-        return State(omega, x, cycle, g, residual)  # type: ignore[arg-type]
+        return WornState(omega, x, cycle, g, residual, depth)  # type: ignore[arg-type]
 
     def linearise(self, state: State) -> Linearisation:
         """d R / d x at a state."""
         return Linearisation(self, state)  # type: ignore[arg-type]
 
-    def follow(self, state: State, moves: np.ndarray) -> np.ndarray:
+    def follow(self, state: WornState, moves: np.ndarray) -> np.ndarray:
         """First-order change of x when the duties' frequencies move by `moves` [rad/s], the depths following."""
         omegas: tuple[float, ...] = state.omega  # type: ignore[assignment]
-        depth, spread = self.depth(state.x), []
+        spread = []
         for balance, omega, part, move in zip(self.balances, omegas, self.parts(state.x), moves, strict=True):
-            there = balance.with_gap(balance.parameters.gap + depth)
+            there = balance.with_gap(balance.parameters.gap + state.depth)
             spread.append(move * there.frequency_slope(there.evaluate(omega, part))[0])
         moved, _, _ = self.linearise(state).solve(-self.at(omegas).join(spread), 1e-4)
         return moved.reshape(state.x.shape)
-
-    def depth(self, x: np.ndarray) -> np.ndarray:
-        """(n_pair,) wear depth that goes with x [m]."""
-        return self._wear_along(x)[0]
 
     def _wear_along(self, x: np.ndarray) -> tuple[np.ndarray, ContactCycle]:
         """Depth that goes with x, and the contact cycles at it with their derivative along x and depth."""
@@ -178,7 +187,7 @@ class WearingBalance:
     def _solve_depth(self, parts: Sequence[np.ndarray]) -> tuple[np.ndarray, list[_Sample]]:
         """The depth of every pair by Newton's method inside a bracket, and the cycles at it."""
         size = np.maximum.reduce([np.abs(p).max(axis=(1, 2)) for p in parts])
-        depth, low, high = self.base.copy(), self.base.copy(), np.full_like(self.base, np.inf)
+        depth, low, high = self._guess.copy(), self.base.copy(), np.full_like(self.base, np.inf)
         full = self._sample(parts, depth, np.arange(len(depth)))
         todo = np.arange(len(depth))
         samples = full
@@ -191,16 +200,17 @@ class WearingBalance:
             high[todo] = np.where(miss > 0, depth[todo], high[todo])
             here, below, above = depth[todo], low[todo], high[todo]
             trial = here - miss / np.where(bend > 0, bend, 1.0)
+            scale = np.maximum(np.maximum(np.abs(here), size[todo]), 1e-300)
+            done = (miss == 0) | (np.abs(trial - here) <= ROUNDING * scale) | (above - below <= ROUNDING * scale)
             middle = np.where(np.isfinite(above), 0.5 * (below + above), here - miss)
             trial = np.where((trial > below) & (trial < above), trial, middle)
-            scale = np.maximum(np.maximum(np.abs(here), size[todo]), 1e-300)
-            done = (miss == 0) | (np.abs(trial - here) <= ROUNDING * scale)
             if done.all():
                 break
             todo = todo[~done]
             depth[todo] = trial[~done]
             samples = self._sample(parts, depth, todo)
             full = [whole.updated(todo, part) for whole, part in zip(full, samples, strict=True)]
+        self._guess = depth
         return depth, full
 
     def _sample(self, parts: Sequence[np.ndarray], depth: np.ndarray, pairs: np.ndarray) -> list[_Sample]:

@@ -55,24 +55,26 @@ def craig_bampton(
         raise ValueError("Craig-Bampton: every DOF is a master, nothing is left to reduce: use the matrices")
     K_ss, M_ss = K[s][:, s], M[s][:, s]
     factor = factorise(K_ss, solver=solver)
-    psi = constraint_modes(factor, csc_matrix(K[s][:, m]))
     omega, phi, omitted = fixed_interface_modes(K_ss, M_ss, factor, n_modes, cutoff)
 
     n_m = len(m)
     basis = np.zeros((system.n_dof, n_m + len(omega)))
     basis[m, np.arange(n_m)] = 1.0  # A.5
-    basis[s, :n_m] = psi
     basis[s, n_m:] = phi
-    inertia = M @ basis
-    mass = _symmetric(basis.T @ inertia)  # A.6
-    mass[n_m:, n_m:] = np.eye(len(omega))
     stiffness = np.diag(np.concatenate([np.zeros(n_m), omega**2]))
-    stiffness[:n_m, :n_m] = _symmetric(K[m][:, m] + K[m][:, s] @ psi)  # A.7
+    K_sm, K_ms, K_mm = csc_matrix(K[s][:, m]), K[m][:, s], K[m][:, m]
+    for block in _blocks(n_m):
+        psi = constraint_modes(factor, K_sm[:, block])
+        basis[s, block] = psi
+        stiffness[:n_m, block] = K_mm[:, block] + K_ms @ psi  # A.7
+    stiffness = _symmetric(stiffness)
+    mass = _congruent(basis, M)  # A.6
+    mass[n_m:, n_m:] = np.eye(len(omega))
 
     reduced = SecondOrderSystem(
         mass,
         stiffness,
-        None if system.damping is None else _symmetric(basis.T @ (system.damping @ basis)),
+        None if system.damping is None else _congruent(basis, system.damping),
         {name: basis.T @ load for name, load in system.loads.items()},  # A.8
         {name: basis.T @ row for name, row in system.outputs.items()},
     )
@@ -90,7 +92,7 @@ def craig_bampton(
         frequency, q = linear_modes(model, springs, min(REPORTED_MODES, reduced.n_dof))
         w = 2 * np.pi * frequency
         # K R q vanishes at the slaves but for the modal part, as K_ss psi + K_sm = 0; springs act on masters only
-        residual = K_ss @ (phi @ q[n_m:]) - (inertia @ q)[s] * w**2
+        residual = K_ss @ (phi @ q[n_m:]) - (M @ (basis @ q))[s] * w**2
         info[f"{state}_frequency"] = frequency
         info[f"{state}_frequency_error"] = frequency_error(factor, residual, w, omitted)
     return replace(model, info=info)
@@ -106,12 +108,9 @@ def master_dofs(
 
 
 def constraint_modes(factor: Factor, K_sm: csc_matrix) -> np.ndarray:
-    """Static shapes Psi = -K_ss^-1 K_sm (n_slave, n_master) of unit displacements of the masters, solved in blocks."""
-    psi = np.empty(K_sm.shape)
+    """Static shapes Psi = -K_ss^-1 K_sm (n_slave, n_master) of unit displacements of some masters."""
     with threadpool_limits(1):
-        for start in range(0, K_sm.shape[1], BLOCK):
-            psi[:, start : start + BLOCK] = -factor.solve(K_sm[:, start : start + BLOCK].toarray())
-    return psi
+        return -factor.solve(K_sm.toarray())
 
 
 def fixed_interface_modes(
@@ -134,6 +133,19 @@ def fixed_interface_modes(
         wanted *= 2
     kept = wanted if cutoff is None else int(np.sum(omega <= 2 * np.pi * cutoff))
     return omega[:kept], phi[:, :kept], float(omega[kept]) if kept < len(omega) else np.inf
+
+
+def _congruent(basis: np.ndarray, matrix: Any) -> np.ndarray:
+    """basis^T A basis (k, k) of a sparse symmetric A (n, n), block by block: no second array as large as the basis."""
+    product = np.empty((basis.shape[1],) * 2)
+    for block in _blocks(basis.shape[1]):
+        product[: block.stop, block] = basis[:, : block.stop].T @ (matrix @ basis[:, block])
+        product[block, : block.start] = product[: block.start, block].T
+    return _symmetric(product)
+
+
+def _blocks(n: int) -> list[slice]:
+    return [slice(start, min(start + BLOCK, n)) for start in range(0, n, BLOCK)]
 
 
 def _symmetric(matrix: Any) -> np.ndarray:

@@ -10,11 +10,11 @@ import pytest
 
 import workflows as scenes
 from hbm import error_controlled_rule, newton, thesis_rule, wear_law
-from hbm.balance import HarmonicBalance
+from hbm.balance import HarmonicBalance, State
 from hbm.evolution import Duty, WearProblem, assess
 from hbm.harmonics import HarmonicBasis
 from hbm.law import SEPARATES
-from hbm.operating_point import AtFrequency, AtPeak, BesidePeak, OperatingPoint
+from hbm.operating_point import AtFrequency, AtPeak, BesidePeak, Correction, OperatingPoint
 from hbm.wear_events import events
 from hbm.wear_history import WearHistory, cycles_to_preload
 from hbm.wearing import WearingBalance
@@ -53,18 +53,19 @@ def test_wear_inside_the_balance_has_the_derivative_of_finite_differences(proble
     balances = [problem.balance, problem.balance.with_load(0.6)]
     omega = (420.0, 450.0)
     gain = np.full(N_PAIR, 1e-9) / problem.area
-    wearing = WearingBalance(balances, (0.3, 0.7), np.array([0.0, 1e-6, 2e-6, 0.0]), 3000.0, gain)
+    base = np.array([0.0, 1e-6, 2e-6, 0.0])
+    wearing = WearingBalance(balances, (0.3, 0.7), base, 3000.0, gain, base)
     parts = [newton.solve(b, w, b.stuck(w)).state.x for b, w in zip(balances, omega, strict=True)]
     solution = newton.solve(wearing, omega, np.concatenate(parts, axis=1))
     assert solution.converged
-    x, depth = solution.state.x, wearing.depth(solution.state.x)
+    x, depth = solution.state.x, wearing.evaluate(omega, solution.state.x).depth
     work = np.zeros(N_PAIR)
     for balance, share, w, part in zip(balances, (0.3, 0.7), omega, wearing.parts(x), strict=True):
         worn = balance.with_gap(balance.parameters.gap + depth)
         state = worn.evaluate(w, part)
         assert newton.relative_residual(state, worn.x_lin(w)) < 1e-8  # every duty is solved at the common depth
         work += share * worn.energy(state)
-    assert depth == pytest.approx(wearing.base + 3000.0 * gain * work, rel=1e-12)
+    assert depth == pytest.approx(base + 3000.0 * gain * work, rel=1e-12)
     assert depth.max() > 1e-5
     direction = np.random.default_rng(1).normal(size=x.shape) * 1e-6 * np.abs(x).max()
     fore, back = (wearing.evaluate(omega, x + sign * direction).residual for sign in (1, -1))
@@ -97,6 +98,9 @@ def test_a_resumed_run_ends_in_the_same_bits(problem: WearProblem, kind: str) ->
     assert np.array_equal(whole.depth, parts.depth)
     assert np.array_equal(whole.cycles, parts.cycles)
     assert np.array_equal(whole.solves, parts.solves)
+    killed = run(replace(whole, end="unfinished"))  # after its last row, before its end was kept
+    assert killed.end == whole.end
+    assert np.array_equal(whole.depth, killed.depth)
 
 
 def test_missions_average_their_duties(problem: WearProblem) -> None:
@@ -199,3 +203,49 @@ def test_a_branch_that_has_ended_is_looked_for_afresh(problem: WearProblem) -> N
     assert after.failure == ""
     assert after.rate == pytest.approx(expected.rate, rel=1e-6)
     assert after.solves > 3
+
+
+def test_error_controlled_steps_get_over_the_end_of_a_branch(problem: WearProblem) -> None:
+    """The branch ends where the deepest pair is at 1e-5 m; the next one is found from 2e-6 m further on."""
+    end, gap, tolerance = 1e-5, problem.balance.parameters.gap, error_controlled_rule.Tolerance(0.05, 2e-4)
+    over = []
+
+    class Ending(AtFrequency):
+        def first(self, balance: HarmonicBalance) -> OperatingPoint:
+            if (balance.parameters.gap - gap).max() > end + 2e-6:
+                over.append(True)
+            return super().first(balance)
+
+        def correct(self, balance: HarmonicBalance, state: State) -> Correction:
+            ended = not over and (balance.parameters.gap - gap).max() > end
+            return Correction(state.omega if ended else 0.0, np.zeros_like(state.x), 0)
+
+    worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Ending("tip", 420.0)),)), tolerance)
+    leaps = np.flatnonzero(worn.plan[:-1, 0] == 0.0)
+    assert 1 < len(leaps) <= 6
+    assert leaps[-1] == leaps[-2] + 1
+    assert worn.worn[leaps[-1]].max() > 2 * worn.worn[leaps[-2]].max()  # a second one in a row is longer
+    assert worn.worn[leaps].max() <= 1e-5  # never longer than the tolerance
+    assert worn.depth[leaps[-1] + 1].max() > end + 2e-6
+    assert worn.end.startswith("preload fell")
+    assert problem.area @ worn.depth[-1] == pytest.approx(1e-9 * worn.work.sum(), rel=1e-12)
+    plain = error_controlled_rule.evolve(problem, tolerance)
+    assert life(worn) == pytest.approx(life(plain), rel=0.02)
+
+
+def test_the_forces_of_a_faint_contact_are_solved_too(problem: WearProblem) -> None:
+    """A start whose residual is just below Newton's tolerance, but far above the stretch of the springs."""
+    apart = newton.solve_from_rest(problem.balance.with_gap(np.full(N_PAIR, 1e-3)), 420.0).state.x[:, 2]
+    faint = problem.balance.with_gap(apart[:, 0] + np.hypot(apart[:, 1], apart[:, 2]) - 1e-11)
+    exact = newton.solve_from_rest(faint, 420.0, newton.NewtonOptions(1e-13))
+    k = faint.compliance.k
+    stretch = np.linalg.norm(exact.state.cycle.force.reshape(len(k), -1) / k[:, None])
+    size = np.linalg.norm(exact.state.x)
+    assert 0 < stretch < 1e-5 * size
+    push = np.random.default_rng(0).normal(size=exact.state.x.shape)
+    start = exact.state.x + 5e-9 * size * push / np.linalg.norm(push)
+    assert newton.relative_residual(faint.evaluate(420.0, start), faint.x_lin(420.0)) < 1e-8
+    found = newton.solve(faint, 420.0, start)
+    assert found.converged
+    missed = np.linalg.norm(found.state.cycle.force - exact.state.cycle.force)
+    assert missed < 1e-3 * np.linalg.norm(exact.state.cycle.force)

@@ -177,7 +177,8 @@ def test_every_setting_of_every_knob_is_a_scene() -> None:
                 assert scene_file.read(scene, (*study.base, *setting.overrides)).name == scene
         for ladder in study.ladders:
             for setting in ladder.settings:
-                scene_file.read(scene, (*ladder.base, *setting.overrides))
+                for placement in ((), *ladder.placements):
+                    scene_file.read(scene, (*ladder.base, *setting.overrides, *placement))
 
 
 def made_up(knob: str, cost: float, error: float) -> Row:
@@ -199,14 +200,23 @@ def test_the_cheapest_combination_is_found() -> None:
 
 
 def test_limit_of_a_known_power() -> None:
-    size = np.array([3.0, 5.0, 9.0, 17.0])
+    size = [3.0, 5.0, 9.0, 17.0]
     for order in (1.0, 2.0):
-        found = converge.limit_of(size, 7.0 + 3.0 * (1 / (size - 1)) ** order)
+        found = converge.limit_of(size, [[7.0 + 3.0 * (1 / (n - 1)) ** order] for n in size])
         assert found.value == pytest.approx(7.0, rel=1e-4)
         assert found.order == pytest.approx(order, abs=0.02)
-    unsettled = converge.limit_of(size, np.array([1.0, 1.2, 0.9, 1.1]))
+
+
+def test_a_limit_of_scattered_values_is_as_uncertain_as_they_are() -> None:
+    unsettled = converge.limit_of([3.0, 5.0, 9.0, 17.0], [[1.0], [1.2], [0.9], [1.1]])
     assert np.isnan(unsettled.order)
-    assert unsettled.uncertainty == pytest.approx(0.3 / 1.1)
+    assert unsettled.value == pytest.approx(1.05)
+    assert unsettled.uncertainty == pytest.approx(0.15 / 1.05)
+    # three that settle, but by less than where the nodes happen to lie makes out
+    by_chance = converge.limit_of([3.0, 5.0, 9.0], [[1.04, 1.06], [1.02, 0.97], [1.01]])
+    assert np.isnan(by_chance.order)
+    assert by_chance.value == pytest.approx((0.97 + 1.06) / 2)
+    assert converge.limit_of([3.0, 5.0, 9.0], [[1.04], [1.02, 1.019], [1.01]]).order == pytest.approx(1.0, abs=0.02)
 
 
 def test_a_linear_field_is_carried_exactly() -> None:
@@ -228,13 +238,34 @@ def test_grids_of_the_beam(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert (tmp_path / "converge_beam_contact_grid.png").stat().st_size > 10_000
 
 
+def grid_row(n: int, worst: float, own: bool = False) -> converge.Row:
+    none = dict.fromkeys(trade_table.QUANTITIES)
+    one = {**none, "peak_m": worst}
+    return converge.Row(n, f"n={n}", own, n * n, {**none, "peak_m": 1.0}, one, one, 0.1, 1.0, "converged")
+
+
+def test_the_grid_that_is_needed_is_the_first_from_which_all_are_good() -> None:
+    rows = (grid_row(3, 0.004), grid_row(5, 0.02), grid_row(7, 0.008, own=True), grid_row(9, 0.001))
+    limits = {"peak_m": converge.Limit(1.0, np.nan, 1e-3)}
+    study = converge.Study("made up", "grid", rows, limits, ())
+    needed = study.needed("peak_m")
+    assert needed is not None
+    assert needed.setting == "n=7"
+    assert study.needed("peak_m", 1e-4) is None
+    text = converge.as_text([study])
+    assert "1 % on amplitude needs n=7 (49 pairs) or finer; the limit is known to 0.1 %" in text
+    assert "the grid of the scene, n=7 (49 pairs), is good for 1 % on all: amplitude 0.8 %" in text
+    poor = replace(study, rows=(grid_row(3, 0.03, own=True), *rows[1:]))
+    assert "n=3 (9 pairs), misses 1 % on amplitude: amplitude 3 %" in converge.as_text([poor])
+
+
 def test_the_budget_of_a_run(tmp_path: Path) -> None:
     words = ["run", "beam", *set_of(SMALL), "--set", "wear.max_steps=2", "--no-pictures", "--out", str(tmp_path)]
     cli.app(words, result_action="return_value")
     result = store.load(tmp_path / "result.h5")
     found = {entry["source"]: entry for entry in budget.of_result(result)}
-    assert {"modes", "harmonics", "samples", "newton", "points", "wear steps", "compliance"} <= set(found)
-    assert found["newton"]["error"] < 1e-5
+    assert {"modes", "harmonics", "samples", "newton, krylov", "points", "wear steps", "compliance"} <= set(found)
+    assert found["newton, krylov"]["error"] < 1e-5
     assert found["samples"]["error"] < 1e-4
     assert 0 < found["points"]["error"] < 0.05
     shown = dict(budget.lines(result))
@@ -242,6 +273,26 @@ def test_the_budget_of_a_run(tmp_path: Path) -> None:
     # more harmonics, less left to them
     wide = scene_file.read("beam", (*SMALL, "wear=", "harmonics.kept=[0, 1, 2, 3, 4, 5]"))
     assert wide.scene.harmonics.kept[-1] == 5
+
+
+def test_what_no_estimator_covers_is_known_from_the_trade() -> None:
+    """A grid that was not measured itself has the error of the next coarser one."""
+    table = trade_table.load(trade_table.TRADES / "beam.json")
+    file = scene_file.read("beam")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(budget.accuracy, "table_of", lambda _: table)
+        found = list(budget._of_trade(file))
+        grid = next(e for e in found if e.source == "contact grid" and e.quantity == "amplitude")
+        assert grid.by.startswith("trade: ")
+        assert grid.error is not None
+        assert 0 < grid.error < 0.02
+        mesh = next(e for e in found if e.source == "fe mesh" and e.quantity == "amplitude")
+        assert mesh.by.endswith("trade: n_length=12, n_height=4")
+        assert all(entry.error is not None for entry in found)
+        coarse = scene_file.read("beam", ("geometry.n_patch=3", "geometry.n_height=1"))
+        mesh = next(e for e in budget._of_trade(coarse) if e.source == "fe mesh")
+        assert mesh.error is None
+        assert "finer settings alone" in mesh.by
 
 
 def test_the_budget_says_where_no_life_can_be_stated() -> None:

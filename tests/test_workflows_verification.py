@@ -48,6 +48,20 @@ def test_the_command_compares_and_draws(folder: Path, capsys: pytest.CaptureFixt
     assert Path(numbers["picture"]).is_file()
 
 
+def test_a_motion_that_hill_finds_unstable_is_said_to_be_and_time_leaves_it(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = {}
+    for hertz in (500, 640):
+        code, out, err = leave(["verify", str(folder), "--at", f"{hertz}Hz", "--steps", "128", "--json"], capsys)
+        assert code == 0, err
+        found[hertz] = json.loads(out)
+    assert not found[500]["stable"]
+    assert abs(found[500]["outputs"]["response"]["difference"]) > 0.1
+    assert found[640]["stable"]
+    assert abs(found[640]["outputs"]["response"]["difference"]) < 0.1
+
+
 def test_more_harmonics_come_closer(folder: Path) -> None:
     """The differences fall with the harmonics kept: this beam lifts and slides, its third harmonic is near a mode."""
     result = store.load(folder / "result.h5")

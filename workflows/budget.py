@@ -20,7 +20,9 @@ from workflows.scene_file import SceneError, SceneFile, read
 from workflows.trade_table import NAMES, QUANTITIES, Trade
 
 FACT = "error_budget"  # where the facts of a result keep it
-ESTIMATED = ("modes", "harmonics", "samples", "newton", "points", "wear")  # knobs that an estimator covers
+# knobs that an estimator covers; Newton's is of the residual, whatever Krylov left of it
+ESTIMATED = ("modes", "harmonics", "samples", "newton", "krylov", "points", "wear")
+SAME, COARSER = "", "as with the coarser "  # how the setting of a knob stands to the scene's
 LOOK = 5  # harmonics beyond the kept ones that the estimate looks at, at the least
 
 
@@ -91,7 +93,7 @@ def _of_response(balance: HarmonicBalance, result: Result) -> Iterator[Entry]:
     omega = float(frf.omega[best])
     x = frf.contact[best].reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
     state = balance.evaluate(omega, x)
-    yield Entry("newton", "response at the peak", _newton_error(balance, state), "estimate: one more step")
+    yield Entry("newton, krylov", "response at the peak", _newton_error(balance, state), "estimate: one more step")
     yield Entry("samples", "response at the peak", sampling_error(balance, omega, x), "estimate: located, finer")
     top = max(balance.basis.harmonics)
     try:
@@ -148,15 +150,16 @@ def _of_trade(file: SceneFile) -> Iterator[Entry]:
         rows = trade.of(knob)
         if knob in ESTIMATED or not rows[-1].tunable:
             continue
-        row = next((r for r in rows if _is_set(file, r.overrides)), None)
+        known = [(r, how) for r in rows if (how := _compared(file, r.overrides)) is not None]
         name = knob.replace("_", " ")
-        if row is None:
-            yield Entry(name, "", None, f"the trade has other settings, {rows[0].setting} to {rows[-1].setting}")
+        if not known:
+            yield Entry(name, "", None, f"the trade has finer settings alone, {rows[0].setting} to {rows[-1].setting}")
             continue
+        row, how = next(((r, how) for r, how in known if how == SAME), known[-1])
         for quantity, label in zip(QUANTITIES, NAMES, strict=True):
             error = _off(trade, knob, row.setting, quantity)
             if error is not None:
-                yield Entry(name, label, error, f"trade: {row.setting}")
+                yield Entry(name, label, error, f"trade: {how}{row.setting}")
 
 
 def _off(trade: Trade, knob: str, setting: str, quantity: str) -> float | None:
@@ -165,9 +168,27 @@ def _off(trade: Trade, knob: str, setting: str, quantity: str) -> float | None:
     return None if rows[place].errors[quantity] is None else accuracy.error_of(rows, place, quantity)
 
 
-def _is_set(file: SceneFile, overrides: tuple[str, ...]) -> bool:
-    """Whether a setting of a knob is what the scene has already."""
+def _compared(file: SceneFile, overrides: tuple[str, ...]) -> str | None:
+    """SAME where a setting of a knob is what the scene has, COARSER where it has less of everything that it sets.
+
+    None where it is finer, where it sets what is not counted, or where the scene cannot be set so
+    """
     try:
-        return read(str(file.folder / f"{file.name}.toml"), (*file.overrides, *overrides)).scene == file.scene
+        other = read(str(file.folder / f"{file.name}.toml"), (*file.overrides, *overrides)).scene
     except SceneError:
-        return False
+        return None
+    ours, theirs = file.scene.model_dump(), other.model_dump()
+    pairs = list(_differences(ours, theirs))
+    if not pairs:
+        return SAME
+    counted = all(type(a) is type(b) is int for a, b in pairs)
+    return COARSER if counted and all(b < a for a, b in pairs) else None
+
+
+def _differences(ours: Any, theirs: Any) -> Iterator[tuple[Any, Any]]:
+    """Pairs of values in which two tables differ."""
+    if isinstance(ours, dict) and isinstance(theirs, dict) and ours.keys() == theirs.keys():
+        for key in ours:
+            yield from _differences(ours[key], theirs[key])
+    elif ours != theirs:
+        yield ours, theirs

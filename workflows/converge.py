@@ -1,6 +1,9 @@
 """Convergence with the contact grid and the mesh: answers on finer and finer ones, and how far each is from the limit.
 
-The limit is Richardson's: a power of the node spacing fitted to the three finest grids. Fields of the finest grid are
+The limit is Richardson's, a power of the node spacing fitted to the three finest grids, where they settle. Contact
+forces have kinks where the contact begins to slip and to lift, and it is chance where these lie between the nodes:
+answers scatter with the grid. A study may measure every grid with its nodes placed otherwise too; a limit is then known
+to the range of the finest grids, and a grid has the error of the worst of its placements. Fields of the finest grid are
 carried to each coarser one, so that differences can be mapped.
 """
 
@@ -13,34 +16,38 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import NullLocator
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from hbm.branch import CONVERGED
 from workflows import scene_file
-from workflows.knobs import Ladder, study_of
+from workflows.knobs import Ladder, Setting, study_of
 from workflows.measure import Measured, measure
 from workflows.style import BLUE, GREEN, GREY, ORANGE, STYLE
 from workflows.trade_table import NAMES, QUANTITIES
 
 WANTED = 0.01
 ORDERS = (0.3, 6.0)  # between which a fitted order is believed
+MOST_SHOWN = 0.98  # share of the nodes whose difference is within the colours of a map
 
 
 @dataclass(frozen=True)
 class Row:
     """One grid.
 
-    size : nodes along the patch; setting : its overrides
+    size : nodes along the patch; setting : its overrides; own : whether the scene has this grid
     values, errors : by trade_table.QUANTITIES, errors against the limit
+    worst : largest error of all placements of the nodes, without its sign, and the uncertainty of the limit
     map_difference : r.m.s. difference of friction work per area from the finest grid, over its r.m.s.
     """
 
     size: float
     setting: str
+    own: bool
     pairs: int
     values: dict[str, float | None]
     errors: dict[str, float | None]
+    worst: dict[str, float | None]
     map_difference: float | None
     seconds: float
     outcome: str
@@ -48,9 +55,9 @@ class Row:
 
 @dataclass(frozen=True)
 class Limit:
-    """Richardson's limit of one quantity; order : observed, nan where the values do not settle monotonically.
+    """Limit of one quantity; order : observed, nan where the values do not settle.
 
-    uncertainty : relative distance of the finest grid from the limit
+    uncertainty : relative, of the limit: distance of the finest grid from it, or half the range of the three finest
     """
 
     value: float
@@ -69,12 +76,13 @@ class Study:
     measured: tuple[Measured, ...]
 
     def needed(self, quantity: str, wanted: float = WANTED) -> Row | None:
-        """The coarsest grid from which on every grid is within the wanted error."""
+        """The coarsest grid from which on every grid is within the wanted error, however its nodes are placed."""
         found = None
-        for row in reversed([row for row in self.rows if row.errors[quantity] is not None]):
-            if abs(row.errors[quantity] or 0.0) > wanted:
+        for row in reversed(self.rows):
+            error = row.worst[quantity]
+            if error is not None and error > wanted:
                 break
-            found = row
+            found = found if error is None else row
         return found
 
 
@@ -90,55 +98,72 @@ def run(scene: str, overrides: Sequence[str], most: float, say: Callable[[str], 
 
 
 def _climb(scene: str, ladder: Ladder, base: tuple[str, ...], most: float, say: Callable[[str], None]) -> Study:
-    found = []
-    for setting in ladder.settings:
-        if setting.size > most:
-            continue
-        file = scene_file.read(scene, (*base, *setting.overrides))
+    def found(setting: Setting, placement: tuple[str, ...]) -> Measured:
+        file = scene_file.read(scene, (*base, *setting.overrides, *placement))
         measured = measure(file, wears=setting.size <= ladder.life_up_to)
-        say(f"{ladder.name}: {setting.label}: {measured.seconds:.1f} s, {measured.outcome}")
-        found.append((setting, measured))
-    if len(found) < 3:
-        raise ValueError(f"{ladder.name}: a limit needs three grids, {len(found)} are left up to {most:g}")
-    good = [(s, m) for s, m in found if m.outcome == CONVERGED]
+        label = ", ".join((setting.label, *placement))
+        say(f"{ladder.name}: {label}: {measured.seconds:.1f} s, {measured.outcome}")
+        return measured
+
+    settings = [setting for setting in ladder.settings if setting.size <= most]
+    if len(settings) < 3:
+        raise ValueError(f"{ladder.name}: a limit needs three grids, {len(settings)} are left up to {most:g}")
+    placed = [((), *ladder.placements) if s.size <= ladder.placed_up_to else ((),) for s in settings]
+    measured = [[found(s, placement) for placement in places] for s, places in zip(settings, placed, strict=True)]
     limits = {}
     for quantity in QUANTITIES:
-        known = [(s.size, v) for s, m in good if (v := m.values[quantity]) is not None]
+        known = [(s.size, v) for s, grid in zip(settings, measured, strict=True) if (v := _values(grid, quantity))]
         if len(known) >= 3:
-            limits[quantity] = limit_of(*np.array(known).T)
-    finest = good[-1][1]
+            limits[quantity] = limit_of([size for size, _ in known], [values for _, values in known])
+    finest = next(grid[0] for grid in reversed(measured) if grid[0].outcome == CONVERGED)
+    own = scene_file.read(scene, base).scene
     rows = tuple(
         Row(
             size=setting.size,
             setting=setting.label,
-            pairs=len(measured.area),
-            values=measured.values,
-            errors={
-                q: measured.values[q] / limits[q].value - 1 if q in limits and measured.values[q] is not None else None  # type: ignore[operator]
-                for q in QUANTITIES
-            },
-            map_difference=None if measured is finest else map_difference(measured, finest),
-            seconds=measured.seconds,
-            outcome=measured.outcome,
+            own=scene_file.read(scene, (*base, *setting.overrides)).scene == own,
+            pairs=len(grid[0].area),
+            values=grid[0].values,
+            errors={q: _off(grid[0].values[q], limits.get(q)) for q in QUANTITIES},
+            worst={q: _worst(_values(grid, q), limits.get(q)) for q in QUANTITIES},
+            map_difference=None if grid[0] is finest else map_difference(grid[0], finest),
+            seconds=sum(one.seconds for one in grid),
+            outcome=next((one.outcome for one in grid if one.outcome != CONVERGED), CONVERGED),
         )
-        for setting, measured in found
+        for setting, grid in zip(settings, measured, strict=True)
     )
-    return Study(scene_file.find(scene).stem, ladder.name, rows, limits, tuple(m for _, m in found))
+    return Study(scene_file.find(scene).stem, ladder.name, rows, limits, tuple(grid[0] for grid in measured))
 
 
-def limit_of(size: np.ndarray, value: np.ndarray) -> Limit:
+def _values(grid: Sequence[Measured], quantity: str) -> list[float]:
+    """What the placements of a grid answer, the grid itself first; none where that failed."""
+    if grid[0].outcome != CONVERGED or grid[0].values[quantity] is None:
+        return []
+    return [v for one in grid if one.outcome == CONVERGED and (v := one.values[quantity]) is not None]
+
+
+def _off(value: float | None, limit: Limit | None) -> float | None:
+    return None if value is None or limit is None else value / limit.value - 1
+
+
+def _worst(values: Sequence[float], limit: Limit | None) -> float | None:
+    if not values or limit is None:
+        return None
+    return max(abs(value / limit.value - 1) for value in values) + limit.uncertainty
+
+
+def limit_of(size: Sequence[float], values: Sequence[Sequence[float]]) -> Limit:
     """Limit of value = v0 + c h^p, h = 1 / (size - 1), through the three finest sizes.
 
-    size : (n,) nodes along the patch, rising; value : (n,) not all zero
-    Where the three are not monotone, or the order is out of ORDERS, the finest value stands, and how far the three are
-    spread is its uncertainty.
+    size : (n,) nodes along the patch, rising; values : (n) of all placements on each, the first one counts
+    Where the three are not monotone, the order is out of ORDERS, or the last step is within the scatter of the finest
+    size with several placements, the middle of all values on the three stands, with half of their range as uncertainty.
     Source  Roache, J. Fluids Eng. 116, 1994
     """
-    h, v = 1.0 / (size[-3:] - 1.0), value[-3:]
+    h, v = 1.0 / (np.asarray(size[-3:]) - 1.0), np.array([some[0] for some in values[-3:]])
+    scatter = next((float(np.ptp(some)) for some in reversed(values) if len(some) > 1), 0.0)
     first, second = v[0] - v[1], v[1] - v[2]
-    if first == second == 0:
-        return Limit(float(v[2]), float("nan"), 0.0)
-    if second != 0 and first / second > 0:
+    if abs(second) > scatter and first / second > 0:
         trial = np.linspace(*ORDERS, 571)
         ratio = (h[0] ** trial - h[1] ** trial) / (h[1] ** trial - h[2] ** trial)
         best = int(np.argmin(np.abs(np.log(ratio) - np.log(first / second))))
@@ -146,7 +171,9 @@ def limit_of(size: np.ndarray, value: np.ndarray) -> Limit:
             p = trial[best]
             limit = v[2] - second * h[2] ** p / (h[1] ** p - h[2] ** p)
             return Limit(float(limit), float(p), float(abs(v[2] / limit - 1)))
-    return Limit(float(v[2]), float("nan"), float(np.ptp(v) / abs(v[2])))
+    every = np.concatenate([np.asarray(some) for some in values[-3:]])
+    middle = (every.min() + every.max()) / 2
+    return Limit(float(middle), float("nan"), float(np.ptp(every) / 2 / abs(middle)))
 
 
 def on_grid(fine: np.ndarray, field: np.ndarray, coarse: np.ndarray) -> np.ndarray:
@@ -169,58 +196,101 @@ def as_records(studies: Sequence[Study]) -> list[dict[str, Any]]:
 
 
 def as_text(studies: Sequence[Study]) -> str:
-    """Tables for people, the limits with their orders, and the grid that a wanted accuracy needs."""
+    """Tables for people, limits with their orders, the grid that a wanted accuracy needs, the scene's grid judged."""
     lines = []
     for study in studies:
         shown = [q for q in QUANTITIES if q in study.limits]
-        titles = [NAMES[QUANTITIES.index(q)] for q in shown]
-        lines.append(f"{study.ladder:14} {'pairs':>6} {'seconds':>8} " + " ".join(f"{t:>22}" for t in titles) + "  map")
+        width = max(len(study.ladder), *(len(row.setting) for row in study.rows))
+        lines.append(_line(study.ladder.ljust(width), "pairs", "seconds", [_name(q) for q in shown], "map"))
         for row in study.rows:
-            cells = []
-            for q in shown:
-                value, error = row.values[q], row.errors[q]
-                cells.append("" if value is None or error is None else f"{value:.5g} ({100 * error:+.2g} %)")
             maps = "" if row.map_difference is None else f"{100 * row.map_difference:.1f} %"
             failed = "" if row.outcome == CONVERGED else f"  {row.outcome}"
-            head = f"{row.size:<14g} {row.pairs:6d} {row.seconds:8.1f} "
-            lines.append(head + " ".join(f"{cell:>22}" for cell in cells) + f"  {maps}{failed}")
-        limits = [study.limits[q] for q in shown]
-        orders = ["not settled" if np.isnan(one.order) else f"order {one.order:.1f}" for one in limits]
-        cells = [f"{one.value:.5g}, {order}" for one, order in zip(limits, orders, strict=True)]
-        lines.append(f"{'limit':14} {'':6} {'':8} " + " ".join(f"{cell:>22}" for cell in cells))
-        for quantity, title in zip(shown, titles, strict=True):
-            enough = study.needed(quantity)
-            need = "none of these grids" if enough is None else f"{enough.setting}, {enough.pairs} pairs"
-            spread = 100 * study.limits[quantity].uncertainty
-            lines.append(f"{100 * WANTED:g} % on {title} needs {need}; the finest is within {spread:.2g} %")
+            cells = [_cell(row, q) for q in shown]
+            seconds = f"{row.seconds:.1f}"
+            lines.append(_line(row.setting.ljust(width), str(row.pairs), seconds, cells, maps + failed))
+        limits = [f"{(one := study.limits[q]).value:.5g} ({_order(one)})" for q in shown]
+        lines.append(_line("limit".ljust(width), "", "", limits, ""))
+        lines.append("in brackets: error; of the worst placement of the nodes, with the uncertainty of the limit")
+        for q in shown:
+            known = f"the limit is known to {100 * study.limits[q].uncertainty:.2g} %"
+            lines.append(f"{100 * WANTED:g} % on {_name(q)} needs {_grid(study.needed(q))}; {known}")
+        lines += [_judgement(row, shown) for row in study.rows if row.own]
     return "\n".join(lines)
 
 
+def _line(setting: str, pairs: str, seconds: str, cells: Sequence[str], maps: str) -> str:
+    return f"{setting} {pairs:>6} {seconds:>8} " + " ".join(f"{cell:>26}" for cell in cells) + f"  {maps}"
+
+
+def _name(quantity: str) -> str:
+    return NAMES[QUANTITIES.index(quantity)]
+
+
+def _cell(row: Row, quantity: str) -> str:
+    value, error, worst = row.values[quantity], row.errors[quantity], row.worst[quantity]
+    if value is None or error is None or worst is None:
+        return ""
+    return f"{value:.5g} ({100 * error:+.2g}; {100 * worst:.2g} %)"
+
+
+def _order(limit: Limit) -> str:
+    return "not settled" if np.isnan(limit.order) else f"order {limit.order:.1f}"
+
+
+def _grid(row: Row | None) -> str:
+    return "a finer grid than these" if row is None else f"{row.setting} ({row.pairs} pairs) or finer"
+
+
+def _judgement(row: Row, quantities: Sequence[str]) -> str:
+    """What the grid of the scene is good for."""
+    known = {q: worst for q in quantities if (worst := row.worst[q]) is not None}
+    errors = ", ".join(f"{_name(q)} {100 * worst:.2g} %" for q, worst in known.items())
+    missed = [_name(q) for q, worst in known.items() if worst > WANTED]
+    share = f"{100 * WANTED:g} %"
+    verdict = f"misses {share} on {', '.join(missed)}" if missed else f"is good for {share} on all"
+    return f"the grid of the scene, {row.setting} ({row.pairs} pairs), {verdict}: {errors}"
+
+
 def picture(study: Study) -> Figure:
-    """Errors against the number of pairs, and where the coarser grids differ from the finest one."""
+    """Errors against the number of pairs, the work on the finest grid, and where coarser grids differ from it."""
     shown = [m for m in study.measured if m.outcome == CONVERGED]
     finest, some = shown[-1], shown[:-1][-3:]
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(4.4 + 2.7 * len(some), 3.6), layout="constrained")
-        panes = figure.subplots(1, 1 + len(some), width_ratios=[1.5] + [1] * len(some), squeeze=False)[0]
-        for quantity, colour, mark in (("peak_m", BLUE, "o"), ("energy_J", ORANGE, "s"), ("life_cycles", GREEN, "D")):
-            points = [(r.pairs, abs(e)) for r in study.rows if (e := r.errors[quantity]) is not None and e != 0]
-            if points:
-                x, y = zip(*points, strict=True)
-                panes[0].loglog(x, y, marker=mark, color=colour, label=NAMES[QUANTITIES.index(quantity)])
-        panes[0].axhline(WANTED, color=GREY, linestyle=":", linewidth=1)
-        title = f"{study.scene}: {study.ladder.replace('_', ' ')}"
-        panes[0].set(xlabel="node pairs", ylabel="relative error", title=title)
-        panes[0].xaxis.set_minor_formatter(NullFormatter())
-        panes[0].legend()
-        reach = max(float((finest.energy / finest.area).max()), 1e-300)
+        figure = Figure(figsize=(7.1 + 2.5 * len(some), 3.6), layout="constrained")
+        panes = figure.subplots(1, 2 + len(some), width_ratios=[1.7] + [1] * (1 + len(some)), squeeze=False)[0]
+        _draw_errors(panes[0], study)
         work = finest.energy / finest.area
+        drawn = _map(panes[1], finest, work, {"cmap": "viridis"})
+        figure.colorbar(drawn, ax=panes[1], label="work per cycle and area, J/m²", location="bottom")
+        reach = max(float(work.max()), 1e-300)
         offs = [(one.energy / one.area - on_grid(finest.patch, work, one.patch)) / reach for one in some]
-        most = max((float(np.abs(off).max()) for off in offs), default=0.0) or 1.0
-        for pane, one, off in zip(panes[1:], some, offs, strict=True):
-            drawn = pane.tripcolor(*(1e3 * one.patch.T), off, shading="gouraud", cmap="RdBu_r", vmin=-most, vmax=most)
-            pane.set(aspect="equal", title=f"{len(one.area)} pairs", xlabel="mm")
-            pane.grid(visible=False)
+        most = max((float(np.quantile(np.abs(off), MOST_SHOWN)) for off in offs), default=0.0) or 1.0
+        for pane, one, off in zip(panes[2:], some, offs, strict=True):
+            drawn = _map(pane, one, off, {"cmap": "RdBu_r", "vmin": -most, "vmax": most})
         if some:
-            figure.colorbar(drawn, ax=panes[-1], label="work per area − finest, over its largest")
+            label = "work − that of the finest grid, over its largest"
+            figure.colorbar(drawn, ax=list(panes[2:]), label=label, location="bottom", extend="both", aspect=40)
     return figure
+
+
+def _draw_errors(pane: Any, study: Study) -> None:
+    drawn = (("peak_hz", GREY, "^"), ("peak_m", BLUE, "o"), ("energy_J", ORANGE, "s"), ("life_cycles", GREEN, "D"))
+    by_pairs = len({row.pairs for row in study.rows}) > 1
+    for quantity, colour, mark in drawn:
+        points = [(r.pairs if by_pairs else r.size, e) for r in study.rows if (e := r.worst[quantity])]
+        if points:
+            pane.loglog(*zip(*points, strict=True), marker=mark, markersize=4, color=colour, label=_name(quantity))
+    pane.axhline(WANTED, color=GREY, linestyle=":", linewidth=1)
+    ticks = [row.pairs if by_pairs else row.size for row in study.rows]
+    pane.set_xticks(ticks, [f"{tick:g}" for tick in ticks], fontsize=8)
+    pane.xaxis.set_minor_locator(NullLocator())
+    pane.set(xlabel="node pairs" if by_pairs else "size of the mesh", ylabel="relative error, worst placement")
+    pane.set_title(f"{study.scene}: {study.ladder.replace('_', ' ')}")
+    pane.legend(fontsize=8)
+
+
+def _map(pane: Any, one: Measured, field: np.ndarray, colours: dict[str, Any]) -> Any:
+    drawn = pane.tripcolor(*(1e3 * one.patch.T), field, shading="gouraud", **colours)
+    pane.set(aspect="equal", title=f"{len(one.area)} pairs", xlabel="mm")
+    pane.grid(visible=False)
+    return drawn

@@ -69,12 +69,18 @@ class Knob:
 
 @dataclass(frozen=True)
 class Ladder:
-    """Grids or meshes of a convergence study; base : overrides; life_up_to : size up to which the contact is worn."""
+    """Grids or meshes of a convergence study.
+
+    base : overrides; life_up_to : size up to which the contact is worn
+    placements : overrides that put the nodes elsewhere; every setting up to size `placed_up_to` is measured with each
+    """
 
     name: str
     settings: tuple[Setting, ...]
     base: tuple[str, ...]
     life_up_to: float
+    placements: tuple[tuple[str, ...], ...] = ()
+    placed_up_to: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -108,7 +114,14 @@ def study_of(name: str) -> Study:
         for knob, given in table.get("knobs", {}).items()
     )
     ladders = tuple(
-        Ladder(ladder, _settings(given), tuple(given.get("base", ())), float(given.get("life_up_to", 0)))
+        Ladder(
+            ladder,
+            _settings(given),
+            tuple(given.get("base", ())),
+            float(given.get("life_up_to", 0)),
+            tuple(tuple(texts) for texts in given.get("placements", ())),
+            float(given.get("placed_up_to", 0)),
+        )
         for ladder, given in table.get("converge", {}).items()
     )
     said = {name: tuple(table.get(name, ())) for name in ("base", "unworn", "check", "check_worn")}

@@ -23,7 +23,7 @@ from workflows.references import delta_max, free_deflection
 from workflows.style import BLUE, GREY, ORANGE, STYLE
 
 THESIS_STEPS = (0.1, 0.05, 0.02, 0.01, 0.005)  # of delta_max, tables 4.2 and 4.4
-FINER_STEPS = (0.0025,)  # ours
+FINER_STEPS = (0.0025, 0.001, 0.0005)  # ours
 TOLERANCES = (0.1, 0.03, 0.01)
 REFERENCE_TOLERANCES = (0.003, 0.001)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from hbm.parameter import Parameter
 
 DEGREE = 2  # of the extrapolating polynomial
 APART = 0.5  # least distance of its points, in steps
+SHORTEST, SLOWEST = 0.03, 0.8  # of Newton's method where a shorter step of the continuation is left to try
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,9 @@ def follow(
 
 def _step(path: Parameter, builder: BranchBuilder, value: float, options: Options, halvings: int) -> Solution:
     """One step to `value`, through points in between where it fails."""
-    solution = newton.solve(*path.place(value), predict(builder, value), options.newton)
+    hasty = replace(options.newton, shortest=SHORTEST, slowest=SLOWEST)
+    patience = hasty if halvings > 0 else options.newton
+    solution = newton.solve(*path.place(value), predict(builder, value), patience)
     if not solution.converged and halvings > 0:
         middle = _step(path, builder, 0.5 * (builder.value[-1] + value), options, halvings - 1)
         if not middle.converged:
