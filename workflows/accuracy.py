@@ -14,6 +14,7 @@ from workflows.trade_table import NAMES, QUANTITIES, TRADES, Row, Trade, key_of,
 from workflows.units import to_si
 
 OF_WEAR = ("depth_m", "life_cycles")
+WANTED = tuple(float(10**-power) for power in np.arange(0.5, 5, 0.125))  # errors of the Pareto front
 MARGIN = 0.7  # of the wanted error that the knobs together may use up: they were measured one by one
 
 
@@ -140,6 +141,19 @@ def error_of(rows: Sequence[Row], place: int, quantity: str) -> float:
         return 0.0
     error, doubt = rows[place].errors[quantity], rows[place].doubts[quantity]
     return float("inf") if error is None or doubt is None else abs(error) + doubt
+
+
+def front(trade: Trade, quantity: str) -> list[Choice]:
+    """The cheapest settings for smaller and smaller errors in a quantity, as far as the trade can promise them."""
+    found: list[Choice] = []
+    for wanted in WANTED:
+        try:
+            choice = choose(trade, wanted, [quantity])
+        except ValueError:
+            break
+        if not found or choice.error < found[-1].error:
+            found = [*(c for c in found if c.seconds < choice.seconds), choice]
+    return found
 
 
 def advice(trade: Trade, wanted: float = 0.01) -> list[str]:

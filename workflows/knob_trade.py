@@ -38,7 +38,8 @@ def run(
     file = scene_file.read(scene, base)
     knobs = chosen(knobs_of(file, study), names)
     measure(file, wears=False)  # compiles what the others only use
-    response, once = measure(file, wears=False), measure(file)
+    meter = Meter()
+    response, once = meter.of(file, wears=False), meter.of(file)
     say(f"{BASE}: {once.seconds:.1f} s, {once.outcome}")
     found = Trade(file.name, key_of(name, scene_file.read(scene, overrides).scene), base, once.seconds, ())
     if earlier is not None and (earlier.key, earlier.base) == (found.key, found.base):
@@ -46,7 +47,7 @@ def run(
         found = replace(found, rows=tuple(row for row in earlier.rows if row.knob not in measured))
     for knob in knobs:
         rows = []
-        for row in _rows_of(scene, knob, knob.settings[-most:], base, say):
+        for row in _rows_of(scene, knob, knob.settings[-most:], base, meter, say):
             worn = row.values["life_cycles"] is not None or once.values["life_cycles"] is None
             less = 0.0 if worn else once.seconds - response.seconds
             rows.append(replace(row, share=(row.seconds + less) / once.seconds))
@@ -55,14 +56,33 @@ def run(
     return found
 
 
+class Meter:
+    """Measures every scene once, however many knobs have it among their settings."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, Measured] = {}
+
+    def of(self, file: scene_file.SceneFile, wears: bool = True, refined: bool = True) -> Measured:
+        """As `measure`."""
+        key = f"{file.scene.model_dump_json()} {wears} {refined}"
+        if key not in self._known:
+            self._known[key] = measure(file, wears, refined)
+        return self._known[key]
+
+
 def _rows_of(
-    scene: str, knob: Knob, settings: Sequence[Setting], base: tuple[str, ...], say: Callable[[str], None]
+    scene: str,
+    knob: Knob,
+    settings: Sequence[Setting],
+    base: tuple[str, ...],
+    meter: Meter,
+    say: Callable[[str], None],
 ) -> list[Row]:
     found = []
     for setting in settings:
         file = scene_file.read(scene, (*base, *setting.overrides))
         try:
-            measured = measure(file, knob.wears(setting), setting.refined)
+            measured = meter.of(file, knob.wears(setting), setting.refined)
         except ValueError as refusal:  # such as more interface modes than there are contact DOFs
             say(f"{knob.name}: {setting.label}: left out: {refusal}")
             continue

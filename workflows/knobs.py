@@ -135,12 +135,12 @@ def _settings(table: dict[str, Any]) -> tuple[Setting, ...]:
 
 def knobs_of(file: SceneFile, study: Study) -> tuple[Knob, ...]:
     """The knobs that a scene has: those of its study, then those that any scene may have and the study has not."""
-    own = {knob.name for knob in study.knobs}
-    found = (*study.knobs, *(knob for knob in _of_any(file) if knob.name not in own))
+    own = {knob.name: knob.settings for knob in study.knobs}
+    found = (*study.knobs, *(knob for knob in _of_any(file, own) if knob.name not in own))
     return tuple(replace(knob, worn_up_to=0.0) if knob.name in study.unworn else knob for knob in found)
 
 
-def _of_any(file: SceneFile) -> list[Knob]:
+def _of_any(file: SceneFile, own: dict[str, tuple[Setting, ...]]) -> list[Knob]:
     scene = file.scene
     found: list[Knob] = []
     if isinstance(scene, PartScene):
@@ -161,7 +161,7 @@ def _of_any(file: SceneFile) -> list[Knob]:
         controlled = tuple(Setting(1 / t, (rule, f"wear.tolerance={t:g}")) for t in WEAR_TOLERANCES)
         thesis = tuple(Setting(1 / s, ('wear.rule="thesis"', f"wear.step={s:g}")) for s in WEAR_STEPS)
         found.append(Knob("wear", controlled))
-        finest = Setting(EXACT, controlled[-1].overrides)
+        finest = Setting(EXACT, own.get("wear", controlled)[-1].overrides)
         found.append(Knob("wear_thesis", (*thesis, finest), tunable=False))
     return found
 

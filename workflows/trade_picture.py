@@ -7,8 +7,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
+from workflows.accuracy import front
 from workflows.style import GREY, INK, STYLE
-from workflows.trade_table import NAMES, QUANTITIES, Trade, pareto
+from workflows.trade_table import NAMES, QUANTITIES, Trade
 
 SHOWN = ("peak_m", "energy_J", "life_cycles")
 FLOOR = 1e-8  # errors below this are drawn here
@@ -16,7 +17,10 @@ MARKERS = "osD^v<>PX*hp"
 
 
 def picture(trade: Trade) -> Figure:
-    """Error in amplitude, energy and life, as far as there are any, against seconds; the Pareto front as a line."""
+    """Error in amplitude, energy and life, as far as there are any, against seconds; the Pareto front as a line.
+
+    The front is of settings of all knobs together, as they are chosen for smaller and smaller errors.
+    """
     shown = [q for q in SHOWN if any(row.errors[q] is not None for row in trade.rows)]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(4.2 * len(shown) + 1.6, 4.0), layout="constrained")
@@ -28,9 +32,9 @@ def picture(trade: Trade) -> Figure:
                 error = [max(abs(row.errors[quantity] or 0.0), FLOOR) for row in rows]
                 style = {"color": colours[i % 20], "marker": MARKERS[i % len(MARKERS)], "linestyle": "none"}
                 pane.plot([row.seconds for row in rows], error, label=knob.replace("_", " "), markersize=5, **style)
-            front = pareto((row for row in trade.rows if np.isfinite(row.size)), quantity)
-            at = [max(abs(row.errors[quantity] or 0.0), FLOOR) for row in front]
-            pane.plot([row.seconds for row in front], at, color=INK, linewidth=0.8, zorder=0)
+            together = front(trade, quantity)
+            at = [[getattr(choice, name) for choice in together] for name in ("seconds", "error")]
+            pane.plot(*at, color=INK, linewidth=0.8, marker=".", zorder=0, label="all together, as chosen")
             pane.set_xscale("log")  # before its formatter
             pane.axhline(0.01, color=GREY, linestyle=":", linewidth=1)
             pane.xaxis.set_minor_formatter(NullFormatter())

@@ -115,18 +115,6 @@ KNOB_KEYS = (
 )
 
 
-def pareto(rows: Iterable[Row], quantity: str) -> list[Row]:
-    """Rows that no other row beats in both seconds and error, the fastest first."""
-    front: list[Row] = []
-    best = float("inf")
-    for row in sorted((r for r in rows if r.errors.get(quantity) is not None), key=lambda r: r.seconds):
-        error = abs(row.errors[quantity] or 0.0)
-        if error < best:
-            front.append(row)
-            best = error
-    return front
-
-
 def save(trade: Trade, path: Path) -> None:
     """Write a trade as JSON."""
     path.parent.mkdir(parents=True, exist_ok=True)
