@@ -13,6 +13,7 @@ from hbm.branch import CONVERGED
 VANISHING = 1e-6  # size of x, relative to the start, below which a solution counts as zero
 RAMP_STEPS = 12  # Newton steps in one step of the load ramp
 FORCE_ACCURACY = 1e-4  # of the contact forces, wanted where these stretch their springs far less than x is large
+EASIER = "more damping, a softer contact, fewer harmonics or a larger static load make it easier"
 FINEST = 1e-12  # residual over the displacement that is asked for at most
 
 
@@ -199,4 +200,5 @@ def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptio
                     return Solution(last.state, CONVERGED, steps, products, last.history)
             else:
                 stride *= 0.5
-    return Solution(first.state, f"{first.outcome}; load ramp stopped at {factor:.0%}", steps, products, first.history)
+    outcome = f"{first.outcome}; load ramp stopped at {factor:.0%}: {EASIER}"
+    return Solution(first.state, outcome, steps, products, first.history)
