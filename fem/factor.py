@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from typing import Any, Protocol
 
 import numpy as np
@@ -61,7 +63,12 @@ def softest_residual(K: csr_matrix, factor: Factor) -> float:
 
 
 def pardiso_available() -> bool:
-    """Whether pypardiso and its MKL library load."""
+    """Whether pypardiso and its MKL library load.
+
+    MKL chooses its kernels by where arrays happen to lie in memory, and rounds by that, unless told otherwise before it
+    loads.
+    """
+    os.environ.setdefault("MKL_CBWR", "AUTO")
     try:
         import pypardiso  # noqa: F401
     except (ImportError, OSError):
@@ -93,7 +100,7 @@ class Pardiso:
         return self._solver.solve(self._upper, np.asarray(rhs, dtype=float))
 
     def __del__(self) -> None:
-        if hasattr(self, "_solver"):
+        if hasattr(self, "_solver") and not sys.is_finalizing():  # with the process its memory goes anyway
             self._solver.free_memory(everything=True)
 
 

@@ -134,13 +134,13 @@ def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOption
 
 
 def _finer(balance: Balance, state: State, x_lin: np.ndarray, least: float) -> float:
-    """The relative residual that leaves the contact forces FORCE_ACCURACY; infinite where nothing touches."""
+    """The relative residual that leaves the contact forces FORCE_ACCURACY; infinite where nothing touches or moves."""
     k = balance.compliance.k[:, None]
     stretch = np.divide(state.cycle.force.reshape(state.g.shape), k, out=np.zeros_like(state.g), where=k > 0)
     size = float(np.linalg.norm(stretch))
-    if size == 0.0:
-        return np.inf
     scale = max(float(np.linalg.norm(state.x)), float(np.linalg.norm(x_lin)), least)
+    if size == 0.0 or scale == 0.0:
+        return np.inf
     return max(FORCE_ACCURACY * size / scale, FINEST)
 
 

@@ -27,8 +27,7 @@ def step_error(history: WearHistory, tolerance: float | None = None) -> StepErro
     A step of Z cycles at the rate of its beginning is off by half the change of the rate over the step. The changes of
     all pairs count without their sign: rates that go back and forth between neighbours are a sign of steps too long.
     The error-controlled rule has measured each of its steps by a first-order companion of its second-order one; the
-    largest stands for the whole run. On the beam life was off by 0.35 to 0.7 of the tolerance from 10 to 1 %, by more
-    than it at 0.3 and 0.1 %: below half a per cent this estimate is too small.
+    largest stands for the whole run. On the beam life was off by 0.3 to 0.4 of the tolerance from 10 to 0.1 %.
     """
     lost = np.flatnonzero(history.preload < LIFE_SHARE * history.preload[0])
     last = int(lost[0]) if len(lost) else len(history.cycles) - 1  # row where the counted steps end

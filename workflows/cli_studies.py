@@ -1,11 +1,11 @@
-"""Words of the command `tribodyn` that measure accuracy: trade, converge, extremes."""
+"""Words of the command `tribodyn` that measure accuracy or follow a number: trade, converge, extremes, track."""
 
 from __future__ import annotations
 
 import json
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -131,3 +131,66 @@ def extremes(
     wrong = table.counts(rows)["wrong"]
     if wrong:
         raise RuntimeError(f"{wrong} of {len(rows)} extreme settings ended with a wrong number, see the table")
+
+
+def track(
+    scene: str,
+    *,
+    against: Literal["load", "gap", "stiffness", "friction", "wear"],
+    start: Annotated[str, Parameter(name="--from")],
+    stop: Annotated[str, Parameter(name="--to")],
+    fold: int | None = None,
+    points: int | None = None,
+    worn: Path | None = None,
+    overrides: Overrides = (),
+    out: Path | None = None,
+    as_json: Json = False,
+) -> None:
+    """Follow the resonance peak, or a fold of the response, while load, gap, stiffness, friction or wear changes.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene (see `tribodyn list`) or a .toml file.
+    against
+        What changes: a factor on the harmonic loads, an opening added to every gap, a factor on the contact springs or
+        on the friction coefficients, or the share of the depth of a worn result.
+    start
+        Value to begin at, such as 1 or, for the gap, 0um.
+    stop
+        Value to end at.
+    fold
+        Number of the fold to follow, 1 for that of the highest frequency; the peak unless told.
+    points
+        Values of the peak (21), or the most that a line of folds may have (500).
+    worn
+        Folder of the result whose last depth is a wear of one.
+    out
+        Folder of track.csv and track.png; results/NAME unless told.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import scene_file, tracking
+    from workflows.progress import Progress, console_progress
+    from workflows.units import to_si
+
+    ends = {}
+    for name, text in (("--from", start), ("--to", stop)):
+        try:
+            ends[name] = to_si(text, tracking.UNITS[against])
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
+    file = scene_file.read(scene, overrides)
+    most = points if points is not None else (21 if fold is None else 500)
+    progress = Progress() if as_json else console_progress()
+    found = tracking.follow(file, against, ends["--from"], ends["--to"], fold, most, worn, progress)
+    folder = out or Path("results") / file.name
+    folder.mkdir(parents=True, exist_ok=True)
+    tracking.write(found, folder / "track.csv")
+    tracking.picture(found).savefig(folder / "track.png")
+    if as_json:
+        print(json.dumps(found.record(), indent=2))
+    else:
+        for value, hertz, amplitude in zip(found.value, found.frequency, found.amplitude, strict=True):
+            print(f"{found.name} {value:<12.6g} {hertz:12.6g} Hz {amplitude:12.6g} m")
+        print(f"{found.what}: {found.end}", folder / "track.csv", folder / "track.png", sep="\n")

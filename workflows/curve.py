@@ -14,20 +14,31 @@ from hbm.newton import NewtonOptions
 from hbm.operating_point import AtPeak
 from workflows.result import CurveStability, ShearBounds
 
+CHOICES = 3  # times that harmonics are chosen, at the peak that the last choice has
+SAME_PEAK = 1e-3  # distance of peaks, relative, that is none
+
 
 def choose_harmonics(
     balance: HarmonicBalance, peak: AtPeak, tolerance: float, highest: int, newton: NewtonOptions
 ) -> HarmonicChoice:
     """Harmonics that make the response of every output right to a tolerance at its resonance.
 
-    peak : where the resonance is looked for, with the harmonics of the balance
+    The harmonics chosen move the resonance: it is looked for again with them, and they are chosen anew there.
+    peak : where the resonance is looked for, with the harmonics of the balance at first
     Raises  harmonic_choice.NotSolved
     """
-    point = peak.first(balance)
-    if not point.solution.converged:
-        raise harmonic_choice.NotSolved(f"harmonics cannot be chosen: no peak was found: {point.solution.outcome}")
     options = harmonic_choice.Options(tolerance, highest, newton=newton)
-    return harmonic_choice.choose(balance, [point.state.omega], options)
+    before = 0.0
+    for _ in range(CHOICES):
+        point = peak.first(balance)
+        if not point.solution.converged:
+            raise harmonic_choice.NotSolved(f"harmonics cannot be chosen: no peak was found: {point.solution.outcome}")
+        omega = point.state.omega
+        if abs(omega - before) <= SAME_PEAK * omega:
+            break
+        choice = harmonic_choice.choose(balance, [omega], options)
+        balance, before = choice.balance, omega
+    return choice
 
 
 def stability_of(balance: HarmonicBalance, branch: Branch) -> CurveStability:

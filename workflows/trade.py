@@ -24,7 +24,7 @@ from workflows.style import BLUE, GREY, ORANGE, STYLE
 
 THESIS_STEPS = (0.1, 0.05, 0.02, 0.01, 0.005)  # of delta_max, tables 4.2 and 4.4
 FINER_STEPS = (0.0025, 0.001, 0.0005)  # ours
-TOLERANCES = (0.1, 0.03, 0.01)
+TOLERANCES = (0.1, 0.03, 0.02, 0.01)
 REFERENCE_TOLERANCES = (0.003, 0.001)
 
 
@@ -204,9 +204,25 @@ def as_text(table: Table) -> str:
         f"{table.reference.life_cycles:.4g} cycles (to {100 * table.life_uncertainty:.2f} %), extrapolated from the "
         f"error-controlled rule at {', '.join(f'{100 * s:g} %' for s in REFERENCE_TOLERANCES)}"
     )
+    lines += [
+        f"life to {_percent(abs(row.life_error))}: error-controlled {row.hbm_solves} solves, {times}"
+        for row in table.rows
+        if row.rule == "error_controlled" and row.life_error is not None and (times := _times(table, row))
+    ]
     left = f"{100 * LIFE_SHARE:g} % of the first preload is left"
     lines.append(f"life and depth where {left}; the thesis's depth where the contact has separated")
     return "\n".join(lines)
+
+
+def _times(table: Table, row: Row) -> str:
+    """How many more solves the thesis's rule takes to the life error of a row, by the rows that were measured."""
+    assert row.life_error is not None
+    errors = {r.hbm_solves: abs(r.life_error) for r in table.rows if r.rule == "thesis" and r.life_error is not None}
+    if not errors:
+        return ""
+    enough = [n for n, e in errors.items() if e <= abs(row.life_error)]
+    most = min(enough, default=max(errors))
+    return f"the thesis's rule {'' if enough else 'more than '}{most}: {most / row.hbm_solves:.0f} times"
 
 
 def _bracket(value: float | None, form: str) -> str:

@@ -1,4 +1,8 @@
-"""Natural continuation: the parameter is stepped, the solution follows by extrapolation of its last points."""
+"""Natural continuation: the parameter is stepped, the solution follows by extrapolation of its last points.
+
+A step that fails is halved. Where that does not help the curve is followed by arc length: if it has a fold there, the
+sweep jumps as a measured one does, to where the curve comes to the next value or else to what is found from rest.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +13,14 @@ import numpy as np
 
 from hbm import newton, parameter
 from hbm.balance import HarmonicBalance
-from hbm.branch import Branch, BranchBuilder
+from hbm.branch import CONVERGED, Branch, BranchBuilder
+from hbm.continuation import arc_length
 from hbm.newton import NewtonOptions, Solution
 from hbm.parameter import Parameter
 
 DEGREE = 2  # of the extrapolating polynomial
 APART = 0.5  # least distance of its points, in steps
+ROUND_FOLDS = 200  # points by arc length on the way round folds
 SHORTEST, SLOWEST = 0.03, 0.8  # of Newton's method where a shorter step of the continuation is left to try
 
 
@@ -38,7 +44,8 @@ def follow(
 
     start, stop : [rad/s] or in the unit of the parameter, either order
     on_point : called with points done and points wanted
-    Returns a Branch; where a point fails after all refinements the branch ends there and says so
+    Returns a Branch; its end says at which folds the response jumped, and where and why a branch ends early. Points
+        of the branch that are folds are marked
     """
     options = options or Options()
     path = parameter.of(problem)
@@ -50,10 +57,14 @@ def follow(
         if not solution.converged:
             break
         solution = _step(path, builder, value, options, options.refinements)
+        if not solution.converged:
+            solution = _by_arc_length(path, builder, solution, value, stop, options)
         if on_point is not None:
             on_point(done + 1, options.n_points)
     if solution.converged:
-        return builder.finish(f"reached {path.say(stop)}")
+        folds = ", ".join(path.say(builder.value[i]) for i in builder.folds)
+        jumped = f"; the response jumped at folds: {folds} (arc_length goes round them)" if folds else ""
+        return builder.finish(f"reached {path.say(stop)}{jumped}")
     return builder.finish(f"ended at {path.say(builder.value[-1])}: {solution.outcome}")
 
 
@@ -71,14 +82,46 @@ def _step(path: Parameter, builder: BranchBuilder, value: float, options: Option
     return solution
 
 
+def _by_arc_length(
+    path: Parameter, builder: BranchBuilder, failed: Solution, value: float, stop: float, options: Options
+) -> Solution:
+    """Replace the failed last point by the fold that made it fail, if any, and the solution behind it, at `value`."""
+    here, origin, shape = builder.value[-2], builder.value[0], failed.state.x.shape
+    way = arc_length.Options(
+        width=arc_length.Options.width * abs((stop - origin) / (value - here)),
+        bounds=(min(origin, value), max(origin, value)),
+        guess=builder.x[-2],
+        max_points=ROUND_FOLDS,
+        newton=options.newton,
+    )
+    curve = arc_length.follow(path, here, value, way)
+    arrived = curve.parameter[-1] == value and curve.outcome[-1] == CONVERGED
+    if not (arrived or curve.folds):
+        return failed
+    builder.truncate(len(builder.value) - 1)
+    for first in curve.folds[:1]:
+        fold, x = float(curve.parameter[first]), curve.contact[first].reshape(shape)
+        builder.add(fold, newton.solve(*path.place(fold), x, options.newton), fold=True)
+    if arrived:
+        solution = newton.solve(*path.place(value), curve.contact[-1].reshape(shape), options.newton)
+    else:
+        solution = arc_length.solve_along_load(*path.place(value), options.newton)
+        if not solution.converged:
+            why = f"the curve turns back at a fold, {path.say(fold)}; arc_length goes round it"
+            solution = replace(solution, outcome=why)
+    builder.add(value, solution)
+    return solution
+
+
 def predict(builder: BranchBuilder, value: float) -> np.ndarray:
     """Extrapolation of the last points to a value of the parameter: (n_pair, n_component, n_coeff) [m].
 
-    Points closer together than half of the step, as halved steps leave them, would blow up their differences.
+    Points closer together than half of the step, as halved steps leave them, would blow up their differences; those
+    before a fold lie on another leg of the curve.
     """
     apart = APART * abs(value - builder.value[-1])
     chosen = [len(builder.value) - 1]
-    for i in reversed(range(chosen[0])):
+    for i in reversed(range(builder.folds[-1] + 1 if builder.folds else 0, chosen[0])):
         if len(chosen) > DEGREE:
             break
         if abs(builder.value[i] - builder.value[chosen[-1]]) >= apart:
