@@ -222,7 +222,9 @@ def displacement_under(balance: HarmonicBalance, omega: float, x: np.ndarray, fo
         load = sum((v * system.loads[name] for (at, name), v in balance.excitation.loads.items() if at == h), 0j)
         s = 1j * h * omega
         dynamic = system.stiffness + b.T @ (k[:, None] * b) + s * damping + s * s * system.mass
-        back[:, position] = b @ np.linalg.solve(dynamic, load + b.T @ spring[:, position])
+        driven = load + b.T @ spring[:, position]
+        if driven.any():  # an undamped resonance that nothing drives stays at rest
+            back[:, position] = b @ np.linalg.solve(dynamic, driven)
     return basis.to_real(back) - base
 
 

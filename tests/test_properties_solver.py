@@ -76,9 +76,15 @@ OVERFLOW = Drawn(  # its first Newton step is so long that the cubic force leave
 )  # fmt: skip
 
 
+UNDRIVEN = replace(  # at rest in an undamped resonance
+    OVERFLOW, law="coulomb_planar", structure="soft", contact=1.3, contact_spread=2.0, dynamic=None, mode=1, seed=1
+)
+
+
 @cases(250)
 @given(drawn_problems())
 @example(OVERFLOW)
+@example(UNDRIVEN)
 def test_what_counts_as_converged_is_in_balance(d: Drawn) -> None:
     try:
         balance = problem_of(d)

@@ -17,7 +17,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
-from matplotlib.tri import TriAnalyzer, Triangulation
+from matplotlib.tri import Triangulation
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from hbm.branch import CONVERGED
@@ -29,7 +29,7 @@ from workflows.style import BLUE, GREEN, GREY, ORANGE, STYLE
 from workflows.trade_table import NAMES, QUANTITIES
 
 WANTED = 0.01
-FLAT = 1e-3  # inner over outer radius of a triangle that is no part of a map
+FLAT = 1e-6  # area over the mean one of a triangle that is no part of a map
 MOST_SHOWN = 0.98  # share of the nodes whose difference is within the colours of a map
 
 
@@ -162,7 +162,7 @@ def limit_of(size: Sequence[float], values: Sequence[Sequence[float]]) -> Limit:
 def on_grid(fine: np.ndarray, field: np.ndarray, coarse: np.ndarray) -> np.ndarray:
     """A field (n_fine,) at fine (n_fine, 2) carried to the nodes coarse (n_coarse, 2): linear, nearest at the rim."""
     centre = fine.mean(axis=0)
-    within = centre + (1 - 1e-9) * (coarse - centre)  # rounding must not put the rim outside
+    within = centre + (1 - 1e-6) * (coarse - centre)  # rounding must not put the rim outside, or into slivers along it
     inside = LinearNDInterpolator(fine, field)(within)
     return np.where(np.isnan(inside), NearestNDInterpolator(fine, field)(coarse), inside)
 
@@ -276,7 +276,9 @@ def _draw_errors(pane: Any, study: Study) -> None:
 
 def _map(pane: Any, one: Measured, field: np.ndarray, colours: dict[str, Any]) -> Any:
     mesh = Triangulation(*(1e3 * one.patch.T))
-    mesh.set_mask(TriAnalyzer(mesh).get_flat_tri_mask(FLAT))  # rounding makes slivers along the rim
+    a, b, c = np.moveaxis(np.stack([mesh.x, mesh.y], axis=1)[mesh.triangles], 1, 0)
+    area = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+    mesh.set_mask(area < FLAT * area.mean())  # rounding makes slivers along the rim
     drawn = pane.tripcolor(mesh, field, shading="gouraud", **colours)
     pane.set(aspect="equal", title=f"{len(one.area)} pairs", xlabel="mm")
     pane.grid(visible=False)
