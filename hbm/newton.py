@@ -162,8 +162,12 @@ def _search(
     best, best_error = state, error
     length = 1.0
     while length > shortest:
-        trial = balance.evaluate(omega, state.x + length * direction.reshape(state.x.shape))
-        trial_error = relative_residual(trial, x_lin, least)
+        with np.errstate(over="ignore", invalid="ignore"):  # steep laws grow beyond all numbers
+            trial = balance.evaluate(omega, state.x + length * direction.reshape(state.x.shape))
+            trial_error = relative_residual(trial, x_lin, least)
+        if not np.isfinite(trial_error):
+            length *= 0.25
+            continue
         if trial_error < best_error:
             best, best_error = trial, trial_error
         if trial_error <= (1 - 0.1 * length) * error:

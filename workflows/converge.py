@@ -17,6 +17,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
+from matplotlib.tri import TriAnalyzer, Triangulation
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from hbm.branch import CONVERGED
@@ -28,6 +29,7 @@ from workflows.style import BLUE, GREEN, GREY, ORANGE, STYLE
 from workflows.trade_table import NAMES, QUANTITIES
 
 WANTED = 0.01
+FLAT = 1e-3  # inner over outer radius of a triangle that is no part of a map
 MOST_SHOWN = 0.98  # share of the nodes whose difference is within the colours of a map
 
 
@@ -273,7 +275,9 @@ def _draw_errors(pane: Any, study: Study) -> None:
 
 
 def _map(pane: Any, one: Measured, field: np.ndarray, colours: dict[str, Any]) -> Any:
-    drawn = pane.tripcolor(*(1e3 * one.patch.T), field, shading="gouraud", **colours)
+    mesh = Triangulation(*(1e3 * one.patch.T))
+    mesh.set_mask(TriAnalyzer(mesh).get_flat_tri_mask(FLAT))  # rounding makes slivers along the rim
+    drawn = pane.tripcolor(mesh, field, shading="gouraud", **colours)
     pane.set(aspect="equal", title=f"{len(one.area)} pairs", xlabel="mm")
     pane.grid(visible=False)
     return drawn
