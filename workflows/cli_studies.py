@@ -101,7 +101,7 @@ def converge(
     folder.mkdir(parents=True, exist_ok=True)
     pictures = [folder / f"converge_{one.scene}_{one.ladder}.png" for one in found]
     for one, path in zip(found, pictures, strict=True):
-        study.picture(one).savefig(path)
+        study.picture(one).savefig(path, dpi=110)
     if as_json:
         print(json.dumps(study.as_records(found), indent=2))
     else:

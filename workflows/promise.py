@@ -84,9 +84,12 @@ def check(
 
 
 def finest(trade: Trade, choice: Choice, quantities: Sequence[str]) -> tuple[str, ...]:
-    """Overrides that set every knob of a choice to its finest setting for which the quantities were measured."""
+    """Overrides that set every knob of a choice to its finest setting for which the quantities were measured.
+
+    Knobs that find the peak are left alone: the finer run refines it.
+    """
     found: list[str] = []
-    for chosen in choice.rows:
+    for chosen in (row for row in choice.rows if trade.of(row.knob)[-1].overrides):
         good = [row for row in trade.of(chosen.knob) if row.tunable and row.outcome == CONVERGED]
         measured = [row for row in good if any(row.values[q] is not None for q in quantities)]
         found += (measured or good)[-1].overrides
