@@ -13,6 +13,7 @@ from hbm.branch import CONVERGED
 VANISHING = 1e-6  # size of x, relative to the start, below which a solution counts as zero
 RAMP_STEPS = 12  # Newton steps in one step of the load ramp
 FORCE_ACCURACY = 1e-4  # of the contact forces, wanted where these stretch their springs far less than x is large
+EASIER = "more damping, a softer contact, fewer harmonics or a larger static load make it easier"
 FINEST = 1e-12  # residual over the displacement that is asked for at most
 
 
@@ -161,8 +162,12 @@ def _search(
     best, best_error = state, error
     length = 1.0
     while length > shortest:
-        trial = balance.evaluate(omega, state.x + length * direction.reshape(state.x.shape))
-        trial_error = relative_residual(trial, x_lin, least)
+        with np.errstate(over="ignore", invalid="ignore"):  # steep laws grow beyond all numbers
+            trial = balance.evaluate(omega, state.x + length * direction.reshape(state.x.shape))
+            trial_error = relative_residual(trial, x_lin, least)
+        if not np.isfinite(trial_error):
+            length *= 0.25
+            continue
         if trial_error < best_error:
             best, best_error = trial, trial_error
         if trial_error <= (1 - 0.1 * length) * error:
@@ -199,4 +204,5 @@ def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptio
                     return Solution(last.state, CONVERGED, steps, products, last.history)
             else:
                 stride *= 0.5
-    return Solution(first.state, f"{first.outcome}; load ramp stopped at {factor:.0%}", steps, products, first.history)
+    outcome = f"{first.outcome}; load ramp stopped at {factor:.0%}: {EASIER}"
+    return Solution(first.state, outcome, steps, products, first.history)

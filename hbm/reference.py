@@ -16,6 +16,7 @@ from scipy.sparse import csr_matrix, kron
 from hbm import law as contact_law
 from hbm.balance import HarmonicBalance
 from hbm.branch import CONVERGED
+from hbm.law import ContactCycle
 
 
 @dataclass
@@ -77,7 +78,6 @@ class DenseBalance:
 
     def solve(self, omega: float, start: np.ndarray, tolerance: float = 1e-8, max_steps: int = 40) -> DenseSolution:
         """Full Newton from reduced coordinates `start` (n, n_coeff), residual relative to the excitation."""
-        p, basis = self.problem, self.problem.basis
         clock = perf_counter()
         linear = self.dynamic_stiffness(omega)
         self.profile.balance += perf_counter() - clock
@@ -86,27 +86,46 @@ class DenseBalance:
         outcome = f"not converged in {max_steps} steps"
         steps = 0
         while True:
-            clock = perf_counter()
-            x = (self._spread @ q).reshape(p.parameters.n_pair, -1, basis.n_coeff)
-            cycle = contact_law.cycle(p.law, x, p.parameters, basis, p.memory)
-            tick = perf_counter()
-            self.profile.contact += tick - clock
-            residual = linear @ q - self.force.ravel() + self._spread.T @ cycle.force.ravel()
+            x, cycle, residual = self.residual(linear, q)
             if np.linalg.norm(residual) <= tolerance * scale:
                 outcome = CONVERGED
-                self.profile.balance += perf_counter() - tick
                 break
             if steps == max_steps:
                 break
             steps += 1
-            assert cycle.jacobian is not None
-            jacobian = linear + (self._spread.T @ _block_diagonal(cycle.jacobian) @ self._spread).toarray()
+            jacobian = self.jacobian(linear, cycle)
             clock = perf_counter()
-            self.profile.balance += clock - tick
             q -= np.linalg.solve(jacobian, residual)
             self.profile.inversion += perf_counter() - clock
             self.profile.inversions += 1
-        return DenseSolution(omega, q.reshape(-1, basis.n_coeff), x, outcome, steps)
+        return DenseSolution(omega, q.reshape(-1, self.problem.basis.n_coeff), x, outcome, steps)
+
+    def residual(self, linear: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, ContactCycle, np.ndarray]:
+        """Contact displacement (n_pair, n_component, n_coeff) [m], its cycle, and the residual (n n_coeff,) [N].
+
+        linear : of `dynamic_stiffness`; q : (n n_coeff,) reduced coordinates [m]
+        """
+        p = self.problem
+        clock = perf_counter()
+        x = (self._spread @ q).reshape(p.parameters.n_pair, -1, p.basis.n_coeff)
+        cycle = contact_law.cycle(p.law, x, p.parameters, p.basis, p.memory)
+        tick = perf_counter()
+        residual = linear @ q - self.force.ravel() + self._spread.T @ cycle.force.ravel()
+        self.profile.contact += tick - clock
+        self.profile.balance += perf_counter() - tick
+        return x, cycle, residual
+
+    def jacobian(self, linear: np.ndarray, cycle: ContactCycle) -> np.ndarray:
+        """(n n_coeff, n n_coeff) derivative of the residual."""
+        clock = perf_counter()
+        assert cycle.jacobian is not None
+        jacobian = linear + (self._spread.T @ _block_diagonal(cycle.jacobian) @ self._spread).toarray()
+        self.profile.balance += perf_counter() - clock
+        return jacobian
+
+    def onto_contact(self, matrix: np.ndarray) -> np.ndarray:
+        """Contact displacements (n_contact n_coeff, ...) that belong to columns of coordinates (n n_coeff, ...)."""
+        return np.asarray(self._spread @ matrix)
 
     def coordinates_of(self, omega: float, x: np.ndarray) -> np.ndarray:
         """Reduced coordinates (n, n_coeff) in balance with the contact forces at x, to start or to check from."""

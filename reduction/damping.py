@@ -16,7 +16,7 @@ def modal_damping(system: SecondOrderSystem, ratio: float) -> np.ndarray:
     Raises  ValueError for a ratio below 0
     """
     if not ratio >= 0:
-        raise ValueError(f"damping: ratio = {ratio} is negative; give the part of critical damping, such as 0.01")
+        raise ValueError(f"damping: ratio = {ratio}: give a part of critical damping of 0 or more, such as 0.01")
     values, phi = eigh(system.stiffness, system.mass)
     # below this an eigenvalue is rounding of a rigid-body mode
     values[values < len(values) * np.finfo(float).eps * values[-1]] = 0.0

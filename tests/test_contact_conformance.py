@@ -2,12 +2,19 @@
 
 import numpy as np
 import pytest
+import scipy.linalg as sla
 
-from hbm import aft
+from fem.system import SecondOrderSystem
+from hbm import aft, newton
 from hbm import law as contact_law
+from hbm.balance import HarmonicBalance
+from hbm.excitation import Excitation
 from hbm.harmonics import HarmonicBasis
 from hbm.law import SEPARATES, SLIPS, STICKS, ContactParameters
+from hbm.recovery import coordinates
+from reduction.model import ReducedModel
 from tests.contact_draws import HARMONICS, LAWS, LOCATED, draw, tangential
+from tests.verification_models import interface, modal_damping
 
 EVERY_LAW = pytest.mark.parametrize(("name", "components"), LAWS, ids=lambda v: v if isinstance(v, str) else "".join(v))
 FRICTION = pytest.mark.parametrize(
@@ -206,6 +213,45 @@ def test_mirror_image_of_the_plane(name, components):
             mirrored = memory * flip[: memory.shape[1]]
             second = contact_law.cycle(law, x * flip[:, None], parameters, basis, mirrored)
             np.testing.assert_allclose(second.force, first.force * flip[:, None], atol=1e-12)
+
+
+@EVERY_LAW
+def test_action_is_reaction(name, components):
+    """What two bodies, joined by their contact alone, lack to be in balance is the contact force, and minus it."""
+    n_pair, n_comp = 4, len(components)
+    n_contact, n_body = n_pair * n_comp, n_pair * n_comp + 3
+    rng = np.random.default_rng(12)
+    a = rng.normal(size=(2, n_body, n_body))
+    stiffness = sla.block_diag(*(m @ m.T / n_body + 0.2 * np.eye(n_body) for m in a))
+    mass = np.eye(2 * n_body)
+    loads = {"press": np.zeros(2 * n_body), "shake": rng.normal(size=2 * n_body)}
+    loads["press"][n_comp - 1 : n_contact : n_comp], loads["press"][n_body + n_comp - 1 :: n_comp] = 1.0, -1.0
+    damping = modal_damping(mass, stiffness, 0.05)
+    touching = np.eye(n_contact, n_body)
+    system = SecondOrderSystem(mass, stiffness, damping, loads, {"first": np.eye(2 * n_body)[-1]})
+    model = ReducedModel(system, interface(np.hstack([touching, -touching]), components))
+    parameters = ContactParameters.of(
+        components, np.full((n_pair, n_comp), 1.5), friction=0.3, normal_load=1.0, cubic=0.1
+    )
+    basis = HarmonicBasis((0, 1, 2, 3), 64)
+    excitation = Excitation.of({"press": 0.5}, {1: {"shake": 1.0}})
+    balance = HarmonicBalance(model, name, parameters, basis, excitation, 2.0)
+    solution = newton.solve_from_rest(balance, 0.8)
+    assert solution.converged
+    state = solution.state
+    flat = state.cycle.force.reshape(n_contact, -1)
+    force = basis.to_complex(flat)
+    size = np.abs(force).max()
+    assert size > 0.05
+    moved = coordinates(balance, state.flat, flat, 0.8)
+    for at, (h, q) in enumerate(zip(basis.harmonics, moved, strict=True)):
+        lacking = (stiffness + 0.8j * h * damping - (0.8 * h) ** 2 * mass) @ q
+        for name_of, value in (("press", 0.5 * (h == 0)), ("shake", 1.0 * (h == 1))):
+            lacking = lacking - value * loads[name_of]
+        first, second = np.split(-lacking, 2)
+        np.testing.assert_allclose(first[:n_contact], force[:, at], atol=1e-6 * size)
+        np.testing.assert_allclose(second[:n_contact], -force[:, at], atol=1e-6 * size)
+        assert np.abs(np.concatenate([first[n_contact:], second[n_contact:]])).max() < 1e-6 * size
 
 
 @EVERY_LAW

@@ -115,6 +115,30 @@ def test_arrays_of_a_run_are_as_large_as_what_they_hold(run: tuple[dict[str, Any
         assert arrays["fields/displacement"][0] <= 3  # first, middle and last row
 
 
+COMMAND = """
+import sys
+from workflows import cli
+try:
+    cli.main(sys.argv[1:])
+except SystemExit as end:
+    assert not end.code, end.code
+print(*(name for name in ("gmsh", "pyvista", "vtk", "matplotlib") if name in sys.modules), file=sys.stderr)
+"""
+
+
+def test_the_command_without_pictures_on_a_mesh_file_loads_neither_mesher_nor_plots(tmp_path: Path) -> None:
+    scene = on_a_mesh_file("beam", ("geometry.n_patch=3", "geometry.n_length=4", "geometry.n_height=1"), tmp_path)
+    words = ["run", "beam", "--no-pictures", "--out", str(tmp_path / "out")]
+    for text in (*scene, "response.points=6", "wear.max_steps=1"):
+        words += ["--set", text]
+    done = subprocess.run(
+        [sys.executable, "-c", COMMAND, *words], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out" / "result.h5").is_file()
+    assert done.stderr.splitlines()[-1] == ""
+
+
 def matrix_scene(folder: Path, *overrides: str) -> scene_file.SceneFile:
     """The scene of matrices, with a file of them beside it."""
     system = random_structure(2, n_extra=12).system

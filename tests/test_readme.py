@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from reduction import foreign
+
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
 START = "./tribodyn "
@@ -59,3 +61,11 @@ def test_the_check_is_what_ci_runs() -> None:
 def test_figures_are_there() -> None:
     for figure in re.findall(r"!\[.*?\]\((.*?)\)", README, re.S):
         assert (ROOT / figure).is_file(), figure
+
+
+def test_the_python_is_what_the_documentation_of_foreign_matrices_says() -> None:
+    """That one is executed word for word by test_workflows_matrices."""
+    documented = [line.strip() for line in (foreign.__doc__ or "").splitlines()]
+    (example,) = re.findall(r"^```python\n(.*?)^```", README, re.M | re.S)
+    lines = example.splitlines()
+    assert lines == documented[documented.index(lines[0]) :][: len(lines)]

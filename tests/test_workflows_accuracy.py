@@ -215,7 +215,7 @@ def test_a_limit_of_scattered_values_is_as_uncertain_as_they_are() -> None:
     unsettled = converge.limit_of([3.0, 5.0, 9.0, 17.0], [[1.0], [1.2], [0.9], [1.1]])
     assert np.isnan(unsettled.order)
     assert unsettled.value == pytest.approx(1.05)
-    assert unsettled.uncertainty == pytest.approx(0.15 / 1.05)
+    assert unsettled.doubt == pytest.approx(0.15 / 1.05)
     # three that settle, but by less than where the nodes happen to lie makes out
     by_chance = converge.limit_of([3.0, 5.0, 9.0], [[1.04, 1.06], [1.02, 0.97], [1.01]])
     assert np.isnan(by_chance.order)
@@ -228,6 +228,8 @@ def test_a_linear_field_is_carried_exactly() -> None:
     coarse = np.array([[0.0, 0.0], [0.31, 1.3], [1.0, 2.0]])
     plane = np.array([2.0, -3.0])
     assert converge.on_grid(fine, fine @ plane + 1, coarse) == pytest.approx(coarse @ plane + 1)
+    beyond = coarse * (1 + 1e-15) + 1e-16  # the rim of a coarser grid, by rounding outside of the finer one
+    assert converge.on_grid(fine, fine @ plane + 1, beyond) == pytest.approx(coarse @ plane + 1)
 
 
 def test_grids_of_the_beam(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -281,22 +283,29 @@ def test_the_budget_of_a_run(tmp_path: Path) -> None:
 
 def test_what_no_estimator_covers_is_known_from_the_trade() -> None:
     """A grid that was not measured itself has the error of the next coarser one."""
-    table = trade_table.load(trade_table.TRADES / "beam.json")
-    file = scene_file.read("beam")
+
+    def traded(knob: str, size: float, error: float, *overrides: str) -> Row:
+        return replace(made_up(knob, size, error), overrides=overrides)
+
+    rows = [traded("contact_grid", n, 0.1 / n, f"geometry.n_patch={n}") for n in (3, 5, 9)]
+    rows += [traded("fe_mesh", n, 0.01 / n, f"geometry.n_length={12 * n}") for n in (1, 2)]
+    rows += [traded("newton", 1.0, 0.5, "solver.tolerance=1")]
+    table = Trade("beam", "", (), 1.0, tuple(rows))
+
+    def found(*overrides: str) -> dict[str, tuple[float | None, str]]:
+        entries = budget._of_trade(scene_file.read("beam", overrides))
+        return {entry.source: (entry.error, entry.by) for entry in entries}
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(budget.accuracy, "table_of", lambda _: table)
-        found = list(budget._of_trade(file))
-        grid = next(e for e in found if e.source == "contact grid" and e.quantity == "amplitude")
-        assert grid.by.startswith("trade: ")
-        assert grid.error is not None
-        assert 0 < grid.error < 0.02
-        mesh = next(e for e in found if e.source == "fe mesh" and e.quantity == "amplitude")
-        assert mesh.by.endswith("trade: n_length=12, n_height=4")
-        assert all(entry.error is not None for entry in found)
-        coarse = scene_file.read("beam", ("geometry.n_patch=3", "geometry.n_height=1"))
-        mesh = next(e for e in budget._of_trade(coarse) if e.source == "fe mesh")
-        assert mesh.error is None
-        assert "finer settings alone" in mesh.by
+        scene = found()
+        assert scene["contact grid"] == (pytest.approx(0.1 / 9), "trade: as with the coarser contact_grid=9")
+        assert scene["fe mesh"] == (pytest.approx(0.01), "trade: fe_mesh=1")
+        assert "newton" not in scene
+        assert found("geometry.n_patch=5")["contact grid"] == (pytest.approx(0.02), "trade: contact_grid=5")
+        error, how = found("geometry.n_length=6")["fe mesh"]
+        assert error is None
+        assert "finer settings alone" in how
 
 
 def test_the_budget_says_where_no_life_can_be_stated() -> None:

@@ -12,6 +12,7 @@ import pytest
 from hbm.step_error import step_error
 from workflows import cli, extremes, extremes_wear
 from workflows.extremes_judge import judged, sampled_honestly, tried
+from workflows.extremes_march import force_error
 from workflows.extremes_models import lattice, rigid
 
 
@@ -29,14 +30,29 @@ def test_the_full_table_has_at_least_300_cells() -> None:
     assert sum(1 for _ in extremes.cells(quick=False)) >= 300
 
 
-def test_a_solution_that_is_slightly_off_is_seen() -> None:
+@pytest.mark.parametrize("transitions", ["located", "sampled"])
+def test_a_solution_that_is_slightly_off_is_seen(transitions: str) -> None:
     body = lattice(2, 2)
-    balance = body.balance(body.ordinary)
+    balance = body.balance(replace(body.ordinary, transitions=transitions))
     verdict, solution = tried(balance, body.ordinary.omega)
     assert verdict.outcome == "converged"
+    assert "forces of a plain march, equilibrium of every coordinate" in verdict.reason
     x = solution.state.x.copy()
-    x[0, 0, 1] *= 1.001
+    x[0, 0, 1] *= 1 + 1e-6
     assert judged(balance, balance.evaluate(body.ordinary.omega, x)).outcome == "wrong"
+
+
+@pytest.mark.parametrize(("transitions", "share"), [("located", 2e-2), ("sampled", 1e-9)])
+def test_a_contact_force_that_is_slightly_off_is_seen(transitions: str, share: float) -> None:
+    """The march shares nothing with the solver's law, which all other checks believe."""
+    body = lattice(2, 2)
+    balance = body.balance(replace(body.ordinary, transitions=transitions))
+    state = tried(balance, body.ordinary.omega)[1].state
+    off, allowed = force_error(balance, state)
+    assert off <= allowed
+    wrong = replace(state, cycle=replace(state.cycle, force=(1 + share) * state.cycle.force))
+    off, allowed = force_error(balance, wrong)
+    assert off > allowed
 
 
 def test_what_nobody_declared_is_wrong_and_what_is_declared_is_refused() -> None:
@@ -63,8 +79,9 @@ def test_the_estimate_of_sampling_covers_its_error(samples: int) -> None:
 def test_a_contact_that_sticks_does_not_wear() -> None:
     """What rounding leaves of the work of a stuck pair was once taken for slow wear, 1e25 cycles of it."""
     body = lattice(3, 3)
-    balance = body.balance(body.ordinary)
-    _, solution = tried(balance, body.ordinary.omega)
+    gentle = replace(body.ordinary, force=12.0)
+    balance = body.balance(gentle)
+    _, solution = tried(balance, gentle.omega)
     assert np.all(solution.state.cycle.status == 1)
     assert not balance.energy(solution.state).any()
 

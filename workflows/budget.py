@@ -165,7 +165,8 @@ def _of_trade(file: SceneFile) -> Iterator[Entry]:
 def _off(trade: Trade, knob: str, setting: str, quantity: str) -> float | None:
     rows = trade.of(knob)
     place = next(i for i, row in enumerate(rows) if row.setting == setting)
-    return None if rows[place].errors[quantity] is None else accuracy.error_of(rows, place, quantity)
+    error = accuracy.error_of(rows, place, quantity)
+    return error if rows[place].errors[quantity] is not None and np.isfinite(error) else None
 
 
 def _compared(file: SceneFile, overrides: tuple[str, ...]) -> str | None:

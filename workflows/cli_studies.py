@@ -101,7 +101,7 @@ def converge(
     folder.mkdir(parents=True, exist_ok=True)
     pictures = [folder / f"converge_{one.scene}_{one.ladder}.png" for one in found]
     for one, path in zip(found, pictures, strict=True):
-        study.picture(one).savefig(path)
+        study.picture(one).savefig(path, dpi=110)
     if as_json:
         print(json.dumps(study.as_records(found), indent=2))
     else:
@@ -192,5 +192,5 @@ def track(
         print(json.dumps(found.record(), indent=2))
     else:
         for value, hertz, amplitude in zip(found.value, found.frequency, found.amplitude, strict=True):
-            print(f"{found.name} {value:<12.6g} {hertz:12.6g} Hz {amplitude:12.6g} m")
+            print(f"{found.name} {f'{value:.6g} {found.unit}':14} {hertz:12.6g} Hz {amplitude:12.6g} m")
         print(f"{found.what}: {found.end}", folder / "track.csv", folder / "track.png", sep="\n")

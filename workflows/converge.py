@@ -17,17 +17,19 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
+from matplotlib.tri import TriAnalyzer, Triangulation
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from hbm.branch import CONVERGED
-from workflows import scene_file
+from workflows import limit, scene_file
 from workflows.knobs import Ladder, Setting, study_of
+from workflows.limit import Limit
 from workflows.measure import Measured, measure
 from workflows.style import BLUE, GREEN, GREY, ORANGE, STYLE
 from workflows.trade_table import NAMES, QUANTITIES
 
 WANTED = 0.01
-ORDERS = (0.3, 6.0)  # between which a fitted order is believed
+FLAT = 1e-3  # inner over outer radius of a triangle that is no part of a map
 MOST_SHOWN = 0.98  # share of the nodes whose difference is within the colours of a map
 
 
@@ -37,7 +39,7 @@ class Row:
 
     size : nodes along the patch; setting : its overrides; own : whether the scene has this grid
     values, errors : by trade_table.QUANTITIES, errors against the limit
-    worst : largest error of all placements of the nodes, without its sign, and the uncertainty of the limit
+    worst : largest error of all placements of the nodes, without its sign, and the doubt in the limit
     map_difference : r.m.s. difference of friction work per area from the finest grid, over its r.m.s.
     """
 
@@ -51,18 +53,6 @@ class Row:
     map_difference: float | None
     seconds: float
     outcome: str
-
-
-@dataclass(frozen=True)
-class Limit:
-    """Limit of one quantity; order : observed, nan where the values do not settle.
-
-    uncertainty : relative, of the limit: distance of the finest grid from it, or half the range of the three finest
-    """
-
-    value: float
-    order: float
-    uncertainty: float
 
 
 @dataclass(frozen=True)
@@ -142,35 +132,28 @@ def _values(grid: Sequence[Measured], quantity: str) -> list[float]:
     return [v for one in grid if one.outcome == CONVERGED and (v := one.values[quantity]) is not None]
 
 
-def _off(value: float | None, limit: Limit | None) -> float | None:
-    return None if value is None or limit is None else value / limit.value - 1
+def _off(value: float | None, end: Limit | None) -> float | None:
+    return None if value is None or end is None else value / end.value - 1
 
 
-def _worst(values: Sequence[float], limit: Limit | None) -> float | None:
-    if not values or limit is None:
+def _worst(values: Sequence[float], end: Limit | None) -> float | None:
+    if not values or end is None:
         return None
-    return max(abs(value / limit.value - 1) for value in values) + limit.uncertainty
+    return max(abs(value / end.value - 1) for value in values) + end.doubt
 
 
 def limit_of(size: Sequence[float], values: Sequence[Sequence[float]]) -> Limit:
-    """Limit of value = v0 + c h^p, h = 1 / (size - 1), through the three finest sizes.
+    """Limit of answers on finer and finer grids, through the three finest.
 
-    size : (n,) nodes along the patch, rising; values : (n) of all placements on each, the first one counts
-    Where the three are not monotone, the order is out of ORDERS, or the last step is within the scatter of the finest
-    size with several placements, the middle of all values on the three stands, with half of their range as uncertainty.
-    Source  Roache, J. Fluids Eng. 116, 1994
+    size : nodes along the patch, rising; values : of all placements on each, the first one counts
+    Where the three do not settle, or the last step is within the scatter of the finest size with several placements,
+    the middle of all values on the three stands, with half of their range as doubt.
     """
-    h, v = 1.0 / (np.asarray(size[-3:]) - 1.0), np.array([some[0] for some in values[-3:]])
+    last = [some[0] for some in values[-3:]]
     scatter = next((float(np.ptp(some)) for some in reversed(values) if len(some) > 1), 0.0)
-    first, second = v[0] - v[1], v[1] - v[2]
-    if abs(second) > scatter and first / second > 0:
-        trial = np.linspace(*ORDERS, 571)
-        ratio = (h[0] ** trial - h[1] ** trial) / (h[1] ** trial - h[2] ** trial)
-        best = int(np.argmin(np.abs(np.log(ratio) - np.log(first / second))))
-        if 0 < best < len(trial) - 1:
-            p = trial[best]
-            limit = v[2] - second * h[2] ** p / (h[1] ** p - h[2] ** p)
-            return Limit(float(limit), float(p), float(abs(v[2] / limit - 1)))
+    found = limit.limit_of([n - 1.0 for n in size[-3:]], last)
+    if np.isfinite(found.order) and abs(last[-1] - last[-2]) > scatter:
+        return found
     every = np.concatenate([np.asarray(some) for some in values[-3:]])
     middle = (every.min() + every.max()) / 2
     return Limit(float(middle), float("nan"), float(np.ptp(every) / 2 / abs(middle)))
@@ -178,7 +161,9 @@ def limit_of(size: Sequence[float], values: Sequence[Sequence[float]]) -> Limit:
 
 def on_grid(fine: np.ndarray, field: np.ndarray, coarse: np.ndarray) -> np.ndarray:
     """A field (n_fine,) at fine (n_fine, 2) carried to the nodes coarse (n_coarse, 2): linear, nearest at the rim."""
-    inside = LinearNDInterpolator(fine, field)(coarse)
+    centre = fine.mean(axis=0)
+    within = centre + (1 - 1e-9) * (coarse - centre)  # rounding must not put the rim outside
+    inside = LinearNDInterpolator(fine, field)(within)
     return np.where(np.isnan(inside), NearestNDInterpolator(fine, field)(coarse), inside)
 
 
@@ -210,9 +195,9 @@ def as_text(studies: Sequence[Study]) -> str:
             lines.append(_line(row.setting.ljust(width), str(row.pairs), seconds, cells, maps + failed))
         limits = [f"{(one := study.limits[q]).value:.5g} ({_order(one)})" for q in shown]
         lines.append(_line("limit".ljust(width), "", "", limits, ""))
-        lines.append("in brackets: error; of the worst placement of the nodes, with the uncertainty of the limit")
+        lines.append("in brackets: error; of the worst placement of the nodes, with the doubt in the limit")
         for q in shown:
-            known = f"the limit is known to {100 * study.limits[q].uncertainty:.2g} %"
+            known = f"the limit is known to {100 * study.limits[q].doubt:.2g} %"
             lines.append(f"{100 * WANTED:g} % on {_name(q)} needs {_grid(study.needed(q))}; {known}")
         lines += [_judgement(row, shown) for row in study.rows if row.own]
     return "\n".join(lines)
@@ -233,8 +218,8 @@ def _cell(row: Row, quantity: str) -> str:
     return f"{value:.5g} ({100 * error:+.2g}; {100 * worst:.2g} %)"
 
 
-def _order(limit: Limit) -> str:
-    return "not settled" if np.isnan(limit.order) else f"order {limit.order:.1f}"
+def _order(end: Limit) -> str:
+    return "scattered" if np.isnan(end.order) else f"order {end.order:.1f}"
 
 
 def _grid(row: Row | None) -> str:
@@ -260,8 +245,8 @@ def picture(study: Study) -> Figure:
         panes = figure.subplots(1, 2 + len(some), width_ratios=[1.7] + [1] * (1 + len(some)), squeeze=False)[0]
         _draw_errors(panes[0], study)
         work = finest.energy / finest.area
-        drawn = _map(panes[1], finest, work, {"cmap": "viridis"})
-        figure.colorbar(drawn, ax=panes[1], label="work per cycle and area, J/m²", location="bottom")
+        drawn = _map(panes[1], finest, 1e-3 * work, {"cmap": "viridis"})
+        figure.colorbar(drawn, ax=panes[1], label="work per cycle and area, kJ/m²", location="bottom")
         reach = max(float(work.max()), 1e-300)
         offs = [(one.energy / one.area - on_grid(finest.patch, work, one.patch)) / reach for one in some]
         most = max((float(np.quantile(np.abs(off), MOST_SHOWN)) for off in offs), default=0.0) or 1.0
@@ -286,11 +271,13 @@ def _draw_errors(pane: Any, study: Study) -> None:
     pane.xaxis.set_minor_locator(NullLocator())
     pane.set(xlabel="node pairs" if by_pairs else "size of the mesh", ylabel="relative error, worst placement")
     pane.set_title(f"{study.scene}: {study.ladder.replace('_', ' ')}")
-    pane.legend(fontsize=8)
+    pane.legend(fontsize=8, loc="upper right")
 
 
 def _map(pane: Any, one: Measured, field: np.ndarray, colours: dict[str, Any]) -> Any:
-    drawn = pane.tripcolor(*(1e3 * one.patch.T), field, shading="gouraud", **colours)
+    mesh = Triangulation(*(1e3 * one.patch.T))
+    mesh.set_mask(TriAnalyzer(mesh).get_flat_tri_mask(FLAT))  # rounding makes slivers along the rim
+    drawn = pane.tripcolor(mesh, field, shading="gouraud", **colours)
     pane.set(aspect="equal", title=f"{len(one.area)} pairs", xlabel="mm")
     pane.grid(visible=False)
     return drawn

@@ -85,7 +85,7 @@ def cells(quick: bool) -> Iterator[Cell]:
         yield from _bases(body)
     loose = lattice(3, 3, suspended=False)
     for preload in PRELOAD:
-        for force in (0.0, 1.0, 30.0):
+        for force in (0.0, 1.0, 80.0):
             label = f"preload {preload:g} N, force {force:g} N"
             yield _cell(loose, "rigid-body modes", label, preload=preload, force=force)
     yield from _node_counts(NODES[:-2] if quick else NODES)

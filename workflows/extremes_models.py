@@ -103,7 +103,7 @@ def lattice(nx: int, ny: int, suspended: bool = True) -> Body:
     )
     b = np.kron(np.eye(n_pair, 2 * n_pair), np.diag([1.0, 1.0, -1.0]))
     name = f"lattice, {nx} x {ny} nodes" if suspended else f"lattice without supports, {nx} x {ny} nodes"
-    ordinary = Setting(2e6, 3e6, 0.4, 40.0, 12.0, 2 * np.pi * 500)
+    ordinary = Setting(2e6, 3e6, 0.4, 40.0, 80.0, 2 * np.pi * 500)  # all pairs slip, two thirds lift
     return Body(name, ReducedModel(system, _interface(b, points[:n_pair], ALL)), ordinary)
 
 

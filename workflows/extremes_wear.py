@@ -23,7 +23,6 @@ COEFFICIENTS = (0.0, 1e-30, 1e-18, 1e-9, 1.0, 1e9)  # m3/J
 ORDINARY = 2e-15  # m3/J
 MOST_STEPS = 150
 TIGHT = 3e-3  # tolerance of the reference
-SLACK = 0.02  # error of the reference itself
 
 Cell = tuple[str, str, str, Callable[[], Verdict]]
 
@@ -83,14 +82,16 @@ def _judged(
         return Verdict(CONVERGED if volume == 0 else WRONG, f"nothing wears: {worn.end}", 0.0)
     estimate = step_error(worn, tolerance).cycles
     if estimate >= UNKNOWN:
-        return Verdict(REFUSED, "no life is stated: the error estimate of the wear steps is above 50 %")
+        says = f"the error estimate of the wear steps is above {UNKNOWN:.0%}, no life is stated"
+        return Verdict(REFUSED, f'{says}: take a smaller wear.step or wear.rule = "error_controlled"')
     # at the same volume: how far are the cycles off
     cycles, volumes = worn.cycles * faster, worn.depth @ problem.area
     reach = np.flatnonzero(worn.preload >= LIFE_SHARE * worn.preload[0])[-1]
     expected = _cycles_for(body, float(volumes[reach]))
     off = abs(cycles[reach] / expected - 1) if expected > 0 else 0.0
     says = f"cycles are off by {off:.1e}, estimated {estimate:.1e}; {worn.end}"
-    return Verdict(CONVERGED if off <= 3 * estimate + SLACK else WRONG, says, off)
+    allowed = estimate + step_error(_reference(body), TIGHT).cycles
+    return Verdict(CONVERGED if off <= allowed else WRONG, says, off)
 
 
 def _cycles_for(body: Body, volume: float) -> float:

@@ -90,6 +90,8 @@ def _curve(result: Result) -> dict[str, Any]:
     numbers: dict[str, Any] = {
         "harmonics": None if harmonics is None else [int(h) for h in np.atleast_1d(harmonics)],
         "harmonics_error": result.facts.get("harmonics_error"),
+        "response_end": None if frf is None else frf.end,
+        "folds_hz": [] if frf is None else [float(frf.frequency[i]) for i in frf.folds],
         "unstable_points": None,
         "bifurcations": None,
         "shear_spread": None,
@@ -141,6 +143,8 @@ def lines(result: Result) -> list[tuple[str, str]]:
         error = numbers["harmonics_error"]
         chosen = "" if error is None else f", chosen: estimated truncation error {error:.1e}"
         shown.append(("harmonics", ", ".join(map(str, numbers["harmonics"])) + chosen))
+    if numbers["response_end"] is not None:
+        shown.append(("response", numbers["response_end"]))
     if numbers["bifurcations"] is not None:
         places = ", ".join(f"{b['kind']} at {b['hz']:.5g} Hz" for b in numbers["bifurcations"])
         shown.append(("stability", f"{numbers['unstable_points']} unstable points; {places or 'no bifurcations'}"))
