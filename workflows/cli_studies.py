@@ -192,5 +192,5 @@ def track(
         print(json.dumps(found.record(), indent=2))
     else:
         for value, hertz, amplitude in zip(found.value, found.frequency, found.amplitude, strict=True):
-            print(f"{found.name} {value:<12.6g} {hertz:12.6g} Hz {amplitude:12.6g} m")
+            print(f"{found.name} {f'{value:.6g} {found.unit}':14} {hertz:12.6g} Hz {amplitude:12.6g} m")
         print(f"{found.what}: {found.end}", folder / "track.csv", folder / "track.png", sep="\n")
