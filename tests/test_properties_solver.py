@@ -61,8 +61,9 @@ def check(balance: HarmonicBalance, state: State) -> None:
         rounding = 5e-14 * condition(balance, state.omega)
         assert np.linalg.norm(back - state.flat) <= (3 * TOLERANCE + rounding) * size + tiny * np.sqrt(back.size)
     along = parameters.tangential
-    forces, travels = (np.linalg.norm(values[:, along], axis=2) for values in (state.cycle.force, state.x))
     basis = balance.basis
+    travelled = np.maximum(basis.order, 1) * state.x  # harmonic h goes to and fro h times in a cycle
+    forces, travels = (np.linalg.norm(values[:, along], axis=2) for values in (state.cycle.force, travelled))
     scale = np.pi * ((forces + tiny * parameters.stiffness[:, along]) * (travels + tiny)).sum(axis=1)
     factor, order = SAMPLING.get(balance.law_name, UNCOUPLED)
     coarse = 0.0 if basis.transitions == "located" else factor * (basis.harmonics[-1] / basis.n_samples) ** order
@@ -79,12 +80,17 @@ OVERFLOW = Drawn(  # its first Newton step is so long that the cubic force leave
 UNDRIVEN = replace(  # at rest in an undamped resonance
     OVERFLOW, law="coulomb_planar", structure="soft", contact=1.3, contact_spread=2.0, dynamic=None, mode=1, seed=1
 )
+COARSE = replace(  # eleven samples for the work of harmonic 5
+    OVERFLOW, law="jenkins", components=("t1", "n"), n_extra=2, structure="clamped", damping=0.01, contact_spread=0.0,
+    dynamic=None, base=-9.0, harmonics=(0, 1, 5), n_samples=11, tuning=0.9, seed=123,
+)  # fmt: skip
 
 
 @cases(250)
 @given(drawn_problems())
 @example(OVERFLOW)
 @example(UNDRIVEN)
+@example(COARSE)
 def test_what_counts_as_converged_is_in_balance(d: Drawn) -> None:
     try:
         balance = problem_of(d)

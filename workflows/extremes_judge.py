@@ -96,7 +96,8 @@ def _gain(balance: HarmonicBalance, state: State, energy: np.ndarray) -> float:
     Sampled transitions are late by up to a sample, and the work is wrong by the square of it.
     """
     tangential, basis = balance.parameters.tangential, balance.basis
-    force, travel = (np.linalg.norm(v[:, tangential], axis=2) for v in (state.cycle.force, state.x))
+    travelled = np.maximum(basis.order, 1) * state.x  # harmonic h goes to and fro h times in a cycle
+    force, travel = (np.linalg.norm(v[:, tangential], axis=2) for v in (state.cycle.force, travelled))
     coarse = 0.0 if basis.transitions == "located" else WORK_BY_SAMPLING * (basis.harmonics[-1] / basis.n_samples) ** 2
     beyond = -energy - (LOST_WORK + coarse) * np.pi * (force * travel).sum(axis=1)
     return float(beyond.max())
