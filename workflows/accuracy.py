@@ -123,11 +123,21 @@ def _name(quantity: str) -> str:
 
 
 def _usable(rows: Sequence[Row], asked: Sequence[str]) -> list[Row]:
-    """Settings of a knob that may be chosen; none of a knob that is another model, or has no say in what is asked."""
-    quantities = {"energy_J" if q in OF_WEAR else q for q in asked} | set(asked)
-    if all(row.values[q] is None for row in rows for q in quantities):
-        return []
-    return [row for row in rows if row.tunable and row.outcome == CONVERGED]
+    """Settings of a knob for which all was measured that is asked and that the knob has a say in.
+
+    None of a knob that is another model, or that has no say in anything that is asked.
+    """
+    quantities = {_judged_by(rows, quantity) for quantity in asked}
+    said = [q for q in quantities if any(row.values[q] is not None for row in rows)]
+    good = [row for row in rows if row.tunable and row.outcome == CONVERGED]
+    return [row for row in good if all(row.values[q] is not None for q in said)] if said else []
+
+
+def _judged_by(rows: Sequence[Row], quantity: str) -> str:
+    """The quantity itself; of depth and life of a knob that was not worn its energy, as life goes with the work."""
+    if quantity in OF_WEAR and all(row.values[quantity] is None for row in rows):
+        return "energy_J"
+    return quantity
 
 
 def error_of(rows: Sequence[Row], place: int, quantity: str) -> float:
@@ -135,9 +145,8 @@ def error_of(rows: Sequence[Row], place: int, quantity: str) -> float:
 
     A knob whose settings were not worn is judged by its energy: life is in proportion to the work per cycle.
     """
-    if quantity in OF_WEAR and all(other.values[quantity] is None for other in rows):
-        quantity = "energy_J"
-    if all(other.values[quantity] is None for other in rows):
+    quantity = _judged_by(rows, quantity)
+    if all(row.values[quantity] is None for row in rows):
         return 0.0
     error, doubt = rows[place].errors[quantity], rows[place].doubts[quantity]
     return float("inf") if error is None or doubt is None else abs(error) + doubt

@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from hbm.branch import CONVERGED
-from workflows import scene_file
+from workflows import pipeline, scene_file
 from workflows.knobs import Knob, Setting, chosen, knobs_of, study_of
 from workflows.limit import limit_of
 from workflows.measure import Measured, measure
@@ -64,6 +64,7 @@ class Meter:
 
     def of(self, file: scene_file.SceneFile, wears: bool = True, refined: bool = True) -> Measured:
         """As `measure`."""
+        wears = wears and pipeline.wears(file.scene)
         key = f"{file.scene.model_dump_json()} {wears} {refined}"
         if key not in self._known:
             self._known[key] = measure(file, wears, refined)
@@ -110,27 +111,21 @@ def _row(knob: Knob, setting: Setting, measured: Measured) -> Row:
 
 
 def judged(rows: Sequence[Row]) -> list[Row]:
-    """The rows of a knob with their errors, and with what is doubtful about the limit that these are relative to.
-
-    A setting that is finer than all that were worn counts as good as the finest of those.
-    """
+    """The rows of a knob with their errors, and with what is doubtful about the limit that these are relative to."""
     known = {name: known_of(rows, name) for name in QUANTITIES}
     limits = {name: limit_of(*zip(*points, strict=True)) for name, points in known.items() if points}
-    found: list[Row] = []
-    for row in rows:
-        errors: dict[str, float | None] = {}
-        for name in QUANTITIES:
-            value = row.values[name]
-            coarser = [r.errors[name] for r in found if r.values[name] is not None and r.outcome == CONVERGED]
-            if name not in limits:
-                errors[name] = None
-            elif value is not None:
-                errors[name] = value / limits[name].value - 1
-            else:
-                errors[name] = coarser[-1] if coarser and row.outcome == CONVERGED else None
-        doubts = {name: None if errors[name] is None else limits[name].doubt for name in QUANTITIES}
-        found.append(replace(row, errors=errors, doubts=doubts))
-    return found
+
+    def error(row: Row, name: str) -> float | None:
+        value = row.values[name]
+        return None if value is None or name not in limits else value / limits[name].value - 1
+
+    def doubt(row: Row, name: str) -> float | None:
+        return None if row.values[name] is None or name not in limits else limits[name].doubt
+
+    return [
+        replace(row, errors={n: error(row, n) for n in QUANTITIES}, doubts={n: doubt(row, n) for n in QUANTITIES})
+        for row in rows
+    ]
 
 
 def as_records(trade: Trade) -> list[dict[str, Any]]:
@@ -158,7 +153,7 @@ def as_text(trade: Trade) -> str:
 
 def _cell(row: Row, quantity: str) -> str:
     error, doubt = row.errors[quantity], row.doubts[quantity]
-    if error is None or doubt is None or row.values[quantity] is None:
+    if error is None or doubt is None:
         return ""
     known = f"{100 * error:+.3g}" if error else "0"
     return f"{known} ~{100 * doubt:.2g} %" if doubt else f"{known} %"

@@ -10,7 +10,7 @@ from pathlib import Path
 from hbm.branch import CONVERGED
 from workflows import scene_file
 from workflows.accuracy import OF_WEAR, Choice, parsed, table_of, tuned
-from workflows.knobs import study_of
+from workflows.knobs import Study, study_of
 from workflows.measure import Measured, measure
 from workflows.trade_table import NAMES, QUANTITIES, Trade
 
@@ -71,7 +71,7 @@ def check(
     truth: dict[str, float | None] = {}
     for name, quantities, more in (("response", others, study.check), ("wear", worn, study.check_worn)):
         if quantities:
-            finer[name] = (*finest(trade, choice, quantities), *more)
+            finer[name] = (*finest(trade, choice, quantities), *_concerned(more, study, choice))
             reference = _measured(scene_file.read(scene, (*overrides, *finer[name])), name == "wear", True, say)
             truth |= {q: reference.values[q] for q in quantities}
     lines = []
@@ -94,6 +94,13 @@ def finest(trade: Trade, choice: Choice, quantities: Sequence[str]) -> tuple[str
         measured = [row for row in good if any(row.values[q] is not None for q in quantities)]
         found += (measured or good)[-1].overrides
     return tuple(found)
+
+
+def _concerned(more: Sequence[str], study: Study, choice: Choice) -> list[str]:
+    """Those of `more` that set no knob which the choice leaves alone."""
+    ours = {text.partition("=")[0] for text in choice.overrides}
+    knobs = {text.partition("=")[0] for knob in study.knobs for s in knob.settings for text in s.overrides}
+    return [text for text in more if text.partition("=")[0] not in knobs - ours]
 
 
 def _measured(file: scene_file.SceneFile, wears: bool, refined: bool, say: Callable[[str], None]) -> Measured:

@@ -28,8 +28,11 @@ def picture(trade: Trade) -> Figure:
         colours = mpl.colormaps["tab20"].colors  # type: ignore[attr-defined]
         for pane, quantity in zip(panes, shown, strict=True):
             for i, knob in enumerate(trade.knobs):
-                rows = [row for row in trade.of(knob) if row.errors[quantity] is not None and np.isfinite(row.size)]
-                error = [max(abs(row.errors[quantity] or 0.0), FLOOR) for row in rows]
+                rows = [row for row in trade.of(knob) if row.values[quantity] is not None and np.isfinite(row.size)]
+                if not rows:
+                    continue
+                off = [abs(row.errors[quantity] or 0.0) + (row.doubts[quantity] or 0.0) for row in rows]
+                error = np.maximum(off, FLOOR)
                 style = {"color": colours[i % 20], "marker": MARKERS[i % len(MARKERS)], "linestyle": "none"}
                 pane.plot([row.seconds for row in rows], error, label=knob.replace("_", " "), markersize=5, **style)
             together = front(trade, quantity)
@@ -40,6 +43,7 @@ def picture(trade: Trade) -> Figure:
             pane.xaxis.set_minor_formatter(NullFormatter())
             name = NAMES[QUANTITIES.index(quantity)]
             pane.set(yscale="log", xlabel="seconds of one processor", title=f"{trade.scene}: {name}")
-        panes[0].set_ylabel("relative error from where the knob tends to")
-        panes[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
+        panes[0].set_ylabel("relative error, with the doubt in it")
+        known = panes[0].get_legend_handles_labels()
+        panes[-1].legend(*known, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
     return figure
