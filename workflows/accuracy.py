@@ -201,6 +201,11 @@ def table_of(file: SceneFile, path: Path | None = None) -> Trade:
 
 
 def tuned(name: str, overrides: Sequence[str], wanted: str, path: Path | None = None) -> tuple[SceneFile, Choice]:
-    """The scene with the cheapest settings that promise an accuracy as `parsed` reads it, and the choice."""
-    choice = choose(table_of(read(name, overrides), path), *parsed(wanted))
-    return read(name, (*overrides, *choice.overrides)), choice
+    """The scene with the cheapest settings that promise an accuracy as `parsed` reads it, and the choice.
+
+    Where neither depth nor life is asked for, the scene is not worn.
+    """
+    file = read(name, overrides)
+    choice = choose(table_of(file, path), *parsed(wanted))
+    unasked = file.scene.wear is not None and not any(quantity in choice.errors for quantity in OF_WEAR)
+    return read(name, (*overrides, *choice.overrides, *(("wear=",) if unasked else ()))), choice
