@@ -123,9 +123,11 @@ def _measure(balance: HarmonicBalance, harmonics: str, threads: int, windows: tu
             dense_seconds += now() - clock
             own_seconds += per_point[i - 1]
             q.append(solution.q)
-        exact = newton.solve(balance, wanted[start + length - 1], solution.x, NewtonOptions(1e-12)).state.x
-        polished = dense.solve(wanted[start + length - 1], q[-1], 1e-12, max_steps=6).x
-        difference = max(difference, float(np.abs(polished - exact).max() / np.abs(exact).max()))
+        last = wanted[start + length - 1]
+        own = branch.contact[int(np.argmin(np.abs(branch.omega - last)))].reshape(solution.x.shape)
+        exact = newton.solve(balance, last, own, NewtonOptions(1e-12)).state.x
+        polished = dense.solve(last, q[-1], 1e-12, max_steps=6).x
+        difference = float(np.maximum(difference, np.abs(polished - exact).max() / np.abs(exact).max()))
     p = dense.profile
     return Row(
         harmonics=harmonics,
