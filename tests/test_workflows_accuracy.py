@@ -158,6 +158,13 @@ def test_a_table_of_another_scene_is_refused(table: Trade, tmp_path: Path) -> No
         accuracy.choose(table, 1e-9)
 
 
+def test_nothing_is_worn_where_no_wear_is_asked_for() -> None:
+    for asked, worn in (("2 % of peak frequency", False), ("2 % of depth", True)):
+        file, choice = accuracy.tuned("beam", (), asked, trade_table.TRADES / "beam.json")
+        assert (file.scene.wear is not None) == worn
+        assert choice.error <= 0.02
+
+
 def test_a_knob_that_the_scene_has_not_is_refused() -> None:
     with pytest.raises(ValueError, match="the scene has the knobs fe_mesh, contact_grid, nodes, modes"):
         knob_trade.run("beam", ("wheels",), NO_WEAR, lambda text: None)

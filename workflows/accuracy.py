@@ -15,6 +15,7 @@ from workflows.units import to_si
 
 OF_WEAR = ("depth_m", "life_cycles")
 WANTED = tuple(float(10**-power) for power in np.arange(0.5, 5, 0.125))  # errors of the Pareto front
+WORTH = 0.1  # of the time that a coarser setting must save: the clock is no better, and coarse ones are less robust
 MARGIN = 0.7  # of the wanted error that the knobs together may use up: they were measured one by one
 
 
@@ -93,7 +94,7 @@ def choose(trade: Trade, wanted: float, quantities: Sequence[str] = QUANTITIES) 
         raise ValueError(_refusal(trade.scene, wanted, errors(place), ladders, place))
     while True:
         trials = [{**place, knob: i} for knob, rows in ladders.items() for i in range(len(rows)) if i != place[knob]]
-        allowed = [t for t in trials if total(t) <= MARGIN * wanted and seconds(t) < seconds(place)]
+        allowed = [t for t in trials if total(t) <= MARGIN * wanted and seconds(t) < (1 - WORTH) * seconds(place)]
         if not allowed:
             break
         place = max(allowed, key=lambda t: (1 - seconds(t) / seconds(place)) / max(total(t) - total(place), 1e-9))
@@ -201,6 +202,11 @@ def table_of(file: SceneFile, path: Path | None = None) -> Trade:
 
 
 def tuned(name: str, overrides: Sequence[str], wanted: str, path: Path | None = None) -> tuple[SceneFile, Choice]:
-    """The scene with the cheapest settings that promise an accuracy as `parsed` reads it, and the choice."""
-    choice = choose(table_of(read(name, overrides), path), *parsed(wanted))
-    return read(name, (*overrides, *choice.overrides)), choice
+    """The scene with the cheapest settings that promise an accuracy as `parsed` reads it, and the choice.
+
+    Where neither depth nor life is asked for, the scene is not worn.
+    """
+    file = read(name, overrides)
+    choice = choose(table_of(file, path), *parsed(wanted))
+    unasked = file.scene.wear is not None and not any(quantity in choice.errors for quantity in OF_WEAR)
+    return read(name, (*overrides, *choice.overrides, *(("wear=",) if unasked else ()))), choice

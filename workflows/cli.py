@@ -72,7 +72,8 @@ def run(
     scene
         Name of a scene (see `tribodyn list`) or a .toml file.
     accuracy
-        Relative error wanted, such as "1 %" or "1 % of life, energy": the cheapest settings that promise it are taken.
+        Relative error wanted, such as "1 %" or "1 % of energy": the cheapest settings that promise it are taken.
+        Without depth or life among what is asked for, nothing is worn.
     table
         The trade to go by; results/NAME/trade.json or the one that comes with the program unless told.
     out
