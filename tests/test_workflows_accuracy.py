@@ -146,7 +146,21 @@ def test_a_broken_promise_ends_with_code_1(table: Trade, tmp_path: Path, capsys:
 def test_an_accuracy_that_means_nothing_is_refused(asked: str, sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
         accuracy.parsed(asked)
-    assert accuracy.parsed("1 % of life, energy") == (0.01, ("life_cycles", "energy_J"))
+    assert accuracy.parsed("1 % of life, energy") == (0.01, ("life_cycles", "energy_J"), ())
+    assert accuracy.parsed("1 % of life given fe mesh, harmonics")[2] == ("fe_mesh", "harmonics")
+
+
+def test_a_knob_may_stay_as_the_scene_has_it() -> None:
+    """Life of the beam has not settled in the harmonics: it is promised for those that the scene keeps."""
+    measured = trade_table.load(trade_table.TRADES / "beam.json")
+    with pytest.raises(ValueError, match=r'of knob harmonics leaves .* add "given harmonics"'):
+        accuracy.choose(measured, 0.01, ["life_cycles"])
+    file, choice = accuracy.tuned("beam", (), "1 % of life given harmonics", trade_table.TRADES / "beam.json")
+    assert file.scene.harmonics.kept == scene_file.read("beam").scene.harmonics.kept
+    assert choice.error <= 0.007
+    assert "error by harmonics is not counted" in choice.sentence
+    with pytest.raises(ValueError, match='no knob "taste"'):
+        accuracy.choose(measured, 0.01, given=["taste"])
 
 
 def test_a_table_of_another_scene_is_refused(table: Trade, tmp_path: Path) -> None:

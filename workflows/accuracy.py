@@ -21,11 +21,12 @@ MARGIN = 0.7  # of the wanted error that the knobs together may use up: they wer
 
 @dataclass(frozen=True)
 class Choice:
-    """One row for each knob; errors : by quantity, the sum over the knobs; seconds : to expect."""
+    """One row for each knob; errors : by quantity, the sum over the knobs; seconds : to expect; given : other knobs."""
 
     rows: tuple[Row, ...]
     errors: dict[str, float]
     seconds: float
+    given: tuple[str, ...] = ()
 
     @property
     def error(self) -> float:
@@ -42,15 +43,18 @@ class Choice:
         """What is promised and by which settings."""
         settings = ", ".join(row.setting for row in self.rows)
         errors = ", ".join(f"{_name(quantity)} {error:.1e}" for quantity, error in self.errors.items())
-        return f"settings {settings}: expected error {errors}; about {self.seconds:.2g} s of one processor"
+        left = f"; the error by {', '.join(self.given)} is not counted" if self.given else ""
+        return f"settings {settings}: expected error {errors}{left}; about {self.seconds:.2g} s of one processor"
 
 
-def parsed(text: str) -> tuple[float, tuple[str, ...]]:
-    """A wanted accuracy such as "1 %" or "1 % of life, peak frequency": relative error and quantities.
+def parsed(text: str) -> tuple[float, tuple[str, ...], tuple[str, ...]]:
+    """A wanted accuracy such as "1 %", "1 % of life, peak frequency" or "1 % of life given harmonics".
 
+    Returns the relative error, quantities, and knobs that stay as the scene has them, whose error is not counted
     Raises  ValueError with one sentence
     """
-    number, _, names = text.partition(" of ")
+    promised, _, knobs = text.partition(" given ")
+    number, _, names = promised.partition(" of ")
     try:
         wanted = to_si(number.strip(), "")
     except ValueError as wrong:
@@ -61,13 +65,17 @@ def parsed(text: str) -> tuple[float, tuple[str, ...]]:
     for name in asked:
         if name not in NAMES:
             raise ValueError(f'--accuracy "{text}": "{name}" is none of {", ".join(NAMES)}')
-    return wanted, tuple(QUANTITIES[NAMES.index(name)] for name in asked)
+    given = tuple(knob.strip().replace(" ", "_") for knob in knobs.split(",")) if knobs else ()
+    return wanted, tuple(QUANTITIES[NAMES.index(name)] for name in asked), given
 
 
-def choose(trade: Trade, wanted: float, quantities: Sequence[str] = QUANTITIES) -> Choice:
+def choose(
+    trade: Trade, wanted: float, quantities: Sequence[str] = QUANTITIES, given: Sequence[str] = ()
+) -> Choice:
     """The cheapest settings whose errors add up to less than the wanted one, in every quantity.
 
     wanted : relative error, above 0; quantities : that matter, out of trade_table.QUANTITIES
+    given : knobs that stay as the scene has them and whose error is not counted
     Errors of different knobs are added without their signs; times are taken to multiply, each over the base's. From
     the most accurate settings each step coarsens the knob that saves most time for the error it adds.
     Raises  ValueError where even the most accurate settings do not meet it
@@ -75,7 +83,10 @@ def choose(trade: Trade, wanted: float, quantities: Sequence[str] = QUANTITIES) 
     asked = [q for q in quantities if any(row.values[q] is not None for row in trade.rows)]
     if not asked:
         raise ValueError(f"the trade of {trade.scene} has no {' or '.join(map(_name, quantities))}")
-    ladders = {knob: rows for knob in trade.knobs if (rows := _usable(trade.of(knob), asked))}
+    unknown = [knob for knob in given if knob not in trade.knobs]
+    if unknown:
+        raise ValueError(f'the trade of {trade.scene} has no knob "{unknown[0]}", but {", ".join(trade.knobs)}')
+    ladders = {k: rows for k in trade.knobs if k not in given and (rows := _usable(trade.of(k), asked))}
 
     def errors(places: dict[str, int]) -> dict[str, float]:
         return {q: sum(error_of(ladders[k], i, q) for k, i in places.items()) for q in asked}
@@ -98,7 +109,7 @@ def choose(trade: Trade, wanted: float, quantities: Sequence[str] = QUANTITIES) 
         if not allowed:
             break
         place = max(allowed, key=lambda t: (1 - seconds(t) / seconds(place)) / max(total(t) - total(place), 1e-9))
-    return Choice(tuple(ladders[k][i] for k, i in place.items()), errors(place), seconds(place))
+    return Choice(tuple(ladders[k][i] for k, i in place.items()), errors(place), seconds(place), tuple(given))
 
 
 def _refusal(
@@ -111,6 +122,8 @@ def _refusal(
     met = [_name(q) for q, error in errors.items() if error <= MARGIN * wanted]
     least = f"{errors[quantity] / MARGIN:.2g}" if np.isfinite(errors[quantity]) else "no number"
     instead = f', or ask for --accuracy "{100 * wanted:.3g} % of {", ".join(met)}"' if met else ""
+    if max(error - error_of(ladders[knob], place[knob], q) for q, error in errors.items()) <= MARGIN * wanted:
+        instead += f', or add "given {knob}" to leave it as the scene has it and its error out'
     return (
         f"an accuracy of {wanted:.3g} is more than the trade of {scene} can promise: {_name(quantity)} is known to "
         f"{least}, of which {ladders[knob][place[knob]].setting} of knob {knob} leaves {shares[knob]:.2g}; "

@@ -60,7 +60,7 @@ def check(
     Depth and life are held against the finest settings that were worn, all else against the finest of all.
     Raises  ValueError where the accuracy cannot be promised, RuntimeError where a run does not converge
     """
-    wanted, _ = parsed(accuracy)
+    wanted, *_ = parsed(accuracy)
     file, choice = tuned(scene, overrides, accuracy, table)
     say(choice.sentence)
     trade, study = table_of(scene_file.read(scene, overrides), table), study_of(file.name)
