@@ -159,7 +159,7 @@ def test_modal_damping(model):
     modal = phi.T @ C @ phi
     assert np.diag(modal) == pytest.approx(0.02 * omega, rel=1e-6)
     assert np.abs(modal - np.diag(np.diag(modal))).max() < 1e-6 * omega.max()
-    with pytest.raises(ValueError, match="negative"):
+    with pytest.raises(ValueError, match="0 or more"):
         modal_damping(model.system, -0.01)
 
 
