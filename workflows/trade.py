@@ -11,6 +11,7 @@ from time import process_time
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from threadpoolctl import threadpool_limits
 
 from hbm import error_controlled_rule, thesis_rule
@@ -179,6 +180,9 @@ def picture(table: Table) -> Figure:
                     pane.annotate(f"{100 * row.step:g} %", at, (3, 4), textcoords="offset points", fontsize=7)
             pane.axhline(asked, color=GREY, linestyle=":", linewidth=1)
             pane.set(title=f"{table.scene}: error in {name}", xlabel="harmonic balance solves")
+            pane.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            pane.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+            pane.xaxis.set_minor_formatter(NullFormatter())
         panes[0].set_ylabel("relative error")
         panes[0].legend(title="wear rule, step or tolerance")
     return figure
