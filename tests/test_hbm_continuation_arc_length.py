@@ -274,3 +274,21 @@ def test_an_unsolved_start_is_said():
     branch = arc_length.follow(balance, 0.5, 5.0, hopeless)
     assert branch.end.startswith(f"ended at {0.5 / (2 * np.pi):.6g} Hz: not converged")
     assert branch.outcome[0] != "converged"
+
+
+def test_a_gap_in_the_curve_is_stepped_over_and_named(monkeypatch):
+    """The walk is made to lose the curve once; both folds behind the gap are found all the same."""
+    advance, calls = arc_length.Stepper.advance, []
+
+    def lose_it_once(stepper):
+        calls.append(stepper)
+        return [] if len(calls) == 5 else advance(stepper)
+
+    monkeypatch.setattr(arc_length.Stepper, "advance", lose_it_once)
+    duffing = Duffing()
+    branch = arc_length.follow(duffing.balance(), 0.5, 5.0)
+    assert branch.end.startswith("reached")
+    assert "; stepped over gaps in the curve at " in branch.end
+    assert calls[5] is not calls[4]  # a new walk from behind the gap
+    assert np.all(np.diff(branch.omega[:7]) > 0)
+    np.testing.assert_allclose(np.sort(branch.omega[list(branch.folds)]), duffing.folds(), rtol=1e-8)

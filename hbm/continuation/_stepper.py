@@ -104,6 +104,11 @@ class Stepper:
         except BorderFailed:
             return None
 
+    @property
+    def sense(self) -> float:
+        """Sign of the way that the parameter goes at the point reached."""
+        return float(np.sign(self._here.tangent.p))
+
     def rewind(self, index: int) -> None:
         """Go back to the start of an earlier segment, and on from there in shorter steps."""
         segment = self.segments[index]

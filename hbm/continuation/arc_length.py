@@ -4,7 +4,8 @@ One step: predict along the tangent (bent by the last change of the tangent), co
 The step grows and shrinks with the Newton steps and the turn of the tangent. Kinks, as contact laws make them, are
 crossed where their two legs are straight and meet; behind one that turns by more than a right angle the curve is looked
 for in the directions that the derivative there offers. A walk that comes back onto its own way took a wrong turn: it is
-rewound and goes on in shorter steps.
+rewound and goes on in shorter steps. Where all that fails, as where pairs hammer and the curve has gaps, the parameter
+alone takes a short step over the place, and the branch says where.
 Source  Keller 1977 (pseudo arc length); step control and kinks ours.
 """
 
@@ -25,6 +26,8 @@ from hbm.parameter import Parameter
 
 __all__ = ["Options", "follow", "solve_along_load"]
 
+JUMPS = 10 ** np.arange(-6.0, -2.5)  # of the range, lengths of a step over a gap in the curve, tried in turn
+MAX_JUMPS = 20
 REWINDS = 4  # times that a walk which came back onto its own way goes back to where it went wrong
 
 
@@ -60,7 +63,7 @@ def follow(
     builder.add(start, first)
     if not first.converged:
         return builder.finish(f"ended at {path.say(start)}: {first.outcome}")
-    walk = _Walk(path, options, builder, Stepper(path, options, first, start, stop), bounds)
+    walk = _Walk(path, options, builder, Stepper(path, options, first, start, stop), bounds, abs(stop - start))
     while (end := walk.go_on()) is None:
         if on_point is not None:
             done = len(builder.value)
@@ -96,13 +99,16 @@ class _Walk:
         builder: BranchBuilder,
         stepper: Stepper,
         bounds: tuple[float, float],
+        reach: float,
     ):
         self._path, self._options, self._builder, self._stepper, self._bounds = path, options, builder, stepper, bounds
+        self._reach = reach
         self._start = builder.value[0]
         self._first: CurvePoint | None = None
         self._size = float(np.linalg.norm(builder.x[0]))
         self._rows = [1]  # points in the branch before each segment
         self._rewinds = 0
+        self._jumps: list[float] = []
 
     def go_on(self) -> str | None:
         """One step more; the sentence that ends the branch, or None."""
@@ -111,7 +117,7 @@ class _Walk:
             return f"ended at {path.say(builder.value[-1])}: {self._options.max_points} points were allowed"
         parts = self._stepper.advance()
         if not parts:
-            return f"ended at {path.say(builder.value[-1])}: {self._stepper.trouble}"
+            return None if self._jump() else f"ended at {path.say(builder.value[-1])}: {self._stepper.trouble}"
         self._first = self._first or parts[0].start.bare()
         for part in parts:
             bound = next((b for b in self._bounds if part.crosses(b)), None)
@@ -124,6 +130,22 @@ class _Walk:
         self._rows.append(len(builder.value))
         return self._came_back(parts)
 
+    def _jump(self) -> bool:
+        """Step over a gap in the curve, its parameter going on as it went; whether there is a solution behind."""
+        here, span, sense = self._builder.value[-1], self._bounds[1] - self._bounds[0], self._stepper.sense
+        for share in JUMPS if len(self._jumps) < MAX_JUMPS else ():
+            value = here + sense * share * span
+            if sense == 0 or not self._bounds[0] < value < self._bounds[1]:
+                break
+            solution = newton.solve(*self._path.place(value), self._builder.x[-1], self._options.newton)
+            if solution.converged:
+                self._jumps.append(value)
+                self._builder.add(value, solution)
+                self._stepper = Stepper(self._path, self._options, solution, value, value + sense * self._reach)
+                self._rows, self._first = [len(self._builder.value)], None
+                return True
+        return False
+
     def _land(self, part: Segment, bound: float) -> str:
         """Solve at the bound that the curve crosses."""
         balance, omega = self._path.place(bound)
@@ -133,7 +155,9 @@ class _Walk:
         self._builder.add(bound, last)
         if not last.converged:
             return f"ended at {self._path.say(bound)}: {last.outcome}"
-        return f"{'turned back to' if bound == self._start else 'reached'} {self._path.say(bound)}"
+        gaps = ", ".join(self._path.say(value) for value in self._jumps)
+        over = f"; stepped over gaps in the curve at {gaps}" if gaps else ""
+        return f"{'turned back to' if bound == self._start else 'reached'} {self._path.say(bound)}{over}"
 
     def _came_back(self, parts: list[Segment]) -> str | None:
         """Whether the curve is closed, or lost itself in infinity or in its own past."""
