@@ -159,6 +159,11 @@ def test_a_knob_may_stay_as_the_scene_has_it() -> None:
     assert file.scene.harmonics.kept == scene_file.read("beam").scene.harmonics.kept
     assert choice.error <= 0.007
     assert "error by harmonics is not counted" in choice.sentence
+    file, choice = accuracy.tuned("beam", (), "1 %", trade_table.TRADES / "beam.json")
+    assert file.scene.wear is not None
+    assert {"peak_hz", "preload_N", "depth_m"} <= set(choice.errors)
+    assert "life_cycles" not in choice.errors
+    assert "nothing else is promised: an accuracy of 0.01 is more than" in choice.sentence
     with pytest.raises(ValueError, match='no knob "taste"'):
         accuracy.choose(measured, 0.01, given=["taste"])
 
@@ -167,7 +172,7 @@ def test_a_table_of_another_scene_is_refused(table: Trade, tmp_path: Path) -> No
     path = tmp_path / "trade.json"
     trade_table.save(table, path)
     with pytest.raises(ValueError, match="was measured on another scene"):
-        accuracy.tuned("beam", (*NO_WEAR, "contact.friction=0.4"), 0.02, path)
+        accuracy.tuned("beam", (*NO_WEAR, "contact.friction=0.4"), "2 %", path)
     with pytest.raises(ValueError, match=r"more than the trade of beam can promise: .* of knob points leaves"):
         accuracy.choose(table, 1e-9)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,14 +19,26 @@ WORTH = 0.1  # of the time that a coarser setting must save: the clock is no bet
 MARGIN = 0.7  # of the wanted error that the knobs together may use up: they were measured one by one
 
 
+class Refused(ValueError):
+    """An accuracy that cannot be promised; quantity : that is known worst."""
+
+    def __init__(self, sentence: str, quantity: str):
+        super().__init__(sentence)
+        self.quantity = quantity
+
+
 @dataclass(frozen=True)
 class Choice:
-    """One row for each knob; errors : by quantity, the sum over the knobs; seconds : to expect; given : other knobs."""
+    """One row for each knob; errors : by quantity, the sum over the knobs; seconds : to expect.
+
+    given : knobs left out; missed : why some quantities are not promised, if there are any
+    """
 
     rows: tuple[Row, ...]
     errors: dict[str, float]
     seconds: float
     given: tuple[str, ...] = ()
+    missed: str = ""
 
     @property
     def error(self) -> float:
@@ -44,7 +56,8 @@ class Choice:
         settings = ", ".join(row.setting for row in self.rows)
         errors = ", ".join(f"{_name(quantity)} {error:.1e}" for quantity, error in self.errors.items())
         left = f"; the error by {', '.join(self.given)} is not counted" if self.given else ""
-        return f"settings {settings}: expected error {errors}{left}; about {self.seconds:.2g} s of one processor"
+        sure = f"settings {settings}: expected error {errors}{left}; about {self.seconds:.2g} s of one processor"
+        return f"{sure}; nothing else is promised: {self.missed}" if self.missed else sure
 
 
 def parsed(text: str) -> tuple[float, tuple[str, ...], tuple[str, ...]]:
@@ -78,7 +91,7 @@ def choose(
     given : knobs that stay as the scene has them and whose error is not counted
     Errors of different knobs are added without their signs; times are taken to multiply, each over the base's. From
     the most accurate settings each step coarsens the knob that saves most time for the error it adds.
-    Raises  ValueError where even the most accurate settings do not meet it
+    Raises  Refused where even the most accurate settings do not meet it
     """
     asked = [q for q in quantities if any(row.values[q] is not None for row in trade.rows)]
     if not asked:
@@ -102,7 +115,7 @@ def choose(
 
     place = {k: min(range(len(rows)), key=lambda i, rows=rows: worst(rows, i)) for k, rows in ladders.items()}  # type: ignore[misc]
     if not total(place) <= MARGIN * wanted:
-        raise ValueError(_refusal(trade.scene, wanted, errors(place), ladders, place))
+        raise _refusal(trade.scene, wanted, errors(place), ladders, place)
     while True:
         trials = [{**place, knob: i} for knob, rows in ladders.items() for i in range(len(rows)) if i != place[knob]]
         allowed = [t for t in trials if total(t) <= MARGIN * wanted and seconds(t) < (1 - WORTH) * seconds(place)]
@@ -112,9 +125,22 @@ def choose(
     return Choice(tuple(ladders[k][i] for k, i in place.items()), errors(place), seconds(place), tuple(given))
 
 
+def choose_most(trade: Trade, wanted: float, quantities: Sequence[str], given: Sequence[str] = ()) -> Choice:
+    """As `choose`, for as many of the quantities as can be promised: the worst known is left out until it can be."""
+    asked, missed = [q for q in quantities if any(row.values[q] is not None for row in trade.rows)], ""
+    while True:
+        try:
+            return replace(choose(trade, wanted, asked, given), missed=missed)
+        except Refused as refusal:
+            missed = missed or str(refusal)
+            asked.remove(refusal.quantity)
+            if not asked:
+                raise
+
+
 def _refusal(
     scene: str, wanted: float, errors: dict[str, float], ladders: dict[str, list[Row]], place: dict[str, int]
-) -> str:
+) -> Refused:
     """Which knob is to blame for which quantity."""
     quantity = max(errors, key=lambda q: errors[q])
     shares = {knob: error_of(ladders[knob], i, quantity) for knob, i in place.items()}
@@ -124,12 +150,13 @@ def _refusal(
     instead = f', or ask for --accuracy "{100 * wanted:.3g} % of {", ".join(met)}"' if met else ""
     if max(error - error_of(ladders[knob], place[knob], q) for q, error in errors.items()) <= MARGIN * wanted:
         instead += f', or add "given {knob}" to leave it as the scene has it and its error out'
-    return (
+    sentence = (
         f"an accuracy of {wanted:.3g} is more than the trade of {scene} can promise: {_name(quantity)} is known to "
         f"{least}, of which {ladders[knob][place[knob]].setting} of knob {knob} leaves {shares[knob]:.2g}; "
         f"give that knob finer settings in workflows/studies/{scene}.toml and measure them with tribodyn trade {scene}"
         f"{instead}"
     )
+    return Refused(sentence, quantity)
 
 
 def _name(quantity: str) -> str:
@@ -217,9 +244,13 @@ def table_of(file: SceneFile, path: Path | None = None) -> Trade:
 def tuned(name: str, overrides: Sequence[str], wanted: str, path: Path | None = None) -> tuple[SceneFile, Choice]:
     """The scene with the cheapest settings that promise an accuracy as `parsed` reads it, and the choice.
 
-    Where neither depth nor life is asked for, the scene is not worn.
+    Quantities that are named are promised or refused; where none is, as many as can be. Where neither depth nor life
+    is asked for, the scene is not worn.
     """
     file = read(name, overrides)
-    choice = choose(table_of(file, path), *parsed(wanted))
-    unasked = file.scene.wear is not None and not any(quantity in choice.errors for quantity in OF_WEAR)
+    trade = table_of(file, path)
+    error, quantities, given = parsed(wanted)
+    way = choose if set(quantities) != set(QUANTITIES) else choose_most
+    choice = way(trade, error, quantities, given)
+    unasked = file.scene.wear is not None and not any(quantity in quantities for quantity in OF_WEAR)
     return read(name, (*overrides, *choice.overrides, *(("wear=",) if unasked else ()))), choice

@@ -72,9 +72,9 @@ def run(
     scene
         Name of a scene (see `tribodyn list`) or a .toml file.
     accuracy
-        Relative error wanted, such as "1 %" or "1 % of energy": the cheapest settings that promise it are taken.
-        Without depth or life among what is asked for, nothing is worn. "1 % of life given harmonics" leaves
-        a knob as the scene has it, and its error out.
+        Relative error wanted, of as much as can be promised, such as "1 %", or of what is named, "1 % of energy": the
+        cheapest settings that promise it are taken; without depth or life in it nothing is worn. "1 % of life given
+        harmonics" leaves a knob as the scene has it, and its error out.
     table
         The trade to go by; results/NAME/trade.json or the one that comes with the program unless told.
     out
