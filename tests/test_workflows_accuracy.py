@@ -164,6 +164,9 @@ def test_a_knob_may_stay_as_the_scene_has_it() -> None:
     assert {"peak_hz", "preload_N", "depth_m"} <= set(choice.errors)
     assert "life_cycles" not in choice.errors
     assert "nothing else is promised: an accuracy of 0.01 is more than" in choice.sentence
+    named = ", ".join(trade_table.NAMES)
+    with pytest.raises(ValueError, match="more than the trade of beam can promise"):  # named, hence promised or refused
+        accuracy.tuned("beam", (), f"1 % of {named}", trade_table.TRADES / "beam.json")
     with pytest.raises(ValueError, match='no knob "taste"'):
         accuracy.choose(measured, 0.01, given=["taste"])
 

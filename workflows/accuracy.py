@@ -63,7 +63,8 @@ class Choice:
 def parsed(text: str) -> tuple[float, tuple[str, ...], tuple[str, ...]]:
     """A wanted accuracy such as "1 %", "1 % of life, peak frequency" or "1 % of life given harmonics".
 
-    Returns the relative error, quantities, and knobs that stay as the scene has them, whose error is not counted
+    Returns the relative error, the quantities that are named, and knobs that stay as the scene has them, whose error is
+    not counted
     Raises  ValueError with one sentence
     """
     promised, _, knobs = text.partition(" given ")
@@ -74,7 +75,7 @@ def parsed(text: str) -> tuple[float, tuple[str, ...], tuple[str, ...]]:
         raise ValueError(f'--accuracy "{text}": {wrong}') from None
     if wanted <= 0:
         raise ValueError(f'--accuracy "{text}": an error is above 0, such as "1 %"')
-    asked = [name.strip() for name in names.split(",")] if names else list(NAMES)
+    asked = [name.strip() for name in names.split(",")] if names else []
     for name in asked:
         if name not in NAMES:
             raise ValueError(f'--accuracy "{text}": "{name}" is none of {", ".join(NAMES)}')
@@ -250,7 +251,8 @@ def tuned(name: str, overrides: Sequence[str], wanted: str, path: Path | None = 
     file = read(name, overrides)
     trade = table_of(file, path)
     error, quantities, given = parsed(wanted)
-    way = choose if set(quantities) != set(QUANTITIES) else choose_most
-    choice = way(trade, error, quantities, given)
-    unasked = file.scene.wear is not None and not any(quantity in quantities for quantity in OF_WEAR)
+    way = choose if quantities else choose_most
+    asked = quantities or QUANTITIES
+    choice = way(trade, error, asked, given)
+    unasked = file.scene.wear is not None and not any(quantity in asked for quantity in OF_WEAR)
     return read(name, (*overrides, *choice.overrides, *(("wear=",) if unasked else ()))), choice

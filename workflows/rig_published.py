@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-TITLE = "L. R. Tamatam 2021, chapter 5"
-
 Modes = tuple[tuple[str, float], ...]
 
 OPEN: Modes = (

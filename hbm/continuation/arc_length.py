@@ -69,7 +69,7 @@ def follow(
             done = len(builder.value)
             share = abs(builder.value[-1] - start) / abs(stop - start)
             on_point(done, max(done, min(options.max_points, round(done / max(share, 1e-3)))))
-    return builder.finish(end)
+    return builder.finish(end + walk.gaps)
 
 
 def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None) -> Solution:
@@ -109,6 +109,12 @@ class _Walk:
         self._rows = [1]  # points in the branch before each segment
         self._rewinds = 0
         self._jumps: list[float] = []
+
+    @property
+    def gaps(self) -> str:
+        """Where the walk stepped over gaps in the curve, to be added to how it ended; empty where it did not."""
+        places = ", ".join(self._path.say(value) for value in self._jumps)
+        return f"; stepped over gaps in the curve at {places}" if places else ""
 
     def go_on(self) -> str | None:
         """One step more; the sentence that ends the branch, or None."""
@@ -155,9 +161,7 @@ class _Walk:
         self._builder.add(bound, last)
         if not last.converged:
             return f"ended at {self._path.say(bound)}: {last.outcome}"
-        gaps = ", ".join(self._path.say(value) for value in self._jumps)
-        over = f"; stepped over gaps in the curve at {gaps}" if gaps else ""
-        return f"{'turned back to' if bound == self._start else 'reached'} {self._path.say(bound)}{over}"
+        return f"{'turned back to' if bound == self._start else 'reached'} {self._path.say(bound)}"
 
     def _came_back(self, parts: list[Segment]) -> str | None:
         """Whether the curve is closed, or lost itself in infinity or in its own past."""
