@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -78,6 +79,16 @@ def test_list_names_every_scene(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = leave(["list"], capsys)
     assert code == 0
     assert "beam" in out
+
+
+def test_who_reads_only_the_first_lines_gets_no_complaint() -> None:
+    """As in `tribodyn list | head -1`: here nobody reads at all."""
+    read_end, write_end = os.pipe()
+    os.close(read_end)
+    command = [sys.executable, "-m", "workflows.cli", "list"]
+    done = subprocess.run(command, cwd=ROOT, stdout=write_end, stderr=subprocess.PIPE, check=False)
+    os.close(write_end)
+    assert (done.returncode, done.stderr) == (cli.BROKEN_PIPE, b"")
 
 
 def test_plan_says_what_will_be_modelled(capsys: pytest.CaptureFixture[str]) -> None:
