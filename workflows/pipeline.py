@@ -31,7 +31,7 @@ from hbm.harmonic_choice import HarmonicChoice
 from hbm.harmonics import HarmonicBasis
 from hbm.newton import NewtonOptions
 from hbm.operating_point import AtFrequency, AtPeak, BesidePeak
-from hbm.wear_history import WearRow, history
+from hbm.wear_history import WearRow, history, rows_to_go_on
 from reduction.damping import modal_damping, rayleigh
 from reduction.held import hold
 from reduction.linear import stuck_stiffness
@@ -379,7 +379,7 @@ def wear_down(
     assert scene.wear is not None
     assert result.patch is not None
     patch, wear = result.patch, scene.wear
-    rows = [] if result.wear is None else result.wear.rows()
+    rows = rows_to_go_on(result.wear)
     to_wear = float(patch.area @ patch.free_deflection)
 
     def on_row(row: WearRow) -> None:
