@@ -28,7 +28,7 @@ app = cyclopts.App(
     version_flags=["--version"],
     suppress_keyboard_interrupt=False,
 )
-for command in (cli_studies.trade, cli_studies.converge, cli_studies.extremes, cli_studies.track):
+for command in (cli_studies.trade, cli_studies.converge, cli_studies.extremes, cli_studies.track, cli_studies.rig):
     app.command(command)
 
 
@@ -410,47 +410,6 @@ def blade(
         written = blade_study.run(scene, overrides, folder, highest, aside, blade_study.Extent())
     for path in written:
         print(path)
-
-
-@app.command
-def rig(
-    work: Literal["fit", "study"],
-    *,
-    column: Annotated[bool, Parameter(negative=())] = False,
-    wear: Annotated[bool, Parameter(negative=())] = False,
-    overrides: Overrides = (),
-    out: Path | None = None,
-    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
-) -> None:
-    """What only the fretting rig has: fits of what is not published, and its comparison with the published experiment.
-
-    Parameters
-    ----------
-    work
-        fit looks for joint springs, platform height and damping that give published numbers, and says how well these
-        determine them; study holds every published number and trend against ours, wear to the loss of the preload for
-        three mating heights included.
-    column
-        fit: the section of the column too, minutes.
-    wear
-        fit: the wear coefficient too, from a whole wear run, minutes.
-    out
-        study: folder of table and pictures; results/rig_study unless told.
-    as_json
-        Print JSON for machines.
-    """
-    from workflows import rig_fit, rig_study, rig_table
-
-    if work == "fit":
-        fits = rig_fit.run(overrides, column, wear, aside)
-        print(json.dumps(rig_fit.as_records(fits), indent=2) if as_json else rig_fit.as_text(fits))
-        return
-    table, paths = rig_study.run(out or Path("results") / "rig_study", overrides, aside)
-    if as_json:
-        print(json.dumps({**rig_table.as_records(table), "files": [str(path) for path in paths]}, indent=2))
-    else:
-        print(rig_table.as_text(table))
-        print(*paths, sep="\n")
 
 
 def _option(name: str, text: str, unit: str) -> float:

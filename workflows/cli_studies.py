@@ -1,4 +1,4 @@
-"""Words of the command `tribodyn` that measure accuracy or follow a number: trade, converge, extremes, track."""
+"""Words of the command `tribodyn` that measure, follow or fit: trade, converge, extremes, track, rig."""
 
 from __future__ import annotations
 
@@ -194,3 +194,46 @@ def track(
         for value, hertz, amplitude in zip(found.value, found.frequency, found.amplitude, strict=True):
             print(f"{found.name} {f'{value:.6g} {found.unit}':14} {hertz:12.6g} Hz {amplitude:12.6g} m")
         print(f"{found.what}: {found.end}", folder / "track.csv", folder / "track.png", sep="\n")
+
+
+def rig(
+    work: Literal["fit", "study"],
+    scene: str = "rig",
+    *,
+    column: Annotated[bool, Parameter(negative=())] = False,
+    wear: Annotated[bool, Parameter(negative=())] = False,
+    overrides: Overrides = (),
+    out: Path | None = None,
+    as_json: Json = False,
+) -> None:
+    """What only the fretting rig has: fits of what is not published, and its comparison with the published experiment.
+
+    Parameters
+    ----------
+    work
+        fit looks for joint springs, platform height and damping that give published numbers, and says how well these
+        determine them; study holds every published number and trend against ours, wear to the loss of the preload for
+        three mating heights included.
+    scene
+        Name of a scene of this rig or a .toml file.
+    column
+        fit: the section of the column too, minutes.
+    wear
+        fit: the wear coefficient too, from a whole wear run, minutes.
+    out
+        study: folder of table and pictures; results/rig_study unless told.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import rig_fit, rig_study, rig_table
+
+    if work == "fit":
+        fits = rig_fit.run(scene, overrides, column, wear, aside)
+        print(json.dumps(rig_fit.as_records(fits), indent=2) if as_json else rig_fit.as_text(fits))
+        return
+    table, paths = rig_study.run(scene, overrides, out or Path("results") / "rig_study", aside)
+    if as_json:
+        print(json.dumps({**rig_table.as_records(table), "files": [str(path) for path in paths]}, indent=2))
+    else:
+        print(rig_table.as_text(table))
+        print(*paths, sep="\n")
