@@ -79,6 +79,7 @@ def blade(
 
 def rig(
     work: Literal["fit", "study"],
+    scene: str = "rig",
     *,
     column: Flag = False,
     wear: Flag = False,
@@ -94,6 +95,8 @@ def rig(
         fit looks for joint springs, platform height and damping that give published numbers, and says how well these
         determine them; study holds every published number and trend against ours, wear to the loss of the preload for
         three mating heights included.
+    scene
+        Name of a scene of this rig or a .toml file.
     column
         fit: the section of the column too, minutes.
     wear
@@ -106,10 +109,10 @@ def rig(
     from workflows import rig_fit, rig_study, rig_table
 
     if work == "fit":
-        fits = rig_fit.run(overrides, column, wear, aside)
+        fits = rig_fit.run(scene, overrides, column, wear, aside)
         print(json.dumps(rig_fit.as_records(fits), indent=2) if as_json else rig_fit.as_text(fits))
         return
-    table, paths = rig_study.run(out or Path("results") / "rig_study", overrides, aside)
+    table, paths = rig_study.run(scene, overrides, out or Path("results") / "rig_study", aside)
     if as_json:
         print(json.dumps({**rig_table.as_records(table), "files": [str(path) for path in paths]}, indent=2))
     else:

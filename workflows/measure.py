@@ -86,7 +86,8 @@ def wear(file: SceneFile, model: pipeline.Model) -> WearHistory:
     wanted, balance = file.scene.wear, model.balance
     assert wanted is not None
     area, duties = model.reduced.interface.area, pipeline.mission(file.scene)
-    problem = WearProblem(balance, duties, wanted.law, wanted.coefficient, area, lost_below=LIFE_SHARE)
+    law = pipeline.law_of(file.scene, file.folder)
+    problem = WearProblem(balance, duties, law, wanted.coefficient, area, lost_below=LIFE_SHARE)
     scale = delta_max(file.scene, free_deflection(balance), area)
     if wanted.rule == "thesis":
         assert wanted.step is not None
