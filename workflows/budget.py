@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -43,7 +43,8 @@ class Entry:
 def budget(file: SceneFile, balance: HarmonicBalance, result: Result) -> list[Entry]:
     """The budget of a result with its response, and with its wear where there is any."""
     entries = [*_of_reduction(balance, file), *_of_response(balance, result), *_of_wear(file, result)]
-    return entries + list(_of_trade(file))
+    unknown = {entry.source for entry in entries if entry.error is None}
+    return entries + list(_of_trade(file, [knob for knob in ESTIMATED if knob not in unknown]))
 
 
 def with_budget(file: SceneFile, balance: HarmonicBalance, result: Result) -> Result:
@@ -100,6 +101,8 @@ def _of_response(balance: HarmonicBalance, result: Result) -> Iterator[Entry]:
         wide = harmonic_choice.widened(balance, top + LOOK)
         error: float | None = harmonic_choice.estimate(wide, balance.basis.harmonics, omega, x, split=False).error
         how = "estimate: one step with more"
+        if error >= UNKNOWN:  # as at a fold, where a step at the same frequency leads anywhere
+            error, how = None, f"one step with more harmonics moves it by more than {UNKNOWN:.0%}"
     except ValueError as refusal:
         error, how = None, str(refusal)
     yield Entry("harmonics", "response at the peak", error, how)
@@ -139,8 +142,8 @@ def _of_wear(file: SceneFile, result: Result) -> Iterator[Entry]:
     yield Entry("wear steps", "depth", found.depth, by)
 
 
-def _of_trade(file: SceneFile) -> Iterator[Entry]:
-    """What the trade has measured of the knobs that no estimator covers."""
+def _of_trade(file: SceneFile, estimated: Sequence[str]) -> Iterator[Entry]:
+    """What the trade has measured of the knobs that no estimator covers here."""
     try:
         trade = accuracy.table_of(file)
     except ValueError as missing:
@@ -148,7 +151,7 @@ def _of_trade(file: SceneFile) -> Iterator[Entry]:
         return
     for knob in trade.knobs:
         rows = trade.of(knob)
-        if knob in ESTIMATED or not rows[-1].tunable:
+        if knob in estimated or not rows[-1].tunable:
             continue
         known = [(r, how) for r in rows if (how := _compared(file, r.overrides)) is not None]
         name = knob.replace("_", " ")
