@@ -44,7 +44,9 @@ def budget(file: SceneFile, balance: HarmonicBalance, result: Result) -> list[En
     """The budget of a result with its response, and with its wear where there is any."""
     entries = [*_of_reduction(balance, file), *_of_response(balance, result), *_of_wear(file, result)]
     unknown = {entry.source for entry in entries if entry.error is None}
-    return entries + list(_of_trade(file, [knob for knob in ESTIMATED if knob not in unknown]))
+    traded = list(_of_trade(file, [knob for knob in ESTIMATED if knob not in unknown]))
+    covered = {entry.source for entry in traded if entry.error is not None}
+    return [entry for entry in entries if entry.error is not None or entry.source not in covered] + traded
 
 
 def with_budget(file: SceneFile, balance: HarmonicBalance, result: Result) -> Result:
@@ -97,14 +99,15 @@ def _of_response(balance: HarmonicBalance, result: Result) -> Iterator[Entry]:
     yield Entry("newton, krylov", "response at the peak", _newton_error(balance, state), "estimate: one more step")
     yield Entry("samples", "response at the peak", sampling_error(balance, omega, x), "estimate: located, finer")
     top = max(balance.basis.harmonics)
+    error: float | None = None
     try:
         wide = harmonic_choice.widened(balance, top + LOOK)
-        error: float | None = harmonic_choice.estimate(wide, balance.basis.harmonics, omega, x, split=False).error
+        error = harmonic_choice.estimate(wide, balance.basis.harmonics, omega, x, split=False).error
         how = "estimate: one step with more"
-        if error >= UNKNOWN:  # as at a fold, where a step at the same frequency leads anywhere
-            error, how = None, f"one step with more harmonics moves it by more than {UNKNOWN:.0%}"
     except ValueError as refusal:
-        error, how = None, str(refusal)
+        how = str(refusal)
+    if error is not None and error >= UNKNOWN:  # as at a fold, where a step at the same frequency leads anywhere
+        error, how = None, f"one step with more harmonics moves it by more than {UNKNOWN:.0%}"
     yield Entry("harmonics", "response at the peak", error, how)
     yield Entry("points", "peak amplitude", _missed(frf.omega, height, best), "estimate: parabola")
     if result.bounds is not None and good.any():

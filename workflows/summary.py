@@ -27,6 +27,7 @@ def summary(result: Result) -> dict[str, Any]:
     energy_J, volume_m3 : friction work and worn volume, accumulated
     wear_steps, hbm_solves : steps taken and balance solves spent on wear
     peak_hz, peak_m, preload_N : [first, last] of the wear run, or the peak of the response curve without one
+    peak_at_end : whether that peak is no peak, but an end of the response curve
     peak_is_stable : whether that peak of the curve is a motion that stays, None where this was not asked for
     stable_peak_hz, stable_peak_m : the highest point of the curve that is
     seconds : of computing, interrupted runs included
@@ -78,13 +79,15 @@ def _peak(result: Result) -> dict[str, Any]:
             "peak_hz": [float(w) for w in wear.omega[ends] / (2 * np.pi)],
             "peak_m": [float(a) for a in wear.amplitude[ends]],
             "preload_N": [float(n) for n in wear.preload[ends]],
+            "peak_at_end": None,
         }
     if frf is not None:
         amplitude = frf.amplitude(frf.output_names[0])
         best = int(np.argmax(np.where([outcome == CONVERGED for outcome in frf.outcome], amplitude, -1.0)))
         hertz, height = float(frf.frequency[best]), float(amplitude[best])
-        return {"peak_hz": [hertz, hertz], "peak_m": [height, height], "preload_N": None}
-    return {"peak_hz": None, "peak_m": None, "preload_N": None}
+        at_end = best in (0, len(amplitude) - 1)
+        return {"peak_hz": [hertz, hertz], "peak_m": [height, height], "preload_N": None, "peak_at_end": at_end}
+    return dict.fromkeys(("peak_hz", "peak_m", "preload_N", "peak_at_end"))
 
 
 def _stable_peak(result: Result) -> dict[str, Any]:
@@ -156,6 +159,8 @@ def lines(result: Result) -> list[tuple[str, str]]:
     if numbers["peak_hz"] is not None:
         shown.append(("frequency", pair("peak_hz", 1, "Hz")))
         shown.append(("amplitude", pair("peak_m", 1e3, "mm")))
+    if numbers["peak_at_end"]:
+        shown.append(("", "no peak: the response is highest at an end of response.frequency, widen it"))
     if numbers["peak_is_stable"] is False and not numbers["wear_steps"]:
         hertz, height = numbers["stable_peak_hz"], numbers["stable_peak_m"]
         below = "no point is stable" if hertz is None else f"the highest that is: {hertz:.5g} Hz, {1e3 * height:.5g} mm"
