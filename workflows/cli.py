@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import shlex
-import signal
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,13 +12,11 @@ from typing import TYPE_CHECKING, Annotated
 import cyclopts
 from cyclopts import Parameter
 
-from workflows import cli_cases, cli_studies, scene_file
+from workflows import cli_cases, cli_studies, exits, scene_file
 from workflows.cli_words import Flag, Json, Overrides, print_lines, quantity
 
 if TYPE_CHECKING:
     from workflows.result import Result
-
-BAD_INPUT, FAILED_SOLVE, INTERRUPTED, BROKEN_PIPE = 2, 3, 130, 141
 
 app = cyclopts.App(
     name="tribodyn",
@@ -35,31 +30,8 @@ for module in (cli_studies, cli_cases):
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command and leave with its exit code.
-
-    2 after bad input, 3 after a failed solve, 130 after Ctrl-C, 141 where nobody reads what it prints
-    """
-    # a shell without job control starts background jobs with Ctrl-C ignored
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        app(arguments, exit_on_error=False, print_error=False)
-    except KeyboardInterrupt as stop:
-        _leave(INTERRUPTED, str(stop) or "stopped")
-    except cyclopts.CycloptsError as error:
-        _leave(BAD_INPUT, " ".join(str(error).split()))
-    except BrokenPipeError:  # who reads our output has seen enough, as in tribodyn list | head -1
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # else Python complains when it flushes at exit
-        sys.exit(BROKEN_PIPE)
-    except (ValueError, OSError) as error:
-        _leave(BAD_INPUT, str(error))
-    except (RuntimeError, MemoryError) as error:
-        _leave(FAILED_SOLVE, str(error) or "the memory of this machine is not enough for this scene")
-
-
-def _leave(code: int, sentence: str) -> None:
-    one_line = " ".join(sentence.split()).rstrip(".")
-    print(f"tribodyn: {one_line}{'' if one_line.endswith('?') else '.'}", file=sys.stderr)
-    sys.exit(code)
+    """Run the command and leave with its exit code, see workflows.exits."""
+    exits.guard(lambda: app(arguments, exit_on_error=False, print_error=False))
 
 
 @app.command
