@@ -132,6 +132,30 @@ def test_a_reader_that_has_seen_enough_ends_the_command_in_silence(tmp_path: Pat
         assert (done.returncode, done.stderr) == (exits.READER_LEFT, b"")
 
 
+CTRL_C_WHILE_AN_OBJECT_IS_FREED = """
+import os, signal, time
+from workflows import exits
+
+class Freed:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0)
+
+def command():
+    Freed()
+    while True:
+        time.sleep(1)
+
+exits.guard(command)
+"""
+
+
+def test_ctrl_c_is_not_lost_while_an_object_is_freed() -> None:
+    command = [sys.executable, "-c", CTRL_C_WHILE_AN_OBJECT_IS_FREED]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (exits.INTERRUPTED, "tribodyn: stopped.\n")
+
+
 def curve(peak: int, unstable: range | None = None):
     """A made-up result without wear, its response highest at one of its points, unstable at some."""
     made = result()

@@ -12,14 +12,13 @@ from time import process_time
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from hbm import error_controlled_rule, thesis_rule
 from hbm.branch import CONVERGED
 from hbm.evolution import WearProblem
 from hbm.operating_point import OperatingPoint
 from hbm.wear_history import LIFE_SHARE, WearHistory, cycles_to_preload
 from workflows import pipeline
 from workflows.progress import Progress
-from workflows.references import delta_max, free_deflection
+from workflows.references import free_deflection
 from workflows.scene_file import SceneFile
 from workflows.trade_table import QUANTITIES
 
@@ -88,14 +87,8 @@ def wear(file: SceneFile, model: pipeline.Model) -> WearHistory:
     area, duties = model.reduced.interface.area, pipeline.mission(file.scene)
     law = pipeline.law_of(file.scene, file.folder)
     problem = WearProblem(balance, duties, law, wanted.coefficient, area, lost_below=LIFE_SHARE)
-    scale = delta_max(file.scene, free_deflection(balance), area)
-    if wanted.rule == "thesis":
-        assert wanted.step is not None
-        share = wanted.step.share
-        limit = wanted.step.depth if share is None else share * scale
-        return thesis_rule.evolve(problem, limit or 0.0, wanted.max_steps)
-    tolerance = error_controlled_rule.Tolerance(wanted.tolerance, scale)
-    return error_controlled_rule.evolve(problem, tolerance, wanted.max_steps)
+    limit = pipeline.step_limit(file.scene, free_deflection(balance), area)
+    return pipeline.evolve(problem, wanted, limit, wanted.max_steps)
 
 
 def depth_at(worn: WearHistory, cycles: float) -> np.ndarray:

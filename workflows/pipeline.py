@@ -31,7 +31,7 @@ from hbm.harmonic_choice import HarmonicChoice
 from hbm.harmonics import HarmonicBasis
 from hbm.newton import NewtonOptions
 from hbm.operating_point import AtFrequency, AtPeak, BesidePeak
-from hbm.wear_history import WearRow, history, rows_to_go_on
+from hbm.wear_history import WearHistory, WearRow, history, rows_to_go_on
 from reduction.damping import modal_damping, rayleigh
 from reduction.held import hold
 from reduction.linear import stuck_stiffness
@@ -43,8 +43,8 @@ from workflows.description import described
 from workflows.fields import with_shown
 from workflows.matrix_scene import MatrixScene
 from workflows.progress import Progress
-from workflows.result import Patch, Result
-from workflows.scene import CENTRIFUGAL, HIGHEST, PartScene, Place, Scene, StaticLoad, unknown_key
+from workflows.result import Result
+from workflows.scene import CENTRIFUGAL, HIGHEST, PartScene, Place, Scene, StaticLoad, Wear, unknown_key
 from workflows.scene_file import SceneFile
 
 OUTPUT = "response"
@@ -81,7 +81,7 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
         model = build(file, folder, progress, () if earlier is None else earlier.harmonics)
         result = earlier or described(file, model.part, model.balance, model.choice)
         if wears(scene) and result.patch is not None:
-            step_limit(scene, result.patch)  # raises before anything long is begun
+            step_limit(scene, result.patch.free_deflection, result.patch.area)  # raises before anything long is begun
         previous = None if earlier else store.set_aside(keep.path)
         if previous:
             progress.say(f"the result that was here is now {previous}")
@@ -392,17 +392,28 @@ def wear_down(
     problem = WearProblem(
         model.balance, duties, law_of(scene, file.folder), wear.coefficient, patch.area, wear.lost_below
     )
-    limit = step_limit(scene, patch)
-    if wear.rule == "thesis":
-        worn = thesis_rule.evolve(problem, limit, wear.max_steps, on_row, result.wear)
-    else:
-        tolerance = error_controlled_rule.Tolerance(wear.tolerance, limit)
-        worn = error_controlled_rule.evolve(problem, tolerance, wear.max_steps, on_row, result.wear)
+    limit = step_limit(scene, patch.free_deflection, patch.area)
+    worn = evolve(problem, wear, limit, wear.max_steps, on_row, result.wear)
     result = with_shown(scene, replace(result, wear=worn), model.balance.with_load(duties[0].load), model.part)
     if worn.end.startswith("solve failed"):
         keep(replace(result, state=worn.end))
         raise SolveFailed(f"wear step {len(worn.cycles)}: {worn.end}")
     return result
+
+
+def evolve(
+    problem: WearProblem,
+    wear: Wear,
+    limit: float,
+    max_steps: int,
+    on_row: Callable[[WearRow], None] | None = None,
+    resume: WearHistory | None = None,
+) -> WearHistory:
+    """Wear by the rule that a scene asks for; limit : of `step_limit` [m], the rest as for hbm.thesis_rule."""
+    if wear.rule == "thesis":
+        return thesis_rule.evolve(problem, limit, max_steps, on_row, resume)
+    tolerance = error_controlled_rule.Tolerance(wear.tolerance, limit)
+    return error_controlled_rule.evolve(problem, tolerance, max_steps, on_row, resume)
 
 
 def peak_of(scene: Scene) -> AtPeak:
@@ -426,16 +437,17 @@ def mission(scene: Scene) -> tuple[Duty, ...]:
     return tuple(Duty(site(duty.at), duty.share, duty.load) for duty in scene.wear.mission)
 
 
-def step_limit(scene: Scene, patch: Patch) -> float:
+def step_limit(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:
     """Largest depth of one wear step by the thesis's rule, or delta_max that the other rule measures errors by [m].
 
+    approach : (n_pair,) by which the static loads press the faces into each other without contact [m]; area : [m2]
     Raises  ValueError where delta_max is needed and the scene has none
     """
     assert scene.wear is not None
     step = scene.wear.step
     if scene.wear.rule == "thesis" and step is not None and step.depth is not None:
         return step.depth
-    delta_max = references.delta_max(scene, patch.free_deflection, patch.area)
+    delta_max = references.delta_max(scene, approach, area)
     if not (np.isfinite(delta_max) and delta_max > 0):
         raise ValueError(
             "wear.step: a share of delta_max needs static loads that press the contact of a part held without it; "
