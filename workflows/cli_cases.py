@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Literal
 
-from workflows.cli_words import Flag, Json, Overrides, aside, quantity
+from workflows.cli_words import Changes, Flag, Json, Overrides, aside, quantity
 
 
 def leaf(
@@ -78,11 +78,12 @@ def blade(
 
 
 def rig(
-    work: Literal["fit", "study"],
+    work: Literal["fit", "study", "life"],
     scene: str = "rig",
     *,
     column: Flag = False,
     wear: Flag = False,
+    change: Changes = (),
     overrides: Overrides = (),
     out: Path | None = None,
     as_json: Json = False,
@@ -94,20 +95,29 @@ def rig(
     work
         fit looks for joint springs, platform height and damping that give published numbers, and says how well these
         determine them; study holds every published number and trend against ours, wear to the loss of the preload for
-        three mating heights included.
+        three mating heights included; life wears the rig with one thing changed at a time.
     scene
         Name of a scene of this rig or a .toml file.
     column
         fit: the section of the column too, minutes.
     wear
         fit: the wear coefficient too, from a whole wear run, minutes.
+    change
+        life: what to change, such as "damping.modal=1 %" or several joined by ";", can be repeated; what the published
+        text leaves open unless told.
     out
         study: folder of table and pictures; results/rig_study unless told.
     as_json
         Print JSON for machines.
     """
-    from workflows import rig_fit, rig_study, rig_table
+    from workflows import rig_fit, rig_life, rig_study, rig_table
 
+    if change and work != "life":
+        raise ValueError(f"--change is for rig life; for rig {work} use --set")
+    if work == "life":
+        rows = rig_life.run(scene, overrides, change, aside)
+        print(json.dumps(rig_life.as_records(rows), indent=2) if as_json else rig_life.as_text(rows))
+        return
     if work == "fit":
         fits = rig_fit.run(scene, overrides, column, wear, aside)
         print(json.dumps(rig_fit.as_records(fits), indent=2) if as_json else rig_fit.as_text(fits))

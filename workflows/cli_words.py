@@ -11,6 +11,7 @@ Overrides = Annotated[
     tuple[str, ...],
     Parameter(name="--set", negative=(), consume_multiple=False, help="Change a key of the scene: section.key=value."),
 ]
+Changes = Annotated[tuple[str, ...], Parameter(name="--change", negative=(), consume_multiple=False)]
 Json = Annotated[bool, Parameter(name="--json", negative=())]
 Flag = Annotated[bool, Parameter(negative=())]
 
