@@ -286,12 +286,12 @@ def test_bad_files_are_refused_in_one_sentence(call, words, tmp_path):
     assert "\n" not in str(refusal.value)
 
 
-COUNTED = [from_npz, from_sparse_npz, from_matrix_market, from_matlab, from_matlab_73, from_ansys]
+COUNTED = [from_npz, from_sparse_npz, from_matrix_market, from_matlab, from_matlab_73, from_ansys_unsymmetric]
 
 
 @pytest.mark.parametrize("reader", COUNTED, ids=lambda reader: reader.__name__)
 def test_a_file_that_ends_early_is_refused_in_one_sentence(reader, tmp_path):
-    """Of the formats that say how many entries there are; nobody can tell where the last number lost its last digits."""
+    """Of the formats that say how many entries there are; nobody can tell where the last number lost its end."""
     reader(tmp_path)
     for path in (path for path in tmp_path.iterdir() if path.suffix != ".mapping"):
         whole = path.read_bytes()
