@@ -97,7 +97,7 @@ class Pardiso:
             self._solver.factorize(self._upper)
         except (PyPardisoError, ValueError) as error:
             if getattr(error, "value", None) == NO_MEMORY:
-                raise MemoryError(f"not enough for the factors of {K.shape[0]} equations") from error
+                raise MemoryError(f"the memory is not enough for the factors of {K.shape[0]} equations") from error
             raise ArithmeticError(str(error)) from error
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
