@@ -28,7 +28,7 @@ app = cyclopts.App(
     version_flags=["--version"],
     suppress_keyboard_interrupt=False,
 )
-for command in (cli_studies.trade, cli_studies.converge, cli_studies.extremes, cli_studies.track, cli_studies.rig):
+for command in cli_studies.COMMANDS:
     app.command(command)
 
 

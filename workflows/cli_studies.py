@@ -1,4 +1,4 @@
-"""Words of the command `tribodyn` that measure, follow or fit: trade, converge, extremes, track, rig."""
+"""Words of the command `tribodyn` that measure, follow or fit: trade, converge, extremes, track, rig, identify."""
 
 from __future__ import annotations
 
@@ -237,3 +237,27 @@ def rig(
     else:
         print(rig_table.as_text(table))
         print(*paths, sep="\n")
+
+
+def identify(scene: str, task: Path, *, overrides: Overrides = (), as_json: Json = False) -> None:
+    """Fit named numbers of a scene to measured ones, within bounds, and say how well these determine them.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene or a .toml file; nothing is written into it.
+    task
+        File with the numbers that are looked for and those that were measured, such as workflows/fits/rig.toml.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import fit_file
+
+    found, changes = fit_file.run(scene, overrides, fit_file.read(task), aside)
+    if as_json:
+        print(json.dumps({**found.record(), "set": changes}, indent=2))
+    else:
+        print(found.report(), "", "to go on with what was found:", *(f'  --set "{c}"' for c in changes), sep="\n")
+
+
+COMMANDS = (trade, converge, extremes, track, rig, identify)
