@@ -1,4 +1,4 @@
-"""Words of the command `tribodyn` that measure cost and accuracy, or follow a number while another changes."""
+"""Words of the command `tribodyn` that measure cost and accuracy, follow a number, or fit numbers to measured ones."""
 
 from __future__ import annotations
 
@@ -284,4 +284,25 @@ def backbone(
         print(folder / "backbone.csv", folder / "backbone.png", sep="\n")
 
 
-COMMANDS = (bench, trade, converge, extremes, track, backbone)
+def identify(scene: str, task: Path, *, overrides: Overrides = (), as_json: Json = False) -> None:
+    """Fit named numbers of a scene to measured ones, within bounds, and say how well these determine them.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene or a .toml file; nothing is written into it.
+    task
+        File with the numbers that are looked for and those that were measured, such as workflows/fits/rig.toml.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import fit_file
+
+    found, changes = fit_file.run(scene, overrides, fit_file.read(task), aside)
+    if as_json:
+        print(json.dumps({**found.record(), "set": changes}, indent=2))
+    else:
+        print(found.report(), "", "to go on with what was found:", *(f'  --set "{c}"' for c in changes), sep="\n")
+
+
+COMMANDS = (bench, trade, converge, extremes, track, backbone, identify)

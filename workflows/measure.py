@@ -78,13 +78,13 @@ def measure(file: SceneFile, wears: bool = True, refined: bool = True) -> Measur
     return Measured(values, flat, interface.area, depth, energy, spent, needed, outcome)
 
 
-def wear(file: SceneFile, model: pipeline.Model) -> WearHistory:
-    """Wear by the scene's rule until LIFE_SHARE of the preload is left."""
+def wear(file: SceneFile, model: pipeline.Model, left: float = LIFE_SHARE) -> WearHistory:
+    """Wear by the scene's rule until a share `left` of the preload is left."""
     wanted, balance = file.scene.wear, model.balance
     assert wanted is not None
     area, duties = model.reduced.interface.area, pipeline.mission(file.scene)
     law = pipeline.law_of(file.scene, file.folder)
-    problem = WearProblem(balance, duties, law, wanted.coefficient, area, lost_below=LIFE_SHARE)
+    problem = WearProblem(balance, duties, law, wanted.coefficient, area, left)
     limit = pipeline.step_limit(file.scene, free_deflection(balance), area)
     return pipeline.evolve(problem, wanted, limit, wanted.max_steps)
 

@@ -44,8 +44,9 @@ from workflows.fields import with_shown
 from workflows.matrix_scene import MatrixScene
 from workflows.progress import Progress
 from workflows.result import Result
-from workflows.scene import CENTRIFUGAL, HIGHEST, PartScene, Place, Scene, StaticLoad, Wear, unknown_key
+from workflows.scene import CENTRIFUGAL, HIGHEST, PartScene, Scene, StaticLoad, unknown_key
 from workflows.scene_file import SceneFile
+from workflows.scene_wear import Place, Wear
 
 OUTPUT = "response"
 TOLERANCE = 0.01  # of the response, where a scene leaves the choice of harmonics
@@ -424,17 +425,17 @@ def peak_of(scene: Scene) -> AtPeak:
 def mission(scene: Scene) -> tuple[Duty, ...]:
     """Where the cycles that wear are taken: the scene's one place, or the duties of its mission."""
     assert scene.wear is not None
-    newton, peak = newton_options(scene), peak_of(scene)
-
-    def site(place: Place) -> AtFrequency | AtPeak | BesidePeak:
-        if place.frequency is not None:
-            return AtFrequency(OUTPUT, 2 * np.pi * place.frequency, newton)
-        assert place.peak is not None
-        return peak if place.peak == 1.0 else BesidePeak(peak, place.peak)
-
     if not scene.wear.mission:
-        return (Duty(site(scene.wear.at)),)
-    return tuple(Duty(site(duty.at), duty.share, duty.load) for duty in scene.wear.mission)
+        return (Duty(site_of(scene, scene.wear.at)),)
+    return tuple(Duty(site_of(scene, duty.at), duty.share, duty.load) for duty in scene.wear.mission)
+
+
+def site_of(scene: Scene, place: Place) -> AtFrequency | AtPeak | BesidePeak:
+    """A place of the scene's response."""
+    if place.frequency is not None:
+        return AtFrequency(OUTPUT, 2 * np.pi * place.frequency, newton_options(scene))
+    assert place.peak is not None
+    return peak_of(scene) if place.peak == 1.0 else BesidePeak(peak_of(scene), place.peak)
 
 
 def step_limit(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:
