@@ -118,6 +118,7 @@ RIG = ("geometry.n_contact_length=3", "geometry.n_contact_width=3", "wear=", 're
 RIG = (*RIG, "response.points=9", 'response.frequency=["289 Hz", "293 Hz"]')
 COARSE = {"beam": (*SMALL, 'wear.at="700 Hz"'), "blade": BLADE, "leaf_seal": LEAF, "rig": RIG}
 ASKED = {"beam": ("wear", "30 % of life, depth"), "blade": ("samples", "1 %"), "leaf_seal": ("newton", "1 %")}
+ASKED["rig"] = ("interface_rank", "1 %")
 
 
 @pytest.mark.parametrize("scene", sorted(COARSE))
