@@ -62,12 +62,8 @@ def test_reduced_against_full_sector(published):
 
 
 def test_blade_is_what_the_scene_says(published):
-    """delta_max of a few millimetres, preload that closes, a first bending mode that contact raises."""
+    """Free blades are alone, and contact raises their first bending mode."""
     _, reduced = published
-    right, left = waves.shroud_deflection(reduced, {"couple": 60e3})
-    area = reduced.sector.interface.area
-    means = [area @ face / area.sum() for face in (right, left)]
-    assert means == pytest.approx([3.41e-3, 4.67e-3], rel=0.01)
     free = waves.nodal_diameters(reduced.sector, range(21), 1)
     stuck = waves.nodal_diameters(reduced.sector, range(21), 1, reduced.sector.interface.stiffness(93e6, 113e6))
     assert np.ptp(free) < 1e-6 * free.max()  # a rigid disk: blades are alone
