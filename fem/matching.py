@@ -8,19 +8,23 @@ from scipy.spatial import cKDTree
 TOLERANCE = 1e-4
 
 
+class Mismatch(ValueError):
+    """Nodes of two faces that should meet do not."""
+
+
 def partners(points: np.ndarray, others: np.ndarray, what: str, tolerance: float = TOLERANCE) -> np.ndarray:
     """Which of the others lies at each point.
 
     points : (k, 3), others : (m, 3), m >= k [m]; what : the two faces, for the error
     tolerance : largest distance of two matching nodes, as a part of the length of the first face
     Returns (k,) numbers of the others, all different
-    Raises  ValueError, naming what and the worst place, where a point has no partner
+    Raises  Mismatch, naming what and the worst place, where a point has no partner
     """
     distance, partner = cKDTree(others).query(points)
     lost = distance > tolerance * float(np.linalg.norm(np.ptp(points, axis=0)))
     if lost.any() or len(np.unique(partner)) < len(partner):
         worst = points[distance.argmax()]
-        raise ValueError(
+        raise Mismatch(
             f"{what} do not match: {lost.sum()} of {len(partner)} nodes of the first have no partner on the second, "
             f"the farthest at ({worst[0]:.4g}, {worst[1]:.4g}, {worst[2]:.4g}) m is {distance.max():.3g} m away; "
             "mesh both with the same grid"

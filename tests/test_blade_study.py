@@ -80,6 +80,15 @@ def test_highest_maximum_is_not_an_end_of_the_range(blade):
     assert height == curve.amplitude().max()
 
 
+def test_references_carry_the_load_of_their_curve(blade):
+    """Hardly shaken the response is the stuck one, and both references grow with the load."""
+    little, more = (blade_study.respond(blade.wave().with_load(load), (150.0, 160.0), 0.01) for load in (1e-3, 1e-2))
+    stuck = np.interp(2 * np.pi * little.branch.frequency, little.references.omega, little.references.stuck)
+    assert little.amplitude() == pytest.approx(stuck, rel=1e-4)
+    for state in ("free", "stuck"):
+        assert getattr(more.references, state) == pytest.approx(10 * getattr(little.references, state), rel=1e-9)
+
+
 def test_blades_alike_are_a_travelling_wave():
     """The wheel that the mistuned example solves, with no deviation, is the sector: same parts, same answer."""
     blade = blade_model.build(scene_file.read("blade", FEWER))

@@ -10,6 +10,7 @@ import pytest
 
 from hbm import newton, stability, time_integration
 from hbm.law import SEPARATES, STICKS
+from hbm.recovery import coordinates
 from hbm.time_integration import Options
 from workflows import leaf_figures, leaf_fit, leaf_record, leaf_study, pipeline, planning, scene_file
 from workflows.leaf_cases import Case, cases, liner
@@ -246,6 +247,25 @@ def test_liner_motion_enters_the_contact_and_the_linear_references():
     ours = moved.branch.amplitude("response")
     np.testing.assert_allclose(references.stuck[[0, -1]], ours[[0, -1]], rtol=1e-6)
     assert np.all(references.free == 0.0)
+
+
+def test_a_smaller_load_moves_the_liner_less_in_every_answer():
+    """Of a linear answer, all stuck: half of the harmonic loads is half of the motion; the static part stays."""
+    moved = respond(scene_file.read("leaf_seal", (*liner(0.0, 1.0), "response.frequency=[300, 310]")))
+    full, half = moved.balance, moved.balance.with_load(0.5)
+    omega, answers = 2 * np.pi * 300, []
+    for balance in (full, half):
+        state = newton.solve_from_rest(balance, omega).state
+        force = state.cycle.force.reshape(state.flat.shape)
+        answers.append(np.stack(coordinates(balance, state.flat, force, omega), axis=-1))
+        row = np.array([balance.model.at_harmonic(0)[0].outputs["response"]])
+        found = balance.basis.to_real(row @ answers[-1])[0]
+        told = balance.outputs(state)[balance.compliance.output_names.index("response")]
+        np.testing.assert_allclose(found, told, atol=1e-8 * np.abs(told).max())
+    np.testing.assert_allclose(answers[1][:, 1], 0.5 * answers[0][:, 1], atol=1e-9 * np.abs(answers[0]).max())
+    np.testing.assert_allclose(answers[1][:, 0], answers[0][:, 0], atol=1e-9 * np.abs(answers[0]).max())
+    scaled = [linear_references(balance, "response", omega, 1.01 * omega).stuck for balance in (full, half)]
+    np.testing.assert_allclose(scaled[1], 0.5 * scaled[0], rtol=1e-9)
 
 
 def test_wear_by_impacts_grows_where_the_leaf_chatters(tmp_path):

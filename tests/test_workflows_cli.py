@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 from tests.synthetic_result import result
-from workflows import cli, store, summary
+from workflows import cli, exits, store, summary
 
 ROOT = Path(__file__).parents[1]
 
@@ -120,17 +121,15 @@ def test_show_for_people(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
 
 
 def test_a_reader_that_has_seen_enough_ends_the_command_in_silence(tmp_path: Path) -> None:
+    """As in `tribodyn list | head -1`; here nobody reads at all."""
     store.save(tmp_path / "result.h5", result(9))
-    script = "import sys; from workflows import cli; cli.main(sys.argv[1:])"
     for words in (["show", str(tmp_path)], ["show", str(tmp_path), "--json"], ["list"]):
-        command = subprocess.Popen(
-            [sys.executable, "-c", script, *words], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-        )
-        assert command.stdout is not None
-        assert command.stderr is not None
-        command.stdout.close()  # before anything is written
-        err = command.stderr.read()
-        assert (command.wait(), err) == (141, b"")
+        read_end, write_end = os.pipe()
+        os.close(read_end)
+        command = [sys.executable, "-m", "workflows.cli", *words]
+        done = subprocess.run(command, cwd=ROOT, stdout=write_end, stderr=subprocess.PIPE, check=False)
+        os.close(write_end)
+        assert (done.returncode, done.stderr) == (exits.READER_LEFT, b"")
 
 
 def curve(peak: int, unstable: range | None = None):

@@ -176,6 +176,9 @@ def test_the_study_compares_every_number_and_draws(tmp_path, capsys):
     found = sum(number["topic"] == "frequency" for number in record["numbers"])
     assert found == len(published.OPEN) + len(published.STUCK) + 1
     assert sum(topic == "energy per cycle" for topic, _ in numbers) == len(published.TABLE_5_3)
+    lives = [name for topic, name in numbers if topic == "life"]
+    assert sum("harmonics 0 to 2" in name for name in lives) == 1
+    assert len(lives) == len(published.MATING_HEIGHTS) + 1
     assert numbers["wear", "slope of volume over work"]["ours"] == pytest.approx(5500, rel=1e-6)
     assert numbers["preload", "at the start"]["published"] == published.PRELOAD
     agrees = {t["published"]: t["agrees"] for t in record["trends"]}
@@ -190,6 +193,34 @@ def test_the_study_compares_every_number_and_draws(tmp_path, capsys):
     assert all((tmp_path / name.rsplit("/", 1)[-1]).stat().st_size > 1000 for name in record["files"])
     text = (tmp_path / "comparison.md").read_text(encoding="utf-8")
     assert text.count("\n|") >= len(record["numbers"]) + len(record["trends"])
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("wear.at=peak", 'need wear at one frequency, wear.at = "290 Hz"'),
+        ("wear=", "need wear at one frequency"),
+        ("prescribed=", r"need one table under prescribed, \[prescribed.platform\]"),
+        ("springs.seat_along=", r"need the joint \[springs.seat_along\]"),
+        ("harmonics.kept=auto", "need harmonics that are named"),
+    ],
+)
+def test_a_scene_that_is_not_this_rig_is_one_sentence(override, words):
+    with pytest.raises(ValueError, match=words):
+        Rig.of(scene_file.read("rig", (override,)))
+
+
+def test_a_wear_law_beside_the_scene_is_found(tmp_path):
+    """The law of a file, the energy's own written once more, gives the same wear."""
+    law = "from hbm.wear.energy import depth_rate"
+    text = scene_file.find("rig").read_text(encoding="utf-8")
+    (tmp_path / "own.py").write_text(law, encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    depths = []
+    for extra in ((), ("wear.law=own.py",)):
+        file = scene_file.read(str(tmp_path / "mine.toml"), (*QUICK, "wear.max_steps=2", *extra))
+        depths.append(wear_down(Rig.of(file), 0.0, lambda sentence: None).history.depth)
+    np.testing.assert_allclose(depths[1], depths[0], rtol=1e-12)
 
 
 def test_differences_are_relative():

@@ -90,8 +90,8 @@ def forces_figure(curves: Mapping[float, Curve]) -> Figure:
         one, first = next(iter(curves.items()))
         hertz = first.references.omega / (2 * np.pi)
         scale = MILLI / (kilo * one)
-        axes.plot(hertz, scale * first.references.free, "--", color=GREY, lw=1.2, label="free")
-        axes.plot(hertz, scale * first.references.stuck, ":", color=INK, lw=1.2, label="stuck")
+        axes.plot(hertz, scale * first.references.free, "--", color=GREY, lw=1.2, zorder=3, label="free")
+        axes.plot(hertz, scale * first.references.stuck, ":", color=INK, lw=1.2, zorder=3, label="stuck")
         for (force, curve), color in zip(curves.items(), shades(len(curves)), strict=True):
             scaled = MILLI * curve.amplitude() / (kilo * force)
             axes.plot(curve.branch.frequency, scaled, color=color, label=f"{kilo * force:g} kN")

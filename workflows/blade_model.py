@@ -18,7 +18,7 @@ from hbm.branch import Branch
 from hbm.continuation import adaptive
 from hbm.law import ContactParameters
 from hbm.travelling_wave import on_wheel
-from reduction.cyclic import ReducedSector, nodal_diameters, reduce_sector, travelling_wave, wheel_model
+from reduction.cyclic import ReducedSector, nodal_diameters, travelling_wave, wheel_model
 from workflows import part_reduction, pipeline
 from workflows.scene import PartScene
 from workflows.scene_file import SceneError, SceneFile
@@ -125,5 +125,4 @@ def assembled(file: SceneFile, mesh: Any, node_sets: dict[str, np.ndarray]) -> B
     scene = file.part_scene
     part = pipeline.make_part(scene, mesh, node_sets)
     full = part_reduction.sector(scene, part)
-    reduced = reduce_sector(full, scene.reduction.modes, scene.reduction.cutoff)
-    return Blade(file, part, full, reduced)
+    return Blade(file, part, full, part_reduction.reduced_from(scene, full))

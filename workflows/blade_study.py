@@ -165,10 +165,9 @@ def forces(blade: Blade, extent: Extent) -> dict[float, Curve]:
 def problem_of(blade: Blade) -> tuple[WearProblem, float]:
     """The wear of the scene until every pair is separated, and its delta_max [m]."""
     scene, balance = blade.scene, blade.wave()
-    if scene.wear is None:
-        raise SceneError(f"{blade.file.name} has no [wear]: nothing of its shrouds is lost")
-    area = balance.model.interface.area
-    problem = WearProblem(balance, pipeline.mission(scene), scene.wear.law, scene.wear.coefficient, area)
+    assert scene.wear is not None
+    area, law = balance.model.interface.area, pipeline.law_of(scene, blade.file.folder)
+    problem = WearProblem(balance, pipeline.mission(scene), law, scene.wear.coefficient, area)
     return problem, delta_max(scene, free_deflection(balance), area)
 
 
@@ -251,8 +250,10 @@ def run(
     extent: Extent,
 ) -> list[Path]:
     """Run the whole study into a folder; highest : speed of the Campbell diagram [Hz], None for no diagram."""
-    folder.mkdir(parents=True, exist_ok=True)
     file = scene_file.read(scene, overrides)
+    if file.scene.wear is None:
+        raise SceneError(f"{file.name} has no [wear]: nothing of its shrouds is lost")
+    folder.mkdir(parents=True, exist_ok=True)
     drawn = {}
     with threadpool_limits(1):
         blade = blade_model.build(file)

@@ -91,7 +91,7 @@ def _of_response(balance: HarmonicBalance, result: Result) -> Iterator[Entry]:
     if frf is None:
         return
     good = np.array([outcome == CONVERGED for outcome in frf.outcome])
-    height = np.where(good, frf.amplitude(frf.output_names[0], balance.basis.has_static), -1.0)
+    height = np.where(good, frf.amplitude(frf.output_names[0]), -1.0)
     best = int(np.argmax(height))
     omega = float(frf.omega[best])
     x = frf.contact[best].reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)

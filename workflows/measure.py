@@ -86,7 +86,8 @@ def wear(file: SceneFile, model: pipeline.Model) -> WearHistory:
     wanted, balance = file.scene.wear, model.balance
     assert wanted is not None
     area, duties = model.reduced.interface.area, pipeline.mission(file.scene)
-    problem = WearProblem(balance, duties, wanted.law, wanted.coefficient, area, lost_below=LIFE_SHARE)
+    law = pipeline.law_of(file.scene, file.folder)
+    problem = WearProblem(balance, duties, law, wanted.coefficient, area, lost_below=LIFE_SHARE)
     scale = delta_max(file.scene, free_deflection(balance), area)
     if wanted.rule == "thesis":
         assert wanted.step is not None
@@ -107,7 +108,7 @@ def _peak(file: SceneFile, model: pipeline.Model, refined: bool) -> OperatingPoi
     balance, site = model.balance, pipeline.peak_of(file.scene)
     branch = pipeline.follow_response(file.scene, balance, lambda share, note: None)
     pipeline.check_branch(branch)
-    height = branch.amplitude(pipeline.OUTPUT, balance.basis.has_static)
+    height = branch.amplitude(pipeline.OUTPUT)
     best = int(np.argmax(np.where([outcome == CONVERGED for outcome in branch.outcome], height, -1.0)))
     x = branch.contact[best].reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
     omega = float(branch.omega[best])

@@ -9,6 +9,7 @@ import numpy as np
 import fem.part
 from fem import cyclic
 from fem.cyclic import Sector
+from fem.matching import Mismatch
 from fem.material import Material
 from fem.part import Part
 from fem.prestress import spinning
@@ -21,6 +22,7 @@ from reduction.prescribed import StaticReaction, prescribe
 from reduction.relative import relative
 from workflows.scene import PartScene
 
+SEAM = ("cyclic_right", "cyclic_left")  # what a part calls the faces where its wheel is one piece
 REACTION = "reaction"  # where the facts of a model keep its StaticReaction
 
 
@@ -67,11 +69,21 @@ def reduce(scene: PartScene, part: Part) -> ReducedModel:
 def sector(scene: PartScene, part: Part) -> Sector:
     """The full sector of the scene's wheel, stiffened by its stress where the wheel spins.
 
-    Raises  ValueError where its faces do not match those of its neighbours
+    Raises  ValueError where its faces do not match those of its neighbours, or where the disk is left cut open
     """
     wheel = scene.wheel
     assert wheel is not None
-    cut = cyclic.cut_from(part, contacts(scene), wheel.sectors, wheel.seam, wheel.axis)
+    if wheel.seam is None and all(name in part.node_sets for name in SEAM):
+        raise ValueError(
+            f"wheel.seam is missing, but the part has {' and '.join(SEAM)}, where its disk would be cut open: "
+            f'give wheel.seam = ["{SEAM[0]}", "{SEAM[1]}"]'
+        )
+    try:
+        cut = cyclic.cut_from(part, contacts(scene), wheel.sectors, wheel.seam, wheel.axis)
+    except Mismatch as miss:
+        raise ValueError(
+            f"{miss}, and let wheel.sectors = {wheel.sectors} and wheel.axis be those that the part was made for"
+        ) from None
     if not wheel.speed:
         return cut
     tie = cyclic.seam_map(cut, 0)
@@ -80,7 +92,18 @@ def sector(scene: PartScene, part: Part) -> Sector:
 
 def reduced_sector(scene: PartScene, part: Part) -> ReducedSector:
     """The sector on its shroud, seam and load nodes and a few modes: what serves every engine order."""
-    return reduce_sector(sector(scene, part), scene.reduction.modes, scene.reduction.cutoff)
+    return reduced_from(scene, sector(scene, part))
+
+
+def reduced_from(scene: PartScene, full: Sector) -> ReducedSector:
+    """The full sector reduced as the scene says; raises ValueError where it cannot stand, by itself or at its speed."""
+    try:
+        return reduce_sector(full, scene.reduction.modes, scene.reduction.cutoff)
+    except ValueError as trouble:
+        if scene.wheel is None or not scene.wheel.speed:
+            raise
+        rpm = 60 * scene.wheel.speed
+        raise ValueError(f"at wheel.speed = {rpm:.6g} rpm {trouble}, or let it turn slower") from None
 
 
 def with_prescribed(scene: PartScene, part: Part, reduced: ReducedModel) -> ReducedModel:

@@ -16,7 +16,7 @@ MODES = 100
 
 
 def linear_references(balance: HarmonicBalance, output: str, start: float, stop: float) -> References:
-    """Amplitudes of an output, free and stuck, from one frequency to another [rad/s].
+    """Amplitudes of an output, free and stuck, from one frequency to another [rad/s], under the loads of the balance.
 
     The free amplitude is nan where the part is loose without its contact.
     """
@@ -50,6 +50,8 @@ def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: st
         force = np.sum([np.zeros(system.n_dof), *loads], axis=0)
         if springs is not None and base is not None:
             force = force + B.conj().T @ (springs.ravel() * base[:, position])
+        if h:
+            force = balance.load_factor * force
         if not force.any():
             continue
         stiffness = system.stiffness if springs is None else stuck_stiffness(system.stiffness, B, springs)
@@ -65,7 +67,7 @@ def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: st
         for i, s in enumerate(1j * h * omega):
             dynamic = np.diag(lam + s**2) + s * damping
             amplitudes[i, position] = remainder + (row @ phi) @ np.linalg.solve(dynamic, modal)
-    return amplitude(basis.to_real(amplitudes), basis.has_static)
+    return amplitude(basis.to_real(amplitudes))
 
 
 def free_deflection(balance: HarmonicBalance) -> np.ndarray:

@@ -63,7 +63,8 @@ class Study:
     stuck_complex : of ours nearest to the fifth stuck mode [Hz]
     cycles : harmonics -> shaker force [N] -> cycle; tight : the cycle under STUCK_PRELOAD
     apart : largest relative difference of the response without contact to the open rig's
-    runs : one per mating height; the first is that of the scene, whose stages these are; seconds : of processor time
+    runs : one per mating height; the first is that of the scene, whose stages these are
+    other : the first one with the other reading of the harmonics; seconds : of processor time
     """
 
     before: np.ndarray
@@ -74,6 +75,7 @@ class Study:
     cycles: Mapping[tuple[int, ...], Mapping[float, Cycle]]
     tight: Cycle
     runs: tuple[RigWear, ...]
+    other: RigWear
     stages: tuple[Stage, ...]
     references: References
     patch: Patch
@@ -102,11 +104,13 @@ def compute(file: SceneFile, tell: Callable[[str], None]) -> Study:
         stiffness = heights[-1].preload / heights[-1].height
         tight = rig.with_height(STUCK_PRELOAD / stiffness).cycle()
         runs = tuple(wear_down(rig, shift, tell) for shift in MATING_HEIGHTS)
+        tell(f"the other reading of the harmonics, 0 to {READINGS[1][-1]}")
+        other = wear_down(rig.with_harmonics(READINGS[1]), 0.0, tell)
         stages = tuple(_stage(rig, runs[0], share, tell) for share in STAGES)
         model = rig.model()
         references = linear_references(model.balance, pipeline.OUTPUT, *pipeline.response_range(scene))
         return Study(
-            before, after, _stuck_complex(joints), heights, apart(rig, references), cycles, tight, runs, stages,
+            before, after, _stuck_complex(joints), heights, apart(rig, references), cycles, tight, runs, other, stages,
             references, rig.patch(model.balance), scene.wear.coefficient, scene.contact.friction or 0.0,
             time.process_time() - clock,
         )  # fmt: skip

@@ -181,9 +181,9 @@ def response(study: Study) -> Figure:
                 f"{name} {value:.0f}", (value, 0.02), (3, 0), textcoords="offset points", color=RED, fontsize=7,
                 xycoords=("data", "axes fraction"), rotation=90, va="bottom",
             )  # fmt: skip
-    axes.set(yscale="log", xlabel="frequency / Hz", ylabel="amplitude / µm")
+    axes.set(yscale="log", xlabel="frequency / Hz", ylabel="amplitude / µm", ylim=(None, 5 * axes.get_ylim()[1]))
     axes.set_title("Figure 5.31: response at 70 N under wear; red: published modes")
-    axes.legend(fontsize=7, loc="upper right")
+    axes.legend(fontsize=7, loc="upper right", ncols=2)
     return figure
 
 

@@ -22,16 +22,11 @@ from threadpoolctl import threadpool_limits
 from workflows import scene_file
 from workflows.identification import Identification, Measured, Parameter, fit
 from workflows.rig_joints import Joints, joints_of
-from workflows.rig_model import Rig
+from workflows.rig_model import TIED, Rig, check
 from workflows.rig_published import LIFE_MEASURED, OPEN, PRELOAD, STUCK, TABLE_5_3, WORK
 from workflows.rig_wear import RigWear, wear_down
 from workflows.scene_file import SceneFile
 
-TIED = {
-    "base_vertical": ("base_vertical",),
-    "base_sliding": ("base_along", "base_across"),
-    "seat": ("seat_along", "seat_across", "seat_vertical"),
-}
 RIGID = 1e11  # stiffness beyond which no published frequency changes by one in a thousand [N/m]
 MICROMETRE = 1e-6
 SECTIONS = 3  # models kept, some 0.2 GB each: a section and its two neighbours for the derivatives
@@ -59,13 +54,13 @@ def fit_joints(joints: Joints) -> Identification:
     return fit(parameters, FREQUENCIES, lambda values: joints.frequencies(stiffnesses(values)), before)
 
 
-def fit_column(overrides: Sequence[str] = ()) -> Identification:
+def fit_column(scene: str, overrides: Sequence[str] = ()) -> Identification:
     """Section of the column and springs at its base to the published frequencies, from a square section."""
 
     @lru_cache(maxsize=SECTIONS)
     def joints(length: float, depth: float) -> Joints:
         section = (f"geometry.column_length={length!r} m", f"geometry.column_depth={depth!r} m")
-        return joints_of(scene_file.read("rig", (*overrides, *section)))
+        return joints_of(scene_file.read(scene, (*overrides, *section)))
 
     def predict(values: Mapping[str, float]) -> np.ndarray:
         length, depth = (round(values[name] / MICROMETRE) * MICROMETRE for name in ("column_length", "column_depth"))
@@ -111,18 +106,20 @@ def fit_coefficient(run: RigWear, coefficient: float) -> Identification:
 
 
 def run(
-    overrides: Sequence[str], column: bool, wear: bool, tell: Callable[[str], None]
+    scene: str, overrides: Sequence[str], column: bool, wear: bool, tell: Callable[[str], None]
 ) -> dict[str, Identification]:
     """Every fit by its name: to joints, height and damping, and on demand of the column and by a whole wear run.
 
     tell : called with a sentence on what is under way
     """
     found = {}
+    file = scene_file.read(scene, overrides)
+    check(file)
     with threadpool_limits(1):
         if column:
             tell("section of the column: a mesh and a reduction for every section tried")
-            found["Section of the column and springs at its base to published frequencies"] = fit_column(overrides)
-        file = scene_file.read("rig", overrides)
+            title = "Section of the column and springs at its base to published frequencies"
+            found[title] = fit_column(scene, overrides)
         tell("joint springs")
         found["Joint springs to published frequencies, before: rigid joints"] = fit_joints(joints_of(file))
         rig = Rig.of(file)

@@ -17,9 +17,15 @@ from workflows import part_reduction, pipeline
 from workflows.references import free_deflection
 from workflows.result import Patch
 from workflows.scene import Damping, PartScene
-from workflows.scene_file import SceneFile
+from workflows.scene_file import SceneError, SceneFile
 
 PLATFORM, SHAKER = "platform", "shaker"  # names in the scene
+TIED = {
+    "base_vertical": ("base_vertical",),
+    "base_sliding": ("base_along", "base_across"),
+    "seat": ("seat_along", "seat_across", "seat_vertical"),
+}
+"""Springs of the scene that act at one joint, tied where frequencies cannot tell them apart."""
 
 
 class NoSolution(RuntimeError):
@@ -45,20 +51,25 @@ class Cycle:
 
 @dataclass(frozen=True)
 class Rig:
-    """scene : as read; part : with the gap of its faces; plain : reduced, not damped, nothing prescribed."""
+    """scene : as read; part : with the gap of its faces; plain : reduced, not damped, nothing prescribed.
+
+    folder : where relative file names of the scene begin
+    """
 
     scene: PartScene
     part: Part
     plain: ReducedModel
+    folder: Path
 
     @classmethod
     def of(cls, file: SceneFile) -> Rig:
-        """Build and reduce the rig of a scene."""
+        """Build and reduce the rig of a scene; raises SceneError as `check` does."""
+        check(file)
         scene = file.part_scene
         with TemporaryDirectory() as folder:
             mesh, node_sets = pipeline.make_mesh(file, Path(folder))
         part, _ = pipeline.with_surfaces(scene, pipeline.make_part(scene, mesh, node_sets), file.folder)
-        return cls(scene, part, part_reduction.reduce(scene, part))
+        return cls(scene, part, part_reduction.reduce(scene, part), file.folder)
 
     @property
     def omega(self) -> float:
@@ -126,6 +137,21 @@ class Rig:
             force = self.scene.loads.harmonic[SHAKER].amplitude
             raise NoSolution(f"the rig at {omega / (2 * np.pi):.4g} Hz and {force:.4g} N: {solution.outcome}")
         return cycle_of(balance, solution.state, self.height)
+
+
+def check(file: SceneFile) -> None:
+    """Raise SceneError where a scene lacks what the fits and the study of the rig change or look at."""
+    scene = file.part_scene
+    wear, springs = scene.wear, [name for tied in TIED.values() for name in tied]
+    for missing, key in (
+        (list(scene.prescribed) != [PLATFORM], f"one table under prescribed, [prescribed.{PLATFORM}]"),
+        (list(scene.loads.harmonic) != [SHAKER], f"one harmonic load, [loads.harmonic.{SHAKER}]"),
+        (wear is None or bool(wear.mission) or wear.at.frequency is None, 'wear at one frequency, wear.at = "290 Hz"'),
+        (scene.harmonics.automatic, "harmonics that are named, harmonics.kept = [0, 1, 2, 3]"),
+        *((name not in scene.springs, f"the joint [springs.{name}]") for name in springs),
+    ):
+        if missing:
+            raise SceneError(f"{file.name}: the fits and the study of the rig need {key}")
 
 
 def cycle_of(balance: HarmonicBalance, state: State, height: float) -> Cycle:

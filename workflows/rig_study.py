@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from workflows import rig_cases, rig_figures, rig_table, scene_file
+from workflows import rig_cases, rig_figures, rig_model, rig_table, scene_file
 
 
 def run(
-    folder: Path, overrides: Sequence[str], tell: Callable[[str], None]
+    scene: str, overrides: Sequence[str], folder: Path, tell: Callable[[str], None]
 ) -> tuple[rig_table.Table, list[Path]]:
-    """Compute the study of the rig's scene with changes, and write its table and pictures into a folder.
+    """Compute the study of the rig of a scene with changes, and write its table and pictures into a folder.
 
     tell : called with a sentence on what is under way
     """
-    study = rig_cases.compute(scene_file.read("rig", overrides), tell)
+    file = scene_file.read(scene, overrides)
+    rig_model.check(file)
+    study = rig_cases.compute(file, tell)
     table = rig_table.table(study)
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "comparison.md"

@@ -110,8 +110,9 @@ def _lives(study: Study) -> list[Number]:
     numbers = [
         Number("preload", "at the start", "N", published.PRELOAD, float(first.rest[0]), "platform height fitted to it")
     ]
-    for run in study.runs:
-        name = f"mating height {1e6 * run.shift:+.0f} um"
+    others = f", harmonics 0 to {READINGS[1][-1]}"
+    for run, reading in (*((run, "") for run in study.runs), (study.other, others)):
+        name = f"mating height {1e6 * run.shift:+.0f} um{reading}"
         end = "to loss of preload" if run.lost else f"so far ({run.end})"
         start = f"{run.rest[0]:.1f} N at the start"
         numbers += [

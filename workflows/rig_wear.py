@@ -92,8 +92,8 @@ def wear_down(rig: Rig, shift: float, tell: Callable[[str], None]) -> RigWear:
     rig = rig.with_mating_height(shift)
     balance, still = rig.model().balance, rig.with_force(0.0).model().balance
     site = AtFrequency(pipeline.OUTPUT, rig.omega, pipeline.newton_options(rig.scene))
-    area = rig.plain.interface.area
-    problem, quiet = (WearProblem(b, (Duty(site),), wear.law, wear.coefficient, area) for b in (balance, still))
+    area, law = rig.plain.interface.area, pipeline.law_of(rig.scene, rig.folder)
+    problem, quiet = (WearProblem(b, (Duty(site),), law, wear.coefficient, area) for b in (balance, still))
     limit = pipeline.step_limit(rig.scene, rig.patch(balance))
     history: WearHistory | None = None
     rest: list[float] = []

@@ -12,6 +12,7 @@ from hbm.wear_events import events
 from hbm.wear_history import LIFE_SHARE, cycles_to_preload
 from workflows import budget
 from workflows.result import Result
+from workflows.trade_table import plain
 
 EVENT_SAMPLES = 256  # of a cycle, to see whether a pair opens
 
@@ -42,7 +43,7 @@ def summary(result: Result) -> dict[str, Any]:
     free = result.facts.get("free_hz")
     numbers["free_hz"] = None if free is None else [float(hertz) for hertz in np.atleast_1d(free)]
     numbers["error_budget"] = budget.of_result(result)
-    return {name: _finite(value) for name, value in numbers.items()}
+    return {name: plain(value) for name, value in numbers.items()}
 
 
 def _wear(result: Result) -> dict[str, Any]:
@@ -53,7 +54,7 @@ def _wear(result: Result) -> dict[str, Any]:
         return dict.fromkeys(names)
     depth, cycles = result.depth_after(-1), result.cycles_after(-1)
     volume, split = float(depth @ patch.area), float(np.squeeze(result.facts.get("wear_split", 0.5)))
-    basis = HarmonicBasis(tuple(int(h) for h in np.atleast_1d(result.facts["harmonics"])), EVENT_SAMPLES)
+    basis = HarmonicBasis(result.harmonics, max(EVENT_SAMPLES, 2 * result.harmonics[-1] + 1))
     when = events(wear, patch.components, patch.gap, basis)
     return {
         "first_lift_cycles": None if when is None else when.first_lift,
@@ -131,17 +132,12 @@ def _curve(result: Result) -> dict[str, Any]:
     return numbers
 
 
-def _finite(value: Any) -> Any:
-    """JSON has no nan."""
-    return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
 def lines(result: Result) -> list[tuple[str, str]]:
     """The summary as pairs of a name and a readable value."""
     numbers = summary(result)
 
     def pair(name: str, scale: float, unit: str) -> str:
-        first, last = (scale * value for value in numbers[name])
+        first, last = (float("nan") if value is None else scale * value for value in numbers[name])
         return f"{first:.5g} {unit}" if numbers["wear_steps"] == 0 else f"{first:.5g} -> {last:.5g} {unit}"
 
     shown = [
