@@ -70,7 +70,7 @@ def test_exactly_one_unknown_for_each_pair_and_coefficient(leaf):
 def test_the_plan_counts_what_the_run_builds(leaf):
     plan = planning.plan(scene_file.read("leaf_seal"))
     assert (plan.contact_pairs, plan.unknowns) == (126, 378)
-    assert int(plan.model_dofs) == leaf.balance.model.system.n_dof + 1  # the held turn
+    assert int(plan.model_dofs) == leaf.balance.model.system.n_dof
 
 
 def test_free_leaf_has_two_rigid_modes_and_contact_alone_holds_it(tmp_path):
@@ -330,6 +330,7 @@ def test_the_study_has_its_thirty_configurations_and_writes_what_it_found(tmp_pa
         ("loads.static.pressure.direction=z", "expected either value and direction"),
         ("geometry.fixed_axes.left_hole=w", "must be some of the letters"),
         ("damping.state=sliding", "damping.state"),
+        ("harmonics.kept=[1]", "gaps, which act in harmonic 0: keep it"),
     ],
 )
 def test_bad_scenes_end_with_one_sentence(override, sentence, tmp_path):

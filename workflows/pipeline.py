@@ -49,6 +49,7 @@ from workflows.scene_file import SceneFile
 from workflows.scene_wear import Place, Wear
 
 OUTPUT = "response"
+NO_GAP = 1e-12  # [m], rounding of node positions
 TOLERANCE = 0.01  # of the response, where a scene leaves the choice of harmonics
 
 
@@ -288,6 +289,8 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
 
     def balance(kept: tuple[int, ...]) -> HarmonicBalance:
         basis = HarmonicBasis(kept, harmonics.samples, harmonics.transitions)
+        if not basis.has_static and np.any(np.abs(parameters.gap) > NO_GAP):
+            raise ValueError("the contact has gaps, which act in harmonic 0: keep it in harmonics.kept")
         base = ground_motion(scene, part, basis) if isinstance(scene, PartScene) and part is not None else None
         return HarmonicBalance(reduced, contact.law, parameters, basis, excite(scene, base), response_range(scene)[1])
 
