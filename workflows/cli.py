@@ -64,7 +64,7 @@ def run(
     pictures
         Draw curves, maps and renders when done.
     """
-    from workflows import pipeline
+    from workflows import checkpoint, pipeline
     from workflows.accuracy import tuned
     from workflows.progress import console_progress
 
@@ -77,7 +77,7 @@ def run(
     folder = out or Path("results") / file.name
     path = folder / "result.h5"
     earlier = _earlier(path, file) if resume else None
-    if earlier is not None and pipeline.is_complete(earlier, file.scene):
+    if earlier is not None and checkpoint.is_complete(earlier, file.scene):
         progress.say(f"{path} is complete already")
         result = earlier
     else:
@@ -96,12 +96,12 @@ def run(
 
 def _earlier(path: Path, file: scene_file.SceneFile) -> Result | None:
     """The unfinished result to go on from, None where there is none yet."""
-    from workflows import pipeline, store
+    from workflows import checkpoint, store
 
     if not path.exists():
         return None
     result = store.load(path)
-    key = pipeline.same_problem(scene_file.from_json(result.provenance["scene"]), file.scene)
+    key = checkpoint.same_problem(scene_file.from_json(result.provenance["scene"]), file.scene)
     if key:
         raise ValueError(f"{path} is the result of another scene, {key} differs: run its scene, or without --resume")
     return result

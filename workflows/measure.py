@@ -63,7 +63,7 @@ def measure(file: SceneFile, wears: bool = True, refined: bool = True) -> Measur
                 values["peak_m"] = point.amplitude
                 values["energy_J"] = float(energy.sum()) or None  # a contact without friction has no error in energy
                 values["preload_N"] = balance.preload(point.state) or None
-            if wears and pipeline.wears(file.scene):
+            if wears and file.scene.wears:
                 worn = wear(file, model)
                 life = cycles_to_preload(worn)
                 if life is None:

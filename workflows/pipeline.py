@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import partial
@@ -38,6 +37,7 @@ from reduction.linear import stuck_stiffness
 from reduction.model import ReducedModel
 from workflows import curve, matrix_model, part_reduction, references, store, worn_responses
 from workflows.budget import with_budget
+from workflows.checkpoint import Clock, Keeper
 from workflows.contact_surfaces import surface_gap
 from workflows.description import described
 from workflows.fields import with_shown
@@ -82,7 +82,7 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
     with threadpool_limits(scene.solver.threads):
         model = build(file, folder, progress, () if earlier is None else earlier.harmonics)
         result = earlier or described(file, model.part, model.balance, model.choice)
-        if wears(scene) and result.patch is not None:
+        if scene.wears and result.patch is not None:
             step_limit(scene, result.patch.free_deflection, result.patch.area)  # raises before anything long is begun
         previous = None if earlier else store.set_aside(keep.path)
         if previous:
@@ -97,7 +97,7 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
             result = keep(replace(result, frf=frf, references=linear, state="response computed"))
         check_branch(result.frf)
         result = keep(judged(scene, model.balance, result, progress))
-        if wears(scene):
+        if scene.wears:
             with progress.track("wear") as advance:
                 result = wear_down(file, model, result, keep, advance)
         if scene.wear is not None and scene.wear.responses and result.wear_steps:
@@ -154,20 +154,6 @@ def build(file: SceneFile, folder: Path, progress: Progress, chosen: tuple[int, 
     if model.choice is not None:
         progress.say(model.choice.outcome)
     return model
-
-
-def wears(scene: Scene) -> bool:
-    """Whether a scene asks for wear steps."""
-    return scene.wear is not None and scene.wear.max_steps > 0
-
-
-def is_complete(result: Result, scene: Scene) -> bool:
-    """Whether a result holds everything that a scene of the same problem asks for."""
-    if not result.state.startswith("complete") or not wears(scene):
-        return result.state.startswith("complete")
-    assert scene.wear is not None
-    stopped = result.wear is None or result.wear.end.startswith("stopped after")
-    return not stopped or result.wear_steps >= scene.wear.max_steps
 
 
 def check_names(scene: Scene, folder: Path) -> None:
@@ -459,49 +445,3 @@ def step_limit(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:
         )
     share = step.share if scene.wear.rule == "thesis" and step is not None else None
     return delta_max if share is None else share * delta_max
-
-
-class Clock:
-    """Seconds of computing, those of an interrupted run included."""
-
-    def __init__(self, earlier: Result | None):
-        self._before = 0.0 if earlier is None else float(earlier.facts["seconds"])
-        self._start = time.perf_counter()
-
-    def seconds(self) -> float:
-        """Seconds so far."""
-        return self._before + time.perf_counter() - self._start
-
-
-@dataclass(frozen=True)
-class Keeper:
-    """Writes each new state of the result to its file."""
-
-    path: Path
-    clock: Clock
-
-    def __call__(self, result: Result) -> Result:
-        """Write a result with the seconds it took, and give it back."""
-        timed = replace(result, facts={**result.facts, "seconds": self.clock.seconds()})
-        store.save(self.path, timed)
-        return timed
-
-
-def same_problem(first: Scene, second: Scene) -> str:
-    """Empty where one scene's result can be gone on from by the other, else the first key that differs.
-
-    What is drawn, how many wear steps are wanted, how their result is told and how many threads work may differ.
-    """
-    ignored: dict[str, Any] = {"scene": True, "pictures": True, "solver": {"threads"}}
-    ignored["wear"] = {"max_steps", "responses", "split"}
-    return _difference(first.model_dump(exclude=ignored), second.model_dump(exclude=ignored))
-
-
-def _difference(first: Any, second: Any) -> str:
-    if isinstance(first, dict) and isinstance(second, dict):
-        for key in [*first, *(k for k in second if k not in first)]:
-            below = _difference(first.get(key), second.get(key))
-            if below:
-                return f"{key}.{below}".rstrip(".")
-        return ""
-    return "" if first == second else "."

@@ -364,6 +364,11 @@ class Scene(Table):
     pictures: Pictures = Pictures()
     solver: Solver = Solver()
 
+    @property
+    def wears(self) -> bool:
+        """Whether wear steps are asked for."""
+        return self.wear is not None and self.wear.max_steps > 0
+
 
 class PartScene(Scene):
     """Which geometry, material, contact, loads, reduction, response and wear are modelled."""
