@@ -6,8 +6,9 @@ are carried over here. A node number is a column of `mesh.doflocs`, everywhere i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -31,13 +32,10 @@ def read(path: str | Path) -> tuple[Any, Groups]:
         become 27-node ones of the same shape
     Returns mesh : skfem MeshHex2 or MeshTet2; surface groups are its boundaries, volume groups its subdomains;
         node_sets : every group of any dimension, name -> sorted node numbers, edge, face and middle nodes included
-    Raises ValueError: no such file, first-order or mixed volume elements, a group that is not part of the volume
-        mesh, an inverted element
+    Raises ValueError: no such file, one that is no mesh, first-order or mixed volume elements, a group that is not
+        part of the volume mesh, an inverted element
     """
-    if not Path(path).is_file():
-        raise ValueError(f"mesh file '{path}' does not exist: build the part first or correct the path")
-    # meshio.read tries other formats called .msh first, and prints what they say
-    file = meshio.gmsh.read(path) if Path(path).suffix == ".msh" else meshio.read(path)
+    file = _file(Path(path))
     cell_type = _volume_cell_type(file, path)
     blocks = [i for i, block in enumerate(file.cells) if block.type == cell_type]
     cells = np.vstack([file.cells[i].data for i in blocks])
@@ -66,17 +64,6 @@ def read(path: str | Path) -> tuple[Any, Groups]:
     mesh = mesh.with_boundaries(boundaries).with_subdomains(subdomains)
     quality(mesh)
     return mesh, node_sets
-
-
-def group(groups: Mapping[str, np.ndarray] | None, name: str) -> np.ndarray:
-    """Return the group of that name from node sets, boundaries or subdomains.
-
-    Raises ValueError: there is none; the sentence lists those that exist
-    """
-    if groups is None or name not in groups:
-        known = ", ".join(sorted(groups or {})) or "none"
-        raise ValueError(f"the mesh has no group '{name}' of this kind: the groups are {known}")
-    return groups[name]
 
 
 @dataclass(frozen=True)
@@ -126,6 +113,21 @@ def quality(mesh: Any) -> Quality:
         )
     volume = float((determinant[:, -len(weights) :] @ weights).sum())
     return Quality(scaled_jacobian=lowest, worst_element=int(element), volume=volume)
+
+
+def _file(path: Path) -> meshio.Mesh:
+    """What meshio reads; what its readers print about formats that they try in vain is not shown."""
+    if not path.is_file():
+        raise ValueError(f"mesh file '{path}' does not exist: build the part first or correct the path")
+    # meshio.read tries other formats called .msh first
+    read = meshio.gmsh.read if path.suffix == ".msh" else meshio.read
+    try:
+        with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+            return read(path)
+    except (Exception, SystemExit) as problem:  # the readers raise what they meet, and where none fits meshio exits
+        said = "" if isinstance(problem, SystemExit) else " ".join(str(problem).split())
+        reason = f" ({said})" if said else ""
+        raise ValueError(f"mesh file '{path}' cannot be read{reason}: write it as a Gmsh file, MSH 4.1") from None
 
 
 def _volume_cell_type(file: meshio.Mesh, path: str | Path) -> str:

@@ -127,14 +127,15 @@ class HarmonicBalance:
             self._point = self.compliance.at(omega)
         return self._point
 
-    def _loaded(self, coefficients: np.ndarray) -> np.ndarray:
+    def loaded(self, coefficients: np.ndarray) -> np.ndarray:
+        """Coefficients (..., n_coeff) that are linear in the loads, their vibrating part times the load factor."""
         if self.load_factor == 1.0:
             return coefficients
         return coefficients * np.where(self.basis.order, self.load_factor, 1.0)
 
     def x_lin(self, omega: float) -> np.ndarray:
         """(n_contact, n_coeff) response with every contact stuck and closed, the gap ignored [m]."""
-        return self._loaded(self.at(omega).x_lin)
+        return self.loaded(self.at(omega).x_lin)
 
     def stuck(self, omega: float) -> np.ndarray:
         """The same as a first guess x (n_pair, n_component, n_coeff) [m]."""
@@ -157,7 +158,7 @@ class HarmonicBalance:
         point = self.at(state.omega)
         x_load, y_load = point.slope(None)
         x_contact, y_contact = point.slope(state.g)
-        return -self._loaded(x_load) - x_contact, self._loaded(y_load) + y_contact
+        return -self.loaded(x_load) - x_contact, self.loaded(y_load) + y_contact
 
     def gap_response(self, state: State, opening: np.ndarray) -> np.ndarray:
         """First-order change of x (n_pair, n_component, n_coeff) when each gap opens by (n_pair,) [m].
@@ -177,7 +178,7 @@ class HarmonicBalance:
     def outputs(self, state: State) -> np.ndarray:
         """(n_output, n_coeff) response of the observed outputs [m]."""
         point = self.at(state.omega)
-        return self._loaded(point.outputs_lin) + point.outputs(state.g)
+        return self.loaded(point.outputs_lin) + point.outputs(state.g)
 
     def energy(self, state: State) -> np.ndarray:
         """(n_pair,) friction work per cycle, both tangential components [J].

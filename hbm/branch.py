@@ -47,18 +47,18 @@ class Branch:
         """(n_point,) excitation frequency [Hz]."""
         return self.omega / (2 * np.pi)
 
-    def amplitude(self, output: str, has_static: bool = True) -> np.ndarray:
+    def amplitude(self, output: str) -> np.ndarray:
         """(n_point,) vibration amplitude of an output, see `amplitude` [m]."""
-        return amplitude(self.response[:, self.output_names.index(output)], has_static)
+        return amplitude(self.response[:, self.output_names.index(output)])
 
 
-def amplitude(coefficients: np.ndarray, has_static: bool = True) -> np.ndarray:
+def amplitude(coefficients: np.ndarray) -> np.ndarray:
     """Vibration amplitude of Fourier coefficients: square root of the sum over harmonics of a_h^2 + b_h^2.
 
-    coefficients : (..., n_coeff), [x_0, a_1, b_1, ...], without x_0 where has_static is False
+    coefficients : (..., n_coeff), [x_0, a_1, b_1, ...]; an even number of them is without x_0
     Returns (...) [same unit]; for one harmonic it is the peak value, for several sqrt(2) times the r.m.s.
     """
-    dynamic = coefficients[..., 1:] if has_static else coefficients
+    dynamic = coefficients[..., coefficients.shape[-1] % 2 :]
     return np.sqrt(np.sum(dynamic**2, axis=-1))
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from hbm import newton
 from hbm.evolution import WearProblem, WearState, assess, first_preload, reason_to_stop, row_of, state_of, worn_state
 from hbm.operating_point import point_of
-from hbm.wear_history import LIFE_SHARE, WearHistory, WearRow, history
+from hbm.wear_history import LIFE_SHARE, WearHistory, WearRow, history, rows_to_go_on
 from hbm.wearing import WearingBalance, WornState
 
 GAMMA = 1 - 1 / np.sqrt(2)
@@ -52,9 +52,7 @@ def evolve(
     Raises  ValueError where the wear law wears pairs that do no friction work
     """
     problem = replace(problem, lost_below=max(problem.lost_below, FAINTEST))
-    rows = resume.rows() if resume is not None else []
-    if rows and rows[-1].cycles_in_step == 0:
-        rows.pop()  # the end, without the sentence that says why: come to it again
+    rows = rows_to_go_on(resume)
     if rows:  # the state after the last step was not kept: take the step again, to the same bits
         again = rows.pop()
         state = _step(problem, tolerance, replace(state_of(problem, again), solves=0), rows).after

@@ -67,9 +67,9 @@ class FoldCurve:
     cusps: tuple[int, ...]
     end: str
 
-    def amplitude(self, output: str, has_static: bool = True) -> np.ndarray:
+    def amplitude(self, output: str) -> np.ndarray:
         """(n_point,) vibration amplitude of an output at the folds [m]."""
-        return amplitude(self.response[:, self.output_names.index(output)], has_static)
+        return amplitude(self.response[:, self.output_names.index(output)])
 
 
 class NoFold(RuntimeError):

@@ -103,7 +103,7 @@ class AtPeak:
         step = min(1 / self.n_scan, COARSEST)
         scan = adaptive.Options(SCAN_TOLERANCE, step, min(5 * step, COARSEST), 1e-3 * step, newton=self.newton)
         branch = adaptive.follow(balance, self.start, self.stop, scan)
-        height = branch.amplitude(self.output, balance.basis.has_static)
+        height = branch.amplitude(self.output)
         best = int(np.argmax(np.where([o == CONVERGED for o in branch.outcome], height, -1.0)))
         x = branch.contact[best].reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
         near = branch.omega[max(best - 1, 0) : best + 2]
@@ -273,7 +273,7 @@ def point_of(site: Site, balance: HarmonicBalance, solution: Solution, solves: i
 def _point(balance: HarmonicBalance, solution: Solution, output: str, solves: int) -> OperatingPoint:
     response = balance.outputs(solution.state)
     row = balance.compliance.output_names.index(output)
-    return OperatingPoint(solution, float(amplitude(response[row], balance.basis.has_static)), response, solves)
+    return OperatingPoint(solution, float(amplitude(response[row])), response, solves)
 
 
 Site = AtFrequency | AtPeak | BesidePeak

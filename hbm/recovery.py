@@ -18,7 +18,7 @@ def coordinates(
     """
     basis, excitation = balance.basis, balance.excitation
     k = balance.parameters.stiffness.ravel()
-    moved = displacement if excitation.base is None else displacement + balance._loaded(excitation.base)
+    moved = displacement if excitation.base is None else displacement + balance.loaded(excitation.base)
     g = basis.to_complex(k[:, None] * moved - force)
     found = []
     for position, h in enumerate(basis.harmonics):

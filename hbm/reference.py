@@ -58,7 +58,7 @@ class DenseBalance:
         for (h, name), value in excitation.loads.items():
             if h in basis.harmonics:
                 amplitudes[:, basis.harmonics.index(h)] += system.loads[name] * value
-        self.force = self.problem._loaded(basis.to_real(amplitudes))
+        self.force = self.problem.loaded(basis.to_real(amplitudes))
 
     def dynamic_stiffness(self, omega: float) -> np.ndarray:
         """(n n_coeff, n n_coeff) linear part, coefficients innermost."""

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hbm.evolution import WearProblem, assess, first_preload, reason_to_stop, row_of, state_of
-from hbm.wear_history import WearHistory, WearRow, history
+from hbm.wear_history import WearHistory, WearRow, history, rows_to_go_on
 
 
 def evolve(
@@ -29,9 +29,7 @@ def evolve(
     """
     if not step_depth > 0:
         raise ValueError("the wear step must be a positive depth")
-    rows = resume.rows() if resume is not None else []
-    if rows and rows[-1].cycles_in_step == 0:
-        rows.pop()  # the end, without the sentence that says why: come to it again
+    rows = rows_to_go_on(resume)
     before = state_of(problem, rows[-1]) if rows else None
     depth = rows[-1].depth + rows[-1].worn if rows else np.zeros_like(problem.area)
     cycles = rows[-1].cycles + rows[-1].cycles_in_step if rows else 0.0

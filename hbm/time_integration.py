@@ -149,11 +149,11 @@ class TimeStepper:
         self.compliance = np.ascontiguousarray((1 - af) * beta * self.h**2 * (self.U @ through))
         self.law = time_step.pointer(balance.law.step)
         self.packed = balance.parameters.packed()
-        self._load_coefficients = balance._loaded(self._modal_load(phi))
+        self._load_coefficients = balance.loaded(self._modal_load(phi))
         samples = self._samples(self._load_coefficients)  # (n, n_step), at t_1 .. t_n_step
         self.load = np.ascontiguousarray(((1 - af) * samples + af * np.roll(samples, 1, axis=1)).T)
         base = balance.excitation.base
-        self._base = np.zeros((len(self.U), balance.basis.n_coeff)) if base is None else balance._loaded(base)
+        self._base = np.zeros((len(self.U), balance.basis.n_coeff)) if base is None else balance.loaded(base)
         self.base = np.ascontiguousarray(self._samples(self._base).T).reshape(options.steps, self.n_pair, self.c)
 
     def _modal_load(self, phi: np.ndarray) -> np.ndarray:

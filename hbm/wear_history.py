@@ -162,6 +162,12 @@ def cycles_to_preload(history: WearHistory, share: float = LIFE_SHARE) -> float 
     return float(history.cycles[i - 1] + part * (history.cycles[i] - history.cycles[i - 1]))
 
 
+def rows_to_go_on(interrupted: WearHistory | None) -> list[WearRow]:
+    """Rows of an interrupted run that steps were taken from; the one that ended it is come to again with its reason."""
+    rows = interrupted.rows() if interrupted is not None else []
+    return [row for row in rows if row.cycles_in_step > 0]
+
+
 def history(rows: list[WearRow], end: str) -> WearHistory:
     """Rows put together."""
     return WearHistory(**{f.name: np.array([getattr(r, f.name) for r in rows]) for f in fields(WearRow)}, end=end)

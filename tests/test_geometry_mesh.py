@@ -99,15 +99,6 @@ def test_groups_of_every_dimension_hold_all_their_nodes(read_box):
     np.testing.assert_array_equal(mesh.subdomains["box"], np.arange(mesh.nelements))
 
 
-def test_a_missing_group_is_one_sentence_with_the_known_ones(read_box):
-    _, _, node_sets = read_box
-    assert len(mesh_file.group(node_sets, "corner")) == 1
-    with pytest.raises(ValueError, match=r"no group 'clamp'.*box, corner, edge, left, left_and_bottom"):
-        mesh_file.group(node_sets, "clamp")
-    with pytest.raises(ValueError, match="none"):
-        mesh_file.group(None, "clamp")
-
-
 def test_curved_twenty_node_hexahedra_keep_their_volume(tmp_path):
     """A quarter of a thick ring: 20 and 27 nodes describe nearly the same body, both close to the true volume."""
     volumes = {}
@@ -165,6 +156,23 @@ def test_files_that_cannot_be_used_are_refused_in_a_sentence(tmp_path):
         mesh_file.read(tmp_path / "nowhere.msh")
     with pytest.raises(ValueError, match="first order"):
         mesh_file.read(box(tmp_path / "linear.msh", "tetra10", order=1))
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("garbage.msh", "hello\nworld\n"),
+        ("empty.msh", ""),
+        ("broken.msh", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 2"),
+        ("garbage.vtk", "hello"),
+        ("garbage.unknown", "hello"),
+    ],
+)
+def test_what_is_no_mesh_is_refused_in_a_sentence(name, text, tmp_path, capfd):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(ValueError, match=rf"mesh file '.*{name}' cannot be read.*: write it as a Gmsh file"):
+        mesh_file.read(tmp_path / name)
+    assert capfd.readouterr() == ("", "")
 
 
 def test_permutation_refuses_different_elements():

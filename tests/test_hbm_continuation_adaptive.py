@@ -67,7 +67,7 @@ def test_a_sweep_jumps_at_the_fold_and_says_so():
         assert "; the response jumped at " in branch.end
         jump = 2 * np.pi * float(branch.end.split()[-2])
         np.testing.assert_allclose(jump, fold, rtol=1e-4)
-        amplitude = branch.amplitude("mass", False)
+        amplitude = branch.amplitude("mass")
         assert np.abs(duffing.defect(branch.omega, amplitude)).max() < 1e-5
 
 

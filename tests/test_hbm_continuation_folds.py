@@ -26,7 +26,7 @@ def test_fold_against_the_load_is_where_the_discriminant_vanishes(duffing_branch
     assert line.parameter[0] == 1.0
     assert line.parameter[-1] == 0.1
     assert len(line.omega) < 50
-    for factor, omega, amplitude in zip(line.parameter, line.omega, line.amplitude("mass", False), strict=True):
+    for factor, omega, amplitude in zip(line.parameter, line.omega, line.amplitude("mass"), strict=True):
         assert np.abs(duffing.folds(factor=factor) / omega - 1).min() < 1e-8
         stiffness = 1 - omega**2 + 0.75 * amplitude**2
         np.testing.assert_allclose(amplitude * np.hypot(stiffness, 2 * duffing.zeta * omega), 0.3 * factor, rtol=1e-6)

@@ -22,7 +22,7 @@ def test_a_sweep_jumps_at_the_fold_and_says_so(n_points):
         assert np.all(np.diff(branch.omega) * (stop - start) > 0)
         np.testing.assert_allclose(branch.omega[list(branch.folds)], [fold], rtol=1e-8)
         assert f"the response jumped at folds: {fold / (2 * np.pi):.6g} Hz" in branch.end
-        amplitude = branch.amplitude("mass", False)
+        amplitude = branch.amplitude("mass")
         assert np.abs(duffing.defect(branch.omega, amplitude)).max() < 1e-5
         at = branch.folds[0]
         assert abs(amplitude[at + 1] - amplitude[at]) > 0.5 * amplitude[at]

@@ -20,7 +20,7 @@ from hbm.harmonics import HarmonicBasis
 from hbm.law import ContactParameters
 from tests.test_workflows_matrices import SCENE
 from tests.verification_models import random_structure
-from workflows import pipeline, scene_file
+from workflows import pipeline, scene_file, summary
 from workflows.progress import Progress
 
 ROOT = Path(__file__).parents[1]
@@ -156,6 +156,9 @@ def test_the_static_part_is_there_where_a_static_load_is_and_nowhere_else(tmp_pa
     assert result.frf is not None
     assert result.frf.contact.shape == (4, 6, 4)
     assert result.facts["unknowns"] == 6 * 4
+    # without x_0 every coefficient vibrates
+    everything = np.linalg.norm(result.frf.response[:, 0], axis=1).max()
+    assert summary.summary(result)["peak_m"] == [everything, everything]
 
 
 def test_contact_without_friction_state_or_derivative_allocates_neither() -> None:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.synthetic_result import result
-from workflows import cli, store, summary
+from workflows import cli, exits, store, summary
 
 ROOT = Path(__file__).parents[1]
 
@@ -116,6 +118,53 @@ def test_show_for_people(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
     assert code == 0
     for words in ("contact lost", "wear depth", "mm", "balance solves"):
         assert words in out
+
+
+def test_a_reader_that_has_seen_enough_ends_the_command_in_silence(tmp_path: Path) -> None:
+    """As in `tribodyn list | head -1`; here nobody reads at all."""
+    store.save(tmp_path / "result.h5", result(9))
+    for words in (["show", str(tmp_path)], ["show", str(tmp_path), "--json"], ["list"]):
+        read_end, write_end = os.pipe()
+        os.close(read_end)
+        command = [sys.executable, "-m", "workflows.cli", *words]
+        done = subprocess.run(command, cwd=ROOT, stdout=write_end, stderr=subprocess.PIPE, check=False)
+        os.close(write_end)
+        assert (done.returncode, done.stderr) == (exits.READER_LEFT, b"")
+
+
+def curve(peak: int, unstable: range | None = None):
+    """A made-up result without wear, its response highest at one of its points, unstable at some."""
+    made = result()
+    assert made.frf is not None
+    assert made.stability is not None
+    response = made.frf.response.copy()
+    response[peak, 0, 1] = 10 * np.abs(response).max()
+    marks = None if unstable is None else ~np.isin(np.arange(61), unstable)
+    stability = None if marks is None else replace(made.stability, stable=marks)
+    return replace(made, wear=None, frf=replace(made.frf, response=response), stability=stability)
+
+
+def test_a_peak_where_no_vibration_stays_is_told() -> None:
+    steady, falls = curve(30, range(20, 25)), curve(30, range(28, 33))
+    assert summary.summary(steady)["peak_is_stable"] is True
+    assert not any("unstable, no vibration" in text for _, text in summary.lines(steady))
+    numbers, frf = summary.summary(falls), falls.frf
+    assert numbers["peak_is_stable"] is False
+    best = max((i for i in range(61) if not 28 <= i < 33), key=lambda i: frf.amplitude("response")[i])
+    assert numbers["stable_peak_hz"] == frf.frequency[best]
+    assert numbers["stable_peak_m"] == frf.amplitude("response")[best]
+    told = [text for _, text in summary.lines(falls) if "unstable, no vibration stays at it" in text]
+    assert len(told) == 1
+    assert f"{frf.frequency[best]:.5g} Hz" in told[0]
+    assert any("no point is stable" in text for _, text in summary.lines(curve(30, range(61))))
+    assert summary.summary(curve(30))["peak_is_stable"] is None
+
+
+def test_the_end_of_the_range_is_no_peak() -> None:
+    for point, at_end in ((0, True), (30, False), (60, True)):
+        made = curve(point)
+        assert summary.summary(made)["peak_at_end"] is at_end
+        assert any("no peak: " in text for _, text in summary.lines(made)) is at_end
 
 
 def test_separation_is_told_only_where_contact_was_lost() -> None:

@@ -26,7 +26,7 @@ def run(folder: Path, *overrides: str) -> store.Result:
 def test_harmonics_are_chosen_and_told(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     overrides = ["harmonics.kept=auto", "harmonics.tolerance=2 %", "harmonics.highest=9", "harmonics.samples=512"]
     result = run(folder, *overrides)
-    kept = pipeline.harmonics_of(result)
+    kept = result.harmonics
     assert {0, 1} < set(kept)
     assert max(kept) <= 9
     assert result.frf is not None

@@ -60,8 +60,17 @@ def test_shares_of_the_patch_have_the_area_of_its_faces() -> None:
 def test_swing_is_the_largest_vibration_over_the_cycle() -> None:
     displacement = np.zeros((2, 3, 3))
     displacement[1, 2] = [5.0, 3.0, 4.0]
-    assert np.abs(view.swing(displacement)[1, 2]) == pytest.approx(5.0, rel=2e-3)  # 64 instants of a cycle
-    assert not view.swing(displacement)[0].any()
+    assert np.abs(view.swing(displacement, (0, 1))[1, 2]) == pytest.approx(5.0, rel=2e-3)  # 64 instants of a cycle
+    assert not view.swing(displacement, (0, 1))[0].any()
+    assert view.at_rest(displacement, (0, 1))[1, 2] == 5.0
+
+
+def test_swing_is_that_of_the_harmonics_kept() -> None:
+    """cos t - cos 3t reaches 1.54, cos t - cos 2t would reach 2."""
+    displacement = np.zeros((1, 3, 4))
+    displacement[0, 0] = [1.0, 0.0, -1.0, 0.0]  # without harmonic 0
+    assert np.abs(view.swing(displacement, (1, 3))[0, 0]) == pytest.approx(8 / 27**0.5, rel=5e-3)
+    assert not view.at_rest(displacement, (1, 3)).any()
 
 
 @pytest.mark.parametrize(("value", "nice"), [(1.0, 1.0), (1.99, 1.0), (2.0, 2.0), (7.0, 5.0), (0.3, 0.2), (5e3, 5e3)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +17,8 @@ from workflows.units import to_si
 OF_WEAR = ("depth_m", "life_cycles")
 WANTED = tuple(float(10**-power) for power in np.arange(0.5, 5, 0.125))  # errors of the Pareto front
 WORTH = 0.1  # of the time that a coarser setting must save: the clock is no better, and coarse ones are less robust
+ACCURACY = re.compile(r"(.*?)(?: ?\bof\b(.*?))?(?: ?\bgiven\b(.*))?")
+PER_CENT = re.compile(r" ?\bper ?cent\b")
 MARGIN = 0.7  # of the wanted error that the knobs together may use up: they were measured one by one
 
 
@@ -61,26 +64,40 @@ class Choice:
 
 
 def parsed(text: str) -> tuple[float, tuple[str, ...], tuple[str, ...]]:
-    """A wanted accuracy such as "1 %", "1 % of life, peak frequency" or "1 % of life given harmonics".
+    """A wanted accuracy such as "1 %", "1 % of life and peak frequency" or "1 % of life given harmonics".
 
     Returns the relative error, the quantities that are named, and knobs that stay as the scene has them, whose error is
     not counted
     Raises  ValueError with one sentence
     """
-    promised, _, knobs = text.partition(" given ")
-    number, _, names = promised.partition(" of ")
+    parts = ACCURACY.fullmatch(" ".join(text.lower().split()).rstrip("."))
+    assert parts is not None  # anything is a number so far
+    number, names, knobs = parts.groups()
     try:
-        wanted = to_si(number.strip(), "")
+        wanted = to_si(PER_CENT.sub("%", number), "")
     except ValueError as wrong:
         raise ValueError(f'--accuracy "{text}": {wrong}') from None
     if wanted <= 0:
         raise ValueError(f'--accuracy "{text}": an error is above 0, such as "1 %"')
-    asked = [name.strip() for name in names.split(",")] if names else []
+    if wanted >= 1:
+        raise ValueError(f'--accuracy "{text}": an error of {100 * wanted:.4g} % says nothing, ask for such as "1 %"')
+    asked = () if names is None else _listed(names)
     for name in asked:
         if name not in NAMES:
-            raise ValueError(f'--accuracy "{text}": "{name}" is none of {", ".join(NAMES)}')
-    given = tuple(knob.strip().replace(" ", "_") for knob in knobs.split(",")) if knobs else ()
-    return wanted, tuple(QUANTITIES[NAMES.index(name)] for name in asked), given
+            raise ValueError(f'--accuracy "{text}": after "of" {_quoted(name)} is none of {", ".join(NAMES)}')
+    given = () if knobs is None else tuple(knob.replace(" ", "_") for knob in _listed(knobs))
+    if "" in given:
+        raise ValueError(f'--accuracy "{text}": after "given" a knob is missing, such as harmonics')
+    return wanted, tuple(QUANTITIES[NAMES.index(name)] for name in dict.fromkeys(asked)), given
+
+
+def _listed(text: str) -> tuple[str, ...]:
+    """Words of a list "a, b and the c"."""
+    return tuple(item.strip().removeprefix("the ") for item in re.split(r",(?: and\b)?| and\b", text))
+
+
+def _quoted(name: str) -> str:
+    return f'"{name}"' if name else "nothing"
 
 
 def choose(
@@ -253,6 +270,11 @@ def tuned(name: str, overrides: Sequence[str], wanted: str, path: Path | None = 
     error, quantities, given = parsed(wanted)
     way = choose if quantities else choose_most
     asked = quantities or QUANTITIES
+    has = [q for q in QUANTITIES if any(row.values[q] is not None for row in trade.rows)]
+    for quantity in quantities:
+        if quantity not in has:
+            known = ", ".join(map(_name, has))
+            raise ValueError(f"the trade of {file.name} has measured no {_name(quantity)}, but {known}")
     choice = way(trade, error, asked, given)
     unasked = file.scene.wear is not None and not any(quantity in asked for quantity in OF_WEAR)
     return read(name, (*overrides, *choice.overrides, *(("wear=",) if unasked else ()))), choice

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -43,7 +43,10 @@ class Entry:
 def budget(file: SceneFile, balance: HarmonicBalance, result: Result) -> list[Entry]:
     """The budget of a result with its response, and with its wear where there is any."""
     entries = [*_of_reduction(balance, file), *_of_response(balance, result), *_of_wear(file, result)]
-    return entries + list(_of_trade(file))
+    unknown = {entry.source for entry in entries if entry.error is None}
+    traded = list(_of_trade(file, [knob for knob in ESTIMATED if knob not in unknown]))
+    covered = {entry.source for entry in traded if entry.error is not None}
+    return [entry for entry in entries if entry.error is not None or entry.source not in covered] + traded
 
 
 def with_budget(file: SceneFile, balance: HarmonicBalance, result: Result) -> Result:
@@ -88,7 +91,7 @@ def _of_response(balance: HarmonicBalance, result: Result) -> Iterator[Entry]:
     if frf is None:
         return
     good = np.array([outcome == CONVERGED for outcome in frf.outcome])
-    height = np.where(good, frf.amplitude(frf.output_names[0], balance.basis.has_static), -1.0)
+    height = np.where(good, frf.amplitude(frf.output_names[0]), -1.0)
     best = int(np.argmax(height))
     omega = float(frf.omega[best])
     x = frf.contact[best].reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
@@ -96,12 +99,15 @@ def _of_response(balance: HarmonicBalance, result: Result) -> Iterator[Entry]:
     yield Entry("newton, krylov", "response at the peak", _newton_error(balance, state), "estimate: one more step")
     yield Entry("samples", "response at the peak", sampling_error(balance, omega, x), "estimate: located, finer")
     top = max(balance.basis.harmonics)
+    error: float | None = None
     try:
         wide = harmonic_choice.widened(balance, top + LOOK)
-        error: float | None = harmonic_choice.estimate(wide, balance.basis.harmonics, omega, x, split=False).error
+        error = harmonic_choice.estimate(wide, balance.basis.harmonics, omega, x, split=False).error
         how = "estimate: one step with more"
     except ValueError as refusal:
-        error, how = None, str(refusal)
+        how = str(refusal)
+    if error is not None and error >= UNKNOWN:  # as at a fold, where a step at the same frequency leads anywhere
+        error, how = None, f"one step with more harmonics moves it by more than {UNKNOWN:.0%}"
     yield Entry("harmonics", "response at the peak", error, how)
     yield Entry("points", "peak amplitude", _missed(frf.omega, height, best), "estimate: parabola")
     if result.bounds is not None and good.any():
@@ -139,8 +145,8 @@ def _of_wear(file: SceneFile, result: Result) -> Iterator[Entry]:
     yield Entry("wear steps", "depth", found.depth, by)
 
 
-def _of_trade(file: SceneFile) -> Iterator[Entry]:
-    """What the trade has measured of the knobs that no estimator covers."""
+def _of_trade(file: SceneFile, estimated: Sequence[str]) -> Iterator[Entry]:
+    """What the trade has measured of the knobs that no estimator covers here."""
     try:
         trade = accuracy.table_of(file)
     except ValueError as missing:
@@ -148,7 +154,7 @@ def _of_trade(file: SceneFile) -> Iterator[Entry]:
         return
     for knob in trade.knobs:
         rows = trade.of(knob)
-        if knob in ESTIMATED or not rows[-1].tunable:
+        if knob in estimated or not rows[-1].tunable:
             continue
         known = [(r, how) for r in rows if (how := _compared(file, r.overrides)) is not None]
         name = knob.replace("_", " ")

@@ -5,22 +5,18 @@ from __future__ import annotations
 import json
 import math
 import shlex
-import signal
-import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import cyclopts
 from cyclopts import Parameter
 
-from workflows import cli_studies, scene_file
-from workflows.cli_studies import Overrides, aside
+from workflows import cli_cases, cli_studies, exits, scene_file
+from workflows.cli_words import Flag, Json, Overrides, print_lines, quantity
 
 if TYPE_CHECKING:
     from workflows.result import Result
-
-BAD_INPUT, FAILED_SOLVE, INTERRUPTED = 2, 3, 130
 
 app = cyclopts.App(
     name="tribodyn",
@@ -28,30 +24,14 @@ app = cyclopts.App(
     version_flags=["--version"],
     suppress_keyboard_interrupt=False,
 )
-for command in cli_studies.COMMANDS:
-    app.command(command)
+for module in (cli_studies, cli_cases):
+    for command in module.COMMANDS:
+        app.command(command)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command and leave with its exit code: 2 after bad input, 3 after a failed solve, 130 after Ctrl-C."""
-    # a shell without job control starts background jobs with Ctrl-C ignored
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        app(arguments, exit_on_error=False, print_error=False)
-    except KeyboardInterrupt as stop:
-        _leave(INTERRUPTED, str(stop) or "stopped")
-    except cyclopts.CycloptsError as error:
-        _leave(BAD_INPUT, " ".join(str(error).split()))
-    except (ValueError, OSError) as error:
-        _leave(BAD_INPUT, str(error))
-    except (RuntimeError, MemoryError) as error:
-        _leave(FAILED_SOLVE, str(error) or "the memory of this machine is not enough for this scene")
-
-
-def _leave(code: int, sentence: str) -> None:
-    one_line = " ".join(sentence.split()).rstrip(".")
-    print(f"tribodyn: {one_line}{'' if one_line.endswith('?') else '.'}", file=sys.stderr)
-    sys.exit(code)
+    """Run the command and leave with its exit code, see workflows.exits."""
+    exits.guard(lambda: app(arguments, exit_on_error=False, print_error=False))
 
 
 @app.command
@@ -62,7 +42,7 @@ def run(
     accuracy: str | None = None,
     table: Path | None = None,
     out: Path | None = None,
-    resume: Annotated[bool, Parameter(negative=())] = False,
+    resume: Flag = False,
     pictures: Annotated[bool, Parameter(negative="--no-pictures")] = True,
 ) -> None:
     """Run a scene and leave its result and pictures in a folder.
@@ -144,51 +124,7 @@ def list_() -> None:
 
 
 @app.command
-def bench(
-    *,
-    quick: Annotated[bool, Parameter(negative=())] = False,
-    scaling: Annotated[bool, Parameter(negative=())] = False,
-    out: Path = Path("scaling.png"),
-    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
-) -> None:
-    """Measure the solver beside the dense algorithm of the thesis on the beam scene (tables 7.1 to 7.3).
-
-    Parameters
-    ----------
-    quick
-        Harmonics 0+1 and 0+3 on one thread, in under a minute; with --scaling up to 13 x 13 contact nodes.
-    scaling
-        Time and memory of one response at 0+3 from 5 x 5 to 31 x 31 contact nodes instead, with a plot.
-    out
-        File of that plot.
-    as_json
-        Print JSON for machines.
-    """
-    from workflows import bench as benchmark
-
-    if scaling:
-        _scaling(quick, out, as_json)
-        return
-    rows = benchmark.run(quick, aside)
-    print(json.dumps(benchmark.as_records(rows), indent=2) if as_json else benchmark.as_text(rows))
-
-
-def _scaling(quick: bool, out: Path, as_json: bool) -> None:
-    from workflows import scaling as measured
-    from workflows.progress import Progress, console_progress
-
-    progress = Progress() if as_json else console_progress()
-    rows = measured.run(measured.QUICK if quick else measured.FULL, progress.say)
-    measured.picture(rows).savefig(out)
-    if as_json:
-        print(json.dumps({**measured.as_records(rows), "picture": str(out)}, indent=2))
-    else:
-        print(measured.as_text(rows))
-        print(out)
-
-
-@app.command
-def show(result: Path, *, as_json: Annotated[bool, Parameter(name="--json", negative=())] = False) -> None:
+def show(result: Path, *, as_json: Json = False) -> None:
     """Say what a result holds.
 
     Parameters
@@ -233,7 +169,7 @@ def verify(
     steps: int | None = None,
     overrides: Overrides = (),
     out: Path | None = None,
-    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
+    as_json: Json = False,
 ) -> None:
     """Check a result against direct time integration of the same model with the same contact law.
 
@@ -256,7 +192,7 @@ def verify(
     from workflows.progress import Progress, console_progress
 
     path = _result_file(result)
-    omega = None if at is None else 2 * math.pi * _option("--at", at, "Hz")
+    omega = None if at is None else 2 * math.pi * quantity("--at", at, "Hz")
     progress = Progress() if as_json else console_progress()
     found = verification.compare(store.load(path), omega, row, overrides, steps, progress)
     folder = out or path.parent / "pictures"
@@ -266,66 +202,10 @@ def verify(
     if as_json:
         print(json.dumps({**found.record(), "picture": str(picture)}, indent=2))
     else:
-        _print_lines(found.lines())
+        print_lines(found.lines())
         print(picture)
     if found.found.outcome != "converged":
         raise pipeline.SolveFailed(f"the time integration found no periodic motion: {found.found.outcome}")
-
-
-@app.command
-def backbone(
-    scene: str,
-    *,
-    start: Annotated[str, Parameter(name="--from")],
-    stop: Annotated[str, Parameter(name="--to")],
-    mode: int = 0,
-    points: int = 40,
-    overrides: Overrides = (),
-    out: Path | None = None,
-    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
-) -> None:
-    """Follow a nonlinear mode: frequency and damping against amplitude, as a table and a plot.
-
-    Parameters
-    ----------
-    scene
-        Name of a scene (see `tribodyn list`) or a .toml file; its harmonic loads play no part.
-    start
-        Amplitude of the response to begin at, such as 1um.
-    stop
-        Amplitude to end at, such as 1mm.
-    mode
-        Number of the mode about the static equilibrium, from 0.
-    points
-        Points on an easy way; there are more where the backbone bends.
-    out
-        Folder of backbone.csv and backbone.png; results/NAME unless told.
-    as_json
-        Print JSON for machines.
-    """
-    from workflows import modes
-    from workflows.progress import Progress, console_progress
-
-    file = scene_file.read(scene, overrides)
-    ends = _option("--from", start, "m"), _option("--to", stop, "m")
-    found = modes.follow(file, *ends, mode, points, Progress() if as_json else console_progress())
-    folder = out or Path("results") / file.name
-    folder.mkdir(parents=True, exist_ok=True)
-    modes.write(found, folder / "backbone.csv")
-    modes.picture(found).savefig(folder / "backbone.png")
-    if as_json:
-        print(json.dumps(modes.record(found), indent=2))
-    else:
-        hertz, damping = found.omega / (2 * math.pi), 100 * found.damping
-        _print_lines(
-            [
-                ("at rest", f"{found.reference_omega / (2 * math.pi):.6g} Hz"),
-                ("frequency", f"{hertz[0]:.6g} -> {hertz[-1]:.6g} Hz"),
-                ("damping", f"{damping[0]:.4g} -> {damping[-1]:.4g} %, largest {damping.max():.4g} %"),
-                ("end", found.end),
-            ]
-        )
-        print(folder / "backbone.csv", folder / "backbone.png", sep="\n")
 
 
 @app.command
@@ -339,86 +219,7 @@ def plan(scene: str, *, overrides: Overrides = ()) -> None:
     """
     from workflows import planning
 
-    _print_lines(planning.plan(scene_file.read(scene, overrides)).lines())
-
-
-@app.command
-def leaf(
-    work: Literal["fit", "check", "study", "accuracy"],
-    *,
-    out: Path | None = None,
-    resume: Annotated[bool, Parameter(negative=())] = False,
-    as_json: Annotated[bool, Parameter(name="--json", negative=())] = False,
-) -> None:
-    """What only the leaf seal has: the fit of its dimensions, its parameter study, its accuracy.
-
-    Parameters
-    ----------
-    work
-        fit looks for the dimensions that give the published frequency ratios, check shows those of the scene; study
-        runs some thirty configurations; accuracy holds 1 to 9 harmonics against time integration.
-    out
-        Folder of tables and pictures; results/leaf_study or results/leaf_accuracy unless told.
-    resume
-        Let a study go on with what is complete in its folder.
-    as_json
-        Print JSON for machines.
-    """
-    from workflows import leaf_accuracy, leaf_fit, leaf_study
-
-    folder = out or Path("results") / f"leaf_{work}"
-    if resume and work != "study":
-        raise ValueError(f"--resume is for leaf study, leaf {work} has nothing to go on with: run it without")
-    if work == "study":
-        leaf_study.run(folder, resume, as_json)
-    elif work == "accuracy":
-        leaf_accuracy.run(folder, as_json)
-    else:
-        leaf_fit.run(work == "check", as_json)
-
-
-@app.command
-def blade(
-    work: Literal["study", "mistuned"],
-    scene: str = "blade",
-    *,
-    overrides: Overrides = (),
-    speed: str | None = None,
-    out: Path | None = None,
-) -> None:
-    """What only a bladed disk has: figures 4.11 to 4.17 and table 4.4 of the thesis beside ours.
-
-    Parameters
-    ----------
-    work
-        study draws nodal diameters, responses to engine orders and to rising forces, and wear for several wear steps;
-        mistuned solves all blades of a small wheel at once, their stiffnesses a few per cent apart.
-    scene
-        Name of a scene with a [wheel] or a .toml file.
-    speed
-        Highest speed of a Campbell diagram, such as 6000rpm; no diagram unless told.
-    out
-        Folder of tables and pictures; results/blade_study unless told.
-    """
-    from workflows import blade_mistuning, blade_study
-
-    highest = None if speed is None else _option("--speed", speed, "Hz")
-    folder = out or Path("results") / f"blade_{work}"
-    if work == "mistuned":
-        written = blade_mistuning.run(scene, overrides, folder)
-    else:
-        written = blade_study.run(scene, overrides, folder, highest, aside, blade_study.Extent())
-    for path in written:
-        print(path)
-
-
-def _option(name: str, text: str, unit: str) -> float:
-    from workflows.units import to_si
-
-    try:
-        return to_si(text, unit)
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None
+    print_lines(planning.plan(scene_file.read(scene, overrides)).lines())
 
 
 def _result_file(path: Path) -> Path:
@@ -428,12 +229,7 @@ def _result_file(path: Path) -> Path:
 def _print_summary(result: Result) -> None:
     from workflows import summary
 
-    _print_lines(summary.lines(result))
-
-
-def _print_lines(lines: list[tuple[str, str]]) -> None:
-    for name, value in lines:
-        print(f"{name:14} {value}")
+    print_lines(summary.lines(result))
 
 
 def _draw(result: Result, folder: Path) -> None:

@@ -1,25 +1,61 @@
-"""Words of the command `tribodyn` that measure, follow or fit: trade, converge, extremes, track, rig, identify."""
+"""Words of the command `tribodyn` that measure cost and accuracy, follow a number while another changes, or fit it."""
 
 from __future__ import annotations
 
 import json
+import math
 import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-Overrides = Annotated[
-    tuple[str, ...],
-    Parameter(name="--set", negative=(), consume_multiple=False, help="Change a key of the scene: section.key=value."),
-]
+from workflows.cli_words import Flag, Json, Overrides, aside, print_lines, quantity
+
 Knobs = Annotated[tuple[str, ...], Parameter(name="--knob", negative=(), consume_multiple=False)]
-Json = Annotated[bool, Parameter(name="--json", negative=())]
 
 
-def aside(sentence: str) -> None:
-    """Progress of a study, beside what it prints."""
-    print(sentence, file=sys.stderr, flush=True)
+def bench(
+    *,
+    quick: Flag = False,
+    scaling: Flag = False,
+    out: Path = Path("scaling.png"),
+    as_json: Json = False,
+) -> None:
+    """Measure the solver beside the dense algorithm of the thesis on the beam scene (tables 7.1 to 7.3).
+
+    Parameters
+    ----------
+    quick
+        Harmonics 0+1 and 0+3 on one thread, in under a minute; with --scaling up to 13 x 13 contact nodes.
+    scaling
+        Time and memory of one response at 0+3 from 5 x 5 to 31 x 31 contact nodes instead, with a plot.
+    out
+        File of that plot.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import bench as benchmark
+
+    if scaling:
+        _scaling(quick, out, as_json)
+        return
+    rows = benchmark.run(quick, aside)
+    print(json.dumps(benchmark.as_records(rows), indent=2) if as_json else benchmark.as_text(rows))
+
+
+def _scaling(quick: bool, out: Path, as_json: bool) -> None:
+    from workflows import scaling as measured
+    from workflows.progress import Progress, console_progress
+
+    progress = Progress() if as_json else console_progress()
+    rows = measured.run(measured.QUICK if quick else measured.FULL, progress.say)
+    measured.picture(rows).savefig(out)
+    if as_json:
+        print(json.dumps({**measured.as_records(rows), "picture": str(out)}, indent=2))
+    else:
+        print(measured.as_text(rows))
+        print(out)
 
 
 def trade(
@@ -52,6 +88,8 @@ def trade(
     as_json
         Print JSON for machines.
     """
+    if most < 1:
+        raise ValueError(f"--most {most}: a knob needs one setting at least")
     from workflows import accuracy, knob_trade, promise, trade_picture, trade_table
     from workflows import trade as wear_step
 
@@ -109,7 +147,7 @@ def converge(
 
 
 def extremes(
-    *, quick: Annotated[bool, Parameter(negative=())] = False, out: Path = Path("extremes.png"), as_json: Json = False
+    *, quick: Flag = False, out: Path = Path("extremes.png"), as_json: Json = False
 ) -> None:
     """Try the solver at its numerical extremes: each cell converged and checked, or refused with a sentence.
 
@@ -172,18 +210,13 @@ def track(
     """
     from workflows import scene_file, tracking
     from workflows.progress import Progress, console_progress
-    from workflows.units import to_si
 
-    ends = {}
-    for name, text in (("--from", start), ("--to", stop)):
-        try:
-            ends[name] = to_si(text, tracking.UNITS[against])
-        except ValueError as error:
-            raise ValueError(f"{name}: {error}") from None
+    unit = tracking.UNITS[against]
+    ends = quantity("--from", start, unit), quantity("--to", stop, unit)
     file = scene_file.read(scene, overrides)
     most = points if points is not None else (21 if fold is None else 500)
     progress = Progress() if as_json else console_progress()
-    found = tracking.follow(file, against, ends["--from"], ends["--to"], fold, most, worn, progress)
+    found = tracking.follow(file, against, *ends, fold, most, worn, progress)
     folder = out or Path("results") / file.name
     folder.mkdir(parents=True, exist_ok=True)
     tracking.write(found, folder / "track.csv")
@@ -196,47 +229,59 @@ def track(
         print(f"{found.what}: {found.end}", folder / "track.csv", folder / "track.png", sep="\n")
 
 
-def rig(
-    work: Literal["fit", "study"],
-    scene: str = "rig",
+def backbone(
+    scene: str,
     *,
-    column: Annotated[bool, Parameter(negative=())] = False,
-    wear: Annotated[bool, Parameter(negative=())] = False,
+    start: Annotated[str, Parameter(name="--from")],
+    stop: Annotated[str, Parameter(name="--to")],
+    mode: int = 0,
+    points: int = 40,
     overrides: Overrides = (),
     out: Path | None = None,
     as_json: Json = False,
 ) -> None:
-    """What only the fretting rig has: fits of what is not published, and its comparison with the published experiment.
+    """Follow a nonlinear mode: frequency and damping against amplitude, as a table and a plot.
 
     Parameters
     ----------
-    work
-        fit looks for joint springs, platform height and damping that give published numbers, and says how well these
-        determine them; study holds every published number and trend against ours, wear to the loss of the preload for
-        three mating heights included.
     scene
-        Name of a scene of this rig or a .toml file.
-    column
-        fit: the section of the column too, minutes.
-    wear
-        fit: the wear coefficient too, from a whole wear run, minutes.
+        Name of a scene (see `tribodyn list`) or a .toml file; its harmonic loads play no part.
+    start
+        Amplitude of the response to begin at, such as 1um.
+    stop
+        Amplitude to end at, such as 1mm.
+    mode
+        Number of the mode about the static equilibrium, from 0.
+    points
+        Points on an easy way; there are more where the backbone bends.
     out
-        study: folder of table and pictures; results/rig_study unless told.
+        Folder of backbone.csv and backbone.png; results/NAME unless told.
     as_json
         Print JSON for machines.
     """
-    from workflows import rig_fit, rig_study, rig_table
+    from workflows import modes, scene_file
+    from workflows.progress import Progress, console_progress
 
-    if work == "fit":
-        fits = rig_fit.run(scene, overrides, column, wear, aside)
-        print(json.dumps(rig_fit.as_records(fits), indent=2) if as_json else rig_fit.as_text(fits))
-        return
-    table, paths = rig_study.run(scene, overrides, out or Path("results") / "rig_study", aside)
+    file = scene_file.read(scene, overrides)
+    ends = quantity("--from", start, "m"), quantity("--to", stop, "m")
+    found = modes.follow(file, *ends, mode, points, Progress() if as_json else console_progress())
+    folder = out or Path("results") / file.name
+    folder.mkdir(parents=True, exist_ok=True)
+    modes.write(found, folder / "backbone.csv")
+    modes.picture(found).savefig(folder / "backbone.png")
     if as_json:
-        print(json.dumps({**rig_table.as_records(table), "files": [str(path) for path in paths]}, indent=2))
+        print(json.dumps(modes.record(found), indent=2))
     else:
-        print(rig_table.as_text(table))
-        print(*paths, sep="\n")
+        hertz, damping = found.omega / (2 * math.pi), 100 * found.damping
+        print_lines(
+            [
+                ("at rest", f"{found.reference_omega / (2 * math.pi):.6g} Hz"),
+                ("frequency", f"{hertz[0]:.6g} -> {hertz[-1]:.6g} Hz"),
+                ("damping", f"{damping[0]:.4g} -> {damping[-1]:.4g} %, largest {damping.max():.4g} %"),
+                ("end", found.end),
+            ]
+        )
+        print(folder / "backbone.csv", folder / "backbone.png", sep="\n")
 
 
 def identify(scene: str, task: Path, *, overrides: Overrides = (), as_json: Json = False) -> None:
@@ -260,4 +305,4 @@ def identify(scene: str, task: Path, *, overrides: Overrides = (), as_json: Json
         print(found.report(), "", "to go on with what was found:", *(f'  --set "{c}"' for c in changes), sep="\n")
 
 
-COMMANDS = (trade, converge, extremes, track, rig, identify)
+COMMANDS = (bench, trade, converge, extremes, track, backbone, identify)

@@ -15,11 +15,12 @@ from hbm.law import SEPARATES, STICKS
 from workflows.leaf_record import Record
 from workflows.leaf_response import LeafResponse
 from workflows.maps import draw_field, draw_status
+from workflows.pipeline import OUTPUT
 from workflows.references import linear_references
 from workflows.result import Patch
 from workflows.style import BLUE, GREEN, INK, ORANGE, PRESSURE_MAP, RED, STATUS, STYLE
 
-TITLES = {"response": "upper patch, centre", "middle": "centre of the leaf", "lower_corner": "lower corner"}
+TITLES = {"upper_centre": "upper patch, centre", "middle": "centre of the leaf", OUTPUT: "lower corner"}
 MICRO = 1e6
 
 

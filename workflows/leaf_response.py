@@ -23,7 +23,7 @@ from workflows import pipeline
 from workflows.scene_file import SceneFile
 
 LINEAR, APART = 0.85, 1.12  # frequencies of the linear points, over those where separation begins and ends
-LINER_NODE = "lower_corner"  # the output that moves most where the leaf chatters
+LINER_NODE = pipeline.OUTPUT  # the lower corner, which moves most where the leaf chatters
 WEAR_COEFFICIENT = 2e-15  # [m3/J], that of the thesis's friction contacts put to impacts (ours)
 
 

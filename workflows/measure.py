@@ -108,7 +108,7 @@ def _peak(file: SceneFile, model: pipeline.Model, refined: bool) -> OperatingPoi
     balance, site = model.balance, pipeline.peak_of(file.scene)
     branch = pipeline.follow_response(file.scene, balance, lambda share, note: None)
     pipeline.check_branch(branch)
-    height = branch.amplitude(pipeline.OUTPUT, balance.basis.has_static)
+    height = branch.amplitude(pipeline.OUTPUT)
     best = int(np.argmax(np.where([outcome == CONVERGED for outcome in branch.outcome], height, -1.0)))
     x = branch.contact[best].reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
     omega = float(branch.omega[best])

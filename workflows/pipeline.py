@@ -31,7 +31,7 @@ from hbm.harmonic_choice import HarmonicChoice
 from hbm.harmonics import HarmonicBasis
 from hbm.newton import NewtonOptions
 from hbm.operating_point import AtFrequency, AtPeak, BesidePeak
-from hbm.wear_history import WearRow, history
+from hbm.wear_history import WearRow, history, rows_to_go_on
 from reduction.damping import modal_damping, rayleigh
 from reduction.held import hold
 from reduction.linear import stuck_stiffness
@@ -79,7 +79,7 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
     check_names(scene, file.folder)
     keep = Keeper(folder / "result.h5", clock)
     with threadpool_limits(scene.solver.threads):
-        model = build(file, folder, progress, harmonics_of(earlier))
+        model = build(file, folder, progress, () if earlier is None else earlier.harmonics)
         result = earlier or described(file, model.part, model.balance, model.choice)
         if wears(scene) and result.patch is not None:
             step_limit(scene, result.patch)  # raises before anything long is begun
@@ -126,11 +126,6 @@ def judged(scene: Scene, balance: HarmonicBalance, result: Result, progress: Pro
             bounds = curve.shear_bounds(balance, frf, OUTPUT, newton_options(scene), advance)
             result = replace(result, bounds=bounds)
     return result
-
-
-def harmonics_of(result: Result | None) -> tuple[int, ...]:
-    """Harmonics that a result was computed with, none where there is no result."""
-    return () if result is None else tuple(int(h) for h in np.atleast_1d(result.facts["harmonics"]))
 
 
 def build(file: SceneFile, folder: Path, progress: Progress, chosen: tuple[int, ...] = ()) -> Model:
@@ -385,7 +380,7 @@ def wear_down(
     assert scene.wear is not None
     assert result.patch is not None
     patch, wear = result.patch, scene.wear
-    rows = [] if result.wear is None else result.wear.rows()
+    rows = rows_to_go_on(result.wear)
     to_wear = float(patch.area @ patch.free_deflection)
 
     def on_row(row: WearRow) -> None:

@@ -67,7 +67,7 @@ def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: st
         for i, s in enumerate(1j * h * omega):
             dynamic = np.diag(lam + s**2) + s * damping
             amplitudes[i, position] = remainder + (row @ phi) @ np.linalg.solve(dynamic, modal)
-    return amplitude(basis.to_real(amplitudes), basis.has_static)
+    return amplitude(basis.to_real(amplitudes))
 
 
 def free_deflection(balance: HarmonicBalance) -> np.ndarray:

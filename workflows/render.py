@@ -121,7 +121,7 @@ def worn_part(result: Result, path: Path, deformation: float | None = None, wear
     assert part is not None
     assert fields is not None
     size = float(np.ptp(part.points, axis=0).max())
-    static = fields.displacement[..., 0]
+    static = drawing.at_rest(fields.displacement, result.harmonics)
     rest_scale = deformation or drawing.deformation_scale(static, size)
     depth = np.stack([result.depth_after(row) for row in fields.row])
     wear = wear or drawing.wear_scale(patch, depth)
@@ -132,7 +132,7 @@ def worn_part(result: Result, path: Path, deformation: float | None = None, wear
     view = drawing.plotter((1, len(static)))
     for column, row in enumerate(fields.row):
         view.subplot(0, column)
-        vibration = drawing.swing(fields.displacement[column])
+        vibration = drawing.swing(fields.displacement[column], result.harmonics)
         scale = deformation or drawing.deformation_scale(vibration, size)
         points = part.points + rest_scale * static[column] + scale * vibration
         points -= wear * 0.5 * drawing.sunk(part.points, patch, depth[column])  # half of the depth for each surface

@@ -86,7 +86,7 @@ def worn_sector(
     assert fields is not None
     assert result.wear is not None
     size = float(np.ptp(part.points, axis=0).max())
-    static = fields.displacement[..., 0]
+    static = drawing.at_rest(fields.displacement, result.harmonics)
     rest_scale = deformation or drawing.deformation_scale(static, size)
     depth = np.stack([result.depth_after(row) for row in fields.row])
     wear = wear or 1.0
@@ -95,7 +95,7 @@ def worn_sector(
     resting = drawing.surface(part.points, part.cells, cell_type, 0).extract_feature_edges(40)
     view = drawing.plotter((2, len(static)), 640)
     for column, row in enumerate(fields.row):
-        vibration = drawing.swing(fields.displacement[column])
+        vibration = drawing.swing(fields.displacement[column], result.harmonics)
         scale = deformation or drawing.deformation_scale(vibration, size)
         points = part.points + rest_scale * static[column] + scale * vibration
         for face in (patch, left):
@@ -135,13 +135,13 @@ def worn_wheel(result: Result, wheel: Wheel, path: Path, deformation: float | No
     shrouds = (height[part.cells] > (1 - 1e-6) * height[patch.nodes].min()).all(axis=1)
     whole, ring = (_Shell.of(part, cells, cell_type) for cells in (part.cells, part.cells[shrouds]))
     view = drawing.plotter((3, len(fields.row)))
-    harmonics = tuple(int(h) for h in np.atleast_1d(result.facts["harmonics"]))
     for column, row in enumerate(fields.row):
-        static, wave = fields.displacement[column, ..., :1], fields.displacement[column]
-        largest = float(np.linalg.norm(drawing.swing(wave), axis=-1).max())
-        scale = deformation or drawing.deformation_scale(drawing.swing(wave), 2 * radius)
-        moved = list(instants(wheel, harmonics, wave))
-        rest = part.points + static[..., 0]
+        wave = fields.displacement[column]
+        swing = drawing.swing(wave, result.harmonics)
+        largest = float(np.linalg.norm(swing, axis=-1).max())
+        scale = deformation or drawing.deformation_scale(swing, 2 * radius)
+        moved = list(instants(wheel, result.harmonics, wave))
+        rest = part.points + drawing.at_rest(wave, result.harmonics)
         view.subplot(0, column)
         for n, vibration in enumerate(moved):
             blade = whole.at(wheel.blade(rest + scale * vibration, n))

@@ -187,6 +187,11 @@ class Result:
     loops: Loops | None = None
 
     @property
+    def harmonics(self) -> tuple[int, ...]:
+        """Harmonics that it was computed with."""
+        return tuple(int(h) for h in np.atleast_1d(self.facts["harmonics"]))
+
+    @property
     def wear_steps(self) -> int:
         """Number of wear steps taken."""
         return 0 if self.wear is None else int(np.count_nonzero(self.wear.cycles_in_step))

@@ -12,6 +12,7 @@ from hbm.wear_events import events
 from hbm.wear_history import LIFE_SHARE, cycles_to_preload
 from workflows import budget
 from workflows.result import Result
+from workflows.trade_table import plain
 
 EVENT_SAMPLES = 256  # of a cycle, to see whether a pair opens
 
@@ -27,19 +28,22 @@ def summary(result: Result) -> dict[str, Any]:
     energy_J, volume_m3 : friction work and worn volume, accumulated
     wear_steps, hbm_solves : steps taken and balance solves spent on wear
     peak_hz, peak_m, preload_N : [first, last] of the wear run, or the peak of the response curve without one
+    peak_at_end : whether that peak is no peak, but an end of the response curve
+    peak_is_stable : whether that peak of the curve is a motion that stays, None where this was not asked for
+    stable_peak_hz, stable_peak_m : the highest point of the curve that is
     seconds : of computing, interrupted runs included
     error_budget : what each discretisation contributes, see workflows.budget.Entry
     """
     numbers: dict[str, Any] = {"state": result.state, "finished": result.state.startswith("complete")}
     numbers |= {"seconds": result.facts.get("seconds"), "wear_steps": result.wear_steps}
-    numbers |= _wear(result) | _peak(result)
+    numbers |= _wear(result) | _peak(result) | _stable_peak(result)
     for name in ("full_dofs", "model_dofs", "contact_pairs", "unknowns", "delta_max_m"):
         numbers[name] = result.facts.get(name)
     numbers |= _curve(result)
     free = result.facts.get("free_hz")
     numbers["free_hz"] = None if free is None else [float(hertz) for hertz in np.atleast_1d(free)]
     numbers["error_budget"] = budget.of_result(result)
-    return {name: _finite(value) for name, value in numbers.items()}
+    return {name: plain(value) for name, value in numbers.items()}
 
 
 def _wear(result: Result) -> dict[str, Any]:
@@ -50,7 +54,7 @@ def _wear(result: Result) -> dict[str, Any]:
         return dict.fromkeys(names)
     depth, cycles = result.depth_after(-1), result.cycles_after(-1)
     volume, split = float(depth @ patch.area), float(np.squeeze(result.facts.get("wear_split", 0.5)))
-    basis = HarmonicBasis(tuple(int(h) for h in np.atleast_1d(result.facts["harmonics"])), EVENT_SAMPLES)
+    basis = HarmonicBasis(result.harmonics, max(EVENT_SAMPLES, 2 * result.harmonics[-1] + 1))
     when = events(wear, patch.components, patch.gap, basis)
     return {
         "first_lift_cycles": None if when is None else when.first_lift,
@@ -76,13 +80,30 @@ def _peak(result: Result) -> dict[str, Any]:
             "peak_hz": [float(w) for w in wear.omega[ends] / (2 * np.pi)],
             "peak_m": [float(a) for a in wear.amplitude[ends]],
             "preload_N": [float(n) for n in wear.preload[ends]],
+            "peak_at_end": None,
         }
     if frf is not None:
         amplitude = frf.amplitude(frf.output_names[0])
         best = int(np.argmax(np.where([outcome == CONVERGED for outcome in frf.outcome], amplitude, -1.0)))
         hertz, height = float(frf.frequency[best]), float(amplitude[best])
-        return {"peak_hz": [hertz, hertz], "peak_m": [height, height], "preload_N": None}
-    return {"peak_hz": None, "peak_m": None, "preload_N": None}
+        at_end = best in (0, len(amplitude) - 1)
+        return {"peak_hz": [hertz, hertz], "peak_m": [height, height], "preload_N": None, "peak_at_end": at_end}
+    return dict.fromkeys(("peak_hz", "peak_m", "preload_N", "peak_at_end"))
+
+
+def _stable_peak(result: Result) -> dict[str, Any]:
+    """An unstable motion is a solution of the balance that no vibration stays at, however high it is."""
+    frf, marks = result.frf, result.stability
+    if frf is None or marks is None:
+        return dict.fromkeys(("peak_is_stable", "stable_peak_hz", "stable_peak_m"))
+    height = np.where([outcome == CONVERGED for outcome in frf.outcome], frf.amplitude(frf.output_names[0]), -1.0)
+    stable = np.where(marks.stable, height, -1.0)
+    best, found = int(np.argmax(stable)), bool(stable.max() >= 0)
+    return {
+        "peak_is_stable": bool(marks.stable[np.argmax(height)]),
+        "stable_peak_hz": float(frf.frequency[best]) if found else None,
+        "stable_peak_m": float(height[best]) if found else None,
+    }
 
 
 def _curve(result: Result) -> dict[str, Any]:
@@ -111,18 +132,13 @@ def _curve(result: Result) -> dict[str, Any]:
     return numbers
 
 
-def _finite(value: Any) -> Any:
-    """JSON has no nan."""
-    return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
 def lines(result: Result) -> list[tuple[str, str]]:
     """The summary as pairs of a name and a readable value."""
     numbers = summary(result)
 
     def pair(name: str, scale: float, unit: str) -> str:
-        first, last = (scale * value for value in numbers[name])
-        return f"{first:.5g} -> {last:.5g} {unit}"
+        first, last = (float("nan") if value is None else scale * value for value in numbers[name])
+        return f"{first:.5g} {unit}" if numbers["wear_steps"] == 0 else f"{first:.5g} -> {last:.5g} {unit}"
 
     shown = [
         ("scene", result.provenance["scene_name"]),
@@ -139,6 +155,12 @@ def lines(result: Result) -> list[tuple[str, str]]:
     if numbers["peak_hz"] is not None:
         shown.append(("frequency", pair("peak_hz", 1, "Hz")))
         shown.append(("amplitude", pair("peak_m", 1e3, "mm")))
+    if numbers["peak_at_end"]:
+        shown.append(("", "no peak: the response is highest at an end of response.frequency, widen it"))
+    if numbers["peak_is_stable"] is False and not numbers["wear_steps"]:
+        hertz, height = numbers["stable_peak_hz"], numbers["stable_peak_m"]
+        below = "no point is stable" if hertz is None else f"the highest that is: {hertz:.5g} Hz, {1e3 * height:.5g} mm"
+        shown.append(("", f"this peak is unstable, no vibration stays at it; {below}"))
     if numbers["harmonics"] is not None:
         error = numbers["harmonics_error"]
         chosen = "" if error is None else f", chosen: estimated truncation error {error:.1e}"

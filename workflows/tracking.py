@@ -157,7 +157,7 @@ def _fold(file: SceneFile, path: Parameter, start: float, stop: float, number: i
     balance = path.make(start)
     x = branch.contact[at].reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
     line = track_fold(path, start, stop, branch.omega[at], x, FoldOptions(max_points=points, newton=newton))
-    amplitude = line.amplitude(pipeline.OUTPUT, balance.basis.has_static)
+    amplitude = line.amplitude(pipeline.OUTPUT)
     frequency = line.omega / (2 * np.pi)
     return Track("fold", path.name, path.unit, line.parameter, frequency, amplitude, line.cusps, line.end)
 

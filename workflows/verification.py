@@ -58,7 +58,7 @@ class Comparison:
     def record(self) -> dict[str, Any]:
         """Numbers for machines: balance, time integration and the difference over the latter; nan is None."""
         state, found, motion = self.solution.state, self.found, self.found.motion
-        ours = amplitude(self.balance.outputs(state), self.balance.basis.has_static)
+        ours = amplitude(self.balance.outputs(state))
         swing = motion.outputs - motion.outputs.mean(axis=1, keepdims=True)
         theirs = np.sqrt(2 * np.mean(swing**2, axis=1))
         outputs = {
@@ -139,7 +139,7 @@ def compare(
     start = time.perf_counter()
     file = rebuilt(result, overrides)
     with TemporaryDirectory() as folder, threadpool_limits(file.scene.solver.threads):
-        unworn = pipeline.build(file, Path(folder), progress, pipeline.harmonics_of(result)).balance
+        unworn = pipeline.build(file, Path(folder), progress, result.harmonics).balance
         balance, omega, x = _start(result, file.scene, unworn, at, row)
         target = omega if at is None else at
         if not 0 < target <= balance.omega_max:
@@ -171,7 +171,7 @@ def _start(
     result: Result, scene: Scene, unworn: HarmonicBalance, at: float | None, row: int | None
 ) -> tuple[HarmonicBalance, float, np.ndarray]:
     """The problem, and the known solution to begin at: its frequency and x on the harmonics of the problem."""
-    basis = HarmonicBasis(pipeline.harmonics_of(result), scene.harmonics.samples)
+    basis = HarmonicBasis(result.harmonics, scene.harmonics.samples)
     if row is not None:
         held = 0 if result.wear is None else len(result.wear.cycles)
         if not 0 <= row < held:
@@ -185,7 +185,7 @@ def _start(
     good = [] if frf is None else [i for i, outcome in enumerate(frf.outcome) if outcome == CONVERGED]
     if frf is None or not good:
         raise ValueError("the result has no response curve to start from: run its scene first")
-    height = frf.amplitude(frf.output_names[0], basis.has_static)
+    height = frf.amplitude(frf.output_names[0])
     best = max(good, key=lambda i: height[i]) if at is None else min(good, key=lambda i: abs(frf.omega[i] - at))
     return unworn, frf.omega[best], _carried(frf.contact[best], basis, unworn)
 

@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from hbm.harmonics import HarmonicBasis
 from workflows.result import Patch, Result
 from workflows.style import INK, STATUS
 
 COLUMN, ROW = 640, 460  # pixels of one view
 BODY, PAPER = "#c9ced6", "white"
 SHADE = {"ambient": 0.45, "diffuse": 0.6}
+INSTANTS = 64  # of a cycle, among which that of the largest swing is looked for
 
 
 def sunk(points: np.ndarray, patch: Patch, depth: np.ndarray) -> np.ndarray:
@@ -39,16 +41,19 @@ def sunk(points: np.ndarray, patch: Patch, depth: np.ndarray) -> np.ndarray:
     return moved
 
 
-def swing(displacement: np.ndarray) -> np.ndarray:
+def at_rest(displacement: np.ndarray, harmonics: tuple[int, ...]) -> np.ndarray:
+    """Static part (...) of coefficients (..., n_coeff) on these harmonics, none where harmonic 0 is not kept [m]."""
+    return displacement[..., 0] if harmonics[0] == 0 else np.zeros(displacement.shape[:-1])
+
+
+def swing(displacement: np.ndarray, harmonics: tuple[int, ...]) -> np.ndarray:
     """Vibration at the instant when the part is farthest from its mean position.
 
-    displacement : (n_node, 3, n_coeff), [x_0, a_1, b_1, ...] [m]
+    displacement : (n_node, 3, n_coeff) on these harmonics [m]
     Returns (n_node, 3) [m]
     """
-    n_harmonic = (displacement.shape[-1] - 1) // 2
-    angle = np.linspace(0, 2 * np.pi, 64, endpoint=False)
-    waves = [f(h * angle) for h in range(1, n_harmonic + 1) for f in (np.cos, np.sin)]
-    dynamic = displacement[..., 1:] @ np.stack(waves)
+    basis = HarmonicBasis(harmonics, max(INSTANTS, 2 * harmonics[-1] + 1))
+    dynamic = displacement @ (basis.synthesis * (basis.order > 0)).T
     farthest = int(np.argmax(np.sum(dynamic**2, axis=(0, 1))))
     return np.asarray(dynamic[..., farthest])
 
