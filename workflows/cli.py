@@ -13,7 +13,7 @@ import cyclopts
 from cyclopts import Parameter
 
 from workflows import cli_cases, cli_studies, exits, scene_file
-from workflows.cli_words import Flag, Json, Overrides, print_lines, quantity
+from workflows.cli_words import Flag, Json, Overrides, make_room, print_lines, quantity
 
 if TYPE_CHECKING:
     from workflows.result import Result
@@ -68,6 +68,7 @@ def run(
     from workflows.accuracy import tuned
     from workflows.progress import console_progress
 
+    make_room(out)
     progress = console_progress()
     if accuracy is None:
         file = scene_file.read(scene, overrides)
@@ -156,6 +157,7 @@ def render(result: Path, *, out: Path | None = None) -> None:
     """
     from workflows import store
 
+    make_room(out)
     path = _result_file(result)
     _draw(store.load(path), out or path.parent / "pictures")
 
@@ -192,6 +194,7 @@ def verify(
     from workflows.progress import Progress, console_progress
 
     path = _result_file(result)
+    make_room(out)
     omega = None if at is None else 2 * math.pi * quantity("--at", at, "Hz")
     progress = Progress() if as_json else console_progress()
     found = verification.compare(store.load(path), omega, row, overrides, steps, progress)

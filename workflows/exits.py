@@ -31,7 +31,8 @@ def guard(command: Callable[[], object]) -> None:
         try:
             command()
         finally:
-            sys.stdout.flush()
+            if sys.stdout is not None:  # as it is where the shell has closed it
+                sys.stdout.flush()
     except BrokenPipeError:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         for stream in (sys.stdout, sys.stderr):  # what is left in them is flushed when the interpreter ends
