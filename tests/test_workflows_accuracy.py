@@ -180,6 +180,7 @@ def test_an_accuracy_that_means_nothing_is_refused(asked: str, sentence: str) ->
         (" 5%  of Peak frequency  and  amplitude", (0.05, ("peak_hz", "peak_m"), ())),
         ("1 % of depth, energy, and depth", (0.01, ("depth_m", "energy_J"), ())),
         ("1 % of life given fe mesh and harmonics", (0.01, ("life_cycles",), ("fe_mesh", "harmonics"))),
+        ("2 % of depth, life, given harmonics", (0.02, ("depth_m", "life_cycles"), ("harmonics",))),
         ("3 % given contact_grid", (0.03, (), ("contact_grid",))),
     ],
 )
