@@ -19,16 +19,21 @@ from fem.modes import modes
 from reduction.model import ReducedModel
 from reduction.projection import projected
 
-STALE = ("free_frequency_error", "stuck_frequency", "stuck_frequency_error")  # told of the model before
+DEPENDENT = 1e-6  # size of what is new in a shape, relative, that is rounding
 
 
-def interface_modes(model: ReducedModel, n_modes: int, keep: np.ndarray | None = None) -> ReducedModel:
+def interface_modes(
+    model: ReducedModel, n_modes: int, keep: np.ndarray | None = None, apart: np.ndarray | None = None
+) -> ReducedModel:
     """Reduce the masters of a Craig-Bampton model to n_modes characteristic constraint modes.
 
     model : from reduction.craig_bampton, masters first; n_modes : at most the number of masters that do not stay
     keep : DOFs of the full system, masters all of them, that stay physical (SCCe); none for SCC
-    Returns the model in coordinates: kept masters in ascending order, interface modes, fixed-interface modes. Besides
-        the facts of the model, info has masters (those kept), n_interface_modes and interface_omitted_frequency [Hz]
+    apart : those of `keep` that must not move the contact by themselves, as a displacement that is to be prescribed
+        must not: the static shapes that belong to them are coordinates of their own, as far as the modes lack them
+    Returns the model in coordinates: kept masters in ascending order, interface modes, static shapes, fixed-interface
+        modes. Besides the facts of the model, info has masters (those kept), n_interface_modes and
+        interface_omitted_frequency [Hz]
     Raises  ValueError for a model that differs from harmonic to harmonic, DOFs that are no masters, too many modes, or
         a boundary that can move rigidly with the kept DOFs held
     """
@@ -45,17 +50,24 @@ def interface_modes(model: ReducedModel, n_modes: int, keep: np.ndarray | None =
     K = np.asarray(model.system.stiffness)
     omega, phi = modes(K[np.ix_(b, b)], model.system.mass[np.ix_(b, b)], min(n_modes + 1, len(b)))
 
-    basis = np.zeros((n, len(a) + n_modes + n - n_m))
+    contact = phi[:, :n_modes]
+    following = _static_shapes(K, a, b) if len(a) else np.zeros((len(b), 0))
+    alone = np.isin(masters[a], np.asarray([] if apart is None else apart, dtype=int))
+    if alone.any():
+        contact = np.hstack([contact, _lacking(contact, following[:, alone], model.system.mass[np.ix_(b, b)])])
+        following = np.where(alone, 0.0, following)
+
+    n_contact = contact.shape[1]
+    basis = np.zeros((n, len(a) + n_contact + n - n_m))
     basis[a, np.arange(len(a))] = 1.0
-    if len(a):
-        basis[np.ix_(b, np.arange(len(a)))] = _static_shapes(K, a, b)
-    basis[np.ix_(b, len(a) + np.arange(n_modes))] = phi[:, :n_modes]
-    basis[np.arange(n_m, n), np.arange(len(a) + n_modes, basis.shape[1])] = 1.0
-    facts = {name: fact for name, fact in model.info.items() if name not in STALE}
+    basis[np.ix_(b, np.arange(len(a)))] = following
+    basis[np.ix_(b, len(a) + np.arange(n_contact))] = contact
+    basis[np.arange(n_m, n), np.arange(len(a) + n_contact, basis.shape[1])] = 1.0
     omitted = float(omega[n_modes]) / (2 * np.pi) if n_modes < len(b) else np.inf
-    facts |= {"masters": masters[a], "n_masters": len(a)}
+    facts = {"masters": masters[a], "n_masters": len(a)}
     facts |= {"n_interface_modes": n_modes, "interface_omitted_frequency": omitted}
-    return replace(projected(model, basis), info=facts)
+    fewer = projected(model, basis)
+    return replace(fewer, info={**fewer.info, **facts})
 
 
 def _static_shapes(K: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -66,3 +78,14 @@ def _static_shapes(K: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         raise ValueError(
             "interface modes: the contact can move rigidly with the kept DOFs held; keep more, or none"
         ) from None
+
+
+def _lacking(phi: np.ndarray, shapes: np.ndarray, mass: np.ndarray) -> np.ndarray:
+    """What of some shapes no combination of modes is, as independent columns.
+
+    phi : (n, n_modes) modes, orthonormal in the mass; shapes : (n, k)
+    """
+    rest = shapes - phi @ (phi.T @ mass @ shapes)
+    rest -= phi @ (phi.T @ mass @ rest)
+    left, size, _ = np.linalg.svd(rest, full_matrices=False)
+    return left[:, size > DEPENDENT * np.linalg.norm(shapes, 2)]

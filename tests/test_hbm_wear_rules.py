@@ -168,6 +168,21 @@ def test_a_file_that_is_no_wear_law_is_refused(tmp_path: Path, text: str | None,
         wear_law.load(str(path))
 
 
+@pytest.mark.parametrize(
+    ("body", "says"),
+    [
+        ("return exposure.enrgy", "cannot be run: AttributeError: .* 'enrgy'"),
+        ("return exposure.energy[:1]", r"depths of shape \(1,\) and not"),
+        ("return exposure.energy + float('nan')", "not finite"),
+    ],
+)
+def test_a_wear_law_that_fails_in_the_run_is_told(tmp_path: Path, body: str, says: str) -> None:
+    path = tmp_path / "law.py"
+    path.write_text(f"def depth_rate(exposure):\n    {body}\n")
+    with pytest.raises(ValueError, match=says):
+        thesis_rule.evolve(wear_problem(law=str(path)), 5e-7, max_steps=1)
+
+
 def test_events_are_where_the_penetration_of_a_pair_changes_its_sign(problem: WearProblem, fine: WearHistory) -> None:
     gap, basis = problem.balance.parameters.gap, HarmonicBasis((0, 1), 1024)
     found = events(fine, ("t1", "t2", "n"), gap, basis)

@@ -13,6 +13,7 @@ from reduction.craig_bampton import craig_bampton
 from reduction.interface_modes import interface_modes
 from reduction.linear import linear_modes
 from reduction.model import ReducedModel
+from reduction.prescribed import prescribe
 from tests.test_reduction_craig_bampton import make
 from workflows import pipeline, scene_file
 from workflows.progress import Progress
@@ -62,6 +63,38 @@ def test_kept_dofs_are_displacements(full: ReducedModel) -> None:
     static = np.linalg.solve(reduced.system.stiffness, reduced.system.loads["point"])
     exact = np.linalg.solve(full.system.stiffness, full.system.loads["point"])
     assert reduced.reconstruct(static)[keep] == pytest.approx(full.reconstruct(exact)[keep], rel=2e-2)
+
+
+def test_a_displacement_can_be_prescribed_after_the_interface_is_reduced() -> None:
+    """Harmonic 0 and harmonic 1 of a contact on springs, and the reaction at the height: as without the reduction."""
+    part = make(nx=4)
+    loose = np.flatnonzero(np.asarray(abs(part.interface.B).sum(axis=0)).ravel() == 0)
+    held = loose[[5, 50, 51]]
+    full = craig_bampton(part.system, part.interface, 8, None, held)
+    n_contact = len(np.asarray(full.info["masters"])) - len(held)
+    springs = np.ravel(part.interface.stiffness(470e6, 583e6))
+
+    def answers(model: ReducedModel) -> tuple[np.ndarray, ...]:
+        places = np.searchsorted(np.asarray(model.info["masters"]), held)
+        made, reaction = prescribe(model, places, "height")
+        assert made.per_harmonic is not None
+        moved = []
+        for h, load in ((0, "height"), (1, "point")):
+            system, B = made.per_harmonic(h)
+            K = system.stiffness + B.T @ (springs[:, None] * B) - h * (2 * np.pi * 300) ** 2 * system.mass
+            moved.append(B @ np.linalg.solve(K, system.loads[load]))
+        force = (springs * moved[0]).reshape(part.interface.n_pair, -1)
+        return *moved, reaction.force(1.0, force)
+
+    exact = answers(full)
+    for n, within in ((6, 0.05), (n_contact // 2, 0.02), (n_contact, 1e-6)):
+        reduced = interface_modes(full, n, held, apart=held)
+        assert not np.asarray(reduced.interface.B)[:, : len(held)].any()
+        for ours, theirs in zip(answers(reduced), exact, strict=True):
+            assert np.linalg.norm(ours - theirs) < within * np.linalg.norm(theirs)
+    assert reduced.system.n_dof == full.system.n_dof  # with all modes the static shapes are nothing new
+    with pytest.raises(ValueError, match="acts on contact nodes"):
+        prescribe(interface_modes(full, 6, held), np.arange(3), "height")
 
 
 def test_what_cannot_be_is_refused(full: ReducedModel) -> None:

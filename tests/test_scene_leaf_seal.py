@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -69,7 +70,7 @@ def test_exactly_one_unknown_for_each_pair_and_coefficient(leaf):
 def test_the_plan_counts_what_the_run_builds(leaf):
     plan = planning.plan(scene_file.read("leaf_seal"))
     assert (plan.contact_pairs, plan.unknowns) == (126, 378)
-    assert int(plan.model_dofs) == leaf.balance.model.system.n_dof + 1  # the held turn
+    assert int(plan.model_dofs) == leaf.balance.model.system.n_dof
 
 
 def test_free_leaf_has_two_rigid_modes_and_contact_alone_holds_it(tmp_path):
@@ -111,6 +112,38 @@ def test_the_scene_has_the_stiffnesses_that_suit_its_leaf_best():
     assert contact == pytest.approx(scene.contact.normal_stiffness, rel=0.01)
     assert unit == pytest.approx(160.0, rel=0.01)
     assert np.sqrt(np.mean(errors**2)) == pytest.approx(leaf_fit.of_scene(scene).rms, rel=0.01)
+
+
+def test_the_fit_stays_at_the_leaf_of_the_scene():
+    scene = scene_file.read("leaf_seal").scene
+    shape = leaf_fit.shape_of(leaf_fit.dimensions(scene))
+    found = leaf_fit.fit(scene, 3, shape, max_steps=2)
+    assert found.rms == pytest.approx(leaf_fit.of_scene(scene).rms, rel=0.003)
+    np.testing.assert_allclose(leaf_fit.shape_of(found.parameters), shape, rtol=0.015)
+
+
+def test_a_leaf_gives_way_only_to_one_that_the_numbers_tell_apart():
+    own = leaf_fit.of_scene(scene_file.read("leaf_seal").scene)
+    published = np.array(list(leaf_fit.PUBLISHED.values()))
+
+    def with_errors(errors):
+        return replace(own, columns=own.unit * (published + errors * np.maximum(published, leaf_fit.FLOOR)))
+
+    noise = np.random.default_rng(3).normal(size=published.shape)
+    same, better = with_errors(own.errors + 1e-3 * noise), with_errors(0.5 * own.errors)
+    assert leaf_fit.doubt(own, own) == 0.0
+    assert leaf_fit.chosen(own, [better, same]) is better
+    # one number that happens to fit says nothing: here that of the largest error
+    lucky = own.errors.copy()
+    lucky.flat[np.abs(lucky).argmax()] = 0.0
+    assert with_errors(lucky).rms < 0.9 * own.rms
+    assert leaf_fit.chosen(own, [with_errors(lucky)]) is own
+    # the same by hand
+    errors = (own.errors[leaf_fit.COUNTED], better.errors[leaf_fit.COUNTED])
+    left = [np.sqrt(np.mean(np.delete(one, i) ** 2)) for one in errors for i in range(28)]
+    difference = np.subtract(left[:28], left[28:])
+    by_hand = np.sqrt(27 / 28 * np.sum((difference - difference.mean()) ** 2))
+    assert leaf_fit.doubt(own, better) == pytest.approx(by_hand)
 
 
 def test_away_from_resonance_the_leaf_answers_as_if_stuck(leaf):
@@ -297,6 +330,7 @@ def test_the_study_has_its_thirty_configurations_and_writes_what_it_found(tmp_pa
         ("loads.static.pressure.direction=z", "expected either value and direction"),
         ("geometry.fixed_axes.left_hole=w", "must be some of the letters"),
         ("damping.state=sliding", "damping.state"),
+        ("harmonics.kept=[1]", "gaps, which act in harmonic 0: keep it"),
     ],
 )
 def test_bad_scenes_end_with_one_sentence(override, sentence, tmp_path):

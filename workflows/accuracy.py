@@ -17,7 +17,7 @@ from workflows.units import to_si
 OF_WEAR = ("depth_m", "life_cycles")
 WANTED = tuple(float(10**-power) for power in np.arange(0.5, 5, 0.125))  # errors of the Pareto front
 WORTH = 0.1  # of the time that a coarser setting must save: the clock is no better, and coarse ones are less robust
-ACCURACY = re.compile(r"(.*?)(?: ?\bof\b(.*?))?(?: ?\bgiven\b(.*))?")
+ACCURACY = re.compile(r"(.*?)(?: ?\bof\b(.*?))?(?:,? ?\bgiven\b(.*))?")
 PER_CENT = re.compile(r" ?\bper ?cent\b")
 MARGIN = 0.7  # of the wanted error that the knobs together may use up: they were measured one by one
 

@@ -208,10 +208,12 @@ def _of_harmonics(scene: Scene) -> list[Knob]:
         located = ("harmonics.samples=128", 'harmonics.transitions="located"')
         found.append(Knob("samples", (*sampled, Setting(EXACT, located))))
     if scene.contact.components == ("t1", "t2", "n") and scene.contact.law == "jenkins":
-        common = ("harmonics.samples=256", 'harmonics.transitions="sampled"')
+        common = ["harmonics.samples=256", 'harmonics.transitions="sampled"']
+        if scene.wear is not None:  # the error-controlled rule solves for depth and knows no planar slider
+            common += ['wear.rule="thesis"', f"wear.step={WEAR_STEPS[0]:g}"]
         names = ("jenkins", "coulomb_planar")  # directions that know nothing of each other, or one planar slider
         laws = tuple(Setting(EXACT, (f'contact.law="{name}"', *common)) for name in names)
-        found.append(Knob("friction", laws, tunable=False, worn_up_to=0))
+        found.append(Knob("friction", laws, tunable=False))
     return found
 
 

@@ -62,7 +62,7 @@ def reduce(scene: PartScene, part: Part) -> ReducedModel:
         if wanted.interface_keep is not None:
             named = [part.dofs(group, axis) for group in wanted.interface_keep for axis in "xyz"]
             keep = np.union1d(np.intersect1d(np.concatenate([[], *named]), masters), extra)
-        reduced = interface_modes(reduced, wanted.interface_modes, keep.astype(int))
+        reduced = interface_modes(reduced, wanted.interface_modes, keep.astype(int), apart=extra)
     return reduced if back is None else replace(reduced, basis=back @ reduced.basis)
 
 

@@ -76,7 +76,7 @@ def plan(file: SceneFile) -> Plan:
     """Plan a scene; raises ValueError for what the run would refuse after reading the mesh."""
     scene = file.scene
     check_names(scene, file.folder)
-    elements = nodes = 0
+    elements = nodes = held = 0
     if isinstance(scene, MatrixScene):
         reduced = matrix_model.make(scene, file.folder)
         full, pairs, masters = int(str(reduced.info["n_full"])), reduced.interface.n_pair, reduced.system.n_dof
@@ -88,10 +88,11 @@ def plan(file: SceneFile) -> Plan:
         free = free_dofs(3 * nodes, clamps(file.part_scene), node_sets)
         full = len(free)
         pairs, masters = _contact(file.part_scene, mesh, node_sets, free)
+        held = int(file.part_scene.geometry.no_turning is not None)
         modes, cutoff = file.part_scene.reduction.modes, file.part_scene.reduction.cutoff
     basis = HarmonicBasis(scene.harmonics.kept or LIKELY, scene.harmonics.samples, scene.harmonics.transitions)
     contact = pairs * len(scene.contact.components)
-    model = masters + (modes if modes is not None else 50)
+    model = masters + (modes if modes is not None else 50) - held
     memory = (
         200e6  # the program itself
         + FACTOR_BYTES * full
