@@ -49,6 +49,7 @@ def _scaling(quick: bool, out: Path, as_json: bool) -> None:
     from workflows.progress import Progress, console_progress
 
     progress = Progress() if as_json else console_progress()
+    out.parent.mkdir(parents=True, exist_ok=True)
     rows = measured.run(measured.QUICK if quick else measured.FULL, progress.say)
     measured.picture(rows).savefig(out)
     if as_json:
@@ -163,6 +164,7 @@ def extremes(
     from workflows import extremes as table
     from workflows import extremes_picture
 
+    out.parent.mkdir(parents=True, exist_ok=True)  # what cannot be written is told now, not after minutes
     rows = table.run(quick, aside)
     extremes_picture.picture(rows).savefig(out)
     print(json.dumps(table.as_records(rows), indent=2) if as_json else table.as_text(rows))
