@@ -50,7 +50,6 @@ def _scaling(quick: bool, out: Path, as_json: bool) -> None:
     from workflows.progress import Progress, console_progress
 
     progress = Progress() if as_json else console_progress()
-    out.parent.mkdir(parents=True, exist_ok=True)
     rows = measured.run(measured.QUICK if quick else measured.FULL, progress.say)
     measured.picture(rows).savefig(out)
     if as_json:
