@@ -187,4 +187,3 @@ def projected(system: SecondOrderSystem, T: Any) -> SecondOrderSystem:
         {name: T.conj().T @ load for name, load in system.loads.items()},
         {name: T.T @ row for name, row in system.outputs.items()},
     )
-

@@ -13,6 +13,7 @@ from scipy.sparse.linalg import splu
 # Relative residual of the softest direction that still counts as regular. Measured: a plate 2000 times longer than
 # thick reaches 0.05, a body that can move rigidly 6 to 1000.
 SINGULAR = 0.5
+NO_MEMORY = -2  # error code of PARDISO
 
 
 class Factor(Protocol):
@@ -28,11 +29,13 @@ def factorise(K: Any, definite: bool = True, solver: str | None = None) -> Facto
 
     K : (n, n) scipy.sparse; definite : K is positive definite (False for a shifted, indefinite matrix)
     solver : "pardiso" or "superlu", the best available unless told
-    Raises  ValueError where K is singular, as when a body can still move rigidly
+    Raises  ValueError where K is singular, as when a body can still move rigidly; MemoryError
     """
     K = csr_matrix(K)
     if solver is None:
         solver = "pardiso" if pardiso_available() else "superlu"
+    elif solver not in ("pardiso", "superlu"):
+        raise ValueError(f"no solver '{solver}': there are pardiso, superlu")
     try:
         factor: Factor = Pardiso(K, definite) if solver == "pardiso" else SuperLU(K)
         regular = softest_residual(K, factor) < SINGULAR
@@ -93,6 +96,8 @@ class Pardiso:
         try:
             self._solver.factorize(self._upper)
         except (PyPardisoError, ValueError) as error:
+            if getattr(error, "value", None) == NO_MEMORY:
+                raise MemoryError(f"the memory is not enough for the factors of {K.shape[0]} equations") from error
             raise ArithmeticError(str(error)) from error
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:

@@ -119,8 +119,7 @@ def build(parameters: Parameters, path: str | Path) -> None:
     Groups: volumes "column", "beam", "upper_specimen", "lower_specimen", "separator", "platform"; surfaces
     "column_base", "column_seat" and "beam_root" (matching), "upper_contact", "lower_contact" (larger, with the matching
     grid in its middle); points "shaker", "accelerometer" (free end), "screws" (six below the platform), "pins" (two),
-    and
-    "low", "middle", "high" followed by 1 to 4 at quarters of the length before the slot, for mode shapes
+    and "low", "middle", "high" followed by 1 to 4 at quarters of the length before the slot, for mode shapes
     """
     blocks.write(path, _column(parameters), _beam(parameters), _platform(parameters))
 

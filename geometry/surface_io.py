@@ -30,13 +30,15 @@ def read(
 
     spacing : steps along x and y of a matrix text, in lateral units; None for text with x y z
     lateral_unit, height_unit : metres per unit of a text, 1e-6 for micrometres; other formats know their units
-    Raises  ValueError: no such file, not a regular grid, a reader that is not installed
+    Raises  ValueError: no such file, an empty one, not a regular grid, a reader that is not installed
     """
     path = Path(path)
     if not path.is_file():
         raise ValueError(f"there is no height map {path}: check the name and the folder")
     with path.open("rb") as stream:
         head = stream.read(16)
+    if not head:
+        raise ValueError(f"{path.name} is empty: export the height map again")
     is_text = path.suffix.lower() in TEXT_ENDINGS and not surface_sdf.looks_like(head)
     if not is_text and (spacing is not None or lateral_unit != 1.0 or height_unit != 1.0):
         raise ValueError(f"{path.name} carries its own units: leave out spacing, lateral_unit and height_unit")

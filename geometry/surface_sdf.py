@@ -77,7 +77,7 @@ def _text(content: bytes, name: str) -> tuple[Header, np.ndarray]:
     header: Header = {}
     for key in ("NumPoints", "NumProfiles", "Xscale", "Yscale", "Zscale", "DataType", "Compression"):
         try:
-            header[key.lower()] = float(entries.get(key.lower(), ""))
+            header[key.lower()] = _finite(entries.get(key.lower(), ""))
         except ValueError:
             raise ValueError(f"{name} lacks a number for {key} in its header") from None
     if header["compression"]:
@@ -87,6 +87,13 @@ def _text(content: bytes, name: str) -> tuple[Header, np.ndarray]:
         return header, np.array(words, dtype=float)
     except ValueError:
         raise ValueError(f"{name} has heights that are not numbers") from None
+
+
+def _finite(word: str) -> float:
+    number = float(word)
+    if not np.isfinite(number):
+        raise ValueError(f"{word} is no finite number")
+    return number
 
 
 def _binary(content: bytes, version: str, name: str) -> tuple[Header, np.ndarray]:

@@ -132,17 +132,19 @@ def _leap(
     """An explicit step over the end of a branch, behind which the site is looked for as at the start.
 
     The response folds, or the tracked peak merges with a valley: no solution follows on the one here. A step that did
-    not get over it is followed by a longer one, until one would be longer than the tolerance.
+    not get over it, or behind which none was found, is followed by a longer one, up to the tolerance. Where pairs
+    hammer and branches are short, the rule goes on in such steps.
     """
     nothing = np.zeros_like(problem.area)
     plan = np.zeros(1 + len(state.points))
     tried = next((i for i, row in enumerate(reversed(rows)) if row.plan[0] > 0), len(rows))
-    if failure and tried < len(LEAPS):
-        stride *= LEAPS[tried] / LEAPS[0]
-        worn = stride * state.rate
-        after = assess(problem, state.depth + worn, state.cycles + stride, None)
+    for length in LEAPS[min(tried, len(LEAPS) - 1) :] / LEAPS[0] * stride if failure else ():
+        worn = length * state.rate
+        after = assess(problem, state.depth + worn, state.cycles + length, None)
+        state = replace(state, solves=state.solves + after.solves)
         if not after.failure:
-            return _Taken(row_of(problem, state, stride, worn, stride * state.work, 1.0, plan), after)
+            row = row_of(problem, state, length, worn, length * state.work, 1.0, plan)
+            return _Taken(row, replace(after, solves=0))
         failure = after.failure
     failed = row_of(problem, state, 0.0, nothing, nothing, 0.0, plan)
     return _Taken(failed, None, failure or "no wear step is small enough for the tolerance")

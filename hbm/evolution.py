@@ -103,12 +103,11 @@ def worn_state(
     problem: WearProblem, depth: np.ndarray, cycles: float, points: Sequence[OperatingPoint], solves: int
 ) -> WearState:
     """The wear law applied to solved duties."""
-    rate_of = wear_law.load(problem.law).depth_rate
     rate, work = np.zeros_like(depth), np.zeros_like(depth)
     for duty, point in zip(problem.mission, points, strict=True):
         balance = problem.at_depth(depth).with_load(duty.load)
         exposure = wear_law.Exposure(balance, point.state, problem.area, problem.spread, depth, cycles)
-        rate += duty.share * rate_of(exposure)
+        rate += duty.share * wear_law.depth_rate(problem.law, exposure)
         work += duty.share * exposure.energy
     return WearState(depth, cycles, tuple(points), rate, work, solves)
 

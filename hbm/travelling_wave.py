@@ -7,17 +7,12 @@ Source  Petrov 2004; Tamatam 2021, section 3.2.3
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
 
-from hbm.balance import HarmonicBalance
-from hbm.branch import Branch
 from hbm.excitation import Excitation
 from hbm.harmonics import HarmonicBasis
-from reduction.cyclic import ReducedSector, travelling_wave
-from reduction.model import ReducedModel
 
 
 def at_sector(
@@ -44,17 +39,3 @@ def on_wheel(excitation: Excitation, engine_order: int, n_sectors: int) -> Excit
         for n in range(n_sectors)
     }
     return replace(excitation, loads=loads)
-
-
-def responses(
-    reduced: ReducedSector,
-    engine_orders: Iterable[int],
-    problem: Callable[[ReducedModel], HarmonicBalance],
-    follow: Callable[[HarmonicBalance], Branch],
-) -> dict[int, Branch]:
-    """Response of the wheel to several engine orders.
-
-    problem : makes the balance of a model, damped as it should be; follow : follows its response
-    Returns engine order -> branch of sector 0
-    """
-    return {order: follow(problem(travelling_wave(reduced, order))) for order in engine_orders}

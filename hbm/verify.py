@@ -11,9 +11,7 @@ from hbm.balance import HarmonicBalance, State
 from hbm.branch import CONVERGED
 from hbm.time_integration import Options, PeriodicMotion
 
-ENERGY_FLOOR = (
-    1e-6  # of (largest force x travel, summed over pairs), below which a difference in energy is no difference
-)
+ENERGY_FLOOR = 1e-6  # of (largest force x travel, summed over pairs), below which energies do not differ
 
 
 @dataclass(frozen=True)

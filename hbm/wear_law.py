@@ -75,6 +75,25 @@ def load(name: str) -> ModuleType:
     return importlib.import_module(f"hbm.wear.{name}")
 
 
+def depth_rate(name: str, exposure: Exposure) -> np.ndarray:
+    """What the law of this name says of a cycle: (n_pair,) wear depth per cycle [m].
+
+    Raises  ValueError where a law of one's own cannot be run or says what is no depth of every pair
+    """
+    law = load(name)
+    if not name.endswith(".py"):
+        return np.asarray(law.depth_rate(exposure))
+    try:
+        rate = np.asarray(law.depth_rate(exposure), float)
+    except Exception as error:  # of a file of one's own: it may be anything
+        raise ValueError(f"wear law file '{name}' cannot be run: {type(error).__name__}: {error}") from error
+    if rate.shape != exposure.area.shape:
+        raise ValueError(f"wear law file '{name}' gives depths of shape {rate.shape} and not {exposure.area.shape}")
+    if np.isfinite(exposure.energy).all() and not np.isfinite(rate).all():
+        raise ValueError(f"wear law file '{name}' gives depths that are not finite")
+    return rate
+
+
 @cache
 def _from_file(path: Path) -> ModuleType:
     if not path.is_file():

@@ -180,19 +180,3 @@ def condensation(system: SecondOrderSystem, n_masters: int, cutoff: float) -> np
     basis[s, m] = psi
     basis[s, n_masters:] = phi
     return basis
-
-
-def shroud_deflection(reduced: ReducedSector, loads: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Outward normal displacement of the right and of the left face (n_pair,) each [m], neighbours absent.
-
-    loads : name -> static load of every sector [N]. Their sum is the approach of neighbours; the mean over area of one
-    is the thesis's delta_max (4.3.1)
-    """
-    sector = reduced.sector
-    T = seam_map(sector, 0)
-    system = projected(sector.system, T)
-    force = np.sum([value * system.loads[name] for name, value in loads.items()], axis=0)
-    q = T @ sla.solve(system.stiffness, force, assume_a="pos")
-    components = sector.interface.components
-    normal = slice(components.index("n"), None, len(components))
-    return (sector.interface.B @ q)[normal], -(sector.left @ q)[normal]

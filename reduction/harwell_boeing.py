@@ -30,7 +30,10 @@ def read(path: Path) -> sp.csr_matrix:
     lines = path.read_text(encoding="ascii", errors="replace").splitlines()
     if not looks_like(lines):
         raise ValueError(f"{path.name} has no Harwell-Boeing header: export it with HBMAT in ASCII form")
-    counts = [int(word) for word in lines[1].split()]
+    try:
+        counts = [int(word) for word in lines[1].split()]
+    except ValueError:
+        raise ValueError(f"{path.name} counts its lines as '{lines[1].strip()}': whole numbers are expected") from None
     kind, n_row, n_column, n_entry = lines[2].split()[:4]
     kind = kind.upper()
     if kind[0] != "R" or kind[1] not in "SUR" or kind[2] != "A":
@@ -67,7 +70,12 @@ def read(path: Path) -> sp.csr_matrix:
 
 
 def read_mapping(path: Path) -> tuple[tuple[int, int], ...]:
-    """(node, component 1..6) of each equation, from the .mapping file that HBMAT writes on request."""
+    """(node, component 1..6) of each equation, from the .mapping file that HBMAT writes on request.
+
+    Raises  ValueError: no such file, no mapping file
+    """
+    if not path.is_file():
+        raise ValueError(f"there is no mapping file {path}: check the name and the folder")
     rows: dict[int, tuple[int, int]] = {}
     for line in path.read_text(encoding="ascii", errors="replace").splitlines():
         words = line.split()

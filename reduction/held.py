@@ -12,9 +12,6 @@ from reduction.linear import linear_modes
 from reduction.model import ReducedModel
 from reduction.projection import projected
 
-# facts about frequencies of the model before; the free ones are told anew
-STALE = ("free_frequency_error", "stuck_frequency", "stuck_frequency_error")
-
 
 def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:
     """The model without the motions that break rows @ q_full = 0.
@@ -31,6 +28,5 @@ def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:
     held = rows @ model.basis
     N = null_space(held / np.linalg.norm(held, axis=1, keepdims=True))
     held_model = projected(model, N)
-    facts = {name: fact for name, fact in model.info.items() if name not in STALE}
     frequency, _ = linear_modes(held_model, n=min(REPORTED_MODES, N.shape[1]))
-    return replace(held_model, info={**facts, "free_frequency": frequency})
+    return replace(held_model, info={**held_model.info, "free_frequency": frequency})

@@ -20,7 +20,6 @@ from reduction.model import ReducedModel
 from reduction.projection import projected
 
 DEPENDENT = 1e-6  # size of what is new in a shape, relative, that is rounding
-STALE = ("free_frequency_error", "stuck_frequency", "stuck_frequency_error")  # told of the model before
 
 
 def interface_modes(
@@ -64,11 +63,11 @@ def interface_modes(
     basis[np.ix_(b, np.arange(len(a)))] = following
     basis[np.ix_(b, len(a) + np.arange(n_contact))] = contact
     basis[np.arange(n_m, n), np.arange(len(a) + n_contact, basis.shape[1])] = 1.0
-    facts = {name: fact for name, fact in model.info.items() if name not in STALE}
     omitted = float(omega[n_modes]) / (2 * np.pi) if n_modes < len(b) else np.inf
-    facts |= {"masters": masters[a], "n_masters": len(a)}
+    facts = {"masters": masters[a], "n_masters": len(a)}
     facts |= {"n_interface_modes": n_modes, "interface_omitted_frequency": omitted}
-    return replace(projected(model, basis), info=facts)
+    fewer = projected(model, basis)
+    return replace(fewer, info={**fewer.info, **facts})
 
 
 def _static_shapes(K: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import zipfile
+import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,25 +13,24 @@ import h5py
 import numpy as np
 import scipy.io
 import scipy.sparse as sp
+from scipy.io.matlab import MatReadError
 
-from reduction import abaqus_matrix, harwell_boeing
+from reduction import abaqus_matrix, harwell_boeing, matrix_market
 from reduction.abaqus_matrix import Labels
-
-CONTAINERS = (".npz", ".mat")
-"""Files that can hold several matrices by name."""
 
 
 def variables(path: Path) -> list[str]:
     """Names of what a container holds; an empty list for a file that is one matrix (also scipy.sparse.save_npz)."""
     _require(path)
-    if path.suffix.lower() == ".npz":
-        with _opened_npz(path) as archive:
-            return [] if "format" in archive.files else sorted(archive.files)
-    if path.suffix.lower() == ".mat":
-        if h5py.is_hdf5(path):
-            with h5py.File(path, "r") as archive:
-                return sorted(name for name in archive if not name.startswith("#"))
-        return sorted(name for name, _, _ in _whosmat(path))
+    with _told(path):
+        if path.suffix.lower() == ".npz":
+            with _opened_npz(path) as archive:
+                return [] if "format" in archive.files else sorted(archive.files)
+        if path.suffix.lower() == ".mat":
+            if h5py.is_hdf5(path):
+                with h5py.File(path, "r") as archive:
+                    return sorted(name for name in archive if not name.startswith("#"))
+            return sorted(name for name, _, _ in _whosmat(path))
     return []
 
 
@@ -45,12 +47,13 @@ def read_matrix(path: Path, variable: str | None = None) -> tuple[sp.csr_matrix,
         raise ValueError(f"{path.name} has no variable '{variable}': it holds {', '.join(known)}")
     if known and variable is None:
         raise ValueError(f"{path.name} holds {', '.join(known)}: name the variable that is wanted")
-    if path.suffix.lower() == ".npz":
-        matrix = _from_npz(path, variable)
-    elif path.suffix.lower() == ".mat":
-        matrix = _from_mat(path, str(variable))
-    else:
-        matrix, labels = _from_text(path)
+    with _told(path):
+        if path.suffix.lower() == ".npz":
+            matrix = _from_npz(path, variable)
+        elif path.suffix.lower() == ".mat":
+            matrix = _from_mat(path, str(variable))
+        else:
+            matrix, labels = _from_text(path)
     return _real(matrix, f"{path.name} {variable or ''}".strip()), labels
 
 
@@ -59,11 +62,21 @@ def read_array(path: Path, variable: str) -> np.ndarray:
     known = variables(path)
     if variable not in known:
         raise ValueError(f"{path.name} has no variable '{variable}': it holds {', '.join(known) or 'one matrix alone'}")
-    found = _from_npz(path, variable) if path.suffix.lower() == ".npz" else _from_mat(path, variable)
+    with _told(path):
+        found = _from_npz(path, variable) if path.suffix.lower() == ".npz" else _from_mat(path, variable)
     array = found.toarray() if sp.issparse(found) else np.asarray(found)
     if array.dtype.kind not in "fiub" or not np.isfinite(array).all():
         raise ValueError(f"{path.name} {variable} must hold finite real numbers")
     return array.astype(float)
+
+
+@contextlib.contextmanager
+def _told(path: Path) -> Iterator[None]:
+    """What readers of several libraries raise for broken files, as one sentence."""
+    try:
+        yield
+    except (LookupError, TypeError, EOFError, OSError, RuntimeError, MatReadError, zipfile.BadZipFile, zlib.error):
+        raise ValueError(f"{path.name} is broken, it ends early or contradicts itself: export it again") from None
 
 
 def _from_npz(path: Path, variable: str | None) -> Any:
@@ -103,11 +116,8 @@ def _from_mat(path: Path, variable: str) -> Any:
 def _from_text(path: Path) -> tuple[Any, Labels | None]:
     with path.open(encoding="ascii", errors="replace") as stream:
         head = [line for _, line in zip(range(50), stream, strict=False)]
-    if head and head[0].startswith("%%MatrixMarket"):
-        try:
-            return scipy.io.mmread(path), None
-        except (ValueError, OverflowError) as problem:
-            raise ValueError(f"{path.name} is a broken Matrix Market file: {problem}") from None
+    if head and head[0].startswith(matrix_market.BANNER):
+        return matrix_market.read(path), None
     if harwell_boeing.looks_like(head):
         return harwell_boeing.read(path), None
     if abaqus_matrix.looks_like(head):
@@ -126,6 +136,11 @@ def _real(matrix: Any, name: str) -> sp.csr_matrix:
     """Double precision compressed rows, or a ValueError for entries that cannot belong to a structure."""
     if not sp.issparse(matrix) and np.ndim(matrix) != 2:
         raise ValueError(f"{name} has {np.ndim(matrix)} dimensions: a matrix has two")
+    if sp.issparse(matrix) and matrix.format in ("csr", "csc", "bsr"):
+        try:
+            matrix.check_format(full_check=True)  # scipy reads outside of its arrays otherwise
+        except ValueError as problem:
+            raise ValueError(f"{name} is broken, {problem}: export it again") from None
     rows = sp.csr_matrix(matrix)
     if rows.dtype.kind not in "fiub":
         raise ValueError(f"{name} has entries of type {rows.dtype}: real numbers are needed")

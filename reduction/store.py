@@ -34,21 +34,28 @@ def save(model: ReducedModel, path: str | Path, harmonics: Sequence[int] = ()) -
     if model.per_harmonic is not None and not harmonics:
         raise ValueError("this model differs from harmonic to harmonic: say which harmonics are to be stored")
     path = Path(path)
-    partial = path.with_name(path.name + ".partial")
-    with h5py.File(partial, "w") as file:
-        file.attrs["format"] = FORMAT
-        file.attrs["version"] = VERSION
-        interface = model.interface
-        _write_system(file.create_group("system"), model.system)
-        if model.per_harmonic is not None:
-            _write_harmonics(file, model, harmonics)
-        fields = {name: getattr(interface, name) for name in ("points", "frames", "area", "gap", "B", "faces")}
-        _write(file.create_group("interface"), fields)
-        file["interface"].attrs["components"] = list(interface.components)
-        _write(file, {"basis": model.basis})
-        facts = {name: fact for name, fact in model.info.items() if isinstance(fact, DATA)}
-        _write(file.create_group("info"), facts)
-    os.replace(partial, path)
+    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
+    try:
+        with h5py.File(partial, "w") as file:
+            _write_model(file, model, harmonics)
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _write_model(file: h5py.File, model: ReducedModel, harmonics: Sequence[int]) -> None:
+    file.attrs["format"] = FORMAT
+    file.attrs["version"] = VERSION
+    interface = model.interface
+    _write_system(file.create_group("system"), model.system)
+    if model.per_harmonic is not None:
+        _write_harmonics(file, model, harmonics)
+    fields = {name: getattr(interface, name) for name in ("points", "frames", "area", "gap", "B", "faces")}
+    _write(file.create_group("interface"), fields)
+    file["interface"].attrs["components"] = list(interface.components)
+    _write(file, {"basis": model.basis})
+    facts = {name: fact for name, fact in model.info.items() if isinstance(fact, DATA)}
+    _write(file.create_group("info"), facts)
 
 
 def load(path: str | Path) -> ReducedModel:

@@ -1,4 +1,4 @@
-"""Oscillators with closed-form response curves for the checks of continuations."""
+"""Oscillators with closed-form response curves, and two with friction, for the checks of continuations."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hbm.balance import HarmonicBalance
 from hbm.excitation import Excitation
 from hbm.harmonics import HarmonicBasis
 from hbm.law import ContactParameters
-from tests.verification_models import oscillator
+from tests.verification_models import oscillator, random_structure
 
 
 class Duffing:
@@ -81,3 +81,19 @@ class Lifting:
         p = k - 2 * self.zeta**2
         root = p**2 - k**2 + (self.force / amplitude) ** 2
         return float(np.sqrt(p + side * np.sqrt(root)))
+
+
+def rubbing_mass(harmonics: tuple[int, ...] = (0, 1), n_samples: int = 128, how: str = "sampled") -> HarmonicBalance:
+    """A pressed mass on a Jenkins element that sticks far from its resonance and slips in it."""
+    parameters = ContactParameters.of(("t1", "n"), [[3.0, 5.0]], friction=0.5)
+    excitation = Excitation.of({"normal": 1.0}, {1: {"force": 0.3}})
+    basis = HarmonicBasis(harmonics, n_samples, how)
+    return HarmonicBalance(oscillator(1.0, 1.0, 0.01), "jenkins", parameters, basis, excitation, 5.0)
+
+
+def rubbing_pairs(harmonics: tuple[int, ...] = (0, 1), n_samples: int = 64) -> HarmonicBalance:
+    """Four pairs under a random structure."""
+    parameters = ContactParameters.of(("t1", "t2", "n"), np.full((4, 3), 5e6), friction=0.4)
+    excitation = Excitation.of({"static": 2000.0}, {1: {"shaker": 1500.0}})
+    basis = HarmonicBasis(harmonics, n_samples)
+    return HarmonicBalance(random_structure(4, seed=2), "jenkins", parameters, basis, excitation, 2000.0)

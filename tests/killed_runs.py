@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from workflows import pipeline, store
+from workflows import checkpoint, pipeline, store
 from workflows.progress import Progress
 from workflows.scene_file import read
 
@@ -14,5 +14,5 @@ def go_on(folder: Path, overrides: tuple[str, ...]) -> None:
     path = folder / "result.h5"
     file = read("beam", overrides)
     earlier = store.load(path) if path.exists() else None
-    if earlier is None or not pipeline.is_complete(earlier, file.scene):
+    if earlier is None or not checkpoint.is_complete(earlier, file.scene):
         pipeline.run(file, folder, Progress(), earlier)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hbm import law as contact_law
@@ -10,6 +10,7 @@ from hbm import located
 from hbm.harmonics import HarmonicBasis
 from hbm.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tests.contact_draws import HARMONICS, LOCATED, draw
+from tests.random_problems import cases
 
 EVERY_LAW = pytest.mark.parametrize(
     ("name", "components"), LOCATED, ids=lambda v: v if isinstance(v, str) else "".join(v)
@@ -227,7 +228,7 @@ def test_friction_proportional_to_the_motion():
         np.testing.assert_allclose(cycle.force[0, 0], 0.5 * cycle.force[0, 1], atol=1e-14)
 
 
-@settings(max_examples=150, deadline=None)
+@cases(150)
 @given(
     st.lists(st.floats(-1, 1, allow_subnormal=False), min_size=9, max_size=9),
     st.sampled_from([(1, 2, 3, 4), (1, 3, 5, 7), (2, 3, 8, 9)]),

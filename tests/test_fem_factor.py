@@ -9,6 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.sparse import eye_array
+
+from fem.factor import factorise
 
 FRESH = """
 import sys
@@ -34,6 +37,11 @@ def digest(folder: Path) -> str:
     system = pipeline.build(read("beam", small), folder, Progress()).reduced.system
     both = np.ascontiguousarray(np.concatenate([np.asarray(system.stiffness), np.asarray(system.mass)]))
     return hashlib.sha256(both.tobytes()).hexdigest()
+
+
+def test_an_unknown_solver_is_refused() -> None:
+    with pytest.raises(ValueError, match="no solver 'umfpack': there are pardiso, superlu"):
+        factorise(eye_array(3), solver="umfpack")
 
 
 @pytest.mark.parametrize("before", ["", WORN], ids=["fresh", "after_other_work"])

@@ -319,6 +319,9 @@ def with_nan():
     [
         ("none.xyz", None, {}, "there is no height map"),
         ("a.txt", "hello\n", {}, "holds no numbers"),
+        ("a.txt", "", {}, "a.txt is empty"),
+        ("a.sdf", "", {}, "a.sdf is empty"),
+        ("a.sur", "", {}, "a.sur is empty"),
         ("a.txt", "1 2 3\n4 5\n", {}, "lines of 2 to 3 numbers"),
         ("a.txt", "1 2 3\noops 5 6\n", {}, "words in line 2"),
         ("a.txt", "1 2 3 4\n5 6 7 8\n", {}, "give spacing"),

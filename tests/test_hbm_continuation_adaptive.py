@@ -6,22 +6,10 @@ import numpy as np
 import pytest
 
 from hbm import parameter
-from hbm.balance import HarmonicBalance
 from hbm.branch import Branch
 from hbm.continuation import adaptive, natural
 from hbm.continuation.adaptive import Options, interpolate
-from hbm.excitation import Excitation
-from hbm.harmonics import HarmonicBasis
-from hbm.law import ContactParameters
-from tests.continuation_models import Duffing
-from tests.verification_models import oscillator
-
-
-def friction() -> HarmonicBalance:
-    parameters = ContactParameters.of(("t1", "n"), [[3.0, 5.0]], friction=0.5)
-    excitation = Excitation.of({"normal": 1.0}, {1: {"force": 0.3}})
-    basis = HarmonicBasis((0, 1), 128, "located")
-    return HarmonicBalance(oscillator(1.0, 1.0, 0.01), "jenkins", parameters, basis, excitation, 5.0)
+from tests.continuation_models import Duffing, rubbing_mass
 
 
 def worst(branch: Branch, reference: Branch) -> float:
@@ -32,7 +20,7 @@ def worst(branch: Branch, reference: Branch) -> float:
 
 @pytest.mark.parametrize(("case", "share"), [("friction", 0.35), ("resonance", 0.1)])
 def test_points_lie_where_the_response_bends(case, share):
-    balance = friction() if case == "friction" else Duffing(zeta=1e-3, cubic=0.0).balance()
+    balance = rubbing_mass(how="located") if case == "friction" else Duffing(zeta=1e-3, cubic=0.0).balance()
     reference = natural.follow(balance, 0.5, 2.0, natural.Options(2001))
     for tolerance in (1e-2, 1e-3):
         branch = adaptive.follow(balance, 0.5, 2.0, Options(tolerance=tolerance))
@@ -48,7 +36,7 @@ def test_points_lie_where_the_response_bends(case, share):
 
 
 def test_error_falls_with_the_tolerance_and_both_ways_agree():
-    balance = friction()
+    balance = rubbing_mass(how="located")
     reference = natural.follow(balance, 0.5, 2.0, natural.Options(2001))
     errors = [worst(adaptive.follow(balance, 0.5, 2.0, Options(tolerance=t)), reference) for t in (3e-2, 3e-3, 3e-4)]
     assert errors[0] > errors[1] > errors[2]

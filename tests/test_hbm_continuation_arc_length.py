@@ -18,8 +18,8 @@ from hbm.excitation import Excitation
 from hbm.harmonics import HarmonicBasis
 from hbm.law import ContactParameters
 from hbm.parameter import Parameter
-from tests.continuation_models import Duffing, Lifting
-from tests.verification_models import oscillator, random_structure, slab
+from tests.continuation_models import Duffing, Lifting, rubbing_mass, rubbing_pairs
+from tests.verification_models import random_structure, slab
 
 
 def pressed_slab(harmonics: tuple[int, ...] = (0, 1, 2), rock: float = 2.0, how: str = "located") -> HarmonicBalance:
@@ -93,14 +93,7 @@ def test_several_pairs_with_friction_and_lift_trace_the_same_curve_both_ways():
 
 
 def test_where_the_curve_is_single_valued_it_is_the_natural_one():
-    parameters = ContactParameters.of(("t1", "n"), [[3.0, 5.0]], friction=0.5)
-    excitation = Excitation.of({"normal": 1.0}, {1: {"force": 0.3}})
-    basis = HarmonicBasis((0, 1, 2, 3), 128)
-    friction = HarmonicBalance(oscillator(1.0, 1.0, 0.01), "jenkins", parameters, basis, excitation, 5.0)
-    structure = random_structure(4, seed=2)
-    parameters = ContactParameters.of(("t1", "t2", "n"), np.full((4, 3), 5e6), friction=0.4)
-    excitation = Excitation.of({"static": 2000.0}, {1: {"shaker": 1500.0}})
-    pairs = HarmonicBalance(structure, "jenkins", parameters, HarmonicBasis((0, 1, 3), 64), excitation, 2000.0)
+    friction, pairs = rubbing_mass((0, 1, 2, 3)), rubbing_pairs((0, 1, 3))
     for balance, low, high in ((friction, 0.3, 4.0), (pairs, 200.0, 900.0)):
         for way in ((low, high), (high, low)):
             arc = arc_length.follow(balance, *way)
@@ -116,12 +109,7 @@ def test_where_the_curve_is_single_valued_it_is_the_natural_one():
 
 
 def test_slip_is_part_of_the_friction_curves_above():
-    parameters = ContactParameters.of(("t1", "n"), [[3.0, 5.0]], friction=0.5)
-    excitation = Excitation.of({"normal": 1.0}, {1: {"force": 0.3}})
-    balance = HarmonicBalance(
-        oscillator(1.0, 1.0, 0.01), "jenkins", parameters, HarmonicBasis((0, 1), 128), excitation, 5.0
-    )
-    branch = arc_length.follow(balance, 0.3, 4.0)
+    branch = arc_length.follow(rubbing_mass(), 0.3, 4.0)
     assert branch.energy.max() > 0.1 * 0.3 * branch.amplitude("mass").max()
 
 

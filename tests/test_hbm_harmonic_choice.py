@@ -9,26 +9,16 @@ import pytest
 
 from hbm import harmonic_choice, newton
 from hbm.balance import HarmonicBalance
-from hbm.excitation import Excitation
 from hbm.harmonic_choice import NotSolved, Options, choose, widened
-from hbm.harmonics import HarmonicBasis
-from hbm.law import ContactParameters
-from tests.continuation_models import Duffing, Lifting
-from tests.verification_models import oscillator, random_structure
+from tests.continuation_models import Duffing, Lifting, rubbing_mass, rubbing_pairs
 
 
 def friction() -> tuple[HarmonicBalance, list[float]]:
-    parameters = ContactParameters.of(("t1", "n"), [[3.0, 5.0]], friction=0.5)
-    excitation = Excitation.of({"normal": 1.0}, {1: {"force": 0.3}})
-    basis = HarmonicBasis((0, 1), 256)
-    return HarmonicBalance(oscillator(1.0, 1.0, 0.01), "jenkins", parameters, basis, excitation, 5.0), [1.45, 1.8]
+    return rubbing_mass(n_samples=256), [1.45, 1.8]
 
 
 def pairs() -> tuple[HarmonicBalance, list[float]]:
-    parameters = ContactParameters.of(("t1", "t2", "n"), np.full((4, 3), 5e6), friction=0.4)
-    excitation = Excitation.of({"static": 2000.0}, {1: {"shaker": 1500.0}})
-    basis = HarmonicBasis((0, 1), 256)
-    return HarmonicBalance(random_structure(4, 2), "jenkins", parameters, basis, excitation, 2000.0), [300.0, 600.0]
+    return rubbing_pairs(n_samples=256), [300.0, 600.0]
 
 
 def true_error(

@@ -12,7 +12,7 @@ from hbm.excitation import Excitation
 from hbm.harmonics import HarmonicBasis
 from hbm.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from hbm.recovery import coordinates, full_displacement
-from reduction.cyclic import nodal_diameters, relative_map
+from reduction.cyclic import nodal_diameters, relative_map, travelling_wave
 from tests import small_wheel as small
 
 EXACT = newton.NewtonOptions(tolerance=1e-11)
@@ -165,15 +165,12 @@ def test_responses_to_several_engine_orders(sectors):
     def problem(model):
         return HarmonicBalance(model, "jenkins", pressed, HarmonicBasis((0, 1), 32), load, 2 * np.pi * 1100)
 
-    def follow(balance):
-        return natural.follow(balance, 2 * np.pi * 1000, 2 * np.pi * 1100, natural.Options(n_points=51))
-
     orders = (1, 3, 7)
-    found = waves.responses(reduced, orders, problem, follow)
-    assert tuple(found) == orders
     expected = nodal_diameters(reduced.sector, orders, 1, k)[:, 0]
     for order, frequency in zip(orders, expected, strict=True):
-        peak = found[order].omega[np.argmax(found[order].amplitude("tip"))] / (2 * np.pi)
+        balance = problem(travelling_wave(reduced, order))
+        found = natural.follow(balance, 2 * np.pi * 1000, 2 * np.pi * 1100, natural.Options(n_points=51))
+        peak = found.omega[np.argmax(found.amplitude("tip"))] / (2 * np.pi)
         assert peak == pytest.approx(frequency, abs=1.0)
 
 

@@ -168,6 +168,21 @@ def test_a_file_that_is_no_wear_law_is_refused(tmp_path: Path, text: str | None,
         wear_law.load(str(path))
 
 
+@pytest.mark.parametrize(
+    ("body", "says"),
+    [
+        ("return exposure.enrgy", "cannot be run: AttributeError: .* 'enrgy'"),
+        ("return exposure.energy[:1]", r"depths of shape \(1,\) and not"),
+        ("return exposure.energy + float('nan')", "not finite"),
+    ],
+)
+def test_a_wear_law_that_fails_in_the_run_is_told(tmp_path: Path, body: str, says: str) -> None:
+    path = tmp_path / "law.py"
+    path.write_text(f"def depth_rate(exposure):\n    {body}\n")
+    with pytest.raises(ValueError, match=says):
+        thesis_rule.evolve(wear_problem(law=str(path)), 5e-7, max_steps=1)
+
+
 def test_events_are_where_the_penetration_of_a_pair_changes_its_sign(problem: WearProblem, fine: WearHistory) -> None:
     gap, basis = problem.balance.parameters.gap, HarmonicBasis((0, 1), 1024)
     found = events(fine, ("t1", "t2", "n"), gap, basis)
@@ -231,6 +246,49 @@ def test_error_controlled_steps_get_over_the_end_of_a_branch(problem: WearProble
     assert problem.area @ worn.depth[-1] == pytest.approx(1e-9 * worn.work.sum(), rel=1e-12)
     plain = error_controlled_rule.evolve(problem, tolerance)
     assert life(worn) == pytest.approx(life(plain), rel=0.02)
+
+
+def test_a_step_behind_which_no_solution_is_found_is_followed_by_a_longer_one(problem: WearProblem) -> None:
+    """The branch ends where the deepest pair is at 1e-5 m; less than 5e-6 m further on nothing is found by any way."""
+    end, gap, tolerance = 1e-5, problem.balance.parameters.gap, error_controlled_rule.Tolerance(0.05, 2e-4)
+    missed, over = [], []
+
+    class Blind(AtFrequency):
+        def first(self, balance: HarmonicBalance) -> OperatingPoint:
+            found, deepest = super().first(balance), (balance.parameters.gap - gap).max()
+            if end < deepest < end + 5e-6:
+                missed.append(deepest)
+                return replace(found, solution=replace(found.solution, outcome="nothing here"))
+            if deepest > end:
+                over.append(deepest)
+            return found
+
+        def correct(self, balance: HarmonicBalance, state: State) -> Correction:
+            ended = not over and (balance.parameters.gap - gap).max() > end
+            return Correction(state.omega if ended else 0.0, np.zeros_like(state.x), 0)
+
+    worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Blind("tip", 420.0)),)), tolerance)
+    assert missed
+    assert worn.end.startswith("preload fell")
+    leap = int(np.flatnonzero(worn.depth.max(axis=1) == over[0])[0]) - 1
+    assert worn.plan[leap, 0] == 0.0
+    assert worn.solves[leap] > len(missed)  # what was looked for in vain is counted
+    assert worn.worn[leap].max() <= 1e-5
+    assert life(worn) == pytest.approx(life(error_controlled_rule.evolve(problem, tolerance)), rel=0.02)
+
+
+def test_where_no_branch_goes_on_the_rule_takes_explicit_steps_to_the_end(problem: WearProblem) -> None:
+    class Never(AtFrequency):
+        def correct(self, balance: HarmonicBalance, state: State) -> Correction:
+            return Correction(state.omega, np.zeros_like(state.x), 0)
+
+    tolerance = error_controlled_rule.Tolerance(0.05, 2e-4)
+    worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Never("tip", 420.0)),)), tolerance)
+    explicit = thesis_rule.evolve(problem, error_controlled_rule.LEAPS[-1] * 0.05 * 2e-4)
+    assert worn.end == explicit.end
+    assert np.all(worn.step_error[:-1] == 1.0)
+    assert worn.worn.max() <= 1e-5
+    assert life(worn) == pytest.approx(life(explicit), rel=0.05)  # the first steps are shorter
 
 
 def test_the_forces_of_a_faint_contact_are_solved_too(problem: WearProblem) -> None:

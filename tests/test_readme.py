@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pkgutil
 import re
 import shlex
 import subprocess
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+import hbm
 from reduction import foreign
 
 ROOT = Path(__file__).parent.parent
@@ -69,3 +71,9 @@ def test_the_python_is_what_the_documentation_of_foreign_matrices_says() -> None
     (example,) = re.findall(r"^```python\n(.*?)^```", README, re.M | re.S)
     lines = example.splitlines()
     assert lines == documented[documented.index(lines[0]) :][: len(lines)]
+
+
+def test_the_map_of_the_solver_names_every_module_once() -> None:
+    named = re.findall(r"\w+", (hbm.__doc__ or "").partition("\n")[2])
+    for module in pkgutil.iter_modules(hbm.__path__):
+        assert named.count(module.name) == 1, module.name

@@ -6,8 +6,9 @@ import pytest
 import scipy.io
 import scipy.sparse as sp
 
+from reduction import matrix_market
 from reduction.foreign import ForeignMatrices, read_matrices, reduced_model
-from reduction.matrix_files import read_matrix
+from reduction.matrix_files import read_matrix, variables
 
 N_NODE = 5
 LABELS = [(10 * node + 7, component) for node in range(N_NODE) for component in (1, 2, 3)]
@@ -283,6 +284,33 @@ def test_bad_files_are_refused_in_one_sentence(call, words, tmp_path):
     with pytest.raises(ValueError, match=words) as refusal:
         call(tmp_path)
     assert "\n" not in str(refusal.value)
+
+
+COUNTED = [from_npz, from_sparse_npz, from_matrix_market, from_matlab, from_matlab_73, from_ansys_unsymmetric]
+
+
+@pytest.mark.parametrize("reader", COUNTED, ids=lambda reader: reader.__name__)
+def test_a_file_that_ends_early_is_refused_in_one_sentence(reader, tmp_path):
+    """Of the formats that say how many entries there are; nobody can tell where the last number lost its end."""
+    reader(tmp_path)
+    for path in (path for path in tmp_path.iterdir() if path.suffix != ".mapping"):
+        whole = path.read_bytes()
+        names = variables(path) or [None]
+        for share in np.linspace(0.01, 0.95, 40):
+            path.write_bytes(whole[: int(share * len(whole))])
+            with pytest.raises(ValueError, match=path.name) as refusal:
+                [read_matrix(path, name) for name in names]
+            assert "\n" not in str(refusal.value), share
+
+
+@pytest.mark.parametrize("storage", ["coordinate", "array"])
+@pytest.mark.parametrize("symmetry", ["general", "symmetric", "skew-symmetric"])
+def test_matrix_market_is_read_as_scipy_writes_it(storage, symmetry, tmp_path):
+    square = np.arange(25.0).reshape(5, 5)
+    matrix = {"general": square[:, :3], "symmetric": square + square.T, "skew-symmetric": square - square.T}[symmetry]
+    stored = sp.coo_matrix(matrix) if storage == "coordinate" else matrix
+    scipy.io.mmwrite(tmp_path / "m.mtx", stored, symmetry=symmetry)
+    np.testing.assert_array_equal(matrix_market.read(tmp_path / "m.mtx").toarray(), matrix)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -76,6 +77,34 @@ def test_a_mesh_file_that_is_not_there(capsys: pytest.CaptureFixture[str], tmp_p
     assert err.count("\n") == 1
 
 
+WRITING = {
+    "a folder at a file": (["run", "beam"], "file", "no folder can be made at .*file, file exists"),
+    "a folder in a file": (["converge", "beam"], "file/folder", "no folder can be made"),
+    "a table that is none": (["trade", "beam"], "table.png", "give a file that ends with .json"),
+    "a picture at a folder": (["extremes"], "folder.png", "a folder is there, give a file"),
+    "a picture of no kind": (["bench", "--scaling"], "picture", "give a file that ends with .png or .pdf or .svg"),
+}
+
+
+@pytest.mark.parametrize("case", WRITING)
+def test_what_cannot_be_written_is_refused_before_long_work(
+    case: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "file").touch()
+    (tmp_path / "folder.png").mkdir()
+    words, out, says = WRITING[case]
+    code, _, err = leave([*words, "--out", str(tmp_path / out)], capsys)
+    assert code == 2
+    assert re.search(says, err)
+    assert err.count("\n") == 1
+
+
+def test_closed_standard_streams_do_not_matter() -> None:
+    command = f"{sys.executable} -m workflows.cli list >&-"
+    done = subprocess.run(command, shell=True, cwd=ROOT, capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
 def test_list_names_every_scene(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = leave(["list"], capsys)
     assert code == 0
@@ -130,6 +159,30 @@ def test_a_reader_that_has_seen_enough_ends_the_command_in_silence(tmp_path: Pat
         done = subprocess.run(command, cwd=ROOT, stdout=write_end, stderr=subprocess.PIPE, check=False)
         os.close(write_end)
         assert (done.returncode, done.stderr) == (exits.READER_LEFT, b"")
+
+
+CTRL_C_WHILE_AN_OBJECT_IS_FREED = """
+import os, signal, time
+from workflows import exits
+
+class Freed:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0)
+
+def command():
+    Freed()
+    while True:
+        time.sleep(1)
+
+exits.guard(command)
+"""
+
+
+def test_ctrl_c_is_not_lost_while_an_object_is_freed() -> None:
+    command = [sys.executable, "-c", CTRL_C_WHILE_AN_OBJECT_IS_FREED]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (exits.INTERRUPTED, "tribodyn: stopped.\n")
 
 
 def curve(peak: int, unstable: range | None = None):

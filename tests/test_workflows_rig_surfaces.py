@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from geometry.surface_pair import synthetic_pair
+from tests.test_workflows_cli import leave
 from workflows import cli
 
 MICRO = 1e6
@@ -30,18 +31,12 @@ def write(folder: Path, damage=lambda z: z, lateral: float = MICRO, height: floa
     return scene
 
 
-def leave(scene: Path, capsys: pytest.CaptureFixture[str], *more: str) -> tuple[int, str, str]:
+def run(scene: Path, capsys: pytest.CaptureFixture[str], *more: str) -> tuple[int, str, str]:
     """Exit code, standard output and standard error of a small run of the scene."""
     words = ["run", str(scene), "--no-pictures", "--out", str(scene.parent / "out")]
     for override in (*SMALL, *more):
         words += ["--set", override]
-    code = 0
-    try:
-        cli.main(words)
-    except SystemExit as stop:
-        code = int(stop.code or 0)
-    out, err = capsys.readouterr()
-    return code, out, err
+    return leave(words, capsys)
 
 
 def holes(share):
@@ -71,7 +66,7 @@ def spikes(share):
     ids=["sound", "holes", "spikes", "tilted"],
 )
 def test_a_measured_face_is_taken_and_each_repair_is_told(damage, repairs, tmp_path, capsys):
-    code, out, err = leave(write(tmp_path, damage), capsys)
+    code, out, err = run(write(tmp_path, damage), capsys)
     assert code == 0, err
     told = [line for line in out.splitlines() if line.startswith("face.xyz")]
     assert len(told) == len(repairs)
@@ -97,7 +92,7 @@ def test_a_measured_face_is_taken_and_each_repair_is_told(damage, repairs, tmp_p
          "no file"],
 )  # fmt: skip
 def test_garbage_is_one_sentence_and_exit_code_2(change, more, words, tmp_path, capsys):
-    code, _, err = leave(write(tmp_path, **change), capsys, *more)
+    code, _, err = run(write(tmp_path, **change), capsys, *more)
     assert code == 2
     sentence = err.strip().splitlines()[-1]
     assert sentence.startswith("tribodyn: ")

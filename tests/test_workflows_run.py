@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from tests.killed_runs import go_on
-from workflows import fields, pipeline, plots, store
+from workflows import checkpoint, fields, pipeline, plots, store
 from workflows.progress import Progress
 from workflows.result import Result
 from workflows.scene_file import read
@@ -239,9 +239,9 @@ def test_more_steps_go_on_from_a_run_that_stopped(finished: Result, tmp_path: Pa
     short, longer = read("beam", [*SMALL, "wear.max_steps=2"]), read("beam", [*SMALL, "wear.max_steps=4"])
     stopped = pipeline.run(short, tmp_path, Progress())
     assert stopped.state == "complete: stopped after 2 wear steps"
-    assert pipeline.is_complete(stopped, short.scene)
-    assert not pipeline.is_complete(stopped, longer.scene)
-    assert pipeline.same_problem(short.scene, longer.scene) == ""
+    assert checkpoint.is_complete(stopped, short.scene)
+    assert not checkpoint.is_complete(stopped, longer.scene)
+    assert checkpoint.same_problem(short.scene, longer.scene) == ""
     more = pipeline.run(longer, tmp_path, Progress(), stopped)
     assert more.wear is not None
     assert finished.wear is not None

@@ -13,7 +13,7 @@ import cyclopts
 from cyclopts import Parameter
 
 from workflows import cli_cases, cli_studies, exits, scene_file
-from workflows.cli_words import Flag, Json, Overrides, print_lines, quantity
+from workflows.cli_words import Flag, Json, Overrides, make_room, print_lines, quantity
 
 if TYPE_CHECKING:
     from workflows.result import Result
@@ -64,10 +64,11 @@ def run(
     pictures
         Draw curves, maps and renders when done.
     """
-    from workflows import pipeline
+    from workflows import checkpoint, pipeline
     from workflows.accuracy import tuned
     from workflows.progress import console_progress
 
+    make_room(out)
     progress = console_progress()
     if accuracy is None:
         file = scene_file.read(scene, overrides)
@@ -77,7 +78,7 @@ def run(
     folder = out or Path("results") / file.name
     path = folder / "result.h5"
     earlier = _earlier(path, file) if resume else None
-    if earlier is not None and pipeline.is_complete(earlier, file.scene):
+    if earlier is not None and checkpoint.is_complete(earlier, file.scene):
         progress.say(f"{path} is complete already")
         result = earlier
     else:
@@ -96,12 +97,12 @@ def run(
 
 def _earlier(path: Path, file: scene_file.SceneFile) -> Result | None:
     """The unfinished result to go on from, None where there is none yet."""
-    from workflows import pipeline, store
+    from workflows import checkpoint, store
 
     if not path.exists():
         return None
     result = store.load(path)
-    key = pipeline.same_problem(scene_file.from_json(result.provenance["scene"]), file.scene)
+    key = checkpoint.same_problem(scene_file.from_json(result.provenance["scene"]), file.scene)
     if key:
         raise ValueError(f"{path} is the result of another scene, {key} differs: run its scene, or without --resume")
     return result
@@ -156,6 +157,7 @@ def render(result: Path, *, out: Path | None = None) -> None:
     """
     from workflows import store
 
+    make_room(out)
     path = _result_file(result)
     _draw(store.load(path), out or path.parent / "pictures")
 
@@ -192,6 +194,7 @@ def verify(
     from workflows.progress import Progress, console_progress
 
     path = _result_file(result)
+    make_room(out)
     omega = None if at is None else 2 * math.pi * quantity("--at", at, "Hz")
     progress = Progress() if as_json else console_progress()
     found = verification.compare(store.load(path), omega, row, overrides, steps, progress)

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Literal
 
-from workflows.cli_words import Changes, Flag, Json, Overrides, aside, quantity
+from workflows.cli_words import Changes, Flag, Json, Overrides, aside, make_room, quantity
 
 
 def leaf(
@@ -32,6 +32,7 @@ def leaf(
     """
     from workflows import leaf_accuracy, leaf_fit, leaf_study
 
+    make_room(out)
     folder = out or Path("results") / f"leaf_{work}"
     if resume and work != "study":
         raise ValueError(f"--resume is for leaf study, leaf {work} has nothing to go on with: run it without")
@@ -68,6 +69,7 @@ def blade(
     from workflows import blade_mistuning, blade_study
 
     highest = None if speed is None else quantity("--speed", speed, "Hz")
+    make_room(out)
     folder = out or Path("results") / f"blade_{work}"
     if work == "mistuned":
         written = blade_mistuning.run(scene, overrides, folder)
@@ -122,6 +124,7 @@ def rig(
         fits = rig_fit.run(scene, overrides, column, wear, aside)
         print(json.dumps(rig_fit.as_records(fits), indent=2) if as_json else rig_fit.as_text(fits))
         return
+    make_room(out)
     table, paths = rig_study.run(scene, overrides, out or Path("results") / "rig_study", aside)
     if as_json:
         print(json.dumps({**rig_table.as_records(table), "files": [str(path) for path in paths]}, indent=2))

@@ -1,4 +1,4 @@
-"""Words of the command `tribodyn` that measure cost and accuracy, or follow a number while another changes."""
+"""Words of the command `tribodyn` that measure cost and accuracy, follow a number, or fit numbers to measured ones."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from workflows.cli_words import Flag, Json, Overrides, aside, print_lines, quantity
+from workflows.cli_words import PICTURE, Flag, Json, Overrides, aside, make_room, print_lines, quantity
 
 Knobs = Annotated[tuple[str, ...], Parameter(name="--knob", negative=(), consume_multiple=False)]
 
@@ -38,6 +38,7 @@ def bench(
     from workflows import bench as benchmark
 
     if scaling:
+        make_room(out, PICTURE)
         _scaling(quick, out, as_json)
         return
     rows = benchmark.run(quick, aside)
@@ -49,7 +50,6 @@ def _scaling(quick: bool, out: Path, as_json: bool) -> None:
     from workflows.progress import Progress, console_progress
 
     progress = Progress() if as_json else console_progress()
-    out.parent.mkdir(parents=True, exist_ok=True)
     rows = measured.run(measured.QUICK if quick else measured.FULL, progress.say)
     measured.picture(rows).savefig(out)
     if as_json:
@@ -95,6 +95,7 @@ def trade(
     from workflows import trade as wear_step
 
     if knob == ("wear_step",):
+        make_room(out, PICTURE)
         table = wear_step.wear_step(scene, aside, overrides)
         if out is not None:
             wear_step.picture(table).savefig(out)
@@ -106,6 +107,7 @@ def trade(
         if not kept.kept:
             sys.exit(1)
         return
+    make_room(out, (".json",))
     path = out or Path("results") / Path(scene).stem / "trade.json"
     earlier = trade_table.load(path) if knob and path.exists() else None
     found = knob_trade.run(scene, knob, overrides, aside, most, lambda table: trade_table.save(table, path), earlier)
@@ -135,6 +137,7 @@ def converge(
     """
     from workflows import converge as study
 
+    make_room(out)
     found = study.run(scene, overrides, most, aside)
     folder = out or Path("results") / found[0].scene
     folder.mkdir(parents=True, exist_ok=True)
@@ -164,7 +167,7 @@ def extremes(
     from workflows import extremes as table
     from workflows import extremes_picture
 
-    out.parent.mkdir(parents=True, exist_ok=True)  # what cannot be written is told now, not after minutes
+    make_room(out, PICTURE)
     rows = table.run(quick, aside)
     extremes_picture.picture(rows).savefig(out)
     print(json.dumps(table.as_records(rows), indent=2) if as_json else table.as_text(rows))
@@ -213,6 +216,7 @@ def track(
     from workflows import scene_file, tracking
     from workflows.progress import Progress, console_progress
 
+    make_room(out)
     unit = tracking.UNITS[against]
     ends = quantity("--from", start, unit), quantity("--to", stop, unit)
     file = scene_file.read(scene, overrides)
@@ -264,6 +268,7 @@ def backbone(
     from workflows import modes, scene_file
     from workflows.progress import Progress, console_progress
 
+    make_room(out)
     file = scene_file.read(scene, overrides)
     ends = quantity("--from", start, "m"), quantity("--to", stop, "m")
     found = modes.follow(file, *ends, mode, points, Progress() if as_json else console_progress())
@@ -286,4 +291,25 @@ def backbone(
         print(folder / "backbone.csv", folder / "backbone.png", sep="\n")
 
 
-COMMANDS = (bench, trade, converge, extremes, track, backbone)
+def identify(scene: str, task: Path, *, overrides: Overrides = (), as_json: Json = False) -> None:
+    """Fit named numbers of a scene to measured ones, within bounds, and say how well these determine them.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene or a .toml file; nothing is written into it.
+    task
+        File with the numbers that are looked for and those that were measured, such as workflows/fits/rig.toml.
+    as_json
+        Print JSON for machines.
+    """
+    from workflows import fit_file
+
+    found, changes = fit_file.run(scene, overrides, fit_file.read(task), aside)
+    if as_json:
+        print(json.dumps({**found.record(), "set": changes}, indent=2))
+    else:
+        print(found.report(), "", "to go on with what was found:", *(f'  --set "{c}"' for c in changes), sep="\n")
+
+
+COMMANDS = (bench, trade, converge, extremes, track, backbone, identify)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
@@ -14,6 +16,7 @@ Overrides = Annotated[
 Changes = Annotated[tuple[str, ...], Parameter(name="--change", negative=(), consume_multiple=False)]
 Json = Annotated[bool, Parameter(name="--json", negative=())]
 Flag = Annotated[bool, Parameter(negative=())]
+PICTURE = (".png", ".pdf", ".svg")
 
 
 def aside(sentence: str) -> None:
@@ -29,6 +32,24 @@ def quantity(name: str, text: str, unit: str) -> float:
         return to_si(text, unit)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
+
+
+def make_room(out: Path | None, endings: Sequence[str] = ()) -> None:
+    """Make sure, before long work, that its outcome can be written to --out: to a folder, or a file of these endings.
+
+    Raises  ValueError with one sentence
+    """
+    if out is None:
+        return
+    if endings and out.suffix.lower() not in endings:
+        raise ValueError(f"--out {out}: give a file that ends with {' or '.join(endings)}")
+    if endings and out.is_dir():
+        raise ValueError(f"--out {out}: a folder is there, give a file")
+    folder = out.parent if endings else out
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(f"--out {out}: no folder can be made at {folder}, {str(error.strerror).lower()}") from None
 
 
 def print_lines(lines: list[tuple[str, str]]) -> None:

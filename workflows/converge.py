@@ -105,7 +105,9 @@ def _climb(scene: str, ladder: Ladder, base: tuple[str, ...], most: float, say: 
         known = [(s.size, v) for s, grid in zip(settings, measured, strict=True) if (v := _values(grid, quantity))]
         if len(known) >= 3:
             limits[quantity] = limit_of([size for size, _ in known], [values for _, values in known])
-    finest = next(grid[0] for grid in reversed(measured) if grid[0].outcome == CONVERGED)
+    finest = next((grid[0] for grid in reversed(measured) if grid[0].outcome == CONVERGED), None)
+    if finest is None:
+        raise RuntimeError(f"{ladder.name}: no grid has an answer, the finest says: {measured[-1][0].outcome}")
     own = scene_file.read(scene, base).scene
     rows = tuple(
         Row(

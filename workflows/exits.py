@@ -5,10 +5,15 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
+from _thread import interrupt_main
 from collections.abc import Callable
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import cyclopts
+
+if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
 
 BAD_INPUT, FAILED_SOLVE, INTERRUPTED = 2, 3, 130
 READER_LEFT = 128 + 13  # as a shell counts the end by SIGPIPE, which Windows has not
@@ -21,11 +26,13 @@ def guard(command: Callable[[], object]) -> None:
     """
     # a shell without job control starts background jobs with Ctrl-C ignored
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    sys.unraisablehook = _interrupt_again
     try:
         try:
             command()
         finally:
-            sys.stdout.flush()
+            if sys.stdout is not None:  # as it is where the shell has closed it
+                sys.stdout.flush()
     except BrokenPipeError:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         for stream in (sys.stdout, sys.stderr):  # what is left in them is flushed when the interpreter ends
@@ -39,6 +46,14 @@ def guard(command: Callable[[], object]) -> None:
         _leave(BAD_INPUT, str(error))
     except (RuntimeError, MemoryError) as error:
         _leave(FAILED_SOLVE, str(error) or "the memory of this machine is not enough for this scene")
+
+
+def _interrupt_again(lost: UnraisableHookArgs) -> None:
+    """Python drops what is raised while it frees an object: a Ctrl-C that came just then comes again a moment later."""
+    if isinstance(lost.exc_value, KeyboardInterrupt):
+        threading.Timer(0.01, interrupt_main).start()
+    else:
+        sys.__unraisablehook__(lost)
 
 
 def _leave(code: int, sentence: str) -> NoReturn:

@@ -172,15 +172,25 @@ def fit(
             )
         return found
 
+    last: tuple[np.ndarray, np.ndarray] = (np.array([]), np.array([]))  # where, and what was predicted there
+
     def residual(unknowns: np.ndarray) -> np.ndarray:
-        return weight * np.log(predicted(unknowns) / target)
+        nonlocal last
+        if not np.array_equal(last[0], unknowns):
+            last = unknowns.copy(), predicted(unknowns)
+        return weight * np.log(last[1] / target)
+
+    def derivative(unknowns: np.ndarray) -> np.ndarray:
+        here, steps = residual(unknowns), _inward(unknowns, high)
+        there = [weight * np.log(predicted(unknowns + step) / target) for step in steps]
+        return np.stack([(r - here) / step.sum() for r, step in zip(there, steps, strict=True)], axis=1)
 
     low, high = np.array([p.scaled(p.low) for p in parameters]), np.array([p.scaled(p.high) for p in parameters])
     best = None
     for start in product(*(p.starts for p in parameters)):
         first = np.array([p.scaled(v) for p, v in zip(parameters, start, strict=True)])
         inside = np.clip(first, low + 1e-6 * (high - low), high - 1e-6 * (high - low))
-        found = least_squares(residual, inside, bounds=(low, high), diff_step=_steps(inside))
+        found = least_squares(residual, inside, jac=derivative, bounds=(low, high))
         if best is None or found.cost < best.cost:
             best = found
     assert best is not None
@@ -204,9 +214,9 @@ def _values(measured: Sequence[Measured]) -> np.ndarray:
     return np.array([m.value for m in measured])
 
 
-def _steps(unknowns: np.ndarray) -> np.ndarray:
-    """Relative steps that make absolute ones of DIFFERENCE."""
-    return DIFFERENCE / np.maximum(np.abs(unknowns), DIFFERENCE)
+def _inward(at: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """One step of DIFFERENCE along each unknown (k, k), down where up is beyond its upper bound."""
+    return np.diag(np.where(at + DIFFERENCE <= high, DIFFERENCE, -DIFFERENCE))
 
 
 def _slope(

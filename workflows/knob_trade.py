@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from hbm.branch import CONVERGED
-from workflows import pipeline, scene_file
+from workflows import scene_file
 from workflows.knobs import Knob, Setting, chosen, knobs_of, study_of
 from workflows.limit import limit_of
 from workflows.measure import Measured, measure
@@ -64,7 +64,7 @@ class Meter:
 
     def of(self, file: scene_file.SceneFile, wears: bool = True, refined: bool = True) -> Measured:
         """As `measure`."""
-        wears = wears and pipeline.wears(file.scene)
+        wears = wears and file.scene.wears
         key = f"{file.scene.model_dump_json()} {wears} {refined}"
         if key not in self._known:
             self._known[key] = measure(file, wears, refined)

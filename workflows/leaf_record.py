@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import zipfile
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from hbm.law import SEPARATES, STICKS
 from workflows.leaf_cases import Case
 from workflows.leaf_response import LINER_NODE, LeafResponse
 from workflows.scene import Scene
+from workflows.whole_file import replacing
 
 COLUMNS = (
     "group", "value", "points", "folds", "fold_hz", "unstable_points", "peak_hz", "peak_um",
@@ -106,8 +106,7 @@ def save(record: Record, scene: Scene, folder: Path) -> None:
     """Write a record; a kill at any moment leaves the old file or the new one."""
     path = file_of(record.case, folder)
     path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_suffix(".part")
-    with open(unfinished, "wb") as file:
+    with replacing(path) as new, new.open("wb") as file:
         np.savez(
             file,
             scene=scene.model_dump_json(),
@@ -116,7 +115,6 @@ def save(record: Record, scene: Scene, folder: Path) -> None:
             amplitude=record.amplitude,
             stable=record.stable,
         )
-    os.replace(unfinished, path)
 
 
 def load(case: Case, scene: Scene, folder: Path) -> Record | None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import csv
 import json
-import resource
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -19,7 +18,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
-from workflows import leaf_figures, leaf_record, scene_file
+from workflows import leaf_figures, leaf_record, memory, scene_file
 from workflows.leaf_cases import Case, cases
 from workflows.leaf_record import COLUMNS, STRUCK_POINT, Record
 from workflows.leaf_response import LeafResponse, respond
@@ -38,12 +37,11 @@ def sizes(response: LeafResponse) -> str:
     assert state.cycle.jacobian is not None
     arrays = (state.x, state.cycle.force, state.cycle.jacobian, state.g, state.residual)
     kilobytes = sum(array.nbytes for array in arrays) / 1024
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     return (
         f"{balance.model.system.n_dof} DOFs; {balance.n_unknown} unknowns = {pairs} pairs x "
         f"{len(balance.parameters.components)} component x {basis.n_coeff} coefficients; "
         f"friction memory {balance.memory.size} numbers; contact state with derivative {kilobytes:.0f} kB; "
-        f"peak memory of the process {peak:.0f} MB"
+        f"peak memory of the process {memory.peak() / 1e6:.0f} MB"
     )
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import resource
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,14 +10,13 @@ from time import process_time
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from hbm import error_controlled_rule, thesis_rule
 from hbm.branch import CONVERGED
 from hbm.evolution import WearProblem
 from hbm.operating_point import OperatingPoint
 from hbm.wear_history import LIFE_SHARE, WearHistory, cycles_to_preload
-from workflows import pipeline
+from workflows import memory, pipeline
 from workflows.progress import Progress
-from workflows.references import delta_max, free_deflection
+from workflows.references import free_deflection
 from workflows.scene_file import SceneFile
 from workflows.trade_table import QUANTITIES
 
@@ -51,7 +48,7 @@ def measure(file: SceneFile, wears: bool = True, refined: bool = True) -> Measur
     """
     values: dict[str, float | None] = dict.fromkeys(QUANTITIES)
     clock = process_time()
-    _forget_peak()
+    memory.forget_peak()
     with TemporaryDirectory() as folder, threadpool_limits(1):
         model = pipeline.build(file, Path(folder), Progress())
         balance, interface = model.balance, model.reduced.interface
@@ -66,7 +63,7 @@ def measure(file: SceneFile, wears: bool = True, refined: bool = True) -> Measur
                 values["peak_m"] = point.amplitude
                 values["energy_J"] = float(energy.sum()) or None  # a contact without friction has no error in energy
                 values["preload_N"] = balance.preload(point.state) or None
-            if wears and pipeline.wears(file.scene):
+            if wears and file.scene.wears:
                 worn = wear(file, model)
                 life = cycles_to_preload(worn)
                 if life is None:
@@ -76,26 +73,20 @@ def measure(file: SceneFile, wears: bool = True, refined: bool = True) -> Measur
                     values["depth_m"], values["life_cycles"] = float(depth.max()), life
         except RuntimeError as failure:
             outcome = str(failure)
-    spent, memory = process_time() - clock, _peak_memory()
+    spent, needed = process_time() - clock, memory.peak()
     flat = (interface.points - interface.points.mean(axis=0)) @ interface.frames.mean(axis=0)[:2].T
-    return Measured(values, flat, interface.area, depth, energy, spent, memory, outcome)
+    return Measured(values, flat, interface.area, depth, energy, spent, needed, outcome)
 
 
-def wear(file: SceneFile, model: pipeline.Model) -> WearHistory:
-    """Wear by the scene's rule until LIFE_SHARE of the preload is left."""
+def wear(file: SceneFile, model: pipeline.Model, left: float = LIFE_SHARE) -> WearHistory:
+    """Wear by the scene's rule until a share `left` of the preload is left."""
     wanted, balance = file.scene.wear, model.balance
     assert wanted is not None
     area, duties = model.reduced.interface.area, pipeline.mission(file.scene)
     law = pipeline.law_of(file.scene, file.folder)
-    problem = WearProblem(balance, duties, law, wanted.coefficient, area, lost_below=LIFE_SHARE)
-    scale = delta_max(file.scene, free_deflection(balance), area)
-    if wanted.rule == "thesis":
-        assert wanted.step is not None
-        share = wanted.step.share
-        limit = wanted.step.depth if share is None else share * scale
-        return thesis_rule.evolve(problem, limit or 0.0, wanted.max_steps)
-    tolerance = error_controlled_rule.Tolerance(wanted.tolerance, scale)
-    return error_controlled_rule.evolve(problem, tolerance, wanted.max_steps)
+    problem = WearProblem(balance, duties, law, wanted.coefficient, area, left)
+    limit = pipeline.step_limit(file.scene, free_deflection(balance), area)
+    return pipeline.evolve(problem, wanted, limit, wanted.max_steps)
 
 
 def depth_at(worn: WearHistory, cycles: float) -> np.ndarray:
@@ -115,21 +106,3 @@ def _peak(file: SceneFile, model: pipeline.Model, refined: bool) -> OperatingPoi
     if refined:
         return site.next(balance, omega, x)
     return pipeline.AtFrequency(pipeline.OUTPUT, omega, site.newton).next(balance, omega, x)
-
-
-def _forget_peak() -> None:
-    """Let the peak memory of this process count from here on, where the system can."""
-    try:
-        Path("/proc/self/clear_refs").write_text("5")
-    except OSError:
-        return
-
-
-def _peak_memory() -> float:
-    """Largest memory of this process since `_forget_peak` [bytes]; since its start where the system cannot forget."""
-    try:
-        lines = Path("/proc/self/status").read_text().splitlines()
-        return 1024.0 * next(int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
-    except (OSError, StopIteration):
-        unit = 1 if sys.platform == "darwin" else 1024
-        return float(unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import partial
@@ -31,21 +30,23 @@ from hbm.harmonic_choice import HarmonicChoice
 from hbm.harmonics import HarmonicBasis
 from hbm.newton import NewtonOptions
 from hbm.operating_point import AtFrequency, AtPeak, BesidePeak
-from hbm.wear_history import WearRow, history, rows_to_go_on
+from hbm.wear_history import WearHistory, WearRow, history, rows_to_go_on
 from reduction.damping import modal_damping, rayleigh
 from reduction.held import hold
 from reduction.linear import stuck_stiffness
 from reduction.model import ReducedModel
 from workflows import curve, matrix_model, part_reduction, references, store, worn_responses
 from workflows.budget import with_budget
+from workflows.checkpoint import Clock, Keeper
 from workflows.contact_surfaces import surface_gap
 from workflows.description import described
 from workflows.fields import with_shown
 from workflows.matrix_scene import MatrixScene
 from workflows.progress import Progress
-from workflows.result import Patch, Result
-from workflows.scene import CENTRIFUGAL, HIGHEST, PartScene, Place, Scene, StaticLoad, unknown_key
+from workflows.result import Result
+from workflows.scene import CENTRIFUGAL, HIGHEST, PartScene, Scene, StaticLoad, unknown_key
 from workflows.scene_file import SceneFile
+from workflows.scene_wear import Place, Wear
 
 OUTPUT = "response"
 NO_GAP = 1e-12  # [m], rounding of node positions
@@ -81,8 +82,8 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
     with threadpool_limits(scene.solver.threads):
         model = build(file, folder, progress, () if earlier is None else earlier.harmonics)
         result = earlier or described(file, model.part, model.balance, model.choice)
-        if wears(scene) and result.patch is not None:
-            step_limit(scene, result.patch)  # raises before anything long is begun
+        if scene.wears and result.patch is not None:
+            step_limit(scene, result.patch.free_deflection, result.patch.area)  # raises before anything long is begun
         previous = None if earlier else store.set_aside(keep.path)
         if previous:
             progress.say(f"the result that was here is now {previous}")
@@ -96,7 +97,7 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
             result = keep(replace(result, frf=frf, references=linear, state="response computed"))
         check_branch(result.frf)
         result = keep(judged(scene, model.balance, result, progress))
-        if wears(scene):
+        if scene.wears:
             with progress.track("wear") as advance:
                 result = wear_down(file, model, result, keep, advance)
         if scene.wear is not None and scene.wear.responses and result.wear_steps:
@@ -153,20 +154,6 @@ def build(file: SceneFile, folder: Path, progress: Progress, chosen: tuple[int, 
     if model.choice is not None:
         progress.say(model.choice.outcome)
     return model
-
-
-def wears(scene: Scene) -> bool:
-    """Whether a scene asks for wear steps."""
-    return scene.wear is not None and scene.wear.max_steps > 0
-
-
-def is_complete(result: Result, scene: Scene) -> bool:
-    """Whether a result holds everything that a scene of the same problem asks for."""
-    if not result.state.startswith("complete") or not wears(scene):
-        return result.state.startswith("complete")
-    assert scene.wear is not None
-    stopped = result.wear is None or result.wear.end.startswith("stopped after")
-    return not stopped or result.wear_steps >= scene.wear.max_steps
 
 
 def check_names(scene: Scene, folder: Path) -> None:
@@ -395,17 +382,28 @@ def wear_down(
     problem = WearProblem(
         model.balance, duties, law_of(scene, file.folder), wear.coefficient, patch.area, wear.lost_below
     )
-    limit = step_limit(scene, patch)
-    if wear.rule == "thesis":
-        worn = thesis_rule.evolve(problem, limit, wear.max_steps, on_row, result.wear)
-    else:
-        tolerance = error_controlled_rule.Tolerance(wear.tolerance, limit)
-        worn = error_controlled_rule.evolve(problem, tolerance, wear.max_steps, on_row, result.wear)
+    limit = step_limit(scene, patch.free_deflection, patch.area)
+    worn = evolve(problem, wear, limit, wear.max_steps, on_row, result.wear)
     result = with_shown(scene, replace(result, wear=worn), model.balance.with_load(duties[0].load), model.part)
     if worn.end.startswith("solve failed"):
         keep(replace(result, state=worn.end))
         raise SolveFailed(f"wear step {len(worn.cycles)}: {worn.end}")
     return result
+
+
+def evolve(
+    problem: WearProblem,
+    wear: Wear,
+    limit: float,
+    max_steps: int,
+    on_row: Callable[[WearRow], None] | None = None,
+    resume: WearHistory | None = None,
+) -> WearHistory:
+    """Wear by the rule that a scene asks for; limit : of `step_limit` [m], the rest as for hbm.thesis_rule."""
+    if wear.rule == "thesis":
+        return thesis_rule.evolve(problem, limit, max_steps, on_row, resume)
+    tolerance = error_controlled_rule.Tolerance(wear.tolerance, limit)
+    return error_controlled_rule.evolve(problem, tolerance, max_steps, on_row, resume)
 
 
 def peak_of(scene: Scene) -> AtPeak:
@@ -416,29 +414,30 @@ def peak_of(scene: Scene) -> AtPeak:
 def mission(scene: Scene) -> tuple[Duty, ...]:
     """Where the cycles that wear are taken: the scene's one place, or the duties of its mission."""
     assert scene.wear is not None
-    newton, peak = newton_options(scene), peak_of(scene)
-
-    def site(place: Place) -> AtFrequency | AtPeak | BesidePeak:
-        if place.frequency is not None:
-            return AtFrequency(OUTPUT, 2 * np.pi * place.frequency, newton)
-        assert place.peak is not None
-        return peak if place.peak == 1.0 else BesidePeak(peak, place.peak)
-
     if not scene.wear.mission:
-        return (Duty(site(scene.wear.at)),)
-    return tuple(Duty(site(duty.at), duty.share, duty.load) for duty in scene.wear.mission)
+        return (Duty(site_of(scene, scene.wear.at)),)
+    return tuple(Duty(site_of(scene, duty.at), duty.share, duty.load) for duty in scene.wear.mission)
 
 
-def step_limit(scene: Scene, patch: Patch) -> float:
+def site_of(scene: Scene, place: Place) -> AtFrequency | AtPeak | BesidePeak:
+    """A place of the scene's response."""
+    if place.frequency is not None:
+        return AtFrequency(OUTPUT, 2 * np.pi * place.frequency, newton_options(scene))
+    assert place.peak is not None
+    return peak_of(scene) if place.peak == 1.0 else BesidePeak(peak_of(scene), place.peak)
+
+
+def step_limit(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:
     """Largest depth of one wear step by the thesis's rule, or delta_max that the other rule measures errors by [m].
 
+    approach : (n_pair,) by which the static loads press the faces into each other without contact [m]; area : [m2]
     Raises  ValueError where delta_max is needed and the scene has none
     """
     assert scene.wear is not None
     step = scene.wear.step
     if scene.wear.rule == "thesis" and step is not None and step.depth is not None:
         return step.depth
-    delta_max = references.delta_max(scene, patch.free_deflection, patch.area)
+    delta_max = references.delta_max(scene, approach, area)
     if not (np.isfinite(delta_max) and delta_max > 0):
         raise ValueError(
             "wear.step: a share of delta_max needs static loads that press the contact of a part held without it; "
@@ -446,49 +445,3 @@ def step_limit(scene: Scene, patch: Patch) -> float:
         )
     share = step.share if scene.wear.rule == "thesis" and step is not None else None
     return delta_max if share is None else share * delta_max
-
-
-class Clock:
-    """Seconds of computing, those of an interrupted run included."""
-
-    def __init__(self, earlier: Result | None):
-        self._before = 0.0 if earlier is None else float(earlier.facts["seconds"])
-        self._start = time.perf_counter()
-
-    def seconds(self) -> float:
-        """Seconds so far."""
-        return self._before + time.perf_counter() - self._start
-
-
-@dataclass(frozen=True)
-class Keeper:
-    """Writes each new state of the result to its file."""
-
-    path: Path
-    clock: Clock
-
-    def __call__(self, result: Result) -> Result:
-        """Write a result with the seconds it took, and give it back."""
-        timed = replace(result, facts={**result.facts, "seconds": self.clock.seconds()})
-        store.save(self.path, timed)
-        return timed
-
-
-def same_problem(first: Scene, second: Scene) -> str:
-    """Empty where one scene's result can be gone on from by the other, else the first key that differs.
-
-    What is drawn, how many wear steps are wanted, how their result is told and how many threads work may differ.
-    """
-    ignored: dict[str, Any] = {"scene": True, "pictures": True, "solver": {"threads"}}
-    ignored["wear"] = {"max_steps", "responses", "split"}
-    return _difference(first.model_dump(exclude=ignored), second.model_dump(exclude=ignored))
-
-
-def _difference(first: Any, second: Any) -> str:
-    if isinstance(first, dict) and isinstance(second, dict):
-        for key in [*first, *(k for k in second if k not in first)]:
-            below = _difference(first.get(key), second.get(key))
-            if below:
-                return f"{key}.{below}".rstrip(".")
-        return ""
-    return "" if first == second else "."

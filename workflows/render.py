@@ -34,7 +34,7 @@ def check() -> None:
     """
     _choose_window()
     try:
-        done = subprocess.run([sys.executable, "-c", PROBE], capture_output=True, timeout=120, check=False)
+        done = subprocess.run([sys.executable, "-c", PROBE], capture_output=True, timeout=300, check=False)
         works = done.returncode == 0
     except (OSError, subprocess.TimeoutExpired):
         works = False

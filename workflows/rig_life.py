@@ -108,6 +108,8 @@ def _pressed(rig: Rig) -> Rig:
 
     if over(HIGHEST) < 0:
         raise NoSolution(f"the platform at {HIGHEST * 1e6:.3g} um makes less than {PRELOAD:.3g} N of preload")
+    if over(LOWEST) > 0:
+        raise NoSolution(f"the platform at {LOWEST * 1e6:.3g} um makes more than {PRELOAD:.3g} N of preload")
     return rig.with_height(float(brentq(over, LOWEST, HIGHEST, xtol=CLOSE)))
 
 

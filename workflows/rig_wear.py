@@ -13,13 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hbm import aft, error_controlled_rule, thesis_rule
+from hbm import aft
 from hbm.balance import HarmonicBalance
 from hbm.evolution import Duty, WearProblem, WearState, assess
 from hbm.operating_point import AtFrequency
 from hbm.wear_history import WearHistory
 from hbm.wear_history import history as joined
 from workflows import pipeline
+from workflows.references import free_deflection
 from workflows.rig_model import NoSolution, Rig
 
 STRIDE = 8  # wear steps between two looks at the preload at rest
@@ -94,17 +95,13 @@ def wear_down(rig: Rig, shift: float, tell: Callable[[str], None]) -> RigWear:
     site = AtFrequency(pipeline.OUTPUT, rig.omega, pipeline.newton_options(rig.scene))
     area, law = rig.plain.interface.area, pipeline.law_of(rig.scene, rig.folder)
     problem, quiet = (WearProblem(b, (Duty(site),), law, wear.coefficient, area) for b in (balance, still))
-    limit = pipeline.step_limit(rig.scene, rig.patch(balance))
+    limit = pipeline.step_limit(rig.scene, free_deflection(balance), area)
     history: WearHistory | None = None
     rest: list[float] = []
     resting: WearState | None = None
     while True:
         count = min(len(rest) + STRIDE, wear.max_steps)
-        if wear.rule == "thesis":
-            history = thesis_rule.evolve(problem, limit, count, resume=history)
-        else:
-            tolerance = error_controlled_rule.Tolerance(wear.tolerance, limit)
-            history = error_controlled_rule.evolve(problem, tolerance, count, resume=history)
+        history = pipeline.evolve(problem, wear, limit, count, resume=history)
         if history.end.startswith("solve failed"):
             raise NoSolution(f"mating height {shift * 1e6:+.3g} um, wear step {len(history.cycles)}: {history.end}")
         for depth in history.depth[len(rest) :]:

@@ -6,8 +6,6 @@ thread.
 
 from __future__ import annotations
 
-import resource
-import sys
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -22,7 +20,7 @@ from threadpoolctl import threadpool_limits
 
 from hbm.branch import CONVERGED
 from hbm.continuation import natural
-from workflows import pipeline, scene_file
+from workflows import memory, pipeline, scene_file
 from workflows.plots import axes_of
 from workflows.style import BLUE, GREY, ORANGE
 
@@ -50,7 +48,7 @@ class Row:
     converged: int
     newton_steps: int
     compliance_error: float
-    peak_bytes: int
+    peak_bytes: float
 
 
 def run(sizes: Sequence[int], say: Callable[[str], None]) -> list[Row]:
@@ -82,7 +80,6 @@ def measure(n_patch: int, points: int = POINTS) -> Row:
         clock.append(time.process_time())
         branch = natural.follow(balance, high, low, options)
         clock.append(time.process_time())
-    unit = 1 if sys.platform == "darwin" else 1024
     return Row(
         n_patch=n_patch,
         contact_dofs=balance.compliance.n_contact,
@@ -94,7 +91,7 @@ def measure(n_patch: int, points: int = POINTS) -> Row:
         converged=sum(outcome == CONVERGED for outcome in branch.outcome),
         newton_steps=int(branch.newton_steps.sum()),
         compliance_error=balance.compliance.error,
-        peak_bytes=unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss,
+        peak_bytes=memory.peak(),
     )
 
 

@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
@@ -16,6 +16,8 @@ from workflows.scene import PartScene, Scene, unknown_key
 
 SCENES = Path(__file__).parent / "scenes"
 MOST_PROBLEMS = 3  # told in one sentence
+
+Kind = TypeVar("Kind", bound=BaseModel)
 
 
 class SceneError(ValueError):
@@ -89,13 +91,17 @@ def parse(text: str, label: str, overrides: Sequence[str] = (), folder: Path = S
         raise SceneError(f"{label} is not valid TOML: {str(error)[0].lower()}{str(error)[1:]}") from None
     for override in overrides:
         _override(data, override)
+    return SceneFile(Path(label).stem, text, tuple(overrides), folder, checked(kind_of(data), data, label))
+
+
+def checked(kind: type[Kind], data: dict[str, Any], label: str) -> Kind:
+    """The data of a file as a table of a kind; raises SceneError that names the file `label` and the keys."""
     try:
-        scene = kind_of(data).model_validate(data)
+        return kind.model_validate(data)
     except ValidationError as error:
-        problems = [_sentence(problem, kind_of(data)) for problem in error.errors()]
+        problems = [_sentence(problem, kind) for problem in error.errors()]
         more = f"; and {len(problems) - MOST_PROBLEMS} more" if len(problems) > MOST_PROBLEMS else ""
         raise SceneError(f"{label}: {'; '.join(problems[:MOST_PROBLEMS])}{more}") from None
-    return SceneFile(Path(label).stem, text, tuple(overrides), folder, scene)
 
 
 def kind_of(data: dict[str, Any]) -> type[Scene]:
@@ -129,13 +135,13 @@ def _override(data: dict[str, Any], text: str) -> None:
         table[path[-1]] = value.strip()
 
 
-def _sentence(problem: Any, scene: type[Scene]) -> str:
+def _sentence(problem: Any, kind_of_file: type[BaseModel]) -> str:
     """One clause out of a problem that pydantic found: the key, what was expected, what was given."""
     location = [item for item in problem["loc"] if isinstance(item, (str, int))]
     kind, given, context = problem["type"], problem["input"], problem.get("ctx", {})
     key = _key(location)
     if kind == "extra_forbidden":
-        return unknown_key(key, _fields(location[:-1], scene))
+        return unknown_key(key, _fields(location[:-1], kind_of_file))
     if kind == "missing":
         return f"{key} is missing"
     if kind == "value_error":
@@ -168,9 +174,9 @@ def _key(location: Sequence[str | int]) -> str:
     return key or "the scene"
 
 
-def _fields(location: Sequence[str | int], scene: type[Scene]) -> list[str]:
+def _fields(location: Sequence[str | int], kind: type[BaseModel]) -> list[str]:
     """Names of the keys that the table at a location may have."""
-    table: Any = scene
+    table: Any = kind
     for item in location:
         if isinstance(table, type) and issubclass(table, BaseModel):
             table = table.model_fields[str(item)].annotation

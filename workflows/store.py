@@ -1,12 +1,10 @@
 """The result file: HDF5 with dimension scales, replaced as a whole at every checkpoint.
 
-Each save writes a new file beside the old one and renames it over it, which the operating system does at once or not at
-all: whoever opens the file, at any moment and after any kill, finds one complete checkpoint.
+Whoever opens the file, at any moment and after any kill, finds one complete checkpoint.
 """
 
 from __future__ import annotations
 
-import contextlib
 import os
 from collections.abc import Mapping
 from dataclasses import fields
@@ -29,6 +27,7 @@ from workflows.result import (
     ShearBounds,
     WornResponses,
 )
+from workflows.whole_file import replacing
 
 FORMAT = "tribodyn result 1"
 
@@ -135,14 +134,8 @@ class ResultError(ValueError):
 
 def save(path: Path, result: Result) -> None:
     """Write a result so that `path` holds either the old or the new one, never a part of it."""
-    new = path.with_name(f"{path.name}.{os.getpid()}.new")
-    try:
-        with h5py.File(new, "w", libver="v110") as file:
-            _write(file, result)
-        os.replace(new, path)
-    finally:
-        with contextlib.suppress(FileNotFoundError):
-            new.unlink()
+    with replacing(path) as new, h5py.File(new, "w", libver="v110") as file:
+        _write(file, result)
 
 
 def set_aside(path: Path) -> Path | None:

@@ -15,6 +15,7 @@ from hbm.branch import CONVERGED
 from workflows.knobs import study_of
 from workflows.limit import limit_of
 from workflows.scene import Scene
+from workflows.whole_file import replacing
 
 FORMAT = "tribodyn trade 2"
 TRADES = Path(__file__).parent / "trades"
@@ -118,7 +119,8 @@ KNOB_KEYS = (
 def save(trade: Trade, path: Path) -> None:
     """Write a trade as JSON."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps({"format": FORMAT, **plain(asdict(trade))}, indent=1) + "\n", encoding="utf-8")
+    with replacing(path) as new:
+        new.write_text(json.dumps({"format": FORMAT, **plain(asdict(trade))}, indent=1) + "\n", encoding="utf-8")
 
 
 def load(path: Path) -> Trade:

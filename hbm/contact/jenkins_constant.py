@@ -10,6 +10,7 @@ import numba
 import numpy as np
 
 from hbm import located as transitions
+from hbm.aft import by_kernel
 from hbm.harmonics import HarmonicBasis
 from hbm.law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
 
@@ -57,14 +58,7 @@ def cycle(
 
     x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_component) slider positions at the start [m]
     """
-    n_pair, n_comp, n_coeff = x.shape
-    samples = basis.to_time(x)
-    force = np.empty_like(samples)
-    jac = np.zeros((n_pair, n_comp * n_coeff, n_comp * n_coeff)) if jacobian else np.zeros((0, 0, 0))
-    status = np.zeros(n_pair, np.int64)
-    product, single = basis.prefix_sums
-    _cycle(samples, parameters.packed(), memory, basis.synthesis, product, single, force, jac, status)
-    return ContactCycle(basis.from_time(force), jac if jacobian else None, status)
+    return by_kernel(_cycle, x, parameters, memory, basis, jacobian)
 
 
 @numba.njit(cache=True)

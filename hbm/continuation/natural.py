@@ -32,6 +32,12 @@ class Options:
     refinements: int = 6
     newton: NewtonOptions = field(default_factory=NewtonOptions)
 
+    def __post_init__(self) -> None:
+        if self.n_points < 2 or self.refinements < 0:
+            raise ValueError(
+                f"natural points need n_points >= 2 and refinements >= 0, not {self.n_points}, {self.refinements}"
+            )
+
 
 def follow(
     problem: HarmonicBalance | Parameter,
