@@ -172,6 +172,18 @@ def test_damping_of_every_harmonic(folder):
             assert np.abs(modal - np.diag(0.02 * np.sqrt(lam))).max() < 1e-6 * np.abs(modal).max()
 
 
+def test_a_couple_is_two_opposite_forces(folder):
+    force = 'group = "couple_leading", opposite = "couple_trailing", direction = "y", value = "60 kN"'
+    couple = f"loads.static={{untwist = {{{force}}}}}"
+    two, one = built(folder), built(folder, couple)
+    system, loads = two.reduced.system, two.balance.excitation.loads
+    expected = sum(value * system.loads[name] for (h, name), value in loads.items() if h == 0)
+    assert one.balance.excitation.loads[0, "untwist"] * one.reduced.system.loads["untwist"] == pytest.approx(expected)
+    assert "opposite" not in scene_file.read("blade").scene.loads.model_dump_json()
+    again = scene_file.from_json(scene_file.read("blade", (couple,)).scene.model_dump_json())
+    assert again.loads.static["untwist"].opposite == "couple_trailing"
+
+
 def test_spinning_wheel_is_stiffer_and_presses_harder(folder):
     still, spun = built(folder), built(folder, "wheel.speed=6000 rpm")
     assert "centrifugal" in spun.reduced.system.loads
@@ -216,6 +228,8 @@ def test_rotation_leads_to_the_left(finished):
         ("wheel.sectors=1", "wheel.sectors: expected a value at least 2"),
         ("wheel.sectors=39", "do not match: .* let wheel.sectors = 39 and wheel.axis be those"),
         ("wheel.axis=-x", "let wheel.sectors = 40 and wheel.axis be those"),
+        ('loads.static={p = {group = "tip", opposite = "clamp", pressure = 1}}', "opposite only with value and direc"),
+        ('loads.static={p = {group = "tip", opposite = "no", direction = "y", value = 1}}', "has no node set 'no'"),
         ("geometry.disk_radius=0.15", r"wheel.seam is missing, .* give wheel.seam = \["),
         ("wheel.speed=6000", "at wheel.speed = 360000 rpm the stiffness matrix is singular"),
         ("wheel.engine=2", r"unknown key wheel.engine \(did you mean engine_order\?\)"),

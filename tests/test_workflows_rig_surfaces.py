@@ -87,9 +87,10 @@ def test_a_measured_face_is_taken_and_each_repair_is_told(damage, repairs, tmp_p
         ({}, ("surfaces.axes=['t1', 't2']",), "it covers 0.002 m in x but the contact 0.005 m"),
         ({}, ("surfaces.cutoff=20 um",), "must lie between two steps of the grid"),
         ({}, ("surfaces.first=nowhere.xyz",), "there is no height map"),
+        ({}, ("surfaces.mating_height=3",), 'give its unit, "3 um"'),
     ],
     ids=["half holes", "nothing", "noise", "too small", "millimetres", "metres", "height", "flat", "turned", "cutoff",
-         "no file"],
+         "no file", "no unit"],
 )  # fmt: skip
 def test_garbage_is_one_sentence_and_exit_code_2(change, more, words, tmp_path, capsys):
     code, _, err = run(write(tmp_path, **change), capsys, *more)

@@ -59,7 +59,10 @@ class Choice:
         settings = ", ".join(row.setting for row in self.rows)
         errors = ", ".join(f"{_name(quantity)} {error:.1e}" for quantity, error in self.errors.items())
         left = f"; the error by {', '.join(self.given)} is not counted" if self.given else ""
-        sure = f"settings {settings}: expected error {errors}{left}; about {self.seconds:.2g} s of one processor"
+        sure = (
+            f"settings {settings}: expected error {errors}{left}; about {self.seconds:.2g} s of one processor "
+            "for model, response and wear, stability and error budget apart"
+        )
         return f"{sure}; nothing else is promised: {self.missed}" if self.missed else sure
 
 

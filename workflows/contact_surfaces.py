@@ -31,10 +31,15 @@ class SurfaceGap:
 def surface_gap(surfaces: Surfaces, interface: ContactInterface, folder: Path) -> SurfaceGap:
     """Gap of a flat contact from the faces that a scene names, files relative to `folder`.
 
-    Raises  ValueError where the patch is not flat, or where a height map cannot be what the scene says
+    Raises  ValueError where the patch is not flat, or where a height map or the mating height cannot be what the scene
+        says
     """
     nodes = patch_coordinates(interface, surfaces.axes)
     size = np.ptp(nodes, axis=0)
+    if abs(surfaces.mating_height) > size.max():
+        raise ValueError(
+            f'surfaces.mating_height is {surfaces.mating_height:g} m, more than the face is long: give its unit, "3 um"'
+        )
     waves: list[HeightMap] = []
     repairs: list[str] = []
     for face in faces(surfaces, folder):

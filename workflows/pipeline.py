@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 import fem.part
 from fem.constraints import Clamp, NoMeanRotation
 from fem.interface import COMPONENTS
-from fem.loads import Centrifugal, Load, NodalForce, Pressure
+from fem.loads import Centrifugal, Couple, Load, NodalForce, Pressure
 from fem.part import Part
 from fem.springs import Spring
 from fem.system import SecondOrderSystem
@@ -223,8 +223,12 @@ def springs(scene: PartScene) -> list[Spring]:
 
 
 def make_load(load: StaticLoad) -> Load:
-    """A force at the nodes of a group, or a pressure on a face."""
-    return Pressure(load.group) if load.direction is None else NodalForce(load.group, load.direction)
+    """A force at the nodes of a group, a couple of two forces, or a pressure on a face."""
+    if load.direction is None:
+        return Pressure(load.group)
+    if load.opposite is not None:
+        return Couple(load.group, load.opposite, load.direction)
+    return NodalForce(load.group, load.direction)
 
 
 def reduce_part(scene: PartScene, part: Part) -> ReducedModel:

@@ -126,7 +126,12 @@ def _contact(scene: PartScene, mesh: object, node_sets: dict[str, np.ndarray], f
     contact = scene.contact
     faces = [*contact.groups, *([] if contact.opposite is None else [contact.opposite])]
     loads = [*scene.loads.static.values(), *scene.loads.harmonic.values()]
-    points = [(load.group, load.direction) for load in loads if load.direction is not None]
+    points = [
+        (group, load.direction)
+        for load in loads
+        for group in (load.group, load.opposite)
+        if load.direction is not None and group is not None
+    ]
     points += [(output.group, output.direction) for output in (scene.response, *scene.response.others.values())]
     nodes = [named(node_sets, name, "face") for name in faces]
     corners = np.arange(int(mesh.nvertices))  # type: ignore[attr-defined]

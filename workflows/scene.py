@@ -11,11 +11,13 @@ from typing import Annotated, Any, Generic, Literal, TypeVar
 
 from pydantic import (
     Field,
+    SerializerFunctionWrapHandler,
     StrictBool,
     StrictInt,
     ValidatorFunctionWrapHandler,
     WrapValidator,
     field_serializer,
+    model_serializer,
     model_validator,
 )
 
@@ -145,18 +147,32 @@ class Prescribed(Table):
 
 
 class StaticLoad(Table):
-    """A load that does not change: a force shared equally by the nodes of a group, or a pressure into a face."""
+    """A load that does not change: a force shared equally by the nodes of a group, or a pressure into a face.
+
+    opposite : group on which the same force acts the other way: a couple
+    """
 
     group: str
     direction: Direction | None = None
     value: Force | None = None
     pressure: Pressure | None = None
+    opposite: str | None = None
 
     @model_validator(mode="after")
     def _one_kind(self) -> StaticLoad:
         if (self.pressure is None) == (self.value is None) or (self.value is None) != (self.direction is None):
             raise ValueError("expected either value and direction, for a force, or pressure alone")
+        if self.opposite is not None and self.pressure is not None:
+            raise ValueError("expected opposite only with value and direction, for a couple of forces")
         return self
+
+    @model_serializer(mode="wrap")
+    def _without_none(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """A force that is no couple is told as ever, so that results and tables made before are of the same scene."""
+        said: dict[str, Any] = write(self)
+        if self.opposite is None:
+            said.pop("opposite", None)
+        return said
 
     @property
     def amplitude(self) -> float:
