@@ -11,6 +11,7 @@ from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsed
 from rich.progress import Progress as Bar
 
 NOTE_EVERY = 15.0  # seconds between lines where there is no terminal to draw a bar on
+FORESEEN = 0.02  # share of the work from which on the time left is told: the first steps compile
 
 
 class Progress:
@@ -50,8 +51,8 @@ class Progress:
             now = time.perf_counter()
             if now - last >= NOTE_EVERY and share > 0:
                 last = now
-                left = (now - start) * (1 / min(share, 1.0) - 1)
-                self.say(f"{name}: {min(share, 1.0):.0%}, {left:.0f} s left; {note}".rstrip("; "))
+                left = f", {(now - start) * (1 / min(share, 1.0) - 1):.0f} s left" if share >= FORESEEN else ""
+                self.say(f"{name}: {min(share, 1.0):.0%}{left}; {note}".rstrip("; "))
 
         return advance
 
