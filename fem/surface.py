@@ -52,7 +52,8 @@ def surface(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -> Surfa
     area = np.bincount(local.ravel(), weighted.ravel())
     if (area <= 1e-9 * area.sum()).any():
         raise ValueError(
-            "consistent areas are not positive at the corners of these faces; use vertices only, or nine-node faces"
+            "consistent areas vanish at the corners of six-node faces, which tetrahedra have: take their vertices only "
+            "(contact.vertices_only = true in a scene), or mesh with 27-node hexahedra"
         )
     summed = np.stack([np.bincount(local.ravel(), vectors[:, :, i].ravel()) for i in range(3)], axis=1)
     normals = summed / np.linalg.norm(summed, axis=1, keepdims=True)

@@ -41,6 +41,11 @@ def table() -> Trade:
     return dear_by_size(knob_trade.run("beam", TRADED, NO_WEAR, lambda text: None))
 
 
+def knobs_of(scene: str) -> tuple[knobs.Knob, ...]:
+    file = scene_file.read(scene)
+    return knobs.knobs_of(file, knobs.study_of(file))
+
+
 def set_of(overrides: tuple[str, ...]) -> list[str]:
     return [word for text in overrides for word in ("--set", text)]
 
@@ -199,7 +204,7 @@ def test_every_scene_has_a_trade_that_was_measured_on_it_as_it_is() -> None:
     for name in scene_file.names():
         found = accuracy.table_of(scene_file.read(name), trade_table.TRADES / f"{name}.json")
         assert len(found.knobs) >= 8
-        settings = {knob.name: knob.settings for knob in knobs.knobs_of(scene_file.read(name), knobs.study_of(name))}
+        settings = {knob.name: knob.settings for knob in knobs_of(name)}
         assert set(found.knobs) <= set(settings)
 
 
@@ -243,7 +248,7 @@ def test_nothing_is_worn_where_no_wear_is_asked_for() -> None:
 def test_a_knob_that_the_scene_has_not_is_refused() -> None:
     with pytest.raises(ValueError, match="the scene has the knobs fe_mesh, contact_grid, nodes, modes"):
         knob_trade.run("beam", ("wheels",), NO_WEAR, lambda text: None)
-    known = {scene: knobs.knobs_of(scene_file.read(scene), knobs.study_of(scene)) for scene in scene_file.names()}
+    known = {scene: knobs_of(scene) for scene in scene_file.names()}
     has = {scene: {knob.name for knob in found} for scene, found in known.items()}
     assert {"wear", "friction", "interface_rank"} <= has["beam"]
     assert not {"wear", "friction", "nodes"} & has["leaf_seal"]
@@ -258,7 +263,7 @@ def test_a_knob_that_the_scene_has_not_is_refused() -> None:
 
 def test_every_setting_of_every_knob_is_a_scene() -> None:
     for scene in scene_file.names():
-        study = knobs.study_of(scene)
+        study = knobs.study_of(scene_file.read(scene))
         for knob in knobs.knobs_of(scene_file.read(scene, study.base), study):
             for setting in knob.settings:
                 assert scene_file.read(scene, (*study.base, *setting.overrides)).name == scene

@@ -174,7 +174,7 @@ def _refusal(
     sentence = (
         f"an accuracy of {wanted:.3g} is more than the trade of {scene} can promise: {_name(quantity)} is known to "
         f"{least}, of which {ladders[knob][place[knob]].setting} of knob {knob} leaves {shares[knob]:.2g}; "
-        f"give that knob finer settings in workflows/studies/{scene}.toml and measure them with tribodyn trade {scene}"
+        f"give that knob finer settings in the study of {scene} and measure them with tribodyn trade"
         f"{instead}"
     )
     return Refused(sentence, quantity)
@@ -236,7 +236,7 @@ def advice(trade: Trade, wanted: float = 0.01) -> list[str]:
         try:
             found = choose(trade, wanted, [quantity])
         except ValueError as refusal:
-            lines.append(f"for {wanted:.3g} on {name}: {refusal}")
+            lines.append(f"for {100 * wanted:.3g} % on {name}: {refusal}")
             continue
         settings = ", ".join(row.setting for row in found.rows)
         lines.append(f"for {100 * wanted:.3g} % on {name} use {settings}: {found.seconds:.2g} s")
@@ -252,14 +252,14 @@ def table_of(file: SceneFile, path: Path | None = None) -> Trade:
     places = [path] if path is not None else [p for p in (here, TRADES / f"{file.name}.json") if p.is_file()]
     for place in places:
         trade = load(place)
-        if trade.key == key_of(file.name, file.scene):
+        if trade.key == key_of(file):
             return trade
     if places:
         raise ValueError(
             f"the trade in {places[0]} was measured on another scene than this {file.name}: measure it again with "
-            f"tribodyn trade {file.name} and the same --set"
+            f"tribodyn trade {file.word} and the same --set"
         )
-    raise ValueError(f"no trade was measured for {file.name}: measure it with tribodyn trade {file.name}")
+    raise ValueError(f"no trade was measured for {file.name}: measure it with tribodyn trade {file.word}")
 
 
 def tuned(name: str, overrides: Sequence[str], wanted: str, path: Path | None = None) -> tuple[SceneFile, Choice]:

@@ -22,7 +22,7 @@ from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from hbm.branch import CONVERGED
 from workflows import limit, scene_file
-from workflows.knobs import Ladder, Setting, study_of
+from workflows.knobs import Ladder, Setting, study_of, study_path
 from workflows.limit import Limit
 from workflows.measure import Measured, measure
 from workflows.style import BLUE, GREEN, GREY, ORANGE, STYLE
@@ -81,9 +81,10 @@ def run(scene: str, overrides: Sequence[str], most: float, say: Callable[[str], 
 
     Raises  ValueError for a scene whose study has no ladders, or fewer than three grids
     """
-    study = study_of(scene_file.find(scene).stem)
+    file = scene_file.read(scene)
+    study = study_of(file)
     if not study.ladders:
-        raise ValueError(f"there is no study of grids for {scene}: name them in workflows/studies/{scene}.toml")
+        raise ValueError(f"{file.name} has no study of its grids: name them under [converge] in {study_path(file)}")
     return tuple(_climb(scene, ladder, (*ladder.base, *overrides), most, say) for ladder in study.ladders)
 
 

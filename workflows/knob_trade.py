@@ -32,8 +32,8 @@ def run(
     earlier : table of the same scene, whose other knobs are taken over
     Raises  ValueError for a knob that the scene does not have
     """
-    name = scene_file.find(scene).stem
-    study = study_of(name)
+    plain = scene_file.read(scene, overrides)
+    study = study_of(plain)
     base = (*study.base, *overrides)
     file = scene_file.read(scene, base)
     knobs = chosen(knobs_of(file, study), names)
@@ -41,7 +41,7 @@ def run(
     meter = Meter()
     response, once = meter.of(file, wears=False), meter.of(file)
     say(f"{BASE}: {once.seconds:.1f} s, {once.outcome}")
-    found = Trade(file.name, key_of(name, scene_file.read(scene, overrides).scene), base, once.seconds, ())
+    found = Trade(file.name, key_of(plain), base, once.seconds, ())
     if earlier is not None and (earlier.key, earlier.base) == (found.key, found.base):
         measured = {knob.name for knob in knobs}
         found = replace(found, rows=tuple(row for row in earlier.rows if row.knob not in measured))

@@ -25,6 +25,7 @@ CUTOFFS = (0.25, 0.5, 1, 2)  # over that of the scene
 RANKS = (3, 6, 12, 24)
 WEAR_STEPS = (0.1, 0.05)  # of delta_max
 WEAR_TOLERANCES = (0.3, 0.1, 0.03, 0.01, 0.003)
+TEXTS = ("base", "unworn", "check", "check_worn")  # keys of a study that are lists of texts
 EXACT = float("nan")  # size of a setting that leaves no error
 
 
@@ -102,13 +103,28 @@ class Study:
     check_worn: tuple[str, ...] = ()
 
 
-def study_of(name: str) -> Study:
-    """The study that comes with a scene of this name; an empty one where none does."""
-    path = STUDIES / f"{name}.toml"
+def study_path(file: SceneFile) -> Path:
+    """Where the study of a scene lies: with the program, or beside a scene of one's own."""
+    return STUDIES / f"{file.name}.toml" if file.comes_along else file.folder / f"{file.name}.study.toml"
+
+
+def study_of(file: SceneFile) -> Study:
+    """The study of a scene, an empty one where there is none; raises ValueError for a file that is no study."""
+    path = study_path(file)
     if not path.is_file():
         return Study()
-    text = path.read_text(encoding="utf-8")
-    table = tomllib.loads(text)
+    try:
+        return _study(tomllib.loads(path.read_text(encoding="utf-8")))
+    except ValueError as trouble:
+        raise ValueError(f"{path}: {trouble}") from None
+    except (TypeError, AttributeError):
+        raise ValueError(f"{path} is no study: write its tables as those in workflows/studies") from None
+
+
+def _study(table: dict[str, Any]) -> Study:
+    unknown = set(table) - {"knobs", "converge", *TEXTS}
+    if unknown:
+        raise ValueError(f"a study has no {', '.join(sorted(unknown))}, but knobs, converge, {', '.join(TEXTS)}")
     knobs = tuple(
         Knob(knob, _settings(given), worn_up_to=float(given.get("worn_up_to", math.inf)))
         for knob, given in table.get("knobs", {}).items()
@@ -124,13 +140,15 @@ def study_of(name: str) -> Study:
         )
         for ladder, given in table.get("converge", {}).items()
     )
-    said = {name: tuple(table.get(name, ())) for name in ("base", "unworn", "check", "check_worn")}
+    said = {name: tuple(table.get(name, ())) for name in TEXTS}
     return Study(knobs=knobs, ladders=ladders, **said)
 
 
 def _settings(table: dict[str, Any]) -> tuple[Setting, ...]:
-    pairs = zip(table["sizes"], table["set"], strict=True)
-    return tuple(Setting(float(size), tuple(texts)) for size, texts in pairs)
+    sizes, texts = table.get("sizes", ()), table.get("set", ())
+    if not sizes or len(sizes) != len(texts) or not all(isinstance(one, list) for one in texts):
+        raise ValueError('every knob and ladder needs sizes = [1, 2] and as many set = [["section.key=value"], []]')
+    return tuple(Setting(float(size), tuple(one)) for size, one in zip(sizes, texts, strict=True))
 
 
 def knobs_of(file: SceneFile, study: Study) -> tuple[Knob, ...]:

@@ -63,7 +63,7 @@ def check(
     wanted, *_ = parsed(accuracy)
     file, choice = tuned(scene, overrides, accuracy, table)
     say(choice.sentence)
-    trade, study = table_of(scene_file.read(scene, overrides), table), study_of(file.name)
+    trade, study = table_of(scene_file.read(scene, overrides), table), study_of(file)
     worn = [q for q in choice.errors if q in OF_WEAR]
     others = [q for q in choice.errors if q not in OF_WEAR]
     ours = _measured(file, bool(worn), False, say)

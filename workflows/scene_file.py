@@ -41,6 +41,16 @@ class SceneFile:
     scene: Scene
 
     @property
+    def word(self) -> str:
+        """By what a command knows it: the name of a scene that comes with the program, the path of another one."""
+        return self.name if self.comes_along else str(self.folder / f"{self.name}.toml")
+
+    @property
+    def comes_along(self) -> bool:
+        """Whether it is a scene that comes with the program."""
+        return self.folder.resolve() == SCENES.resolve()
+
+    @property
     def part_scene(self) -> PartScene:
         """The scene, for what needs a mesh; raises SceneError where it is one of matrices."""
         if not isinstance(self.scene, PartScene):

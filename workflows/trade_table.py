@@ -14,7 +14,7 @@ import numpy as np
 from hbm.branch import CONVERGED
 from workflows.knobs import study_of
 from workflows.limit import limit_of
-from workflows.scene import Scene
+from workflows.scene_file import SceneFile
 from workflows.whole_file import replacing
 
 FORMAT = "tribodyn trade 2"
@@ -91,13 +91,10 @@ def known_of(rows: Iterable[Row], quantity: str) -> list[tuple[float, float]]:
     ]
 
 
-def key_of(name: str, scene: Scene) -> str:
-    """A short name of everything in a scene that its trade depends on; the knobs themselves are not among it.
-
-    name : of the scene, whose study has knobs of its own
-    """
-    said = scene.model_dump(mode="json", exclude={"scene": True, "pictures": True, "solver": True})
-    own = {text.partition("=")[0] for k in study_of(name).knobs for s in k.settings for text in s.overrides}
+def key_of(file: SceneFile) -> str:
+    """A short name of everything in a scene that its trade depends on; the knobs themselves are not among it."""
+    said = file.scene.model_dump(mode="json", exclude={"scene": True, "pictures": True, "solver": True})
+    own = {text.partition("=")[0] for k in study_of(file).knobs for s in k.settings for text in s.overrides}
     for key in {*KNOB_KEYS, *own}:
         section, _, last = key.partition(".")
         for table in (said.get(section), (said.get(section) or {}).get("parameters")):
