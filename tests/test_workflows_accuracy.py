@@ -396,6 +396,16 @@ def test_what_no_estimator_covers_is_known_from_the_trade() -> None:
         assert "finer settings alone" in how
 
 
+def test_samples_do_not_make_another_setting_where_transitions_are_located() -> None:
+    """The trade's harmonics are measured with more samples than the scene has; sampled ones would be another result."""
+    for transitions, known in (("located", True), ("sampled", False)):
+        file = scene_file.read("beam", (f'harmonics.transitions="{transitions}"',))
+        overrides = ("harmonics.kept=[0, 1]", "harmonics.samples=128")
+        assert (budget._compared(file, overrides) == budget.SAME) == known
+    errors = {e.quantity: e.error for e in budget._of_trade(scene_file.read("beam"), ()) if e.source == "harmonics"}
+    assert errors["life"] > 0.5  # the life at the peak does not settle with harmonics
+
+
 def test_where_one_step_tells_nothing_of_the_harmonics_the_trade_does(tmp_path: Path) -> None:
     """The highest point of the leaf seal is a fold, at which a step at the same frequency leads anywhere."""
     table = trade_table.load(trade_table.TRADES / "leaf_seal.json")

@@ -164,7 +164,7 @@ def _of_trade(file: SceneFile, estimated: Sequence[str]) -> Iterator[Entry]:
         row, how = next(((r, how) for r, how in known if how == SAME), known[-1])
         for quantity, label in zip(QUANTITIES, NAMES, strict=True):
             error = _off(trade, knob, row.setting, quantity)
-            if error is not None:
+            if error:  # none is left where a knob stands at what it tends to
                 yield Entry(name, label, error, f"trade: {how}{row.setting}")
 
 
@@ -185,6 +185,8 @@ def _compared(file: SceneFile, overrides: tuple[str, ...]) -> str | None:
     except SceneError:
         return None
     ours, theirs = file.scene.model_dump(), other.model_dump()
+    if file.scene.harmonics.transitions == other.harmonics.transitions == "located":
+        del ours["harmonics"]["samples"], theirs["harmonics"]["samples"]  # they find transitions, and move nothing else
     pairs = list(_differences(ours, theirs))
     if not pairs:
         return SAME
