@@ -164,11 +164,9 @@ def forces(blade: Blade, extent: Extent) -> dict[float, Curve]:
 
 def problem_of(blade: Blade) -> tuple[WearProblem, float]:
     """The wear of the scene until every pair is separated, and its delta_max [m]."""
-    scene, balance = blade.scene, blade.wave()
-    assert scene.wear is not None
-    area, law = balance.model.interface.area, pipeline.law_of(scene, blade.file.folder)
-    problem = WearProblem(balance, pipeline.mission(scene), law, scene.wear.coefficient, area)
-    return problem, delta_max(scene, free_deflection(balance), area)
+    balance = blade.wave()
+    problem = pipeline.wear_problem(blade.scene, blade.file.folder, balance)
+    return problem, delta_max(blade.scene, free_deflection(balance), problem.area)
 
 
 def wear(problem: WearProblem, delta: float, step: float) -> Worn:

@@ -11,7 +11,6 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from hbm.branch import CONVERGED
-from hbm.evolution import WearProblem
 from hbm.operating_point import OperatingPoint
 from hbm.wear_history import LIFE_SHARE, WearHistory, cycles_to_preload
 from workflows import memory, pipeline
@@ -82,10 +81,8 @@ def wear(file: SceneFile, model: pipeline.Model, left: float = LIFE_SHARE) -> We
     """Wear by the scene's rule until a share `left` of the preload is left."""
     wanted, balance = file.scene.wear, model.balance
     assert wanted is not None
-    area, duties = model.reduced.interface.area, pipeline.mission(file.scene)
-    law = pipeline.law_of(file.scene, file.folder)
-    problem = WearProblem(balance, duties, law, wanted.coefficient, area, left)
-    limit = pipeline.step_limit(file.scene, free_deflection(balance), area)
+    problem = pipeline.wear_problem(file.scene, file.folder, balance, left)
+    limit = pipeline.step_limit(file.scene, free_deflection(balance), problem.area)
     return pipeline.evolve(problem, wanted, limit, wanted.max_steps)
 
 

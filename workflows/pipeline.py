@@ -382,17 +382,21 @@ def wear_down(
         done = float(patch.area @ (row.depth + row.worn)) / to_wear if to_wear > 0 else 0.0
         advance(done, f"step {len(rows)}, {row.cycles + row.cycles_in_step:.3g} cycles, {row.preload:.4g} N")
 
-    duties = mission(scene)
-    problem = WearProblem(
-        model.balance, duties, law_of(scene, file.folder), wear.coefficient, patch.area, wear.lost_below
-    )
+    problem = wear_problem(scene, file.folder, model.balance, wear.lost_below)
     limit = step_limit(scene, patch.free_deflection, patch.area)
     worn = evolve(problem, wear, limit, wear.max_steps, on_row, result.wear)
-    result = with_shown(scene, replace(result, wear=worn), model.balance.with_load(duties[0].load), model.part)
+    result = with_shown(scene, replace(result, wear=worn), model.balance.with_load(problem.mission[0].load), model.part)
     if worn.end.startswith("solve failed"):
         keep(replace(result, state=worn.end))
         raise SolveFailed(f"wear step {len(worn.cycles)}: {worn.end}")
     return result
+
+
+def wear_problem(scene: Scene, folder: Path, balance: HarmonicBalance, lost_below: float = 0.0) -> WearProblem:
+    """What a scene wears, by its law and mission; folder : of the scene; the rest as `WearProblem` has it."""
+    assert scene.wear is not None
+    law, area = law_of(scene, folder), balance.model.interface.area
+    return WearProblem(balance, mission(scene), law, scene.wear.coefficient, area, lost_below)
 
 
 def evolve(

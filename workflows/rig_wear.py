@@ -15,8 +15,7 @@ import numpy as np
 
 from hbm import aft
 from hbm.balance import HarmonicBalance
-from hbm.evolution import Duty, WearProblem, WearState, assess
-from hbm.operating_point import AtFrequency
+from hbm.evolution import WearState, assess
 from hbm.wear_history import WearHistory
 from hbm.wear_history import history as joined
 from workflows import pipeline
@@ -92,9 +91,8 @@ def wear_down(rig: Rig, shift: float, tell: Callable[[str], None]) -> RigWear:
     assert wear is not None
     rig = rig.with_mating_height(shift)
     balance, still = rig.model().balance, rig.with_force(0.0).model().balance
-    site = AtFrequency(pipeline.OUTPUT, rig.omega, pipeline.newton_options(rig.scene))
-    area, law = rig.plain.interface.area, pipeline.law_of(rig.scene, rig.folder)
-    problem, quiet = (WearProblem(b, (Duty(site),), law, wear.coefficient, area) for b in (balance, still))
+    problem, quiet = (pipeline.wear_problem(rig.scene, rig.folder, b) for b in (balance, still))
+    area = problem.area
     limit = pipeline.step_limit(rig.scene, free_deflection(balance), area)
     history: WearHistory | None = None
     rest: list[float] = []

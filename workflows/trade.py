@@ -98,15 +98,10 @@ def wear_step(scene: str, say: Callable[[str], None], overrides: tuple[str, ...]
 
 
 def _problem(file: scene_file.SceneFile) -> tuple[WearProblem, float]:
-    scene = file.scene
-    assert scene.wear is not None
     with TemporaryDirectory() as folder, threadpool_limits(1):
         model = pipeline.build(file, Path(folder), Progress())
-    wear, area = scene.wear, model.reduced.interface.area
-    duties = pipeline.mission(scene)
-    law = pipeline.law_of(scene, file.folder)
-    problem = WearProblem(model.balance, duties, law, wear.coefficient, area, lost_below=LIFE_SHARE)
-    return problem, delta_max(scene, free_deflection(model.balance), area)
+    problem = pipeline.wear_problem(file.scene, file.folder, model.balance, LIFE_SHARE)
+    return problem, delta_max(file.scene, free_deflection(model.balance), problem.area)
 
 
 def _measure(problem: WearProblem, delta: float, rule: str, step: float, say: Callable[[str], None]) -> Row:
