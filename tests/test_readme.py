@@ -14,6 +14,7 @@ import pytest
 
 import hbm
 from reduction import foreign
+from workflows import accuracy, trade_table
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
@@ -77,3 +78,37 @@ def test_the_map_of_the_solver_names_every_module_once() -> None:
     named = re.findall(r"\w+", (hbm.__doc__ or "").partition("\n")[2])
     for module in pkgutil.iter_modules(hbm.__path__):
         assert named.count(module.name) == 1, module.name
+
+
+LABELS = {
+    "FE mesh": "fe_mesh", "contact grid": "contact_grid", "vertex nodes only": "nodes", "modes": "modes",
+    "interface rank": "interface_rank", "harmonics 0..1": "harmonics", "32 ... 256 samples": "samples",
+    "uncoupled friction": "friction", "Newton": "newton", "points": "points", "wear tolerance": "wear",
+    "thesis's wear step": "wear_thesis",
+}  # fmt: skip
+COLUMNS = (
+    *((scene, quantity) for scene in ("beam", "blade") for quantity in ("peak_m", "energy_J", "life_cycles")),
+    ("leaf_seal", "peak_m"), *(("rig", quantity) for quantity in ("peak_hz", "energy_J", "life_cycles")),
+)  # fmt: skip
+
+
+def test_the_table_of_errors_says_what_the_trades_say() -> None:
+    """The coarsest and the finest setting that leaves an error, to the digits that are printed."""
+    tables = {name: trade_table.load(trade_table.TRADES / f"{name}.json") for name, _ in COLUMNS}
+    _, _, below = README.partition("| | beam: amplitude | beam: energy |")
+    lines = below.split("\n\n")[0].splitlines()[2:]
+    assert len(lines) == len(LABELS)
+    for line in lines:
+        label, *cells = (cell.strip() for cell in line.strip("|").split("|"))
+        (knob,) = {LABELS[start] for start in LABELS if label.startswith(start)}
+        for (scene, quantity), cell in zip(COLUMNS, cells, strict=True):
+            rows = tables[scene].of(knob)
+            known = [i for i, row in enumerate(rows) if row.errors[quantity] is not None]
+            errors = [error for i in known if (error := accuracy.error_of(rows, i, quantity)) > 0]
+            said = [float(number) for number in re.findall(r"[\d.]+(?:e-\d+)?(?=$|[ ,])", cell) if number != "..."]
+            where = f"{label}: {scene}, {quantity}: {cell}"
+            if not errors:
+                assert not said, where
+                continue
+            for number, error in zip((said[0], said[-1]), (errors[0], errors[-1]), strict=True):
+                assert number == pytest.approx(100 * error, rel=0.25, abs=5e-4), where
