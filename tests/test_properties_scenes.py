@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from tests.random_problems import cases
@@ -120,6 +120,8 @@ def changes(overrides: list[str]) -> list[str]:
 
 @cases(300)
 @given(spoilt())
+@example(("rig", ["wear.step={a = 1}"]))
+@example(("beam", ["wear.mission=[{x = 1}]"]))
 def test_a_spoilt_scene_is_read_or_refused_in_one_sentence(drawn: tuple[str, list[str]]) -> None:
     scene, overrides = drawn
     assert "\n" not in refusal(scene_file.read, scene, overrides)

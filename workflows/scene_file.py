@@ -188,14 +188,19 @@ def _fields(location: Sequence[str | int], kind: type[BaseModel]) -> list[str]:
     """Names of the keys that the table at a location may have."""
     table: Any = kind
     for item in location:
-        if isinstance(table, type) and issubclass(table, BaseModel):
-            table = table.model_fields[str(item)].annotation
-        else:  # dict[str, Table]
-            table = get_args(table)[1]
-        tables = [kind for kind in get_args(table) if isinstance(kind, type) and issubclass(kind, BaseModel)]
-        if tables and not _is_mapping(table):
-            table = tables[0]
+        if isinstance(item, int):  # of a list of tables, which `_table` has entered
+            continue
+        table = table.model_fields[item].annotation if _table(table) is table else get_args(table)[1]
+        if not _is_mapping(table):  # else dict[str, Table], whose next key is a name
+            table = _table(table) or table
     return list(table.model_fields)
+
+
+def _table(annotation: Any) -> Any:
+    """The first table inside an annotation, itself where it is one."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((table for inner in get_args(annotation) if (table := _table(inner))), None)
 
 
 def _is_mapping(annotation: Any) -> bool:
