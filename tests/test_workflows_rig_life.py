@@ -40,7 +40,7 @@ def test_life_and_work_go_with_the_inverse_of_the_coefficient(capsys: pytest.Cap
     assert few["outcome"].startswith("stopped after 2 wear steps")
     assert few["cycles"] is None
     assert few["energy"] == scene["energy"]
-    assert f"less than {PRELOAD:.3g} N of preload" in soft["outcome"]
+    assert f"makes {PRELOAD:.3g} N of preload" in soft["outcome"]
 
 
 def test_a_change_that_the_scene_does_not_know_stops_before_anything(capsys: pytest.CaptureFixture[str]) -> None:

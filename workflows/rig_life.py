@@ -11,17 +11,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 
-from scipy.optimize import brentq
 from threadpoolctl import threadpool_limits
 
 from workflows import scene_file
+from workflows.rig_fit import fit_height
 from workflows.rig_model import NoSolution, Rig
 from workflows.rig_published import LIFE_MEASURED, PRELOAD, TABLE_5_3, WORK
 from workflows.rig_wear import wear_down
 from workflows.scene_file import SceneFile
 
-LOWEST, HIGHEST = 1e-6, 100e-6  # platform heights between which that of the preload is looked for [m]
-CLOSE = 1e-10  # to which it is found [m]
+CLOSE = 1e-6  # of the published preload, to which that of a changed rig is set
 LOST = "lost"
 TRUE_FACE = "; ".join((
     "geometry.contact_length=1.56 mm",
@@ -71,7 +70,8 @@ class Row:
 def run(scene: str, overrides: Sequence[str], changes: Sequence[str], tell: Callable[[str], None]) -> list[Row]:
     """A scene of the rig with `overrides`, and with each of the changes beside.
 
-    changes : each one or several overrides, joined by ";"; CHANGES where empty; tell : as `rig_wear.wear_down`
+    scene : name or path; changes : each one or several overrides, joined by ";", CHANGES where empty
+    tell : as `rig_wear.wear_down`
     Raises  ValueError for a change that the scene does not know, before anything is computed
     """
     files = {"": scene_file.read(scene, overrides)}
@@ -102,15 +102,13 @@ def _row(change: str, file: SceneFile, tell: Callable[[str], None]) -> Row:
 
 def _pressed(rig: Rig) -> Rig:
     """The rig with its platform at the height of the published preload; raises NoSolution where there is none."""
-
-    def over(height: float) -> float:
-        return rig.with_height(height).at_rest().preload - PRELOAD
-
-    if over(HIGHEST) < 0:
-        raise NoSolution(f"the platform at {HIGHEST * 1e6:.3g} um makes less than {PRELOAD:.3g} N of preload")
-    if over(LOWEST) > 0:
-        raise NoSolution(f"the platform at {LOWEST * 1e6:.3g} um makes more than {PRELOAD:.3g} N of preload")
-    return rig.with_height(float(brentq(over, LOWEST, HIGHEST, xtol=CLOSE)))
+    found = fit_height(rig)
+    if abs(found.after[0] / PRELOAD - 1) > CLOSE:
+        raise NoSolution(
+            f"no height of the platform that is looked at makes {PRELOAD:.3g} N of preload, the nearest makes "
+            f"{found.after[0]:.3g} N"
+        )
+    return rig.with_height(found.named()["platform"])
 
 
 def as_text(rows: Sequence[Row]) -> str:
