@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix, vstack
 
-from fem.interface import COMPONENTS, ContactInterface
-from fem.loads import unit
-from fem.matching import TOLERANCE, partners
-from fem.surface import Surface, surface
+from tribodyn.fem.interface import COMPONENTS, ContactInterface
+from tribodyn.fem.loads import unit
+from tribodyn.fem.matching import TOLERANCE, partners
+from tribodyn.fem.surface import Surface, surface
 
 
 def ground_contact(

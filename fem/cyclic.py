@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix, vstack
 
-from fem import part as fem_part
-from fem.constraints import Clamp, named
-from fem.contact import pair_halves
-from fem.interface import ContactInterface
-from fem.loads import Load, NodalForce, unit
-from fem.matching import partners
-from fem.material import Material
-from fem.part import Contact, Part
-from fem.system import SecondOrderSystem
+from tribodyn.fem import part as fem_part
+from tribodyn.fem.constraints import Clamp, named
+from tribodyn.fem.contact import pair_halves
+from tribodyn.fem.interface import ContactInterface
+from tribodyn.fem.loads import Load, NodalForce, unit
+from tribodyn.fem.matching import partners
+from tribodyn.fem.material import Material
+from tribodyn.fem.part import Contact, Part
+from tribodyn.fem.system import SecondOrderSystem
 
 AXIS = (1.0, 0.0, 0.0)
 

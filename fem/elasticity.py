@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix, identity, kron
 
-from fem.elements import batches, connectivity, scatter
-from fem.material import Material
+from tribodyn.fem.elements import batches, connectivity, scatter
+from tribodyn.fem.material import Material
 
 
 def assemble(

@@ -9,8 +9,8 @@ from scipy.sparse import block_array, csr_matrix, issparse
 from scipy.sparse.linalg import LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
-from fem.factor import factorise
-from fem.modes import DENSE_BELOW, modes
+from tribodyn.fem.factor import factorise
+from tribodyn.fem.modes import DENSE_BELOW, modes
 
 
 def hermitian_modes(K: Any, M: Any, n: int) -> tuple[np.ndarray, np.ndarray]:

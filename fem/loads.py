@@ -8,9 +8,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from fem.constraints import named
-from fem.elements import coordinates
-from fem.surface import face_integrals, facet_nodes
+from tribodyn.fem.constraints import named
+from tribodyn.fem.elements import coordinates
+from tribodyn.fem.surface import face_integrals, facet_nodes
 
 
 class Load(Protocol):

@@ -10,7 +10,7 @@ from scipy.sparse import issparse
 from scipy.sparse.linalg import LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
-from fem.factor import Factor, factorise
+from tribodyn.fem.factor import Factor, factorise
 
 DENSE_BELOW = 400
 

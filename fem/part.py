@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from fem.constraints import AXES, Clamp, NoMeanRotation, free_dofs, named
-from fem.contact import ground_contact, join, pair_contact, plane_contact
-from fem.elasticity import assemble
-from fem.elements import coordinates
-from fem.interface import COMPONENTS, ContactInterface
-from fem.loads import Load, NodalForce
-from fem.material import Material
-from fem.springs import Spring
-from fem.system import SecondOrderSystem
+from tribodyn.fem.constraints import AXES, Clamp, NoMeanRotation, free_dofs, named
+from tribodyn.fem.contact import ground_contact, join, pair_contact, plane_contact
+from tribodyn.fem.elasticity import assemble
+from tribodyn.fem.elements import coordinates
+from tribodyn.fem.interface import COMPONENTS, ContactInterface
+from tribodyn.fem.loads import Load, NodalForce
+from tribodyn.fem.material import Material
+from tribodyn.fem.springs import Spring
+from tribodyn.fem.system import SecondOrderSystem
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix, identity, kron
 
-from fem.elasticity import assemble, per_element, symmetric
-from fem.elements import batches, connectivity, scatter
-from fem.factor import factorise
-from fem.loads import Centrifugal, unit
-from fem.material import Material
-from fem.part import Part
+from tribodyn.fem.elasticity import assemble, per_element, symmetric
+from tribodyn.fem.elements import batches, connectivity, scatter
+from tribodyn.fem.factor import factorise
+from tribodyn.fem.loads import Centrifugal, unit
+from tribodyn.fem.material import Material
+from tribodyn.fem.part import Part
 
 
 def prestressed(

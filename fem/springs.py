@@ -10,10 +10,10 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from fem.constraints import named
-from fem.elements import coordinates
-from fem.loads import unit
-from fem.surface import surface
+from tribodyn.fem.constraints import named
+from tribodyn.fem.elements import coordinates
+from tribodyn.fem.loads import unit
+from tribodyn.fem.surface import surface
 
 REACH = 1e-4  # farthest distance of two matching nodes, as a part of the size of their set
 

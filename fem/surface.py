@@ -9,7 +9,7 @@ import numpy as np
 from skfem import ElementQuad1, ElementQuad2, ElementTriP1, ElementTriP2, MeshHex2
 from skfem.quadrature import get_quadrature
 
-from fem.elements import connectivity, coordinates
+from tribodyn.fem.elements import connectivity, coordinates
 
 # The four quads that a nine-node face shows, in its own node order: corners, mid-sides, middle.
 NINE_NODE_QUADS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])

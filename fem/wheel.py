@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix, issparse, kron, vstack
 
-from fem.cyclic import Sector, seam_parts
-from fem.interface import ContactInterface
-from fem.system import SecondOrderSystem
+from tribodyn.fem.cyclic import Sector, seam_parts
+from tribodyn.fem.interface import ContactInterface
+from tribodyn.fem.system import SecondOrderSystem
 
 
 def of_sector(name: str, n: int) -> str:

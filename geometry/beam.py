@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry import blocks, checks, grid
+from tribodyn.geometry import blocks, checks, grid
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry import airfoil, blocks, checks
-from geometry.airfoil import Section
-from geometry.platform import Platform, platform, unit
+from tribodyn.geometry import airfoil, blocks, checks
+from tribodyn.geometry.airfoil import Section
+from tribodyn.geometry.platform import Platform, platform, unit
 
 
 @dataclass(frozen=True)

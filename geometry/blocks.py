@@ -15,8 +15,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from geometry.gmsh_session import save, session
-from geometry.numbering import REFERENCE_POINTS, permutation
+from tribodyn.geometry.gmsh_session import save, session
+from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation
 
 SIDES = ("u-", "u+", "v-", "v+", "w-", "w+")
 _JOIN = 1e-3  # nodes nearer than this fraction of the smallest node distance are one node

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry import blocks, checks
+from tribodyn.geometry import blocks, checks
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """Annular sector; dimensions are not published, the defaults come from the fit of workflows/leaf_fit.py (ours).
+    """Annular sector; dimensions are not published, the defaults come from "tribodyn leaf fit" (ours).
 
     radius : at mid-height [m]; angle : of the sector [rad]; height : radial [m]; thickness : [m]
     patch_height : radial width of each contact patch, at the lower and the upper edge [m]

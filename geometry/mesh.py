@@ -17,7 +17,7 @@ import numpy as np
 import skfem
 from skfem.quadrature import get_quadrature
 
-from geometry.numbering import REFERENCE_POINTS, permutation, serendipity_to_lagrange
+from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation, serendipity_to_lagrange
 
 Groups = dict[str, np.ndarray]
 

@@ -28,7 +28,7 @@ def load(name: str) -> ModuleType:
     """
     if name not in names():
         raise ValueError(f"there is no part '{name}': the parts are {', '.join(names())}")
-    return importlib.import_module(f"geometry.{name}")
+    return importlib.import_module(f"tribodyn.geometry.{name}")
 
 
 def _is_part(file: Path) -> bool:

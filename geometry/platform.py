@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.airfoil import Section
-from geometry.blocks import Block
+from tribodyn.geometry.airfoil import Section
+from tribodyn.geometry.blocks import Block
 
 Names = Mapping[tuple[int, int], Mapping[str, str]]
 

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry import blocks, checks, grid
+from tribodyn.geometry import blocks, checks, grid
 
 # Fixed shapes, ours [m].
 SHANK = 0.010  # the upper specimen hangs on a shank of this length and of the beam's whole thickness

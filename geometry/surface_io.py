@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry import surface_sdf
-from geometry.surface import HeightMap
+from tribodyn.geometry import surface_sdf
+from tribodyn.geometry.surface import HeightMap
 
 TEXT_ENDINGS = (".txt", ".xyz", ".csv", ".asc", ".dat", ".tsv", ".prn")
 """Endings read as text; others that are not SDF go to surfalize."""

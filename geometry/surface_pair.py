@@ -14,7 +14,7 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import gaussian_filter
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
-from geometry.surface import HeightMap
+from tribodyn.geometry.surface import HeightMap
 
 CELLS_PER_NODE = 8
 """Sampling cells across the distance of neighbouring nodes, at least."""

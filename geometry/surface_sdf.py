@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry.surface import HeightMap
+from tribodyn.geometry.surface import HeightMap
 
 MAGIC = re.compile(rb"([aAbB])([A-Z]{2,4}-V?\d\.\d)")
 

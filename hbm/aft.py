@@ -8,8 +8,8 @@ from types import ModuleType
 import numba
 import numpy as np
 
-from hbm.harmonics import HarmonicBasis
-from hbm.law import ContactCycle, ContactParameters
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.law import ContactCycle, ContactParameters
 
 PERIODIC = 1e-13  # drift of the memory over a cycle, relative to its largest size in the cycle
 FIRST_CYCLES = 4  # marched before Newton is tried on the memory

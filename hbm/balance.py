@@ -13,13 +13,13 @@ from functools import cached_property
 
 import numpy as np
 
-from hbm import law as contact_law
-from hbm.compliance import CompliancePoint, ContactCompliance
-from hbm.excitation import Excitation
-from hbm.harmonics import HarmonicBasis
-from hbm.krylov import gmres
-from hbm.law import ContactCycle, ContactParameters
-from reduction.model import ReducedModel
+from tribodyn.hbm import law as contact_law
+from tribodyn.hbm.compliance import CompliancePoint, ContactCompliance
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.krylov import gmres
+from tribodyn.hbm.law import ContactCycle, ContactParameters
+from tribodyn.reduction.model import ReducedModel
 
 
 @dataclass(frozen=True)

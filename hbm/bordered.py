@@ -14,11 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hbm.balance import Linearisation, State
-from hbm.branch import CONVERGED
-from hbm.krylov import gmres
-from hbm.newton import NewtonOptions, Solution, relative_residual
-from hbm.parameter import Parameter
+from tribodyn.hbm.balance import Linearisation, State
+from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.krylov import gmres
+from tribodyn.hbm.newton import NewtonOptions, Solution, relative_residual
+from tribodyn.hbm.parameter import Parameter
 
 
 @dataclass(frozen=True)

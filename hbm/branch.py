@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from hbm.newton import Solution
-    from hbm.parameter import Parameter
+    from tribodyn.hbm.newton import Solution
+    from tribodyn.hbm.parameter import Parameter
 
 CONVERGED = "converged"
 

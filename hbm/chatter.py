@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hbm.balance import HarmonicBalance, State
-from hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.harmonics import HarmonicBasis
 
 ON_CIRCLE = 1e-6  # distance from the unit circle within which a root is an instant
 GRAZING = 1e-13  # overlap, relative to the largest amplitude, that is none

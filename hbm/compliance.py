@@ -10,11 +10,11 @@ from functools import cached_property
 
 import numpy as np
 
-from hbm import all_harmonics
-from hbm.excitation import Excitation
-from hbm.expansion import Expansion
-from hbm.harmonics import HarmonicBasis
-from reduction.model import ReducedModel
+from tribodyn.hbm import all_harmonics
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.expansion import Expansion
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.reduction.model import ReducedModel
 
 COARSE = 0.1  # share of the contact flexibility from which on a mode counts in the preconditioner
 

@@ -14,11 +14,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hbm import newton
-from hbm.evolution import WearProblem, WearState, assess, first_preload, reason_to_stop, row_of, state_of, worn_state
-from hbm.operating_point import point_of
-from hbm.wear_history import LIFE_SHARE, WearHistory, WearRow, history, rows_to_go_on
-from hbm.wearing import WearingBalance, WornState
+from tribodyn.hbm import newton
+from tribodyn.hbm.evolution import (
+    WearProblem,
+    WearState,
+    assess,
+    first_preload,
+    reason_to_stop,
+    row_of,
+    state_of,
+    worn_state,
+)
+from tribodyn.hbm.operating_point import point_of
+from tribodyn.hbm.wear_history import LIFE_SHARE, WearHistory, WearRow, history, rows_to_go_on
+from tribodyn.hbm.wearing import WearingBalance, WornState
 
 GAMMA = 1 - 1 / np.sqrt(2)
 GROWTH = (0.2, 3.0)  # limits of the ratio of one step to the one before

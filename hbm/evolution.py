@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hbm import law as contact_law
-from hbm import newton, wear_law
-from hbm.balance import HarmonicBalance
-from hbm.operating_point import OperatingPoint, Site
-from hbm.wear_history import WearRow
+from tribodyn.hbm import law as contact_law
+from tribodyn.hbm import newton, wear_law
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.operating_point import OperatingPoint, Site
+from tribodyn.hbm.wear_history import WearRow
 
 LOST = "contact lost at every pair"
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.harmonics import HarmonicBasis
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ import numpy as np
 import scipy.linalg as sla
 from scipy.sparse import csr_matrix
 
-from fem.system import SecondOrderSystem
+from tribodyn.fem.system import SecondOrderSystem
 
 RESOLUTION = 5e-10  # relative error of the expansion aimed at, at the highest frequency asked for
 ROUNDING = 1e-7  # largest error that may be rounding

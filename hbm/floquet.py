@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hbm.balance import HarmonicBalance, State
-from hbm.time_integration import Options, PeriodicMotion, TimeStepper, integrate
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.time_integration import Options, PeriodicMotion, TimeStepper, integrate
 
 LARGEST = 900  # state variables up to which the monodromy matrix is formed
 DEAD = 1e-10  # multipliers below this belong to the time stepping, not to the structure

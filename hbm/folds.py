@@ -14,14 +14,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hbm import bordered
-from hbm.balance import HarmonicBalance
-from hbm.bordered import BorderFailed, Direction, Metric
-from hbm.branch import CONVERGED, amplitude
-from hbm.continuation._curve import CurvePoint
-from hbm.continuation._stepper import Options, Stepper
-from hbm.newton import NewtonOptions, Solution
-from hbm.parameter import FREQUENCY, Parameter
+from tribodyn.hbm import bordered
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.bordered import BorderFailed, Direction, Metric
+from tribodyn.hbm.branch import CONVERGED, amplitude
+from tribodyn.hbm.continuation._curve import CurvePoint
+from tribodyn.hbm.continuation._stepper import Options, Stepper
+from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.parameter import FREQUENCY, Parameter
 
 WIDTH = 0.1  # frequency that counts as one, relative
 DIFFERENCE = 1e-4  # step along the surface by which the scalar is differentiated

@@ -16,11 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as sla
 
-from hbm import law as contact_law
-from hbm import newton
-from hbm.balance import HarmonicBalance
-from hbm.krylov import gmres
-from hbm.law import SEPARATES, ContactCycle
+from tribodyn.hbm import law as contact_law
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.krylov import gmres
+from tribodyn.hbm.law import SEPARATES, ContactCycle
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hbm import newton
-from hbm.balance import HarmonicBalance
-from hbm.continuation import arc_length
-from hbm.newton import NewtonOptions
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation import arc_length
+from tribodyn.hbm.newton import NewtonOptions
 
 ACCURACY = 1e-3  # of the linear solves behind the estimate
 QUIET = 1e-2  # an output that vibrates less than this share of the liveliest one is measured against that share

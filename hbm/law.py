@@ -18,8 +18,8 @@ from types import ModuleType
 
 import numpy as np
 
-import hbm.contact
-from hbm.harmonics import HarmonicBasis
+from tribodyn.hbm import contact as hbm_contact
+from tribodyn.hbm.harmonics import HarmonicBasis
 
 STICKS, SLIPS, SEPARATES = 1, 2, 4
 
@@ -106,14 +106,14 @@ class ContactCycle:
 
 def names() -> list[str]:
     """Names of the contact laws there are."""
-    return sorted(m.name for m in pkgutil.iter_modules(hbm.contact.__path__) if not m.name.startswith("_"))
+    return sorted(m.name for m in pkgutil.iter_modules(hbm_contact.__path__) if not m.name.startswith("_"))
 
 
 def load(name: str) -> ModuleType:
     """The law module of this name; raises ValueError with the known names."""
     if name not in names():
         raise ValueError(f"no contact law '{name}': there are {', '.join(names())}")
-    return importlib.import_module(f"hbm.contact.{name}")
+    return importlib.import_module(f"tribodyn.hbm.contact.{name}")
 
 
 def check_components(law: ModuleType, components: tuple[str, ...]) -> None:
@@ -137,7 +137,7 @@ def cycle(
     memory : (n_pair, n_state) memory at the start of the load path, zeros if None
     Raises  ValueError where the basis asks for located transitions and the law does not locate them
     """
-    from hbm import aft
+    from tribodyn.hbm import aft
 
     if memory is None:
         memory = np.zeros((parameters.n_pair, law.n_state(parameters.components)))

@@ -23,8 +23,8 @@ import math
 import numba
 import numpy as np
 
-from hbm.harmonics import HarmonicBasis
-from hbm.law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
 
 TURN = 2 * math.pi
 STICK = 0.0  # kinds of segment; slip is the sign of T

@@ -7,8 +7,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hbm.balance import HarmonicBalance, Linearisation, State
-from hbm.branch import CONVERGED
+from tribodyn.hbm.balance import HarmonicBalance, Linearisation, State
+from tribodyn.hbm.branch import CONVERGED
 
 VANISHING = 1e-6  # size of x, relative to the start, below which a solution counts as zero
 RAMP_STEPS = 12  # Newton steps in one step of the load ramp

@@ -15,10 +15,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from hbm.balance import HarmonicBalance
-from hbm.branch import CONVERGED
-from hbm.free_vibration import FreeVibration, Point
-from hbm.newton import NewtonOptions
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.free_vibration import FreeVibration, Point
+from tribodyn.hbm.newton import NewtonOptions
 
 EASY, HARD = 3, 7  # Newton steps up to which the next step grows, and from which it shrinks
 EMPHASIS = 5.0  # of the logarithm of frequency and of the damping ratio beside that of the amplitude, in arc length

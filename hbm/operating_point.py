@@ -10,11 +10,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hbm import newton
-from hbm.balance import HarmonicBalance, State
-from hbm.branch import CONVERGED, amplitude
-from hbm.continuation import adaptive, arc_length
-from hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.branch import CONVERGED, amplitude
+from tribodyn.hbm.continuation import adaptive, arc_length
+from tribodyn.hbm.newton import NewtonOptions, Solution
 
 SCAN_TOLERANCE = 0.03  # of the response between the points of the first search
 COARSEST = 0.05  # longest step of the first search, share of its range

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.balance import HarmonicBalance, State
 
 FREQUENCY, LOAD = "frequency", "load factor"
 DIFFERENCE = 1e-6  # finite-difference step, in units of `Parameter.scale`

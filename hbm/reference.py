@@ -13,10 +13,10 @@ from time import perf_counter
 import numpy as np
 from scipy.sparse import csr_matrix, kron
 
-from hbm import law as contact_law
-from hbm.balance import HarmonicBalance
-from hbm.branch import CONVERGED
-from hbm.law import ContactCycle
+from tribodyn.hbm import law as contact_law
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.law import ContactCycle
 
 
 @dataclass

@@ -21,10 +21,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hbm import newton
-from hbm.balance import HarmonicBalance, State
-from hbm.branch import amplitude
-from hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.branch import amplitude
+from tribodyn.hbm.newton import NewtonOptions, Solution
 
 FAR = 1e4  # times the largest travel of a slider that the unloaded cycle allows
 LINEAR = 1e-9  # deviation of the vibrating force of a stuck pair from its spring, relative to the largest

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hbm.balance import HarmonicBalance
+from tribodyn.hbm.balance import HarmonicBalance
 
 FINE = 8  # times the samples, of a law that cannot locate its transitions
 

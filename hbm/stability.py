@@ -20,12 +20,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from hbm import floquet, parameter
-from hbm import law as contact_law
-from hbm.balance import HarmonicBalance, State
-from hbm.branch import CONVERGED, Branch
-from hbm.harmonics import HarmonicBasis
-from hbm.parameter import Parameter
+from tribodyn.hbm import floquet, parameter
+from tribodyn.hbm import law as contact_law
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.branch import CONVERGED, Branch
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.parameter import Parameter
 
 MARGIN = 1e-6  # real parts up to this times omega count as zero
 FEWEST_MODES, MOST_MODES = 20, 30  # friction makes modes far above the excitation flutter, too

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hbm.wear_history import LIFE_SHARE, WearHistory
+from tribodyn.hbm.wear_history import LIFE_SHARE, WearHistory
 
 UNKNOWN = 0.5  # estimated relative error from which on a number of cycles is no statement
 

@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hbm.evolution import WearProblem, assess, first_preload, reason_to_stop, row_of, state_of
-from hbm.wear_history import WearHistory, WearRow, history, rows_to_go_on
+from tribodyn.hbm.evolution import WearProblem, assess, first_preload, reason_to_stop, row_of, state_of
+from tribodyn.hbm.wear_history import WearHistory, WearRow, history, rows_to_go_on
 
 
 def evolve(

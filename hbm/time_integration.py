@@ -16,11 +16,11 @@ import numpy as np
 import scipy.linalg as sla
 from threadpoolctl import threadpool_limits
 
-from hbm import newton, time_step
-from hbm.anderson import Anderson
-from hbm.balance import HarmonicBalance, State
-from hbm.branch import CONVERGED
-from hbm.harmonics import HarmonicBasis
+from tribodyn.hbm import newton, time_step
+from tribodyn.hbm.anderson import Anderson
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.harmonics import HarmonicBasis
 
 
 @dataclass(frozen=True)

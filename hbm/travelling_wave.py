@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from hbm.excitation import Excitation
-from hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonics import HarmonicBasis
 
 
 def at_sector(

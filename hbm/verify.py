@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hbm import time_integration
-from hbm.balance import HarmonicBalance, State
-from hbm.branch import CONVERGED
-from hbm.time_integration import Options, PeriodicMotion
+from tribodyn.hbm import time_integration
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.time_integration import Options, PeriodicMotion
 
 ENERGY_FLOOR = 1e-6  # of (largest force x travel, summed over pairs), below which energies do not differ
 

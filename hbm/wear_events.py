@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hbm.harmonics import HarmonicBasis
-from hbm.wear_history import WearHistory
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.wear_history import WearHistory
 
 
 @dataclass(frozen=True)

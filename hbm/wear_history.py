@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from hbm.balance import HarmonicBalance
-    from hbm.operating_point import OperatingPoint
+    from tribodyn.hbm.balance import HarmonicBalance
+    from tribodyn.hbm.operating_point import OperatingPoint
 
 
 LIFE_SHARE = 1e-3  # of the first preload, where the life that is stated ends

@@ -17,9 +17,9 @@ from types import ModuleType
 
 import numpy as np
 
-import hbm.wear
-from hbm import aft
-from hbm.balance import HarmonicBalance, State
+from tribodyn.hbm import aft
+from tribodyn.hbm import wear as hbm_wear
+from tribodyn.hbm.balance import HarmonicBalance, State
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Exposure:
 
 def names() -> list[str]:
     """Names of the wear laws there are."""
-    return sorted(m.name for m in pkgutil.iter_modules(hbm.wear.__path__) if not m.name.startswith("_"))
+    return sorted(m.name for m in pkgutil.iter_modules(hbm_wear.__path__) if not m.name.startswith("_"))
 
 
 def load(name: str) -> ModuleType:
@@ -72,7 +72,7 @@ def load(name: str) -> ModuleType:
         return _from_file(Path(name))
     if name not in names():
         raise ValueError(f"no wear law '{name}': there are {', '.join(names())}, or give a file my_law.py")
-    return importlib.import_module(f"hbm.wear.{name}")
+    return importlib.import_module(f"tribodyn.hbm.wear.{name}")
 
 
 def depth_rate(name: str, exposure: Exposure) -> np.ndarray:

@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hbm import law as contact_law
-from hbm.balance import HarmonicBalance, Linearisation, State
-from hbm.compliance import CompliancePoint
-from hbm.law import ContactCycle, ContactParameters
+from tribodyn.hbm import law as contact_law
+from tribodyn.hbm.balance import HarmonicBalance, Linearisation, State
+from tribodyn.hbm.compliance import CompliancePoint
+from tribodyn.hbm.law import ContactCycle, ContactParameters
 
 MAX_ITERATIONS = 80
 ROUNDING = 4e-16

@@ -13,14 +13,14 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 from threadpoolctl import threadpool_limits
 
-from fem.constraints import partition
-from fem.factor import Factor, factorise
-from fem.interface import ContactInterface
-from fem.modes import modes
-from fem.system import SecondOrderSystem
-from reduction.linear import linear_modes
-from reduction.model import ReducedModel
-from reduction.truncation import frequency_error
+from tribodyn.fem.constraints import partition
+from tribodyn.fem.factor import Factor, factorise
+from tribodyn.fem.interface import ContactInterface
+from tribodyn.fem.modes import modes
+from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.reduction.linear import linear_modes
+from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.truncation import frequency_error
 
 POINT_LOAD = 30  # a load or output on more DOFs than this is distributed: projected, but it makes no masters
 BLOCK = 128  # right-hand sides solved at once

@@ -15,13 +15,13 @@ import numpy as np
 import scipy.linalg as sla
 from scipy.sparse import vstack
 
-from fem import wheel
-from fem.cyclic import Sector, at_index, projected, seam_map
-from fem.hermitian import hermitian_modes
-from fem.system import SecondOrderSystem
-from reduction.craig_bampton import POINT_LOAD, REPORTED_MODES, craig_bampton
-from reduction.linear import stuck_stiffness
-from reduction.model import ReducedModel
+from tribodyn.fem import wheel
+from tribodyn.fem.cyclic import Sector, at_index, projected, seam_map
+from tribodyn.fem.hermitian import hermitian_modes
+from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.reduction.craig_bampton import POINT_LOAD, REPORTED_MODES, craig_bampton
+from tribodyn.reduction.linear import stuck_stiffness
+from tribodyn.reduction.model import ReducedModel
 
 
 @dataclass(frozen=True)

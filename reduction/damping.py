@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import eigh
 
-from fem.system import SecondOrderSystem
+from tribodyn.fem.system import SecondOrderSystem
 
 
 def modal_damping(system: SecondOrderSystem, ratio: float) -> np.ndarray:

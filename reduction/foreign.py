@@ -34,11 +34,11 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from fem.interface import COMPONENTS, ContactInterface
-from fem.system import SecondOrderSystem
-from reduction import abaqus_matrix, harwell_boeing, matrix_files
-from reduction.abaqus_matrix import Labels
-from reduction.model import ReducedModel
+from tribodyn.fem.interface import COMPONENTS, ContactInterface
+from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.reduction import abaqus_matrix, harwell_boeing, matrix_files
+from tribodyn.reduction.abaqus_matrix import Labels
+from tribodyn.reduction.model import ReducedModel
 
 NAMES = {"mass": "M", "stiffness": "K", "damping": "C"}
 """Variables looked for in a file that holds all matrices."""

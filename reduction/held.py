@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import null_space
 
-from reduction.craig_bampton import REPORTED_MODES
-from reduction.linear import linear_modes
-from reduction.model import ReducedModel
-from reduction.projection import projected
+from tribodyn.reduction.craig_bampton import REPORTED_MODES
+from tribodyn.reduction.linear import linear_modes
+from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.projection import projected
 
 
 def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:

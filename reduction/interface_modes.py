@@ -15,9 +15,9 @@ from dataclasses import replace
 import numpy as np
 import scipy.linalg as sla
 
-from fem.modes import modes
-from reduction.model import ReducedModel
-from reduction.projection import projected
+from tribodyn.fem.modes import modes
+from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.projection import projected
 
 DEPENDENT = 1e-6  # size of what is new in a shape, relative, that is rounding
 

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix, diags_array, issparse
 
-from fem.interface import ContactInterface
-from fem.modes import modes
-from fem.system import SecondOrderSystem
-from reduction.model import ReducedModel
+from tribodyn.fem.interface import ContactInterface
+from tribodyn.fem.modes import modes
+from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.reduction.model import ReducedModel
 
 
 def linear_modes(

@@ -15,8 +15,8 @@ import scipy.io
 import scipy.sparse as sp
 from scipy.io.matlab import MatReadError
 
-from reduction import abaqus_matrix, harwell_boeing, matrix_market
-from reduction.abaqus_matrix import Labels
+from tribodyn.reduction import abaqus_matrix, harwell_boeing, matrix_market
+from tribodyn.reduction.abaqus_matrix import Labels
 
 
 def variables(path: Path) -> list[str]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fem.interface import ContactInterface
-from fem.system import SecondOrderSystem
+from tribodyn.fem.interface import ContactInterface
+from tribodyn.fem.system import SecondOrderSystem
 
 Damping = Callable[[SecondOrderSystem, np.ndarray], np.ndarray | None]
 """Makes the damping matrix (n, n) [N s/m] of a system whose contact map is (n_contact, n), None for none."""

@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg as sla
 
-from fem.constraints import partition
-from fem.system import SecondOrderSystem
-from reduction.model import ReducedModel
+from tribodyn.fem.constraints import partition
+from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.reduction.model import ReducedModel
 
 
 @dataclass(frozen=True)

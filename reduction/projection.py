@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from fem.system import SecondOrderSystem
-from reduction.model import ReducedModel
+from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.reduction.model import ReducedModel
 
 STALE = ("free_frequency_error", "stuck_frequency", "stuck_frequency_error")
 

@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import csr_matrix, eye_array
 
-from fem.interface import COMPONENTS, ContactInterface
-from fem.system import SecondOrderSystem
+from tribodyn.fem.interface import COMPONENTS, ContactInterface
+from tribodyn.fem.system import SecondOrderSystem
 
 
 def relative(

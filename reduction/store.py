@@ -16,9 +16,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from fem.interface import ContactInterface
-from fem.system import SecondOrderSystem
-from reduction.model import ReducedModel
+from tribodyn.fem.interface import ContactInterface
+from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.reduction.model import ReducedModel
 
 FORMAT = "tribodyn reduced model"
 VERSION = 2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem.factor import Factor
+from tribodyn.fem.factor import Factor
 
 
 def frequency_error(factor: Factor, residual: np.ndarray, omega: np.ndarray, omitted: float) -> np.ndarray:

@@ -16,7 +16,7 @@ import math
 
 import numba
 
-from hbm.law import SEPARATES, SLIPS, STICKS
+from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS
 
 COMPONENTS = (("t1", "t2", "n"),)
 

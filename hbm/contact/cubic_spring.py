@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numba
 
-from hbm.law import STICKS
+from tribodyn.hbm.law import STICKS
 
 COMPONENTS = (("t1", "t2", "n"), ("t1", "t2"), ("t1", "n"), ("t2", "n"), ("t1",), ("t2",), ("n",))
 

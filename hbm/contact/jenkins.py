@@ -9,10 +9,10 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from hbm import located as transitions
-from hbm.aft import by_kernel
-from hbm.harmonics import HarmonicBasis
-from hbm.law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
+from tribodyn.hbm import located as transitions
+from tribodyn.hbm.aft import by_kernel
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
 
 COMPONENTS = (("t1", "t2", "n"), ("t1", "n"), ("t2", "n"))
 

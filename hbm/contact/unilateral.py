@@ -9,9 +9,9 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from hbm import located as transitions
-from hbm.harmonics import HarmonicBasis
-from hbm.law import SEPARATES, STICKS, ContactCycle, ContactParameters
+from tribodyn.hbm import located as transitions
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.law import SEPARATES, STICKS, ContactCycle, ContactParameters
 
 COMPONENTS = (("n",),)
 

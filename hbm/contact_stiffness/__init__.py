@@ -9,9 +9,9 @@ holds most of that compliance: a contact stiffness from here then counts it twic
 wants contact without it sets k_n and k_t by itself.
 """
 
-from hbm.contact_stiffness.elastic import ElasticPair
-from hbm.contact_stiffness.hertz import SphereContact
-from hbm.contact_stiffness.rectangle import rectangular_punch
-from hbm.contact_stiffness.rounded import RoundedPunch
+from tribodyn.hbm.contact_stiffness.elastic import ElasticPair
+from tribodyn.hbm.contact_stiffness.hertz import SphereContact
+from tribodyn.hbm.contact_stiffness.rectangle import rectangular_punch
+from tribodyn.hbm.contact_stiffness.rounded import RoundedPunch
 
 __all__ = ["ElasticPair", "RoundedPunch", "SphereContact", "rectangular_punch"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import pi
 
-from hbm.contact_stiffness.elastic import ElasticPair, require_positive, require_shear_within
+from tribodyn.hbm.contact_stiffness.elastic import ElasticPair, require_positive, require_shear_within
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,8 @@ from math import isfinite, pi, sqrt
 
 import numpy as np
 
-from hbm.contact_stiffness.elastic import ElasticPair, require_positive
-from hbm.contact_stiffness.rounded import RoundedPunch
+from tribodyn.hbm.contact_stiffness.elastic import ElasticPair, require_positive
+from tribodyn.hbm.contact_stiffness.rounded import RoundedPunch
 
 N_STRIPS = 5
 """Strips over half of the shorter side on the coarse mesh; the fine mesh has twice as many."""

@@ -19,7 +19,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import xlogy
 
-from hbm.contact_stiffness.elastic import ElasticPair, require_positive, require_shear_within
+from tribodyn.hbm.contact_stiffness.elastic import ElasticPair, require_positive, require_shear_within
 
 
 @dataclass(frozen=True)

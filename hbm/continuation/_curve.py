@@ -7,11 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
-from hbm import bordered
-from hbm.bordered import BorderFailed, Direction, Metric
-from hbm.branch import CONVERGED
-from hbm.newton import NewtonOptions, Solution
-from hbm.parameter import Parameter
+from tribodyn.hbm import bordered
+from tribodyn.hbm.bordered import BorderFailed, Direction, Metric
+from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.parameter import Parameter
 
 KINK_ANGLE = 0.75  # turn between neighbouring points beyond which they lie on either side of a kink [rad]
 FOLD_TIGHTER = 1e-3  # Newton tolerance at folds, relative to that of other points

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hbm import bordered
-from hbm.bordered import BorderFailed, Direction, Metric
-from hbm.continuation._curve import KINK_ANGLE, CurvePoint, Segment, locate_fold
-from hbm.newton import NewtonOptions, Solution
-from hbm.parameter import Parameter
+from tribodyn.hbm import bordered
+from tribodyn.hbm.bordered import BorderFailed, Direction, Metric
+from tribodyn.hbm.continuation._curve import KINK_ANGLE, CurvePoint, Segment, locate_fold
+from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.parameter import Parameter
 
 FADE = 0.8  # the characteristic length falls to this share per point where the vibration gets small
 STRAY = 0.35  # miss of the prediction, in steps, beyond which the step is too long

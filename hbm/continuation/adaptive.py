@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hbm import newton, parameter
-from hbm.balance import HarmonicBalance
-from hbm.branch import Branch, BranchBuilder
-from hbm.continuation.arc_length import solve_along_load
-from hbm.continuation.natural import DEGREE, extrapolate
-from hbm.newton import NewtonOptions, Solution
-from hbm.parameter import Parameter
+from tribodyn.hbm import newton, parameter
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.branch import Branch, BranchBuilder
+from tribodyn.hbm.continuation.arc_length import solve_along_load
+from tribodyn.hbm.continuation.natural import DEGREE, extrapolate
+from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.parameter import Parameter
 
 KINK = 0.3  # least share of the miss of extrapolation that counts as error of interpolation, as next to a kink
 JUMP = 1e3  # error estimate in the shortest step, relative to the tolerance, beyond which the response has jumped

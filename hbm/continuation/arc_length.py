@@ -16,13 +16,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from hbm import newton, parameter
-from hbm.balance import HarmonicBalance
-from hbm.branch import Branch, BranchBuilder
-from hbm.continuation._curve import CurvePoint, Segment
-from hbm.continuation._stepper import Options, Stepper
-from hbm.newton import NewtonOptions, Solution
-from hbm.parameter import Parameter
+from tribodyn.hbm import newton, parameter
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.branch import Branch, BranchBuilder
+from tribodyn.hbm.continuation._curve import CurvePoint, Segment
+from tribodyn.hbm.continuation._stepper import Options, Stepper
+from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.parameter import Parameter
 
 __all__ = ["Options", "follow", "solve_along_load"]
 

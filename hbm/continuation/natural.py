@@ -11,12 +11,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hbm import newton, parameter
-from hbm.balance import HarmonicBalance
-from hbm.branch import CONVERGED, Branch, BranchBuilder
-from hbm.continuation import arc_length
-from hbm.newton import NewtonOptions, Solution
-from hbm.parameter import Parameter
+from tribodyn.hbm import newton, parameter
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.branch import CONVERGED, Branch, BranchBuilder
+from tribodyn.hbm.continuation import arc_length
+from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.parameter import Parameter
 
 DEGREE = 2  # of the extrapolating polynomial
 APART = 0.5  # least distance of its points, in steps

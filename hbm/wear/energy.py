@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hbm.wear_law import Exposure
+from tribodyn.hbm.wear_law import Exposure
 
 
 def depth_rate(exposure: Exposure) -> np.ndarray:

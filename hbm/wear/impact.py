@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from hbm import aft
-from hbm.law import SEPARATES
-from hbm.wear_law import Exposure
+from tribodyn.hbm import aft
+from tribodyn.hbm.law import SEPARATES
+from tribodyn.hbm.wear_law import Exposure
 
 
 def depth_rate(exposure: Exposure) -> np.ndarray:

@@ -1,0 +1,233 @@
+"""The fretting rig: its prescribed height, its fits, and a coarse run of the study beside the published experiment."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+from tribodyn.reduction.linear import stuck_stiffness
+from tribodyn.workflows.cases.rig import fit as rig_fit
+from tribodyn.workflows.cases.rig import published
+from tribodyn.workflows.cases.rig import table as rig_table
+from tribodyn.workflows.cases.rig.cases import apart
+from tribodyn.workflows.cases.rig.joints import Modes, joints_of
+from tribodyn.workflows.cases.rig.model import Rig
+from tribodyn.workflows.cases.rig.time import held_by_force, in_time
+from tribodyn.workflows.cases.rig.wear import RigWear, wear_down
+from tribodyn.workflows.command import main as cli
+from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run.references import linear_references
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies.identification import Measured, Parameter, fit
+
+COARSE = (
+    "geometry.n_contact_length=3", "geometry.n_contact_width=5", "reduction.modes=6", "harmonics.kept=[0, 1]",
+    "harmonics.samples=32", "harmonics.transitions=sampled",
+)  # fmt: skip
+QUICK = (
+    *COARSE, "damping.modal=6 %", "wear.step=15 %", "wear.lost_below=30 %", "wear.max_steps=60",
+    "response.frequency=['270 Hz', '310 Hz']",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return Rig.of(scene_file.read("rig", COARSE))
+
+
+@pytest.fixture(scope="module")
+def joints():
+    return joints_of(scene_file.read("rig", COARSE))
+
+
+# ---- prescribed height ----
+
+
+def test_the_force_at_the_screws_is_the_preload(rig):
+    for height, force in ((rig.height, 0.0), (rig.height, 70.0), (0.5 * rig.height, 30.0)):
+        cycle = rig.with_height(height).with_force(force).cycle()
+        assert cycle.preload > 5.0
+        assert cycle.reaction == pytest.approx(cycle.preload, rel=1e-9)
+
+
+def test_no_interference_no_preload(rig):
+    for still in (rig.with_height(0.0).at_rest(), rig.with_mating_height(-1.001 * rig.height).at_rest()):
+        assert still.preload == pytest.approx(0.0, abs=1e-9)
+        assert still.reaction == pytest.approx(0.0, abs=1e-6)
+
+
+def test_platform_height_and_mating_height_are_the_same_interference(rig):
+    raised, pushed = rig.with_height(rig.height + 2e-6).at_rest(), rig.with_mating_height(2e-6).at_rest()
+    assert raised.preload == pytest.approx(pushed.preload, rel=1e-6)
+    assert raised.preload > rig.at_rest().preload + 3.0
+
+
+def test_lost_contact_is_the_open_rig(rig):
+    references = linear_references(rig.model().balance, pipeline.OUTPUT, 2 * np.pi * 240, 2 * np.pi * 450)
+    assert apart(rig, references) < 1e-3
+    worn = rig.with_opening(np.full(rig.plain.interface.n_pair, 1e-4)).cycle()
+    assert worn.energy == 0.0
+    assert worn.preload == 0.0
+
+
+def test_the_force_found_instead_of_the_height_makes_the_same_motion(rig):
+    """The balance is the same to rounding, and comes closer to time integration with more harmonics."""
+    errors = []
+    for kept in ((0, 1), (0, 1, 2, 3, 4, 5)):
+        more = rig.with_harmonics(kept)
+        cycle = more.cycle()
+        same = held_by_force(more, cycle).evaluate(rig.omega, cycle.state.x)
+        assert np.abs(same.residual).max() < 1e-7 * np.abs(same.x).max()
+        found = in_time(more, cycle)
+        assert found.periodic
+        assert found.preload == pytest.approx(cycle.preload, rel=0.02)
+        errors.append((abs(cycle.energy / found.energy - 1), abs(found.amplitude)))
+    (energy, amplitude), (finer_energy, finer_amplitude) = errors
+    assert finer_energy < min(0.5 * energy, 0.05)
+    assert finer_amplitude < min(0.5 * amplitude, 0.05)
+
+
+# ---- joints and fits ----
+
+
+def test_frequencies_of_the_joint_model_are_those_of_the_rig(rig, joints):
+    """Other masters, the same rig: springs put in after the reduction or before it."""
+    system, stuck = rig.plain.system, pipeline.contact_stiffness(rig.scene, rig.plain)
+    for K, state in (
+        (system.stiffness, False),
+        (stuck_stiffness(system.stiffness, rig.plain.interface.B, stuck), True),
+    ):
+        exact = np.sqrt(eigh(K, system.mass, eigvals_only=True, subset_by_index=[0, 2])) / (2 * np.pi)
+        np.testing.assert_allclose(joints.modes({}, state).frequency[:3], exact, rtol=3e-3)
+
+
+def test_the_scene_has_the_fitted_joints(joints):
+    """What the scene states is what the fit finds, here on a coarser contact grid."""
+    found = rig_fit.fit_joints(joints)
+    np.testing.assert_allclose(found.after, joints.frequencies({}), rtol=1e-2)
+    assert found.rms < 0.02
+    assert np.sqrt(np.mean(np.log(found.before / found.after) ** 2)) > 0.3  # rigid joints are far off
+    assert found.verdict(2) == "at its upper bound"
+
+
+def test_known_springs_are_found_again(joints):
+    """From eight modes; near the ninth one there are several of its kind, so that it may be taken for another."""
+    true = {"base_vertical": 7e8, "base_sliding": 3e9, "seat": rig_fit.RIGID}
+    numbers = joints.frequencies(rig_fit.stiffnesses(true))[:8]
+    parameters = [Parameter(name, 1e8, 1e11, (1e9,), "N/m") for name in ("base_vertical", "base_sliding")]
+    found = fit(
+        parameters,
+        [Measured(str(i), value, "Hz") for i, value in enumerate(numbers)],
+        lambda values: joints.frequencies(rig_fit.stiffnesses({**values, "seat": rig_fit.RIGID}))[:8],
+    )
+    assert found.values[0] == pytest.approx(7e8, rel=1e-2)
+    assert found.values[1] == pytest.approx(3e9, rel=5e-2)
+
+
+def test_modes_are_told_apart_by_their_motion():
+    frequency = np.array([90.0, 300.0, 310.0, 900.0])
+    share = np.array([[0.9, 0.1, 0.0], [0.0, 1.0, 0.0], [0.8, 0.2, 0.0], [0.1, 0.0, 0.9]])
+    wanted = (("tangential", 91.0), ("tangential", 300.0), ("normal", 305.0))
+    np.testing.assert_array_equal(Modes(frequency, share).assigned(wanted), [90.0, 310.0, 300.0])
+
+
+def test_the_height_is_found_from_the_preload(rig):
+    found = rig_fit.fit_height(rig.with_height(10e-6))
+    height = found.named()["platform"]
+    assert rig.with_height(height).at_rest().preload == pytest.approx(published.PRELOAD, rel=1e-6)
+    assert found.before[0] < 0.9 * published.PRELOAD
+
+
+def test_life_and_work_tell_the_coefficient(rig):
+    run = wear_down(Rig.of(scene_file.read("rig", QUICK)), 0.0, lambda sentence: None)
+    assert run.lost
+    found = rig_fit.fit_coefficient(run, 5.5e-15)
+    ratios = [run.history.cycles[-1] / published.LIFE_MEASURED, run.spent[-1] / published.WORK]
+    assert found.values[0] == pytest.approx(5.5e-15 * np.sqrt(np.prod(ratios)), rel=1e-6)
+    np.testing.assert_allclose(found.sensitivity, [[-1.0], [-1.0]], rtol=1e-6)
+    with pytest.raises(ValueError, match="a run that loses its preload"):
+        rig_fit.fit_coefficient(replace(run, end="stopped after 3 wear steps"), 5.5e-15)
+
+
+def test_both_wear_rules_use_up_the_preload_alike():
+    def run(*more: str) -> RigWear:
+        return wear_down(Rig.of(scene_file.read("rig", (*QUICK, *more))), 0.0, lambda sentence: None)
+
+    explicit, controlled = run("wear.step=4 %"), run("wear.rule=error_controlled", "wear.tolerance=5 %")
+    level = np.linspace(0.9, 0.4, 6) * explicit.rest[0]
+    for quantity in ("spent", "volume"):
+        a, b = (np.interp(-level, -r.rest, getattr(r, quantity)) for r in (explicit, controlled))
+        np.testing.assert_allclose(a, b, rtol=0.1)
+
+
+# ---- the study ----
+
+
+def test_the_study_compares_every_number_and_draws(tmp_path, capsys):
+    words = ["rig", "study", "--json", "--out", str(tmp_path)]
+    for override in QUICK:
+        words += ["--set", override]
+    with pytest.raises(SystemExit) as stop:
+        cli.main(words)
+    assert not stop.value.code
+    out, err = capsys.readouterr()
+    record = json.loads(out)
+    numbers = {(n["topic"], n["name"]): n for n in record["numbers"]}
+    found = sum(number["topic"] == "frequency" for number in record["numbers"])
+    assert found == len(published.OPEN) + len(published.STUCK) + 1
+    assert sum(topic == "energy per cycle" for topic, _ in numbers) == len(published.TABLE_5_3)
+    lives = [name for topic, name in numbers if topic == "life"]
+    assert sum("harmonics 0 to 2" in name for name in lives) == 1
+    assert len(lives) == len(published.MATING_HEIGHTS) + 1
+    assert numbers["wear", "slope of volume over work"]["ours"] == pytest.approx(5500, rel=1e-6)
+    assert numbers["preload", "at the start"]["published"] == published.PRELOAD
+    agrees = {t["published"]: t["agrees"] for t in record["trends"]}
+    for trend in (
+        "the reaction at the platform is the preload", "no interference, no preload", "linear in friction work",
+        "without contact the response is the open one", "3 um less: shorter life", "falls all the time",
+    ):  # fmt: skip
+        assert agrees[trend], trend
+    assert "mating height -3 um" in err
+    assert len(record["checks"]) == 5
+    assert len(record["files"]) == 9
+    assert all((tmp_path / name.rsplit("/", 1)[-1]).stat().st_size > 1000 for name in record["files"])
+    text = (tmp_path / "comparison.md").read_text(encoding="utf-8")
+    assert text.count("\n|") >= len(record["numbers"]) + len(record["trends"])
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("wear.at=peak", 'need wear at one frequency, wear.at = "290 Hz"'),
+        ("wear=", "need wear at one frequency"),
+        ("prescribed=", r"need one table under prescribed, \[prescribed.platform\]"),
+        ("springs.seat_along=", r"need the joint \[springs.seat_along\]"),
+        ("harmonics.kept=auto", "need harmonics that are named"),
+    ],
+)
+def test_a_scene_that_is_not_this_rig_is_one_sentence(override, words):
+    with pytest.raises(ValueError, match=words):
+        Rig.of(scene_file.read("rig", (override,)))
+
+
+def test_a_wear_law_beside_the_scene_is_found(tmp_path):
+    """The law of a file, the energy's own written once more, gives the same wear."""
+    law = "from hbm.wear.energy import depth_rate"
+    text = scene_file.find("rig").read_text(encoding="utf-8")
+    (tmp_path / "own.py").write_text(law, encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    depths = []
+    for extra in ((), ("wear.law=own.py",)):
+        file = scene_file.read(str(tmp_path / "mine.toml"), (*QUICK, "wear.max_steps=2", *extra))
+        depths.append(wear_down(Rig.of(file), 0.0, lambda sentence: None).history.depth)
+    np.testing.assert_allclose(depths[1], depths[0], rtol=1e-12)
+
+
+def test_differences_are_relative():
+    number = rig_table.Number("topic", "name", "N", 4.0, 5.0)
+    assert number.difference == pytest.approx(0.25)
+    assert "+25 %" in rig_table.as_text(rig_table.Table((number,), (), (), 0.0))

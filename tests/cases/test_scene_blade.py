@@ -1,0 +1,244 @@
+"""The bladed disk from its scene: wear to loss of contact, the field of the sector, its pictures, bad scenes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.linalg as sla
+
+from tests.workflows.test_pictures import assert_not_blank
+from tribodyn.fem.constraints import named
+from tribodyn.fem.cyclic import rotation
+from tribodyn.fem.elasticity import assemble
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.travelling_wave import at_sector, left_face
+from tribodyn.reduction.cyclic import nodal_diameters
+from tribodyn.workflows.pictures import render, render_wheel
+from tribodyn.workflows.pictures.view import sunk
+from tribodyn.workflows.result import store, summary
+from tribodyn.workflows.run import part_reduction, pipeline, planning
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene import scene_file
+
+COARSE = (
+    "geometry.n_span=4",
+    "geometry.n_side=1",
+    "geometry.n_root=1",
+    "reduction.cutoff=6 kHz",
+    "response.points=40",
+    "wear.step=40 %",
+)
+
+
+def built(folder, *overrides):
+    return pipeline.build(scene_file.read("blade", (*COARSE, *overrides)), folder, Progress())
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("blade")
+
+
+@pytest.fixture(scope="module")
+def finished(folder):
+    return pipeline.run(scene_file.read("blade", COARSE), folder, Progress())
+
+
+def test_wear_goes_on_until_the_blades_are_free(finished):
+    wear, patch = finished.wear, finished.patch
+    assert finished.state == "complete: contact lost at every pair"
+    assert len(patch.area) == 20
+    assert patch.area.sum() == pytest.approx(20e-3 * 30e-3)
+    assert wear.depth[-1] @ patch.area == pytest.approx(2e-15 * wear.work.sum(), rel=1e-12)
+    # delta_max is that of one face; both close, and what is left is the swing of free blades
+    delta = float(finished.facts["delta_max_m"])
+    assert delta == pytest.approx(0.5 * patch.free_deflection @ patch.area / patch.area.sum())
+    assert delta == pytest.approx(2.7e-3, rel=0.05)
+    assert 2 * delta < wear.depth[-1].max() < 4 * delta
+    # wear of shrouds lowers the frequency and raises the response, to those of the free blade
+    hertz = wear.omega / (2 * np.pi)
+    assert hertz[0] > 1.5 * hertz[-1]
+    assert hertz[-1] == pytest.approx(np.asarray(finished.facts["free_hz"])[0], rel=1e-3)
+    assert wear.amplitude[-1] > 10 * wear.amplitude[0]
+    assert wear.amplitude[-1] == pytest.approx(finished.references.free.max(), rel=0.1)  # on a grid of 0.6 Hz
+
+
+def test_result_is_kept_and_told(finished, folder):
+    loaded = store.load(folder / "result.h5")
+    assert render_wheel.wheel_of(loaded).n_sectors == 40
+    told = dict(summary.lines(loaded))
+    assert told["wheel"] == "40 sectors, engine order 1"
+    assert render_wheel.wheel_of(replace(loaded, facts={})) is None
+
+
+def test_field_of_the_sector_meets_its_neighbour(finished):
+    """From the displacement of all nodes: what the right face sees of the left face of the blade behind is x."""
+    wear, patch, part, fields = finished.wear, finished.patch, finished.part, finished.fields
+    wheel = render_wheel.wheel_of(finished)
+    left = render_wheel.left_patch(patch, part.points, wheel)
+    assert part.points[left.nodes] == pytest.approx(wheel.blade(patch.points, 1), abs=1e-12)
+    basis = HarmonicBasis((0, 1))
+    for row, field in zip(fields.row, fields.displacement, strict=True):
+        behind = at_sector(basis, field, 1, 40, -1)[left.nodes]
+        relative = field[patch.nodes] - np.einsum("xy,pyc->pxc", wheel.turn.T, behind)
+        local = np.einsum("pij,pjc->pic", patch.frames, relative)
+        solved = wear.displacement[row].reshape(local.shape)
+        assert np.abs(local - solved).max() < 1e-7 * np.abs(solved).max()
+
+
+def test_left_and_right_face_agree(finished):
+    """Item 5: the left contact is the right one a phase later, so preload, work and wear of the two are one."""
+    basis = HarmonicBasis((0, 1))
+    for row in range(len(finished.wear.cycles)):
+        x, force = finished.wear.displacement[row], finished.wear.force[row]
+        moved, pushed = (left_face(basis, values, 1, 40) for values in (x, force))
+        work = basis.work_per_cycle(force, x)
+        rounding = 1e-9 * np.abs(work).max() + 1e-12
+        assert basis.work_per_cycle(pushed, moved) == pytest.approx(work, rel=1e-9, abs=rounding)
+        assert pushed[:, 0] == pytest.approx(force[:, 0], abs=1e-12)
+
+
+def test_forces_on_both_faces_balance_in_the_full_sector(finished, folder):
+    """Item 5, from the unreduced stiffness and the static field alone: what the two shrouds of a blade are pushed with.
+
+    Equal preload and shear on both faces; over the wheel the shrouds turn nothing, so the roots take no torque
+    """
+    model = built(folder)
+    wheel, patch, wear = render_wheel.wheel_of(finished), finished.patch, finished.wear
+    _, K = assemble(model.part.mesh, part_reduction.material(model_scene()))
+    left = render_wheel.left_patch(patch, finished.part.points, wheel)
+    clamp = named(model.part.node_sets, "clamp")
+    row = int(finished.fields.row[0])
+    field = finished.fields.displacement[0, ..., 0]
+    force = (K @ field.ravel()).reshape(field.shape)  # that acts on each node from outside
+    frames = patch.frames
+    on_right = np.einsum("pij,pj->pi", frames, force[patch.nodes])  # by the blade behind, in the frame of this face
+    on_left = np.einsum("pij,pj->pi", frames, force[left.nodes] @ wheel.turn)  # by the next, turned back to it
+    solved = wear.force[row].reshape(len(frames), 3, -1)[..., 0]
+    scale = np.abs(solved).max()
+    assert np.abs(on_right + solved).max() < 1e-6 * scale
+    assert np.abs(on_left - solved).max() < 1e-6 * scale
+    assert -on_right[:, 2].sum() == pytest.approx(on_left[:, 2].sum()) == pytest.approx(wear.preload[row])
+
+    def torque(nodes):
+        return np.cross(finished.part.points[nodes], force[nodes]).sum(axis=0) @ wheel.axis
+
+    each = np.abs(np.cross(finished.part.points[patch.nodes], force[patch.nodes])).sum()
+    assert abs(torque(patch.nodes)) > 0.1 * each
+    assert abs(torque(patch.nodes) + torque(left.nodes)) < 1e-7 * each
+    assert abs(torque(clamp)) < 1e-6 * each
+
+
+def model_scene():
+    return scene_file.read("blade", COARSE).part_scene
+
+
+def test_every_blade_has_its_phase(finished):
+    wheel, field = render_wheel.wheel_of(finished), finished.fields.displacement[0]
+    moved = np.stack(list(render_wheel.instants(wheel, (0, 1), field)))
+    assert moved.shape == (40, *field.shape[:2])
+    assert moved[0] == pytest.approx(field[..., 1])  # cos at the start of the period
+    assert moved[10] == pytest.approx(-field[..., 2], abs=1e-12)  # a quarter of the wheel on, a quarter period late
+    assert np.abs(moved.sum(axis=0)).max() < 1e-12
+
+
+def test_pictures(finished, tmp_path):
+    written = render.draw(finished, tmp_path)
+    assert {path.stem for path in written} == {"worn_patch", "worn_sector", "worn_wheel"}
+    for path in written:
+        assert_not_blank(path)
+
+
+def test_worn_face_sinks_between_its_pairs_too(finished):
+    patch, part = finished.patch, finished.part
+    depth = 1e-3 + 0.1 * (patch.flat[:, 0] - patch.flat[:, 0].min())
+    moved = sunk(part.points, patch, depth)
+    on_face = np.flatnonzero(moved.any(axis=1))
+    assert len(on_face) == (2 * 5 - 1) * (2 * 4 - 1)  # all nodes of the second-order face
+    flat = (part.points[on_face] - patch.points.mean(0)) @ patch.frames[0, 0]
+    expected = 1e-3 + 0.1 * (flat - patch.flat[:, 0].min())
+    assert np.linalg.norm(moved[on_face], axis=1) == pytest.approx(expected, rel=1e-6)
+
+
+def test_damping_of_every_harmonic(folder):
+    """1 % in the modes of the index that each harmonic sees, free or stuck."""
+    for state in ("free", "stuck"):
+        model = built(folder, f"damping.state={state}", "wheel.engine_order=5").reduced
+        springs = model.interface.stiffness(93e6, 113e6).ravel() if state == "stuck" else np.zeros(60)
+        for h in (0, 1):
+            system, B = model.at_harmonic(h)
+            K = system.stiffness + B.conj().T @ (springs[:, None] * B)
+            lam, phi = sla.eigh(K, system.mass)
+            modal = phi.conj().T @ system.damping @ phi
+            assert np.abs(modal - np.diag(0.02 * np.sqrt(lam))).max() < 1e-6 * np.abs(modal).max()
+
+
+def test_a_couple_is_two_opposite_forces(folder):
+    force = 'group = "couple_leading", opposite = "couple_trailing", direction = "y", value = "60 kN"'
+    couple = f"loads.static={{untwist = {{{force}}}}}"
+    two, one = built(folder), built(folder, couple)
+    system, loads = two.reduced.system, two.balance.excitation.loads
+    expected = sum(value * system.loads[name] for (h, name), value in loads.items() if h == 0)
+    assert one.balance.excitation.loads[0, "untwist"] * one.reduced.system.loads["untwist"] == pytest.approx(expected)
+    assert "opposite" not in scene_file.read("blade").scene.loads.model_dump_json()
+    again = scene_file.from_json(scene_file.read("blade", (couple,)).scene.model_dump_json())
+    assert again.loads.static["untwist"].opposite == "couple_trailing"
+
+
+def test_spinning_wheel_is_stiffer_and_presses_harder(folder):
+    still, spun = built(folder), built(folder, "wheel.speed=6000 rpm")
+    assert "centrifugal" in spun.reduced.system.loads
+    assert spun.balance.excitation.loads[0, "centrifugal"] == pytest.approx((2 * np.pi * 100) ** 2)
+    free = [model.reduced.info["free_frequency"][0] for model in (still, spun)]
+    assert 1.05 * free[0] < free[1] < 2 * free[0]
+    assert "centrifugal" not in still.reduced.system.loads
+
+
+def test_flexible_disk_couples_through_its_seam(folder):
+    """With a disk sector under the root the free frequencies depend on the nodal diameter."""
+    disk = ("geometry.disk_radius=0.15", 'wheel.seam=["cyclic_right", "cyclic_left"]')
+    scene = scene_file.read("blade", (*COARSE, *disk))
+    mesh, nodes = pipeline.make_mesh(scene, folder)
+    assert len(named(nodes, "cyclic_left")) > 0
+    part = pipeline.make_part(scene.part_scene, mesh, nodes)
+    reduced = part_reduction.reduced_sector(scene.part_scene, part)
+    free = nodal_diameters(reduced.sector, (0, 5, 10), 1)[:, 0]
+    assert np.ptp(free) > 0.1
+    spinning = scene_file.read("blade", (*COARSE, *disk, "wheel.speed=6000 rpm")).part_scene
+    spun = part_reduction.reduced_sector(spinning, pipeline.make_part(spinning, mesh, nodes))
+    assert (nodal_diameters(spun.sector, (0, 5, 10), 1)[:, 0] > free).all()
+
+
+def test_plan_of_a_wheel():
+    plan = planning.plan(scene_file.read("blade", COARSE))
+    assert plan.contact_pairs == 20
+    assert plan.unknowns == 180
+
+
+def test_rotation_leads_to_the_left(finished):
+    wheel = render_wheel.wheel_of(finished)
+    assert wheel.turn == pytest.approx(rotation((1, 0, 0), 2 * np.pi / 40))
+
+
+@pytest.mark.parametrize(
+    ("override", "sentence"),
+    [
+        ("contact.opposite=", "the contact needs one group, the right face, and its opposite, the left one"),
+        ("reduction.relative=true", "reduction.relative has no meaning for a sector of a wheel"),
+        ("motion.shroud_right.direction=z", "motion has no meaning for a sector of a wheel"),
+        ("wheel.sectors=1", "wheel.sectors: expected a value at least 2"),
+        ("wheel.sectors=39", "do not match: .* let wheel.sectors = 39 and wheel.axis be those"),
+        ("wheel.axis=-x", "let wheel.sectors = 40 and wheel.axis be those"),
+        ('loads.static={p = {group = "tip", opposite = "clamp", pressure = 1}}', "opposite only with value and direc"),
+        ('loads.static={p = {group = "tip", opposite = "no", direction = "y", value = 1}}', "has no node set 'no'"),
+        ("geometry.disk_radius=0.15", r"wheel.seam is missing, .* give wheel.seam = \["),
+        ("wheel.speed=6000", "at wheel.speed = 360000 rpm the stiffness matrix is singular"),
+        ("wheel.engine=2", r"unknown key wheel.engine \(did you mean engine_order\?\)"),
+        ('wheel.seam=["cyclic_right", "cyclic_left"]', "the mesh has no .*cyclic_right"),
+    ],
+)
+def test_bad_scenes_end_with_one_sentence(override, sentence, folder):
+    with pytest.raises(ValueError, match=sentence):
+        built(folder, override)

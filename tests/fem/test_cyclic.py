@@ -1,0 +1,119 @@
+"""One sector against the wheel: pairing by rotation, rigid motions, frequencies of every nodal diameter."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.helpers import small_wheel as small
+from tribodyn.fem import cyclic, wheel
+from tribodyn.fem.constraints import Clamp
+from tribodyn.fem.modes import modes
+from tribodyn.fem.part import Contact
+from tribodyn.reduction.cyclic import nodal_diameters
+from tribodyn.reduction.linear import system_modes
+
+
+@pytest.fixture(scope="module", params=[0.0, 0.02], ids=["rigid disk", "flexible disk"])
+def sector(request, tmp_path_factory):
+    return small.full_sector(tmp_path_factory.mktemp("wheel") / "s.msh", request.param)[1]
+
+
+def test_rotation_is_right_handed_about_its_axis():
+    R = cyclic.rotation((0, 0, 2.0), np.pi / 2)
+    assert pytest.approx([0, 1, 0]) == R @ [1, 0, 0]
+    R = cyclic.rotation((1, 2, 3), 0.3)
+    assert pytest.approx(np.eye(3)) == R.T @ R
+    assert pytest.approx([1, 2, 3]) == R @ [1, 2, 3]
+    assert np.linalg.matrix_power(cyclic.rotation((1, 0, 0), 2 * np.pi / 7), 7) == pytest.approx(np.eye(3))
+
+
+def test_every_nodal_diameter_is_that_of_the_assembled_wheel(sector):
+    """Item 1 of the issue, unreduced: all modes of the wheel below a bound are those of the sector, to 1e-8."""
+    k = sector.interface.stiffness(*small.STIFFNESS)
+    system, interface = wheel.assemble(sector)
+    for springs, all_springs in ((None, None), (k, np.tile(k, (small.N, 1)))):
+        half = nodal_diameters(sector, range(small.N // 2 + 1), 4, springs)
+        mine = np.concatenate([half, half[1:-1]])  # waves forwards and backwards
+        bound = 0.99 * mine[:, -1].min()
+        mine = np.sort(mine[mine < bound])
+        theirs, _ = system_modes(system, interface, all_springs, len(mine) + 4)
+        assert np.sum(theirs < bound) == len(mine) >= 2 * small.N
+        assert np.abs(theirs[: len(mine)] / mine - 1).max() < 1e-8
+
+
+def test_opposite_waves_are_mirror_images(sector):
+    for index in (1, 3):
+        system, B = cyclic.at_index(sector, index)
+        other, B_other = cyclic.at_index(sector, small.N - index)
+        assert abs(system.stiffness - other.stiffness.conj()).max() <= 1e-12 * abs(system.stiffness).max()
+        assert abs(B - B_other.conj()).max() < 1e-14
+        assert abs(system.stiffness - system.stiffness.conj().T).max() == 0
+    for index in (0, small.N // 2, small.N, -small.N):
+        system, B = cyclic.at_index(sector, index)
+        assert not np.iscomplexobj(system.stiffness)
+        assert not np.iscomplexobj(B)
+    assert cyclic.phase(3, 8) == pytest.approx(np.exp(-2j * np.pi * 3 / 8))
+    assert cyclic.phase(-3, 8) == pytest.approx(np.conj(cyclic.phase(3, 8)))
+
+
+def test_an_unclamped_wheel_moves_rigidly_in_the_waves_it_should(tmp_path):
+    """Along the axis and about it: index 0. Across it: index 1, since y + i z turns into exp(+-i pitch) of itself."""
+    part, free = small.full_sector(tmp_path / "s.msh", 0.02, clamps=())
+    points = part.points
+    about_axis = np.cross([1.0, 0, 0], points)
+    plus = np.tile(np.array([0, 1, -1j]), (len(points), 1))  # turn @ v = exp(i pitch) v
+    assert free.turn @ plus[0] == pytest.approx(np.exp(2j * np.pi / small.N) * plus[0])
+    tilt = plus * points[:, :1] - np.outer(points @ [0, 1, -1j], [1, 0, 0])
+    along_axis = np.tile([1.0, 0, 0], (len(points), 1))
+    for index, field in ((0, along_axis), (0, about_axis), (1, plus), (1, tilt), (7, plus.conj())):
+        T = cyclic.seam_map(free, index)
+        system, B = cyclic.at_index(free, index)
+        q = field.ravel()
+        kept = np.setdiff1d(np.arange(len(q)), free.seam_left)
+        assert np.abs(T @ q[kept] - q).max() < 1e-12 * np.abs(q).max()
+        scale = abs(system.stiffness).max() * np.abs(q).max()
+        assert np.abs(system.stiffness @ q[kept]).max() < 1e-9 * scale
+        assert np.abs(B @ q[kept]).max() < 1e-12 * np.abs(q).max()  # no relative motion at the shrouds either
+
+
+def test_wheel_is_closed_and_named(sector):
+    system, interface = wheel.assemble(sector)
+    assert interface.n_pair == small.N * sector.interface.n_pair
+    assert set(system.loads) == {f"{name}@{n}" for name in small.LOADS for n in range(small.N)}
+    radius = np.hypot(*interface.points[:, 1:].T).reshape(small.N, -1)
+    assert radius == pytest.approx(np.tile(radius[0], (small.N, 1)))
+    assert abs(system.stiffness - system.stiffness.T).max() <= 1e-12 * abs(system.stiffness).max()
+
+
+def test_a_stiffer_blade_takes_its_own_frequency_with_it(tmp_path):
+    """On a rigid disk with open shrouds blades are alone: each frequency scales with the root of its factor."""
+    sector = small.full_sector(tmp_path / "s.msh")[1]
+    factors = np.linspace(0.9, 1.1, small.N)
+    system, _ = wheel.assemble(sector, factors)
+    alone = modes(sector.system.stiffness, sector.system.mass, 1)[0][0]
+    assert modes(system.stiffness, system.mass, small.N)[0] == pytest.approx(alone * np.sqrt(factors), rel=1e-9)
+    with pytest.raises(ValueError, match="mistuning needs 8 positive stiffness factors"):
+        wheel.assemble(sector, [1.0, 2.0])
+
+
+def test_faces_that_do_not_match_are_one_sentence(tmp_path):
+    mesh, nodes = small.read(tmp_path / "s.msh", 0.02)
+
+    def build(n=small.N, contact=small.CONTACT, clamps=small.CLAMPS, seam=small.SEAM):
+        return cyclic.build(mesh, nodes, small.STEEL, clamps, [contact], small.LOADS, small.OUTPUTS, n, seam)
+
+    with pytest.raises(ValueError, match=r"the two contact faces do not match: 6 of 6 nodes .* is 0.0\d+ m away"):
+        build(n=9)
+    with pytest.raises(ValueError, match="the cyclic faces 'cyclic_right' and 'clamp' have"):
+        build(seam=("cyclic_right", "clamp"))
+    with pytest.raises(ValueError, match="the cyclic faces 'cyclic_left' and 'cyclic_right' do not match"):
+        build(seam=("cyclic_left", "cyclic_right"))
+    with pytest.raises(ValueError, match="'cyclic_right' and 'cyclic_left' are held unequally"):
+        build(clamps=(Clamp("clamp", "y"),))
+    with pytest.raises(ValueError, match="contact 'shroud_right' of a cyclic part needs the opposite face"):
+        build(contact=replace(small.CONTACT, opposite=None))
+    with pytest.raises(ValueError, match="a wheel of 1 sectors"):
+        build(n=1)
+    with pytest.raises(ValueError, match="the mesh has no face 'shroud'"):
+        build(contact=Contact("shroud_right", (1, 0, 0), "shroud"))

@@ -1,0 +1,81 @@
+"""Stress stiffening against a tensioned beam and the published rotating cantilever."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import skfem
+
+from tribodyn.fem.constraints import Clamp
+from tribodyn.fem.elasticity import assemble
+from tribodyn.fem.loads import Centrifugal, NodalForce
+from tribodyn.fem.material import Material
+from tribodyn.fem.modes import modes
+from tribodyn.fem.part import Contact, build
+from tribodyn.fem.prestress import geometric_stiffness, prestressed, spin_softening
+
+SOFT = Material(E=1e9, nu=0.0, rho=1000.0)
+LENGTH, DEPTH = 1.0, 0.01  # slender: shear changes the first frequency by some 1e-4
+
+
+def beam():
+    axes = (np.linspace(0, LENGTH, 21), [0, 2 * DEPTH], [0, DEPTH])
+    mesh = skfem.MeshHex2.from_mesh(skfem.MeshHex.init_tensor(*axes)).with_boundaries(
+        {"tip": lambda x: x[0] > LENGTH - 1e-9}
+    )
+    p = mesh.doflocs
+    sets = {"root": np.flatnonzero(p[0] < 1e-9), "tip": np.flatnonzero(p[0] > LENGTH - 1e-9)}
+    loads = {"pull": NodalForce("tip", (1, 0, 0)), "spin": Centrifugal((0, 0, 1), (0, DEPTH, 0))}
+    return build(mesh, sets, SOFT, [Clamp("root")], [Contact("tip", t1=(0, 1, 0), components=("n",))], loads, {})
+
+
+def test_uniform_stress_is_exact():
+    """Under uniaxial stress sigma, a rotation about y by theta feels sigma theta^2 per volume, a shift nothing."""
+    part = beam()
+    x = part.points
+    u = x * [1e-3, 0, 0]
+    K_G = geometric_stiffness(part.mesh, SOFT, u)
+    tilt = (x[:, :1] * [0, 0, 1.0]).ravel()
+    volume = LENGTH * 2 * DEPTH**2
+    assert tilt @ K_G @ tilt == pytest.approx(1e-3 * SOFT.E * volume, rel=1e-12)
+    assert np.abs(K_G @ np.tile([0, 0, 1.0], len(x))).max() < 1e-12 * abs(K_G).max()
+    assert (K_G != K_G.T).nnz == 0
+
+
+def test_pull_stiffens_and_push_buckles():
+    """omega^2 vanishes at Euler's load P = pi^2 E I / 4 L^2 and starts with the slope of the unloaded mode.
+
+    The slope is P times integral phi'^2 over E I integral phi''^2 = 0.25 pi^2 * 4.6478 / 12.3624 for the cantilever.
+    """
+    part = beam()
+    I = 2 * DEPTH * DEPTH**3 / 12
+    euler = np.pi**2 * SOFT.E * I / (4 * LENGTH**2)
+    free, _ = modes(part.system.stiffness, part.system.mass, 1)
+    slope = 0.25 * np.pi**2 * 4.6478 / 12.3624
+    cases = ((-0.99, 0.01, 2e-3), (0.01, 1 + 0.01 * slope, 3e-5), (-0.01, 1 - 0.01 * slope, 3e-5))
+    for share, expected, tolerance in cases:
+        loaded = prestressed(part, SOFT, share * euler * part.system.loads["pull"])
+        omega, _ = modes(loaded.system.stiffness, part.system.mass, 1)
+        assert (omega[0] / free[0]) ** 2 == pytest.approx(expected, abs=tolerance)
+
+
+def test_rotating_cantilever():
+    """First flap frequency of a uniform cantilever without hub; Wright et al., J. Appl. Mech. 49, 1982, table 1.
+
+    In units of sqrt(E I / rho A L^4): 3.5160 at rest, 4.1373 at speed 2, 7.3604 at 6, 13.1702 at 12. Edgewise
+    stiffening is the same, spin softening takes speed^2 from omega^2.
+    """
+    part = beam()
+    M, _ = assemble(part.mesh, SOFT)
+    unit_flap = np.sqrt(SOFT.E * DEPTH**2 / 12 / SOFT.rho) / LENGTH**2
+    for speed, flap in ((2, 4.1373), (6, 7.3604), (12, 13.1702)):
+        rate = speed * unit_flap
+        softening = spin_softening(M, (0, 0, 1), rate)[part.free][:, part.free]
+        spinning = prestressed(part, SOFT, rate**2 * part.system.loads["spin"], softening)
+        omega, phi = modes(spinning.system.stiffness, part.system.mass, 4)
+        size = np.linalg.norm(part.field(phi), axis=0)  # component, mode
+        edge = list(size[1] > size[2])
+        assert omega[edge.index(False)] / unit_flap == pytest.approx(flap, rel=2e-3)
+        # edgewise the section is twice as deep: rest frequency 2 * 3.5160, speed parameter half as large
+        stiffened = {2: 3.6817, 6: 4.7973, 12: 7.3604}[speed] * 2
+        assert omega[edge.index(True)] / unit_flap == pytest.approx(np.sqrt(stiffened**2 - speed**2), rel=3e-3)

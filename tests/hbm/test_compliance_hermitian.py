@@ -1,0 +1,127 @@
+"""The compliance of models whose harmonics see different systems, complex Hermitian ones among them."""
+
+import numpy as np
+import pytest
+
+from tribodyn.fem.interface import ContactInterface
+from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.law import ContactParameters
+from tribodyn.reduction.model import ReducedModel
+
+N_PAIR, N = 4, 40
+HARMONICS = (0, 1, 2, 3, 5)
+SYSTEM_OF = {0: 0, 1: 1, 2: 2, 3: 1, 5: 0}  # 1 and 3 share a complex system, 0 and 5 a real one
+OMEGA = 40.0
+
+
+def random_system(rng, is_complex):
+    """A Hermitian system with eigenfrequencies from 20 to 4000 rad/s and a contact map, loads and an output."""
+
+    def matrix(n, m):
+        real = rng.normal(size=(n, m))
+        return real + 1j * rng.normal(size=(n, m)) if is_complex else real
+
+    basis = matrix(N, N) + 6 * np.eye(N)
+    omega = np.geomspace(20, 4000, N)
+    half = matrix(N, N)
+    damping = basis.conj().T @ (np.diag(0.03 * omega) + 1e-3 * half @ half.conj().T) @ basis
+    return SecondOrderSystem(
+        basis.conj().T @ basis,
+        basis.conj().T @ np.diag(omega**2) @ basis,
+        damping,
+        {"rest": matrix(N, 1)[:, 0], "shaker": matrix(N, 1)[:, 0]},
+        {"tip": matrix(N, 1)[:, 0]},
+    ), matrix(3 * N_PAIR, N)
+
+
+@pytest.fixture(scope="module")
+def balance():
+    rng = np.random.default_rng(3)
+    systems = [random_system(rng, c) for c in (False, True, False)]
+    interface = ContactInterface(
+        ("t1", "t2", "n"),
+        np.zeros((N_PAIR, 3)),
+        np.tile(np.eye(3), (N_PAIR, 1, 1)),
+        np.ones(N_PAIR),
+        np.zeros(N_PAIR),
+        systems[1][1],
+        np.zeros((0, 4), int),
+    )
+    model = ReducedModel(systems[1][0], interface, per_harmonic=lambda h: systems[SYSTEM_OF[h]])
+    parameters = ContactParameters.of(interface.components, np.full((N_PAIR, 3), 3e3), friction=0.4)
+    load = Excitation.of({"rest": 2e3}, {1: {"shaker": 900 - 300j}, 3: {"shaker": 200j}})
+    return HarmonicBalance(model, "jenkins", parameters, HarmonicBasis(HARMONICS, 64), load, OMEGA)
+
+
+def direct(balance, omega, force, loads):
+    """Contact displacement and output, one dense solve per harmonic; force (n_contact, n_coeff)."""
+    basis = balance.basis
+    amplitudes = basis.to_complex(force)
+    x, y = [], []
+    for position, h in enumerate(basis.harmonics):
+        system, b = balance.model.at_harmonic(h)
+        s = 1j * h * omega
+        stuck = system.stiffness + b.conj().T @ (balance.compliance.k[:, None] * b)
+        D = stuck + s * system.damping + s * s * system.mass
+        total = b.conj().T @ amplitudes[:, position]
+        for (order, name), value in loads.items():
+            if order == h:
+                total = total + value * system.loads[name]
+        q = np.linalg.solve(D, total)
+        x.append(b @ q)
+        y.append(system.outputs["tip"] @ q)
+    return basis.to_real(np.stack(x, axis=-1)), basis.to_real(np.array([y]))
+
+
+def test_compliance_equals_a_dense_solve(balance):
+    point = balance.at(0.7 * OMEGA)
+    x, y = direct(balance, 0.7 * OMEGA, np.zeros((3 * N_PAIR, balance.basis.n_coeff)), balance.excitation.loads)
+    assert np.abs(point.x_lin - x).max() < 1e-8 * np.abs(x).max()
+    assert np.abs(point.outputs_lin - y).max() < 1e-8 * np.abs(y).max()
+    g = np.random.default_rng(0).normal(size=(3 * N_PAIR, balance.basis.n_coeff))
+    x, y = direct(balance, 0.7 * OMEGA, g, {})
+    scale = np.abs(x).max()
+    assert np.abs(point.apply(g) - x).max() < 1e-8 * scale
+    assert np.abs(point.outputs(g) - y).max() < 1e-8 * np.abs(y).max()
+    rows = np.arange(3, 9)
+    some = np.zeros_like(g)
+    some[rows] = g[rows]
+    product = point.jacobian_product(rows)(g[rows])
+    assert np.abs(product - point.apply(some)[rows]).max() < 1e-2 * scale  # low modes and statics, single precision
+
+
+def test_expansion_holds_up_to_the_highest_harmonic_of_each_system(balance):
+    """Harmonics 0 and 5 share a system: its expansion must reach 5 omega_max, not 0."""
+    assert balance.compliance.error < 1e-7
+    g = np.random.default_rng(1).normal(size=(3 * N_PAIR, balance.basis.n_coeff))
+    x, _ = direct(balance, OMEGA, g, {})
+    assert np.abs(balance.at(OMEGA).apply(g) - x).max() < 1e-7 * np.abs(x).max()
+
+
+def test_slopes_equal_finite_differences(balance):
+    omega, step = 0.6 * OMEGA, 2e-4
+    g = np.random.default_rng(2).normal(size=(3 * N_PAIR, balance.basis.n_coeff))
+    for force in (None, g):
+        x_slope, y_slope = balance.at(omega).slope(force)
+        both = []
+        for at in (omega + step, omega - step):
+            point = balance.at(at)
+            both.append((point.x_lin, point.outputs_lin) if force is None else (point.apply(g), point.outputs(g)))
+        for slope, (up, down) in zip((x_slope, y_slope), zip(*both, strict=True), strict=True):
+            assert np.abs(slope - (up - down) / (2 * step)).max() < 1e-6 * np.abs(slope).max()
+
+
+def test_newton_direction_equals_the_derivative(balance):
+    omega = 0.6 * OMEGA
+    rng = np.random.default_rng(5)
+    x = balance.stuck(omega) * 3
+    state = balance.evaluate(omega, x)
+    assert (state.cycle.status & 2).any()
+    direction = rng.normal(size=x.shape)
+    step = 1e-7 * np.abs(x).max()
+    up, down = (balance.evaluate(omega, x + sign * step * direction).residual for sign in (1, -1))
+    dense = balance.linearise(state).dense() @ direction.ravel()
+    assert np.abs((up - down).ravel() / (2 * step) - dense).max() < 1e-5 * np.abs(dense).max()

@@ -1,0 +1,330 @@
+"""What every contact law must obey, run over every law file found by its name and every set of its components."""
+
+import numpy as np
+import pytest
+import scipy.linalg as sla
+
+from tests.helpers.contact_draws import HARMONICS, LAWS, LOCATED, draw, tangential
+from tests.helpers.verification_models import interface, modal_damping
+from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.hbm import aft, newton
+from tribodyn.hbm import law as contact_law
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS, ContactParameters
+from tribodyn.hbm.recovery import coordinates
+from tribodyn.reduction.model import ReducedModel
+
+EVERY_LAW = pytest.mark.parametrize(("name", "components"), LAWS, ids=lambda v: v if isinstance(v, str) else "".join(v))
+FRICTION = pytest.mark.parametrize(
+    ("name", "components"),
+    [(name, c) for name, c in LAWS if contact_law.load(name).n_state(c) > 0],
+    ids=lambda v: v if isinstance(v, str) else "".join(v),
+)
+EVERY_FAST_LAW = pytest.mark.parametrize(
+    ("name", "components"),
+    [(name, c) for name, c in LAWS if hasattr(contact_law.load(name), "cycle")],
+    ids=lambda v: v if isinstance(v, str) else "".join(v),
+)
+BOTH_WAYS = ("sampled", "located")
+
+
+def cycles(name, components):
+    """The ways a law offers its cycle: basis.transitions values."""
+    return BOTH_WAYS if (name, components) in LOCATED else BOTH_WAYS[:1]
+
+
+@EVERY_LAW
+def test_step_derivatives_equal_differences_of_order_six(name, components):
+    law = contact_law.load(name)
+    basis = HarmonicBasis((0, 1), 8)
+    x, parameters, _ = draw(law, components, basis, 200, seed=1)
+    n_comp, n_state = len(components), law.n_state(components)
+    memory = np.random.default_rng(2).normal(size=(200, n_state))
+    stencil, weights = np.array([-3, -2, -1, 1, 2, 3]), np.array([-1, 9, -45, 45, -9, 1]) / 60
+    checked, seen = 0, 0
+
+    def advance(i, z):
+        s, f = z[n_comp:].copy(), np.zeros(n_comp)
+        d = [np.zeros((a, b)) for a in (n_comp, n_state) for b in (n_comp, n_state)]
+        bits = law.step(z[:n_comp].copy(), s, parameters.packed()[i], f, *d)
+        return bits, np.concatenate([f, s]), np.block([[d[0], d[1]], [d[2], d[3]]])
+
+    for i in range(200):
+        z = np.concatenate([x[i] @ basis.synthesis[3], memory[i]])
+        bits, _, slope = advance(i, z)
+        for column in range(len(z)):
+            step = 1e-3 * np.eye(len(z))[column]
+            near = [advance(i, z + k * step) for k in stencil]
+            if all(b == bits for b, _, _ in near):
+                difference = sum(w * out for w, (_, out, _) in zip(weights, near, strict=True)) / 1e-3
+                np.testing.assert_allclose(slope[:, column], difference, atol=2e-11 * (1 + np.abs(difference).max()))
+                checked += 1
+                seen |= bits
+    assert checked > 100 * len(components)
+    if n_state > 0:
+        assert seen & (SLIPS | STICKS) == SLIPS | STICKS
+
+
+@EVERY_LAW
+@pytest.mark.parametrize("harmonics", HARMONICS, ids=str)
+def test_jacobian_of_the_cycle_equals_differences(name, components, harmonics):
+    law = contact_law.load(name)
+    for way in cycles(name, components):
+        basis = HarmonicBasis(harmonics, 64, way)
+        x, parameters, memory = draw(law, components, basis, 80, seed=3)
+        direction = np.random.default_rng(4).normal(size=x.shape) * np.abs(x).max(axis=(1, 2), keepdims=True)
+
+        def force(e, x=x, parameters=parameters, basis=basis, memory=memory, direction=direction):
+            return contact_law.cycle(law, x + e * direction, parameters, basis, memory, jacobian=False).force
+
+        coarse, fine = ((force(e) - force(-e)) / (2 * e) for e in (2e-6, 1e-6))
+        slope = contact_law.cycle(law, x, parameters, basis, memory).jacobian
+        exact = (slope @ direction.reshape(80, -1, 1)).reshape(x.shape)
+        scale = 1e-30 + np.abs(exact).max(axis=(1, 2))
+        smooth = np.abs(coarse - fine).max(axis=(1, 2)) < 1e-5 * scale  # no transition passes a sample within the step
+        error = np.abs(fine - exact).max(axis=(1, 2)) / scale
+        assert smooth.mean() > 0.9
+        assert np.quantile(error[smooth], 0.95) < 1e-6
+        assert error[smooth].max() < 1e-4
+
+
+@EVERY_FAST_LAW
+def test_fast_cycle_equals_the_marched_one_to_rounding(name, components):
+    law = contact_law.load(name)
+    for harmonics in HARMONICS:
+        for n_samples in (15, 128):
+            basis = HarmonicBasis(harmonics, n_samples)
+            x, parameters, memory = draw(law, components, basis, 100, seed=5)
+            fast = law.cycle(x, parameters, memory, basis)
+            slow = aft.march(law, x, parameters, memory, basis)
+            np.testing.assert_allclose(fast.force, slow.force, atol=1e-13)
+            np.testing.assert_allclose(fast.jacobian, slow.jacobian, atol=1e-13)
+            np.testing.assert_array_equal(fast.status, slow.status)
+            assert law.cycle(x, parameters, memory, basis, jacobian=False).jacobian is None
+
+
+@FRICTION
+def test_friction_stays_in_the_coulomb_cone_and_the_normal_force_pushes(name, components):
+    law = contact_law.load(name)
+    basis = HarmonicBasis((0, 1, 2, 3), 64)
+    x, parameters, memory = draw(law, components, basis, 200, seed=6)
+    _, force = aft.history(law, x, parameters, basis, memory)
+    normal = force[:, -1] if "n" in components else np.broadcast_to(parameters.normal_load[:, None], force[:, 0].shape)
+    assert normal.min() >= 0.0
+    t = force[:, tangential(components)]
+    size = np.linalg.norm(t, axis=1) if name == "coulomb_planar" else np.abs(t).max(axis=1)
+    assert np.all(size <= parameters.friction[:, None] * normal * (1 + 1e-12) + 1e-14)
+
+
+@EVERY_LAW
+def test_no_law_makes_energy(name, components):
+    """Work of the tangential forces over a cycle; exactly >= 0 where sampled closed or located, not where a pair lifts.
+
+    Without friction it is zero: to rounding if located or smooth.
+    """
+    law = contact_law.load(name)
+    t = tangential(components)
+    for way in cycles(name, components):
+        basis = HarmonicBasis((0, 1, 2, 3), 256, way)
+        x, parameters, memory = draw(law, components, basis, 300, seed=7)
+        cycle = contact_law.cycle(law, x, parameters, basis, memory)
+        scale = np.abs(cycle.force).max() * np.abs(x).max()
+        work = basis.work_per_cycle(cycle.force, x)
+        opens = (cycle.status & SEPARATES) > 0 if way == "sampled" else np.zeros(300, bool)
+        if law.n_state(components) == 0:
+            assert np.abs(work[~opens]).max() < 1e-13 * scale
+        else:
+            assert work[~opens][:, t].min() >= -1e-13 * scale
+            assert work[opens][:, t].min(initial=0.0) >= -1e-3 * scale
+            assert np.all(np.abs(work[(cycle.status & SLIPS) == 0][:, t]) < 1e-3 * scale)
+
+
+@EVERY_LAW
+def test_stick_limit_is_the_linear_spring(name, components):
+    law = contact_law.load(name)
+    for way in cycles(name, components):
+        basis = HarmonicBasis((0, 1, 2, 3), 64, way)
+        x, drawn, _ = draw(law, components, basis, 50, seed=8)
+        if "n" in components:
+            x[:, -1, 0] = np.abs(x[:, -1, 1:]).sum(axis=1) + 1
+        parameters = ContactParameters.of(components, drawn.stiffness, friction=1e6, normal_load=1.0)
+        cycle = contact_law.cycle(law, x, parameters, basis)
+        linear = drawn.stiffness[:, :, None] * x
+        stiffness = np.stack([np.diag(np.repeat(k, basis.n_coeff)) for k in drawn.stiffness])
+        tolerance = 0.0 if way == "located" else 1e-14
+        np.testing.assert_allclose(cycle.force, linear, rtol=0, atol=tolerance * np.abs(linear).max())
+        np.testing.assert_allclose(cycle.jacobian, stiffness, rtol=0, atol=tolerance * 2)
+        assert np.all(cycle.status == STICKS)
+
+
+@FRICTION
+def test_full_slip_limit_of_energy(name, components):
+    """One direction, constant normal load: E = 4 mu N (A - mu N / k_t), so 4 mu N A for large amplitudes."""
+    law = contact_law.load(name)
+    amplitude, mu, load, kt = 1e3, 0.3, 2.0, 5.0
+    for way in cycles(name, components):
+        basis = HarmonicBasis((0, 1), 4096, way)
+        x = np.zeros((1, len(components), basis.n_coeff))
+        x[0, 0, 1] = amplitude
+        if "n" in components:
+            x[0, -1, 0] = load
+        k = np.full((1, len(components)), kt)
+        k[0, -1] = 1.0 if "n" in components else kt
+        parameters = ContactParameters.of(components, k, friction=mu, normal_load=load)
+        cycle = contact_law.cycle(law, x, parameters, basis)
+        energy = basis.work_per_cycle(cycle.force, x)[0, 0]
+        exact = 4 * mu * load * (amplitude - mu * load / kt)
+        assert energy == pytest.approx(exact, rel=1e-12 if way == "located" else 2e-6)
+        assert exact == pytest.approx(4 * mu * load * amplitude, rel=2e-4)
+
+
+@EVERY_LAW
+def test_time_origin_does_not_matter(name, components):
+    """Shifted motion, shifted force. Planar friction that comes to stick depends on its path: only slipping pairs."""
+    law = contact_law.load(name)
+    for way in cycles(name, components):
+        basis = HarmonicBasis((0, 1, 2, 3), 60, way)
+        x, parameters, _ = draw(law, components, basis, 100, seed=9)
+        angle = 2 * np.pi * 7 / 60 if way == "sampled" else 1.234
+        first = contact_law.cycle(law, x, parameters, basis)
+        second = contact_law.cycle(law, basis.shift(x, angle), parameters, basis)
+        keep = (first.status & SLIPS) > 0 if name == "coulomb_planar" else np.ones(100, bool)
+        assert keep.sum() > 30
+        scale = np.abs(first.force).max()
+        error = np.abs(second.force - basis.shift(first.force, angle)).max(axis=(1, 2))
+        assert error[keep].max() < 1e-11 * scale
+        same = first.status[keep] == second.status[keep]  # a pair on the rim of sticking may touch slip by rounding
+        assert same.mean() > 0.9
+
+
+@EVERY_LAW
+def test_mirror_image_of_the_plane(name, components):
+    """Each tangential direction mirrored with its memory mirrors its force alone; a smooth spring is odd in all."""
+    law = contact_law.load(name)
+    for way in cycles(name, components):
+        basis = HarmonicBasis((0, 1, 2, 3), 64, way)
+        x, parameters, memory = draw(law, components, basis, 100, seed=10)
+        first = contact_law.cycle(law, x, parameters, basis, memory)
+        for c in range(len(components)) if name == "cubic_spring" else tangential(components):
+            flip = np.ones(len(components))
+            flip[c] = -1.0
+            mirrored = memory * flip[: memory.shape[1]]
+            second = contact_law.cycle(law, x * flip[:, None], parameters, basis, mirrored)
+            np.testing.assert_allclose(second.force, first.force * flip[:, None], atol=1e-12)
+
+
+@EVERY_LAW
+def test_action_is_reaction(name, components):
+    """What two bodies, joined by their contact alone, lack to be in balance is the contact force, and minus it."""
+    n_pair, n_comp = 4, len(components)
+    n_contact, n_body = n_pair * n_comp, n_pair * n_comp + 3
+    rng = np.random.default_rng(12)
+    a = rng.normal(size=(2, n_body, n_body))
+    stiffness = sla.block_diag(*(m @ m.T / n_body + 0.2 * np.eye(n_body) for m in a))
+    mass = np.eye(2 * n_body)
+    loads = {"press": np.zeros(2 * n_body), "shake": rng.normal(size=2 * n_body)}
+    loads["press"][n_comp - 1 : n_contact : n_comp], loads["press"][n_body + n_comp - 1 :: n_comp] = 1.0, -1.0
+    damping = modal_damping(mass, stiffness, 0.05)
+    touching = np.eye(n_contact, n_body)
+    system = SecondOrderSystem(mass, stiffness, damping, loads, {"first": np.eye(2 * n_body)[-1]})
+    model = ReducedModel(system, interface(np.hstack([touching, -touching]), components))
+    parameters = ContactParameters.of(
+        components, np.full((n_pair, n_comp), 1.5), friction=0.3, normal_load=1.0, cubic=0.1
+    )
+    basis = HarmonicBasis((0, 1, 2, 3), 64)
+    excitation = Excitation.of({"press": 0.5}, {1: {"shake": 1.0}})
+    balance = HarmonicBalance(model, name, parameters, basis, excitation, 2.0)
+    solution = newton.solve_from_rest(balance, 0.8)
+    assert solution.converged
+    state = solution.state
+    flat = state.cycle.force.reshape(n_contact, -1)
+    force = basis.to_complex(flat)
+    size = np.abs(force).max()
+    assert size > 0.05
+    moved = coordinates(balance, state.flat, flat, 0.8)
+    for at, (h, q) in enumerate(zip(basis.harmonics, moved, strict=True)):
+        lacking = (stiffness + 0.8j * h * damping - (0.8 * h) ** 2 * mass) @ q
+        for name_of, value in (("press", 0.5 * (h == 0)), ("shake", 1.0 * (h == 1))):
+            lacking = lacking - value * loads[name_of]
+        first, second = np.split(-lacking, 2)
+        np.testing.assert_allclose(first[:n_contact], force[:, at], atol=1e-6 * size)
+        np.testing.assert_allclose(second[:n_contact], -force[:, at], atol=1e-6 * size)
+        assert np.abs(np.concatenate([first[n_contact:], second[n_contact:]])).max() < 1e-6 * size
+
+
+@EVERY_LAW
+@pytest.mark.parametrize("length", [1e-9, 1e9])
+@pytest.mark.parametrize("unit_force", [1e-9, 1e9])
+def test_units_of_length_and_force_do_not_matter(name, components, length, unit_force):
+    law = contact_law.load(name)
+    for way in cycles(name, components):
+        basis = HarmonicBasis((0, 1, 2, 3), 64, way)
+        x, p, memory = draw(law, components, basis, 100, seed=11)
+        scaled = ContactParameters.of(
+            components,
+            p.stiffness * unit_force / length,
+            friction=p.friction,
+            gap=p.gap * length,
+            normal_load=p.normal_load * unit_force,
+            cubic=p.cubic * unit_force / length**3,
+        )
+        first = contact_law.cycle(law, x, p, basis, memory)
+        second = contact_law.cycle(law, x * length, scaled, basis, memory * length)
+        np.testing.assert_allclose(second.force / unit_force, first.force, atol=1e-11)
+        error = np.abs(second.jacobian * length / unit_force - first.jacobian).max(axis=(1, 2))
+        assert np.quantile(error, 0.97) < 1e-9
+        assert (first.status == second.status).mean() > 0.9  # pairs on the rim of sticking
+
+
+@EVERY_LAW
+def test_memory_repeats(name, components):
+    """March on from the settled memory: the same cycle again."""
+    law = contact_law.load(name)
+    basis = HarmonicBasis((0, 1, 2, 3), 64)
+    x, parameters, memory = draw(law, components, basis, 100, seed=12)
+    samples = basis.to_time(x)
+    settled, _ = aft.settle(law, samples, parameters.packed(), memory, basis.synthesis[:, :0])
+    again, _ = aft.settle(law, samples, parameters.packed(), settled, basis.synthesis[:, :0])
+    np.testing.assert_allclose(again, settled, atol=1e-12)
+    first = contact_law.cycle(law, x, parameters, basis, memory)
+    second = contact_law.cycle(law, x, parameters, basis, settled)
+    np.testing.assert_allclose(second.force, first.force, atol=1e-11)
+
+
+@EVERY_LAW
+def test_extreme_parameters_give_finite_forces(name, components):
+    law = contact_law.load(name)
+    for way in cycles(name, components):
+        basis = HarmonicBasis((0, 1, 2, 3), 64, way)
+        x, p, memory = draw(law, components, basis, 60, seed=13)
+        for k, mu in ((1e-15, 0.0), (1e15, 10.0), (0.0, 0.5), (1e3, 0.0), (1e15, 1e-12)):
+            stiffness = np.full_like(p.stiffness, k)
+            extreme = ContactParameters.of(components, stiffness, friction=mu, gap=p.gap, normal_load=1e6)
+            for motion in (x, 0 * x, 1e-12 * x, 1e6 * x):
+                cycle = contact_law.cycle(law, motion, extreme, basis, memory)
+                assert np.isfinite(cycle.force).all()
+                assert np.isfinite(cycle.jacobian).all()
+
+
+def test_law_without_located_transitions_refuses():
+    basis = HarmonicBasis((0, 1), 16, "located")
+    refused = [(name, components) for name, components in LAWS if (name, components) not in LOCATED]
+    assert refused
+    for name, components in refused:
+        law = contact_law.load(name)
+        x, parameters, memory = draw(law, components, basis, 2, seed=0)
+        with pytest.raises(ValueError, match=f"'{name}' does not locate its transitions: take transitions = 'sampled'"):
+            contact_law.cycle(law, x, parameters, basis, memory)
+    with pytest.raises(ValueError, match="transitions must be"):
+        HarmonicBasis((0, 1), 16, "exact")
+
+
+def test_names_and_components():
+    assert {"jenkins", "jenkins_constant", "coulomb_planar", "unilateral", "cubic_spring"} <= set(contact_law.names())
+    with pytest.raises(ValueError, match="no contact law 'glue': there are"):
+        contact_law.load("glue")
+    with pytest.raises(ValueError, match="'unilateral' has components \\(n\\), not"):
+        contact_law.check_components(contact_law.load("unilateral"), ("t1", "n"))
+    assert contact_law.load("unilateral").n_state(("n",)) == 0

@@ -1,0 +1,49 @@
+"""Natural continuation at folds: it jumps where the closed form has them, says so, and goes on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.helpers.continuation_models import Duffing, Lifting
+from tribodyn.hbm import parameter
+from tribodyn.hbm.continuation import arc_length, natural
+from tribodyn.hbm.continuation.natural import Options
+
+
+@pytest.mark.parametrize("n_points", [20, 80])
+def test_a_sweep_jumps_at_the_fold_and_says_so(n_points):
+    duffing = Duffing()
+    low, high = duffing.folds()
+    for start, stop, fold in ((0.5, 5.0, high), (5.0, 0.5, low)):
+        branch = natural.follow(duffing.balance(), start, stop, Options(n_points))
+        assert branch.omega[-1] == stop
+        assert set(branch.outcome) == {"converged"}
+        assert np.all(np.diff(branch.omega) * (stop - start) > 0)
+        np.testing.assert_allclose(branch.omega[list(branch.folds)], [fold], rtol=1e-8)
+        assert f"the response jumped at folds: {fold / (2 * np.pi):.6g} Hz" in branch.end
+        amplitude = branch.amplitude("mass")
+        assert np.abs(duffing.defect(branch.omega, amplitude)).max() < 1e-5
+        at = branch.folds[0]
+        assert abs(amplitude[at + 1] - amplitude[at]) > 0.5 * amplitude[at]
+
+
+def test_a_lifting_mass_jumps_both_ways_at_the_folds_of_the_arc_length():
+    balance = Lifting().balance((0, 1, 2, 3), how="located")
+    round_them = arc_length.follow(balance, 0.9, 4.0)
+    folds = np.sort(round_them.omega[list(round_them.folds)])
+    for start, stop in ((0.9, 4.0), (4.0, 0.9)):
+        branch = natural.follow(balance, start, stop, Options(60))
+        assert branch.end.startswith("reached")
+        assert branch.folds
+        for fold in branch.omega[list(branch.folds)]:
+            assert np.abs(folds / fold - 1).min() < 1e-8
+
+
+def test_it_jumps_in_the_load_too():
+    path = parameter.load(Duffing().balance(), 2.0)
+    folds = arc_length.follow(path, 0.0, 12.0)
+    for (start, stop), fold in zip(((0.0, 12.0), (12.0, 0.0)), folds.folds, strict=True):
+        branch = natural.follow(path, start, stop, Options(25))
+        assert branch.end.startswith(f"reached load factor {stop:g}; the response jumped at folds: load factor ")
+        np.testing.assert_allclose(branch.parameter[list(branch.folds)], folds.parameter[fold], rtol=1e-8)

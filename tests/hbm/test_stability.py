@@ -1,0 +1,153 @@
+"""Hill's method and Floquet multipliers: against eigenvalues, finite differences, each other, and turns of a branch."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.helpers.verification_models import oscillator, random_structure
+from tribodyn.hbm import newton, parameter, time_integration
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation import arc_length
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.floquet import monodromy
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.law import ContactParameters
+from tribodyn.hbm.stability import Stability, mark, stability
+from tribodyn.hbm.time_integration import Options, TimeStepper
+from tribodyn.reduction.model import ReducedModel
+
+OMEGA = 305.3
+
+
+def balance_of(friction: float, static: float, shaker: float, top: int) -> HarmonicBalance:
+    model = random_structure(3)
+    parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(3e6, 5e6), friction=friction)
+    excitation = Excitation.of({"static": static}, {1: {"shaker": shaker}})
+    basis = HarmonicBasis(tuple(range(top + 1)), 512)
+    return HarmonicBalance(model, "jenkins", parameters, basis, excitation, 1.2 * OMEGA)
+
+
+@pytest.mark.parametrize(("method", "smallest", "error"), [("hill", 0.0, 1e-9), ("floquet", 0.5, 0.02)])
+def test_exponents_of_a_stuck_contact_are_eigenvalues(method, smallest, error):
+    balance = balance_of(friction=1e9, static=0.0, shaker=1.0, top=3)
+    balance = balance.with_gap(np.full(3, -1e-4))  # pressed together by interference
+    solution = newton.solve_from_rest(balance, OMEGA)
+    assert np.all(solution.state.cycle.status == 1)
+    system, b = balance.model.system, np.asarray(balance.model.interface.B)
+    stiffness = system.stiffness + b.T @ (balance.parameters.stiffness.ravel()[:, None] * b)
+    n = len(stiffness)
+    inverse = np.linalg.inv(system.mass)
+    first_order = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiffness, -inverse @ system.damping]])
+    expected = np.exp(np.linalg.eigvals(first_order) * 2 * np.pi / OMEGA)
+    result = stability(balance, solution.state, method, n_modes=n)
+    assert result.stable
+    assert len(result.exponents) == 2 * n
+    for value in expected[np.abs(expected) > smallest]:
+        assert np.abs(result.multipliers - value).min() < error
+
+
+def test_modes_left_out_of_hill_follow_statically():
+    balance = balance_of(friction=0.3, static=30.0, shaker=60.0, top=5)
+    state = newton.solve_from_rest(balance, OMEGA).state
+    few, all_modes = stability(balance, state, n_modes=8), stability(balance, state, n_modes=13)
+    assert len(few.exponents) == 16
+    assert few.exponents[0].real == pytest.approx(all_modes.exponents[0].real, rel=0.01)
+
+
+def test_monodromy_with_friction_is_the_finite_difference_of_the_period_map():
+    balance = balance_of(friction=0.3, static=30.0, shaker=60.0, top=7)
+    state = newton.solve_from_rest(balance, OMEGA).state
+    options = Options(steps=256, tolerance=1e-11)
+    stepper = TimeStepper(balance, OMEGA, options)
+    motion = time_integration.integrate(balance, OMEGA, state, options, with_slopes=True)
+    exact = np.linalg.eigvals(monodromy(stepper, motion))
+    start = stepper.start_from(state)
+    for _ in range(300):
+        start, record = stepper.period(start)
+    assert np.all(record.bits == 7)
+    n = len(start.eta)
+    unit = np.repeat([1 / OMEGA, 1.0, OMEGA, 1 / OMEGA], [n, n, n, start.memory.size])
+
+    def end_of(change: np.ndarray) -> np.ndarray:
+        eta, v, a, memory = np.split(unit * change, [n, 2 * n, 3 * n])
+        moved = (start.eta + eta, start.v + v, start.a + a, start.memory + memory.reshape(start.memory.shape))
+        end, _ = stepper.period(stepper.motion(*moved))
+        return np.concatenate([end.eta, end.v, end.a, end.memory.ravel()]) / unit
+
+    step = 1e-6 * np.abs(start.v).max() * np.eye(len(unit))
+    columns = [(end_of(e) - end_of(-e)) / (2 * e.max()) for e in step]
+    approximate = np.linalg.eigvals(np.array(columns).T)
+    for value in exact[np.abs(exact) > 0.05]:
+        assert np.abs(approximate - value).min() < 1e-6
+
+
+def test_hill_and_floquet_agree_on_a_flip_from_which_a_plain_march_departs():
+    balance = balance_of(friction=0.0, static=30.0, shaker=60.0, top=15)
+    state = newton.solve_from_rest(balance, OMEGA).state
+    assert np.all(state.cycle.status == 6)
+    hill, floquet = stability(balance, state), stability(balance, state, "floquet")
+    assert not hill.stable
+    assert not floquet.stable
+    assert hill.crossing == floquet.crossing == "flip"
+    np.testing.assert_allclose(hill.multipliers[0], floquet.multipliers[0], rtol=0.01)
+    np.testing.assert_allclose(hill.exponents[:7].real, floquet.exponents[:7].real, rtol=0.03)
+    plain = time_integration.integrate(balance, OMEGA, state, Options(accelerate=False, max_periods=60))
+    mixed = time_integration.integrate(balance, OMEGA, state, Options())
+    assert plain.outcome.startswith("not periodic")
+    assert mixed.outcome == "converged"
+
+
+def lifting_mass() -> HarmonicBalance:
+    """A pressed mass on a unilateral spring: it softens where it lifts, and its resonance bends over."""
+    parameters = ContactParameters.of(("n",), [[4e4]])
+    excitation = Excitation.of({"normal": 50.0}, {1: {"normal": 3.0}})
+    basis = HarmonicBasis((0, 1, 2, 3, 4, 5), 256, "located")
+    return HarmonicBalance(oscillator(1.0, 1e4, 0.01, "n"), "unilateral", parameters, basis, excitation, 300.0)
+
+
+def test_folds_of_a_lifting_mass_are_marked_where_the_branch_turns():
+    balance = lifting_mass()
+    branch = arc_length.follow(balance, 150.0, 260.0)
+    assert branch.end.startswith("reached")
+    assert len(branch.folds) == 2
+    marks = mark(balance, branch)
+    assert [m.kind for m in marks.bifurcations] == ["fold", "fold"]
+    for found, turn in zip(marks.bifurcations, branch.folds, strict=True):
+        assert found.position == pytest.approx(turn, abs=1.0)
+        assert found.value == pytest.approx(branch.omega[turn], rel=1e-3)
+    first, second = branch.folds
+    assert np.all(marks.stable[: first - 1])
+    assert not np.any(marks.stable[first + 2 : second - 1])
+    assert np.all(marks.stable[second + 2 :])
+    between = (first + second) // 2
+    unstable = balance.evaluate(branch.omega[between], branch.contact[between].reshape(1, 1, -1))
+    by_time, by_hill = stability(balance, unstable, "floquet"), stability(balance, unstable)
+    assert by_time.multipliers[0].real > 1
+    assert by_time.multipliers[0] == pytest.approx(by_hill.multipliers[0], rel=0.02)
+
+
+def test_a_branch_in_another_parameter_is_marked_with_it():
+    balance = lifting_mass()
+    load = parameter.load(balance, 200.0)
+    branch = arc_length.follow(load, 0.2, 1.5)
+    marks = mark(load, branch)
+    assert len(marks.stable) == len(branch.omega)
+    assert len(marks.bifurcations) == len(branch.folds)
+    with pytest.raises(ValueError, match="followed in the load factor"):
+        mark(balance, branch)
+
+
+def test_names_and_refusals():
+    model = oscillator(1.0, 1e4, 0.01)
+    parameters = ContactParameters.of(("t1", "n"), [[1e4, 1e4]])
+    excitation = Excitation.of({"normal": 1.0}, {1: {"force": 1.0}})
+    balance = HarmonicBalance(model, "jenkins", parameters, HarmonicBasis((0, 1), 32), excitation, 200.0)
+    state = newton.solve_from_rest(balance, 100.0).state
+    with pytest.raises(ValueError, match="no stability method"):
+        stability(balance, state, "guess")
+    cyclic = ReducedModel(model.system, model.interface, per_harmonic=lambda h: (model.system, np.eye(2)))
+    other = HarmonicBalance(cyclic, "jenkins", parameters, HarmonicBasis((0, 1), 32), excitation, 200.0)
+    with pytest.raises(ValueError, match="one system for all harmonics"):
+        stability(other, state)
+    assert Stability(10.0, np.array([1.0 + 3j]), "hill").crossing == "Neimark-Sacker"

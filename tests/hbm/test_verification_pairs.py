@@ -1,0 +1,126 @@
+"""Many pairs with variable normal load and separation: balance against time integration as harmonics are added."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from tests.helpers.verification_models import random_structure, slab
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation import arc_length
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS, ContactParameters
+from tribodyn.hbm.time_integration import Options
+from tribodyn.hbm.verify import Verification, verify
+
+BESIDE_RESONANCE = (900.0, 60.0, 12.0)  # frequency [Hz], shaking and rocking force [N]: all pairs slip, most lift
+ABOVE_RESONANCE = (2500.0, 40.0, 40.0)  # pairs that stay stuck, pairs that slip, pairs that lift
+
+
+def slab_balance(case: tuple[float, float, float], top: int) -> HarmonicBalance:
+    """A slab of 55 pairs that slides, rocks and lifts at its edges, harmonics 0 to top."""
+    hertz, shake, rock = case
+    model = slab(11, 5)
+    parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(20e6, 30e6), friction=0.4)
+    excitation = Excitation.of({"press": 100.0}, {1: {"shake": shake, "rock": 1j * rock}})
+    basis = HarmonicBasis(tuple(range(top + 1)), 512)
+    return HarmonicBalance(model, "jenkins", parameters, basis, excitation, 2 * np.pi * hertz)
+
+
+def slab_verified(
+    case: tuple[float, float, float], top: int, steps: int = 512
+) -> tuple[np.ndarray, tuple[float, float, float], Verification]:
+    """Status of every pair, errors (scalars, waveform of an output, waveforms of all pairs) and the comparison."""
+    omega = 2 * np.pi * case[0]
+    balance = slab_balance(case, top)
+    solution = newton.solve_from_rest(balance, omega)
+    assert solution.converged
+    result = verify(balance, solution.state, Options(steps=steps))
+    assert result.outcome == "converged"
+    return solution.state.cycle.status, (result.largest, result.waveform["edge"], result.contact), result
+
+
+def test_55_pairs_of_which_some_stick_some_slip_and_some_lift_agree_with_time_integration():
+    errors = {}
+    for top in (1, 3, 5, 7, 9):
+        status, errors[top], result = slab_verified(ABOVE_RESONANCE, top)
+    assert status.shape == (55,)
+    assert np.sum(status & SEPARATES > 0) == 24
+    assert np.sum(status & SLIPS > 0) == 38
+    assert np.sum(status == STICKS) == 17
+    assert max(errors[7]) < 0.002
+    for a, b in pairwise((1, 3, 5, 9)):  # at 7 the scalars are at the error of the time integration, 6e-4
+        assert errors[b][0] < errors[a][0]
+    for a, b in pairwise((1, 3, 5, 7, 9)):
+        assert errors[b][1] < errors[a][1]
+        assert errors[b][2] < errors[a][2]
+    assert result.step_error < 1e-3
+    assert result.drift < 1e-8
+
+
+def test_55_sliding_pairs_of_which_40_lift_agree_with_time_integration_within_one_per_cent_at_seven_harmonics():
+    errors = {}
+    for top in (5, 7, 9):
+        status, errors[top], result = slab_verified(BESIDE_RESONANCE, top)
+    assert np.sum(status & SEPARATES > 0) == 40
+    assert np.all(status & SLIPS > 0)
+    assert np.all(status & STICKS > 0)
+    assert max(errors[7]) < 0.01
+    assert errors[5][1] > errors[7][1] > errors[9][1]
+    assert errors[5][2] > errors[7][2] > errors[9][2]
+    assert result.step_error < 3e-4
+    assert result.drift < 1e-8
+
+
+@pytest.mark.slow
+def test_four_periodic_motions_at_one_frequency_and_time_integration_finds_each():
+    """Two curves with a fold each pass 800 Hz: which motion a solve from rest finds is a matter of its way."""
+    found = {}
+    for start, stop in ((700.0, 900.0), (900.0, 700.0)):
+        balance = slab_balance((900.0, 60.0, 12.0), 7)
+        branch = arc_length.follow(balance, 2 * np.pi * start, 2 * np.pi * stop)
+        assert branch.end == f"turned back to {start:g} Hz"
+        assert len(branch.folds) == 1
+        f = branch.frequency
+        for i in np.flatnonzero((f[1:] - 800.0) * (f[:-1] - 800.0) < 0):
+            share = (800.0 - f[i]) / (f[i + 1] - f[i])
+            guess = (1 - share) * branch.contact[i] + share * branch.contact[i + 1]
+            solution = newton.solve(balance, 2 * np.pi * 800.0, guess.reshape(55, 3, -1))
+            assert solution.converged
+            lifting = int(np.sum(solution.state.cycle.status & SEPARATES > 0))
+            found[lifting] = verify(balance, solution.state, Options(steps=512))
+    assert sorted(found) == [5, 15, 50, 55]
+    for result in found.values():
+        assert result.outcome == "converged"
+        assert max(result.largest, result.waveform["edge"], result.contact) < 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("top", "bound"), [(15, 2e-3), (25, 1e-3)])
+def test_55_sliding_pairs_keep_converging(top, bound):
+    _, errors, _ = slab_verified(BESIDE_RESONANCE, top, steps=4096)
+    assert max(errors) < bound
+
+
+@pytest.mark.parametrize("law", ["jenkins", "coulomb_planar"])
+def test_coupled_structure_near_resonance_approaches_time_integration(law):
+    omega = 305.3  # 3 % below the first mode without contact
+    errors = []
+    for top in (1, 3, 7, 15):
+        model = random_structure(3)
+        parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(3e6, 5e6), friction=0.3)
+        excitation = Excitation.of({"static": 30.0}, {1: {"shaker": 60.0}})
+        basis = HarmonicBasis(tuple(range(top + 1)), 1024)
+        balance = HarmonicBalance(model, law, parameters, basis, excitation, omega)
+        solution = newton.solve_from_rest(balance, omega)
+        assert solution.converged
+        result = verify(balance, solution.state, Options(steps=2048))
+        assert result.outcome == "converged"
+        assert np.all(solution.state.cycle.status == STICKS | SLIPS | SEPARATES)
+        errors.append(max(result.largest, result.contact))
+    assert all(b < a for a, b in pairwise(errors))
+    assert errors[-1] < 5e-3

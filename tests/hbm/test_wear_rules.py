@@ -1,0 +1,309 @@
+"""Both wear rules: what they wear, that they converge to one another, missions, laws, resumption."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.helpers.pressed_body import N_PAIR, wear_problem
+from tribodyn.hbm import error_controlled_rule, newton, thesis_rule, wear_law
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.evolution import Duty, WearProblem, assess
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.law import SEPARATES
+from tribodyn.hbm.operating_point import AtFrequency, AtPeak, BesidePeak, Correction, OperatingPoint
+from tribodyn.hbm.wear_events import events
+from tribodyn.hbm.wear_history import WearHistory, cycles_to_preload
+from tribodyn.hbm.wearing import WearingBalance
+from tribodyn.workflows.scene import scene_file
+
+
+@pytest.fixture(scope="module")
+def problem() -> WearProblem:
+    return wear_problem()
+
+
+@pytest.fixture(scope="module")
+def fine(problem: WearProblem) -> WearHistory:
+    return thesis_rule.evolve(problem, 5e-8)
+
+
+def test_thesis_rule_wears_what_it_dissipates(problem: WearProblem) -> None:
+    first = assess(problem, np.zeros(N_PAIR), 0.0, None)
+    worn = thesis_rule.evolve(problem, 2e-6)
+    assert worn.end.startswith(("preload fell", "contact lost"))
+    assert worn.worn[0].max() <= 2e-6  # eq. 3.30: Z is rounded down
+    assert worn.cycles_in_step[0] == np.floor(2e-6 / first.rate.max())
+    volume = problem.area @ (worn.depth[-1] + worn.worn[-1])
+    assert volume == pytest.approx(1e-9 * worn.work.sum(), rel=1e-12)
+    assert np.all(np.diff(worn.depth, axis=0) >= 0)
+
+
+def life(worn: WearHistory) -> float:
+    """Cycles to 2 % of the first preload."""
+    found = cycles_to_preload(worn, 0.02)
+    assert found is not None
+    return found
+
+
+def test_wear_inside_the_balance_has_the_derivative_of_finite_differences(problem: WearProblem) -> None:
+    balances = [problem.balance, problem.balance.with_load(0.6)]
+    omega = (420.0, 450.0)
+    gain = np.full(N_PAIR, 1e-9) / problem.area
+    base = np.array([0.0, 1e-6, 2e-6, 0.0])
+    wearing = WearingBalance(balances, (0.3, 0.7), base, 3000.0, gain, base)
+    parts = [newton.solve(b, w, b.stuck(w)).state.x for b, w in zip(balances, omega, strict=True)]
+    solution = newton.solve(wearing, omega, np.concatenate(parts, axis=1))
+    assert solution.converged
+    x, depth = solution.state.x, wearing.evaluate(omega, solution.state.x).depth
+    work = np.zeros(N_PAIR)
+    for balance, share, w, part in zip(balances, (0.3, 0.7), omega, wearing.parts(x), strict=True):
+        worn = balance.with_gap(balance.parameters.gap + depth)
+        state = worn.evaluate(w, part)
+        assert newton.relative_residual(state, worn.x_lin(w)) < 1e-8  # every duty is solved at the common depth
+        work += share * worn.energy(state)
+    assert depth == pytest.approx(base + 3000.0 * gain * work, rel=1e-12)
+    assert depth.max() > 1e-5
+    direction = np.random.default_rng(1).normal(size=x.shape) * 1e-6 * np.abs(x).max()
+    fore, back = (wearing.evaluate(omega, x + sign * direction).residual for sign in (1, -1))
+    exact = wearing.linearise(solution.state).product(direction.reshape(-1, x.shape[2]))
+    assert np.abs((fore - back) / 2 - exact).max() < 1e-5 * np.abs(exact).max()
+
+
+def test_error_controlled_rule_converges_with_its_tolerance(problem: WearProblem, fine: WearHistory) -> None:
+    errors = []
+    for share in (0.1, 0.01):
+        worn = error_controlled_rule.evolve(problem, error_controlled_rule.Tolerance(share, 2e-4))
+        assert problem.area @ worn.depth[-1] == pytest.approx(1e-9 * worn.work.sum(), rel=1e-12)
+        errors.append(abs(life(worn) / life(fine) - 1))
+        assert np.all(np.diff(worn.depth, axis=0) >= 0)
+    assert errors[0] < 0.05
+    assert errors[1] < 0.005
+    assert worn.solves.sum() < fine.solves.sum() / 10
+
+
+@pytest.mark.parametrize("kind", ["thesis", "error_controlled"])
+def test_a_resumed_run_ends_in_the_same_bits(problem: WearProblem, kind: str) -> None:
+    def run(resume=None, max_steps=10000):
+        if kind == "thesis":
+            return thesis_rule.evolve(problem, 2e-6, max_steps, None, resume)
+        tolerance = error_controlled_rule.Tolerance(0.05, 1e-5)
+        return error_controlled_rule.evolve(problem, tolerance, max_steps, None, resume)
+
+    whole = run()
+    parts = run(run(None, 3))
+    assert np.array_equal(whole.depth, parts.depth)
+    assert np.array_equal(whole.cycles, parts.cycles)
+    assert np.array_equal(whole.solves, parts.solves)
+    killed = run(replace(whole, end="unfinished"))  # after its last row, before its end was kept
+    assert killed.end == whole.end
+    assert np.array_equal(whole.depth, killed.depth)
+
+
+def test_missions_average_their_duties(problem: WearProblem) -> None:
+    site = AtFrequency("tip", 420.0)
+    mission = (Duty(site, 0.25), Duty(site, 0.75, load=0.5))
+    mixed = WearProblem(problem.balance, mission, "energy", 1e-9, problem.area)
+    state = assess(mixed, np.zeros(N_PAIR), 0.0, None)
+    full, half = (
+        assess(WearProblem(problem.balance, (Duty(site, 1.0, load),), "energy", 1e-9, problem.area), *start)
+        for load, start in ((1.0, (np.zeros(N_PAIR), 0.0, None)), (0.5, (np.zeros(N_PAIR), 0.0, None)))
+    )
+    assert state.rate == pytest.approx(0.25 * full.rate + 0.75 * half.rate, rel=1e-6)
+    beside = BesidePeak(AtPeak("tip", 250.0, 1200.0), 0.97).first(problem.balance)
+    peak = AtPeak("tip", 250.0, 1200.0).first(problem.balance)
+    assert beside.state.omega == pytest.approx(0.97 * peak.state.omega, rel=1e-4)
+    assert beside.amplitude < peak.amplitude
+
+
+def test_archard_and_energy_law_agree_up_to_the_uncoupled_directions(problem: WearProblem) -> None:
+    point = problem.mission[0].site.first(problem.balance)
+    area = problem.area
+    exposure = wear_law.Exposure(problem.balance, point.state, area, np.ones(N_PAIR), np.zeros(N_PAIR), 0.0)
+    energy = wear_law.load("energy").depth_rate(exposure)
+    archard = wear_law.load("archard").depth_rate(exposure)
+    slips = energy > 0.05 * energy.max()
+    # uncoupled sliders dissipate mu N (|ds1| + |ds2|), which lies between mu N |ds| and sqrt(2) times that
+    ratio = energy[slips] / (0.4 * archard[slips])
+    assert np.all((ratio > 0.97) & (ratio < 1.03 * np.sqrt(2)))
+
+
+def test_error_controlled_missions_equal_the_finest_thesis_run(problem: WearProblem) -> None:
+    mission = (Duty(AtFrequency("tip", 420.0), 0.4), Duty(AtPeak("tip", 250.0, 1200.0), 0.6, load=0.7))
+    mixed = wear_problem(mission=mission, lost_below=0.02)
+    fine = thesis_rule.evolve(mixed, 5e-7)
+    worn = error_controlled_rule.evolve(mixed, error_controlled_rule.Tolerance(0.02, 2e-4))
+    assert worn.end.startswith("preload fell")
+    assert life(worn) == pytest.approx(life(fine), rel=0.01)
+    assert worn.solves.sum() < fine.solves.sum() / 3
+
+
+@pytest.mark.parametrize("law", ["archard"])
+def test_error_controlled_rule_takes_laws_whose_depth_per_work_changes(law: str) -> None:
+    other = wear_problem(law=law, coefficient=4e-10)
+    fine = thesis_rule.evolve(other, 5e-7)
+    worn = error_controlled_rule.evolve(other, error_controlled_rule.Tolerance(0.02, 2e-4))
+    assert life(worn) == pytest.approx(life(fine), rel=0.01)
+
+
+def test_a_law_file_of_ones_own_is_taken_by_both_rules() -> None:
+    law = str(scene_file.CASES / "beam" / "running_in.py")
+    own = wear_problem(law=law, coefficient=4e-10)
+    fine = thesis_rule.evolve(own, 5e-7)
+    worn = error_controlled_rule.evolve(own, error_controlled_rule.Tolerance(0.02, 2e-4))
+    assert life(worn) == pytest.approx(life(fine), rel=0.015)
+    plain = error_controlled_rule.evolve(wear_problem(coefficient=4e-10), error_controlled_rule.Tolerance(0.02, 2e-4))
+    assert 0.25 * life(plain) < life(worn) < life(plain)  # a fresh face wears four times as fast
+
+
+@pytest.mark.parametrize(("text", "says"), [(None, "there is no wear law file"), ("x = 1", "no function depth_rate")])
+def test_a_file_that_is_no_wear_law_is_refused(tmp_path: Path, text: str | None, says: str) -> None:
+    path = tmp_path / "law.py"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(ValueError, match=says):
+        wear_law.load(str(path))
+
+
+@pytest.mark.parametrize(
+    ("body", "says"),
+    [
+        ("return exposure.enrgy", "cannot be run: AttributeError: .* 'enrgy'"),
+        ("return exposure.energy[:1]", r"depths of shape \(1,\) and not"),
+        ("return exposure.energy + float('nan')", "not finite"),
+    ],
+)
+def test_a_wear_law_that_fails_in_the_run_is_told(tmp_path: Path, body: str, says: str) -> None:
+    path = tmp_path / "law.py"
+    path.write_text(f"def depth_rate(exposure):\n    {body}\n")
+    with pytest.raises(ValueError, match=says):
+        thesis_rule.evolve(wear_problem(law=str(path)), 5e-7, max_steps=1)
+
+
+def test_events_are_where_the_penetration_of_a_pair_changes_its_sign(problem: WearProblem, fine: WearHistory) -> None:
+    gap, basis = problem.balance.parameters.gap, HarmonicBasis((0, 1), 1024)
+    found = events(fine, ("t1", "t2", "n"), gap, basis)
+    assert found is not None
+    # by the status that the contact law itself reported, to one row
+    for i in range(N_PAIR):
+        lost = np.flatnonzero(fine.status[:, i] == SEPARATES)
+        touching = np.flatnonzero(fine.status[:, i] != SEPARATES)
+        if np.isfinite(found.lost[i]) and found.lost[i] > 0:
+            k = np.searchsorted(fine.cycles, found.lost[i])
+            assert lost[0] == pytest.approx(k, abs=1)
+        elif not np.isfinite(found.lost[i]):
+            assert touching[-1] == len(fine.cycles) - 1
+    coarse = error_controlled_rule.evolve(problem, error_controlled_rule.Tolerance(0.01, 2e-4))
+    rough = events(coarse, ("t1", "t2", "n"), gap, basis)
+    assert rough is not None
+    assert found.first_loss is not None
+    assert rough.first_loss == pytest.approx(found.first_loss, rel=0.05)
+
+
+def test_a_branch_that_has_ended_is_looked_for_afresh(problem: WearProblem) -> None:
+    """Where no way leads on from the neighbour, the site is asked as at the start, and its solves are counted."""
+
+    class Lost(AtFrequency):
+        def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
+            found = self.first(balance)
+            return replace(found, solution=replace(found.solution, outcome="no way from here"))
+
+    lost = replace(problem, mission=(Duty(Lost("tip", 420.0)),))
+    before = assess(lost, np.zeros(N_PAIR), 0.0, None)
+    depth = np.full(N_PAIR, 1e-6)
+    after, expected = assess(lost, depth, 1.0, before), assess(problem, depth, 1.0, None)
+    assert after.failure == ""
+    assert after.rate == pytest.approx(expected.rate, rel=1e-6)
+    assert after.solves > 3
+
+
+def test_error_controlled_steps_get_over_the_end_of_a_branch(problem: WearProblem) -> None:
+    """The branch ends where the deepest pair is at 1e-5 m; the next one is found from 2e-6 m further on."""
+    end, gap, tolerance = 1e-5, problem.balance.parameters.gap, error_controlled_rule.Tolerance(0.05, 2e-4)
+    over = []
+
+    class Ending(AtFrequency):
+        def first(self, balance: HarmonicBalance) -> OperatingPoint:
+            if (balance.parameters.gap - gap).max() > end + 2e-6:
+                over.append(True)
+            return super().first(balance)
+
+        def correct(self, balance: HarmonicBalance, state: State) -> Correction:
+            ended = not over and (balance.parameters.gap - gap).max() > end
+            return Correction(state.omega if ended else 0.0, np.zeros_like(state.x), 0)
+
+    worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Ending("tip", 420.0)),)), tolerance)
+    leaps = np.flatnonzero(worn.plan[:-1, 0] == 0.0)
+    assert 1 < len(leaps) <= 6
+    assert leaps[-1] == leaps[-2] + 1
+    assert worn.worn[leaps[-1]].max() > 2 * worn.worn[leaps[-2]].max()  # a second one in a row is longer
+    assert worn.worn[leaps].max() <= 1e-5  # never longer than the tolerance
+    assert worn.depth[leaps[-1] + 1].max() > end + 2e-6
+    assert worn.end.startswith("preload fell")
+    assert problem.area @ worn.depth[-1] == pytest.approx(1e-9 * worn.work.sum(), rel=1e-12)
+    plain = error_controlled_rule.evolve(problem, tolerance)
+    assert life(worn) == pytest.approx(life(plain), rel=0.02)
+
+
+def test_a_step_behind_which_no_solution_is_found_is_followed_by_a_longer_one(problem: WearProblem) -> None:
+    """The branch ends where the deepest pair is at 1e-5 m; less than 5e-6 m further on nothing is found by any way."""
+    end, gap, tolerance = 1e-5, problem.balance.parameters.gap, error_controlled_rule.Tolerance(0.05, 2e-4)
+    missed, over = [], []
+
+    class Blind(AtFrequency):
+        def first(self, balance: HarmonicBalance) -> OperatingPoint:
+            found, deepest = super().first(balance), (balance.parameters.gap - gap).max()
+            if end < deepest < end + 5e-6:
+                missed.append(deepest)
+                return replace(found, solution=replace(found.solution, outcome="nothing here"))
+            if deepest > end:
+                over.append(deepest)
+            return found
+
+        def correct(self, balance: HarmonicBalance, state: State) -> Correction:
+            ended = not over and (balance.parameters.gap - gap).max() > end
+            return Correction(state.omega if ended else 0.0, np.zeros_like(state.x), 0)
+
+    worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Blind("tip", 420.0)),)), tolerance)
+    assert missed
+    assert worn.end.startswith("preload fell")
+    leap = int(np.flatnonzero(worn.depth.max(axis=1) == over[0])[0]) - 1
+    assert worn.plan[leap, 0] == 0.0
+    assert worn.solves[leap] > len(missed)  # what was looked for in vain is counted
+    assert worn.worn[leap].max() <= 1e-5
+    assert life(worn) == pytest.approx(life(error_controlled_rule.evolve(problem, tolerance)), rel=0.02)
+
+
+def test_where_no_branch_goes_on_the_rule_takes_explicit_steps_to_the_end(problem: WearProblem) -> None:
+    class Never(AtFrequency):
+        def correct(self, balance: HarmonicBalance, state: State) -> Correction:
+            return Correction(state.omega, np.zeros_like(state.x), 0)
+
+    tolerance = error_controlled_rule.Tolerance(0.05, 2e-4)
+    worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Never("tip", 420.0)),)), tolerance)
+    explicit = thesis_rule.evolve(problem, error_controlled_rule.LEAPS[-1] * 0.05 * 2e-4)
+    assert worn.end == explicit.end
+    assert np.all(worn.step_error[:-1] == 1.0)
+    assert worn.worn.max() <= 1e-5
+    assert life(worn) == pytest.approx(life(explicit), rel=0.05)  # the first steps are shorter
+
+
+def test_the_forces_of_a_faint_contact_are_solved_too(problem: WearProblem) -> None:
+    """A start whose residual is just below Newton's tolerance, but far above the stretch of the springs."""
+    apart = newton.solve_from_rest(problem.balance.with_gap(np.full(N_PAIR, 1e-3)), 420.0).state.x[:, 2]
+    faint = problem.balance.with_gap(apart[:, 0] + np.hypot(apart[:, 1], apart[:, 2]) - 1e-11)
+    exact = newton.solve_from_rest(faint, 420.0, newton.NewtonOptions(1e-13))
+    k = faint.compliance.k
+    stretch = np.linalg.norm(exact.state.cycle.force.reshape(len(k), -1) / k[:, None])
+    size = np.linalg.norm(exact.state.x)
+    assert 0 < stretch < 1e-5 * size
+    push = np.random.default_rng(0).normal(size=exact.state.x.shape)
+    start = exact.state.x + 5e-9 * size * push / np.linalg.norm(push)
+    assert newton.relative_residual(faint.evaluate(420.0, start), faint.x_lin(420.0)) < 1e-8
+    found = newton.solve(faint, 420.0, start)
+    assert found.converged
+    missed = np.linalg.norm(found.state.cycle.force - exact.state.cycle.force)
+    assert missed < 1e-3 * np.linalg.norm(exact.state.cycle.force)

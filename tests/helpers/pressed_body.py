@@ -1,0 +1,58 @@
+"""A small body with four pairs that a static load presses and a harmonic one shakes, and its wear problem."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import scipy.linalg as sla
+
+from tests.helpers.verification_models import interface
+from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.evolution import Duty, WearProblem
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.law import ContactParameters
+from tribodyn.hbm.operating_point import AtFrequency
+from tribodyn.reduction.model import ReducedModel
+
+N_PAIR = 4
+
+
+@cache
+def pressed_body() -> ReducedModel:
+    """The model, with a full damping matrix."""
+    rng = np.random.default_rng(3)
+    n = 3 * N_PAIR + 60
+    factor = rng.normal(size=(n, n))
+    stiffness = 2e6 * factor @ factor.T / n + 1e5 * np.eye(n)
+    mass = np.eye(n) + 0.1 * np.diag(rng.random(n))
+    lam, phi = sla.eigh(stiffness, mass)
+    damping = mass @ phi @ np.diag(2 * 0.02 * np.sqrt(lam)) @ phi.T @ mass
+    press, shake = np.zeros(n), np.zeros(n)
+    press[2 : 3 * N_PAIR : 3] = 1 / N_PAIR
+    shake[0 : 3 * N_PAIR : 3] = 1 / N_PAIR
+    system = SecondOrderSystem(mass, stiffness, damping, {"press": press, "shake": shake}, {"tip": shake})
+    return ReducedModel(system, interface(np.eye(3 * N_PAIR, n), ("t1", "t2", "n")))
+
+
+def balance_of(model: ReducedModel, harmonics: tuple[int, ...] = (0, 1, 2, 3), shake: float = 60.0) -> HarmonicBalance:
+    stiffness = np.tile([2e5, 2e5, 3e5], (N_PAIR, 1)) * np.linspace(0.7, 1.3, N_PAIR)[:, None]
+    parameters = ContactParameters.of(("t1", "t2", "n"), stiffness, friction=0.4)
+    basis = HarmonicBasis(harmonics, 64, "located")
+    excitation = Excitation.of({"press": 100.0}, {1: {"shake": shake}})
+    return HarmonicBalance(model, "jenkins", parameters, basis, excitation, 1500.0)
+
+
+def wear_problem(**changes: object) -> WearProblem:
+    """Its wear at a fixed frequency with harmonics 0 and 1, until 1 % of the preload is left."""
+    given: dict = {
+        "balance": balance_of(pressed_body(), (0, 1)),
+        "mission": (Duty(AtFrequency("tip", 420.0)),),
+        "law": "energy",
+        "coefficient": 1e-9,
+        "area": np.full(N_PAIR, 1e-4),
+        "lost_below": 0.01,
+    }
+    return WearProblem(**(given | changes))

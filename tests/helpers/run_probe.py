@@ -1,0 +1,66 @@
+"""Run a scene in a fresh interpreter and tell as JSON what it imported, factorised, allocated and stored.
+
+python -m tests.run_probe SCENE [section.key=value ...]
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from pathlib import Path
+
+import h5py
+
+from tribodyn.fem import factor as fem_factor
+from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene import scene_file
+
+OPTIONAL = ("gmsh", "pyvista", "vtk", "matplotlib", "surfalize", "cyclopts")
+
+
+def main() -> None:
+    """Run and tell."""
+    factorised, models = [], []
+
+    def counted(kind: type) -> type:
+        class Counted(kind):  # type: ignore[misc]
+            def __init__(self, K, *arguments, **options):
+                factorised.append(K.shape[0])
+                super().__init__(K, *arguments, **options)
+
+        return Counted
+
+    fem_factor.Pardiso, fem_factor.SuperLU = counted(fem_factor.Pardiso), counted(fem_factor.SuperLU)
+    build = pipeline.build
+    pipeline.build = lambda *arguments: models.append(build(*arguments)) or models[-1]
+    with tempfile.TemporaryDirectory() as folder:
+        result = pipeline.run(scene_file.read(sys.argv[1], sys.argv[2:]), Path(folder), Progress())
+        arrays: dict[str, tuple[int, ...]] = {}
+        with h5py.File(Path(folder) / "result.h5") as file:
+            file.visititems(lambda name, item: arrays.update({name: getattr(item, "shape", None)}) and None)
+    balance = models[0].balance
+    told = {
+        "state": result.state,
+        "imported": [name for name in OPTIONAL if name in sys.modules],
+        "factorised": factorised,
+        "models": len(models),
+        "groups": sorted(name for name, shape in arrays.items() if shape is None),
+        "arrays": {name: shape for name, shape in arrays.items() if shape is not None},
+        "pairs": balance.parameters.n_pair,
+        "components": len(balance.parameters.components),
+        "coefficients": balance.basis.n_coeff,
+        "unknowns": balance.n_unknown,
+        "memory": balance.memory.size,
+        "systems": len(balance.compliance.groups),
+        "coordinates": balance.model.system.n_dof,
+        "masters": balance.model.info["n_masters"],
+        "modes": balance.model.info["n_modes"],
+        "delta_max": result.facts.get("delta_max_m"),
+    }
+    print(json.dumps(told))
+
+
+if __name__ == "__main__":
+    main()

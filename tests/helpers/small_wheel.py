@@ -1,0 +1,96 @@
+"""A wheel of eight coarse shrouded blades, small enough to be solved as a whole."""
+
+import numpy as np
+
+from tribodyn.fem import cyclic
+from tribodyn.fem.constraints import Clamp
+from tribodyn.fem.loads import Couple, NodalForce
+from tribodyn.fem.material import Material
+from tribodyn.fem.part import Contact
+from tribodyn.geometry import blade
+from tribodyn.geometry import mesh as mesh_file
+from tribodyn.hbm import travelling_wave as waves
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.law import ContactParameters
+from tribodyn.reduction.cyclic import reduce_sector, travelling_wave, wheel_model
+from tribodyn.reduction.damping import modal_damping
+
+N = 8
+STEEL = Material(210e9, 0.3, 7860.0)
+AROUND = (0.0, 1.0, 0.0)
+STIFFNESS = (93e6, 113e6)  # tangential and normal, of a whole face
+CONTACT = Contact("shroud_right", (1, 0, 0), "shroud_left", vertices_only=True)
+LOADS = {"couple": Couple("couple_trailing", "couple_leading", AROUND), "shaker": NodalForce("excitation", AROUND)}
+OUTPUTS = {"tip": NodalForce("tip", AROUND), "driven": NodalForce("excitation", AROUND)}
+CLAMPS = (Clamp("clamp"),)
+SEAM = ("cyclic_right", "cyclic_left")
+
+
+def parameters(disk_radius=0.0):
+    """A blade of 80 mm on a wheel of eight."""
+    return blade.Parameters(
+        n_blades=N,
+        hub_radius=0.06,
+        span=0.08,
+        root_chord=0.035,
+        tip_chord=0.024,
+        root_thickness=0.01,
+        tip_thickness=0.008,
+        camber=0.04,
+        edge=0.65,
+        tip_stagger=0.6,
+        contact_length=0.02,
+        contact_height=0.012,
+        shroud_length=0.035,
+        root_height=0.015,
+        root_length=0.05,
+        disk_radius=disk_radius,
+        n_along=3,
+        n_up=2,
+        n_span=3,
+        n_side=1,
+        n_root=1,
+        n_disk=1,
+    )
+
+
+def read(path, disk_radius=0.0):
+    """Mesh and node sets of a sector."""
+    blade.build(parameters(disk_radius), path)
+    return mesh_file.read(path)
+
+
+def full_sector(path, disk_radius=0.0, clamps=CLAMPS, contact=CONTACT):
+    """Part and sector of a blade on a rigid disk, or on a flexible one."""
+    mesh, node_sets = read(path, disk_radius)
+    seam = SEAM if disk_radius else None
+    return cyclic.build(mesh, node_sets, STEEL, clamps, [contact], LOADS, OUTPUTS, N, seam)
+
+
+def reduced_sector(path, disk_radius=0.0):
+    """The same, reduced."""
+    return reduce_sector(full_sector(path, disk_radius)[1], n_modes=10)
+
+
+def excitation(static=4e3, harmonic=2e3 + 1e3j):
+    """Couple and shaker of sector 0."""
+    return Excitation.of({"couple": static}, {1: {"shaker": harmonic}})
+
+
+def wave_and_wheel(reduced, engine_order, harmonics=(0, 1, 2, 3), damping=0.01, load=None, stiffness=None):
+    """The same problem twice: one sector under a travelling wave, and the whole wheel."""
+    basis = HarmonicBasis(harmonics, 128)
+    load = load or excitation()
+    one, wheel = travelling_wave(reduced, engine_order), wheel_model(reduced, stiffness)
+    if damping:
+        one, wheel = (model.with_damping(lambda system, B: modal_damping(system, damping)) for model in (one, wheel))
+    k = reduced.sector.interface.stiffness(*STIFFNESS)
+    highest = 2 * np.pi * 1000
+
+    def balance(model, copies, loads):
+        contact = ContactParameters.of(model.interface.components, np.tile(k, (copies, 1)), friction=0.3)
+        return HarmonicBalance(model, "jenkins", contact, basis, loads, highest)
+
+    return balance(one, 1, load), balance(wheel, N, waves.on_wheel(load, engine_order, N))

@@ -1,0 +1,126 @@
+"""A made-up result with the shape of a real one, for tests of the store, the summary and the pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tribodyn.hbm.branch import CONVERGED, Branch
+from tribodyn.hbm.evolution import LOST
+from tribodyn.hbm.wear_history import WearHistory
+from tribodyn.workflows.result.result import (
+    CurveStability,
+    Fields,
+    Loops,
+    PartMesh,
+    Patch,
+    References,
+    Result,
+    ShearBounds,
+    WornResponses,
+)
+from tribodyn.workflows.scene.scene_file import read
+
+LENGTH, WIDTH = 0.2, 0.02
+
+
+def block(nx: int = 8, ny: int = 2, nz: int = 2) -> PartMesh:
+    """Straight bar of eight-node bricks along x, top face at z = WIDTH."""
+    x, y, z = np.linspace(0, LENGTH, nx + 1), np.linspace(0, WIDTH, ny + 1), np.linspace(0, WIDTH, nz + 1)
+    points = np.stack(np.meshgrid(x, y, z, indexing="ij"), -1).reshape(-1, 3)
+    node = np.arange(len(points)).reshape(nx + 1, ny + 1, nz + 1)
+    low, high = slice(None, -1), slice(1, None)
+    around = [(low, low), (high, low), (high, high), (low, high)]
+    cells = [node[i, j, k].ravel() for k in (low, high) for i, j in around]
+    return PartMesh("hexahedron", points, np.stack(cells, 1))
+
+
+def patch(part: PartMesh) -> Patch:
+    """The bottom nodes under the last quarter of the bar."""
+    nodes = np.flatnonzero((part.points[:, 2] == 0) & (part.points[:, 0] >= 0.75 * LENGTH - 1e-12))
+    points = part.points[nodes]
+    n_y = len(np.unique(points[:, 1]))
+    index = np.arange(len(nodes)).reshape(-1, n_y)
+    faces = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], -1).reshape(-1, 4)
+    frames = np.tile(np.array([[1.0, 0, 0], [0, -1.0, 0], [0, 0, -1.0]]), (len(nodes), 1, 1))
+    area = np.full(len(nodes), 0.05 * WIDTH / len(nodes))
+    zero = np.zeros(len(nodes))
+    return Patch(("t1", "t2", "n"), nodes, points, frames, area, zero, faces, 5e-3 + 0.01 * (points[:, 0] - LENGTH))
+
+
+def result(n_row: int = 9, nx: int = 8) -> Result:
+    """A finished run with `n_row` wear rows."""
+    file = read("beam")
+    part = block(nx)
+    where = patch(part)
+    n_pair, t = len(where.area), np.linspace(0, 1, n_row)
+    omega = 2 * np.pi * np.linspace(300, 600, 61)
+    angle = 2 * np.pi * np.arange(32) / 32
+    functions = np.stack([np.ones(32), np.cos(angle), np.sin(angle)], -1)
+
+    def resonance(hertz: float, ratio: float) -> np.ndarray:
+        r = omega / (2 * np.pi * hertz)
+        return 1e-3 * ratio / (1 - r**2 + 2j * ratio * r)
+
+    slipping = resonance(500, 0.05)
+    response = np.stack([0 * omega, slipping.real, -slipping.imag], -1)[:, None]
+    frf = Branch(
+        omega, ("response",), response, np.zeros((61, 3 * n_pair, 3)), np.abs(slipping), (CONVERGED,) * 61,
+        np.full(61, 3), "the end of the frequency range was reached", (20, 30), "frequency", omega,
+    )  # fmt: skip
+    rng = np.random.default_rng(1)
+    row_response = np.stack([0 * t, 1e-3 * (1 + 4 * t), 1e-4 * t], -1)[:, None]
+    displacement = 1e-4 * rng.standard_normal((n_row, 3 * n_pair, 3))
+    depth = 5e-3 * t[:, None] * (1 + 0.1 * np.sin(300 * where.points[:, 0]))
+    cycles_in_step = np.append(np.linspace(3e6, 1e6, n_row - 1), 0.0)
+    energy = np.tile(2 * np.sqrt(1 - t**2)[:, None], n_pair)
+    omega_row = 2 * np.pi * (500 - 85 * t)
+    wear = WearHistory(
+        cycles=np.concatenate([[0.0], np.cumsum(cycles_in_step)[:-1]]),
+        cycles_in_step=cycles_in_step,
+        depth=depth,
+        worn=np.diff(depth, axis=0, append=depth[-1:]),
+        energy=energy,
+        preload=6e3 * (1 - t),
+        normal_force=np.outer(6e3 * (1 - t), where.area / where.area.sum()),
+        status=np.where(t[:, None] * np.ones(n_pair) < 0.6, 3, 6).astype(np.int64),
+        omega=omega_row,
+        amplitude=np.hypot(row_response[:, 0, 1], row_response[:, 0, 2]),
+        force=1e6 * displacement,
+        response=row_response,
+        solves=np.full(n_row, 4),
+        step_error=np.zeros(n_row),
+        plan=np.zeros((n_row, 0)),
+        work=cycles_in_step[:, None] * energy,
+        duty_omega=omega_row[:, None],
+        duty_displacement=displacement[:, None],
+        end=LOST,
+    )
+    rows = np.array([0, n_row // 2, n_row - 1])
+    shape = (part.points[:, 0] / LENGTH) ** 2
+    bend = np.zeros((3, len(part.points), 3, 3))
+    bend[:, :, 2, 0] = -5e-3 * np.linspace(0.2, 1, 3)[:, None] * shape
+    bend[:, :, 1, 1] = 3e-3 * np.linspace(0.4, 1, 3)[:, None] * shape
+    loop_x = (displacement.reshape(n_row, n_pair, 3, 3) @ functions.T)[rows]
+    loops = Loops(rows, loop_x, np.clip(1e8 * loop_x, -4e2, 4e2))
+    return Result(
+        provenance={"scene_name": "beam", "scene_text": file.text, "scene": file.scene.model_dump_json()},
+        facts={
+            "seconds": 12.5, "delta_max_m": 5e-3, "unknowns": 9 * n_pair, "model_dofs": 3 * n_pair + 17,
+            "harmonics": np.arange(2),
+        },
+        state=f"complete: {LOST}",
+        patch=where,
+        part=part,
+        references=References(omega, np.abs(resonance(415, 0.01)), np.abs(resonance(530, 0.01))),
+        frf=frf,
+        stability=CurveStability(
+            np.abs(np.arange(61) - 25) > 5, np.full(61, -1.0), omega[[20, 30]], np.array([20.5, 30.5]), ("fold", "fold")
+        ),
+        bounds=ShearBounds(*np.outer([0.9, 1.1, 0.8, 1.2], np.abs(slipping)), np.full(61, 0.5), np.zeros(61, int)),
+        wear=wear,
+        worn=WornResponses(
+            rows, np.tile(omega, (3, 1)), np.abs([resonance(hertz, 0.015) for hertz in (510, 460, 420)])
+        ),
+        fields=Fields(rows, bend),
+        loops=loops,
+    )

@@ -1,0 +1,220 @@
+"""Craig-Bampton: exact with all modes, statically exact always, and an error estimate that tells the truth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import skfem
+
+from tribodyn.fem.constraints import Clamp
+from tribodyn.fem.factor import factorise
+from tribodyn.fem.loads import NodalForce, Pressure
+from tribodyn.fem.material import Material
+from tribodyn.fem.part import Contact, build
+from tribodyn.reduction.craig_bampton import craig_bampton
+from tribodyn.reduction.damping import modal_damping, rayleigh
+from tribodyn.reduction.linear import linear_modes, stuck_stiffness, system_modes
+from tribodyn.reduction.store import load, save
+
+SPRINGS = (470e6, 583e6)
+
+
+def make(nx=8, patch=2, clamped=True):
+    """A coarse beam of the thesis with a point load, a pressure and two outputs."""
+    x = np.append(np.linspace(0, 0.18, nx + 1), np.linspace(0.18, 0.2, patch + 1)[1:])
+    side = np.linspace(0, 0.02, patch + 1)
+    mesh = skfem.MeshHex2.from_mesh(skfem.MeshHex.init_tensor(x, side, side)).with_boundaries(
+        {"contact": lambda x: (x[2] < 1e-9) & (x[0] > 0.18), "top": lambda x: x[2] > 0.02 - 1e-9}
+    )
+    p = mesh.doflocs.T
+    sets = {
+        "root": np.flatnonzero(p[:, 0] < 1e-9),
+        "mid": np.array([np.argmin(np.linalg.norm(p - [0.09, 0.01, 0.02], axis=1))]),
+        "tip": np.flatnonzero(p[:, 0] > 0.2 - 1e-9),
+    }
+    return build(
+        mesh,
+        sets,
+        Material(210e9, 0.3, 7860.0),
+        [Clamp("root")] if clamped else [],
+        [Contact("contact", t1=(1, 0, 0))],
+        {"point": NodalForce("mid", (0, 1, -1)), "pressure": Pressure("top")},
+        {"mid": NodalForce("mid", (0, 1, 0)), "tip": NodalForce("tip", (0, 0, 1))},
+    )
+
+
+@pytest.fixture(scope="module")
+def part():
+    return make()
+
+
+@pytest.fixture(scope="module")
+def model(part):
+    return craig_bampton(part.system, part.interface, n_modes=15)
+
+
+def test_masters(part, model):
+    """25 pairs with 3 DOFs, the 2 DOFs of the point load, the 25 of the mean tip displacement; not the pressure."""
+    masters = model.info["masters"]
+    assert model.info["n_masters"] == len(masters) == 75 + 2 + 25 - 5  # the patch and the tip share 5 nodes
+    assert model.system.n_dof == len(masters) + 15
+    q = np.zeros(model.system.n_dof)
+    q[3] = 1.0
+    assert model.reconstruct(q)[masters] == pytest.approx(q[: len(masters)], abs=1e-14)
+    more = craig_bampton(part.system, part.interface, n_modes=0, extra_masters=[0, 1, 2])
+    assert more.system.n_dof == len(masters) + 3
+    with pytest.raises(ValueError, match="a master lies outside"):
+        craig_bampton(part.system, part.interface, n_modes=0, extra_masters=[part.system.n_dof])
+
+
+def test_all_modes_are_exact():
+    part = make(nx=2, patch=1)
+    n = part.system.n_dof
+    masters = craig_bampton(part.system, part.interface, n_modes=1).info["n_masters"]
+    model = craig_bampton(part.system, part.interface, n_modes=n - masters)
+    assert model.system.n_dof == n
+    k = part.interface.stiffness(*SPRINGS)
+    for stiffness in (None, k):
+        full, _ = system_modes(part.system, part.interface, stiffness, n)
+        reduced, _ = linear_modes(model, stiffness, n)
+        assert reduced == pytest.approx(full, rel=1e-9)
+    # a forced response, damped, with a stuck contact
+    w = 2 * np.pi * 1500
+    part_K = stuck_stiffness(part.system.stiffness.toarray(), part.interface.B.toarray(), k) * (1 + 0.02j)
+    model_K = stuck_stiffness(model.system.stiffness, model.interface.B, k) * (1 + 0.02j)
+    x = np.linalg.solve(part_K - w**2 * part.system.mass.toarray(), part.system.loads["pressure"])
+    q = np.linalg.solve(model_K - w**2 * model.system.mass, model.system.loads["pressure"])
+    assert np.abs(model.reconstruct(q) - x).max() < 1e-9 * np.abs(x).max()
+    assert model.info["first_omitted_frequency"] == np.inf
+    assert np.max(model.info["free_frequency_error"]) < 1e-9
+
+
+def test_statics_are_exact_with_few_modes(part, model):
+    """A load on masters gives the exact static field for any number of modes; preload included."""
+    k = part.interface.stiffness(*SPRINGS)
+    guyan = craig_bampton(part.system, part.interface, n_modes=0)
+    x = factorise(stuck_stiffness(part.system.stiffness, part.interface.B, k)).solve(part.system.loads["point"])
+    for reduced in (guyan, model):
+        K = stuck_stiffness(reduced.system.stiffness, reduced.interface.B, k)
+        q = np.linalg.solve(K, reduced.system.loads["point"])
+        assert np.abs(reduced.reconstruct(q) - x).max() < 1e-9 * np.abs(x).max()
+        assert reduced.interface.B @ q == pytest.approx(part.interface.B @ x, abs=1e-9 * np.abs(x).max())
+        for name in ("mid", "tip"):
+            assert reduced.system.outputs[name] @ q == pytest.approx(part.system.outputs[name] @ x, rel=1e-9)
+
+
+def test_few_modes_are_enough(part, model):
+    """15 modes: the first within 0.05 %; 30 modes: ten free and nine stuck ones within 0.3 %; always from above."""
+    k = part.interface.stiffness(*SPRINGS)
+    finer = craig_bampton(part.system, part.interface, n_modes=30)
+    for stiffness in (None, k):
+        full, _ = system_modes(part.system, part.interface, stiffness)
+        few, _ = linear_modes(model, stiffness)
+        more, _ = linear_modes(finer, stiffness)
+        assert (few - full > -1e-8 * full).all()
+        assert (more <= few * (1 + 1e-9)).all()
+        assert few[0] / full[0] - 1 < 5e-4
+    assert (more / full - 1)[:9].max() < 3e-3
+    full, _ = system_modes(part.system, part.interface)
+    assert (linear_modes(finer)[0] / full - 1).max() < 3e-3
+
+
+def test_truncation_estimate(part, model):
+    k = part.interface.stiffness(*SPRINGS)
+    info = craig_bampton(part.system, part.interface, n_modes=15, contact_stiffness=k).info
+    for state, stiffness in (("free", None), ("stuck", k)):
+        full, _ = system_modes(part.system, part.interface, stiffness)
+        error = info[f"{state}_frequency"] / full - 1
+        assert info[f"{state}_frequency_error"] == pytest.approx(error, rel=0.3, abs=1e-8)
+    assert "stuck_frequency" not in model.info
+
+
+def test_cutoff_keeps_the_modes_below_it(part, model):
+    omitted = model.info["first_omitted_frequency"]
+    assert craig_bampton(part.system, part.interface, cutoff=omitted * 0.9999).info["n_modes"] == 15
+    several = craig_bampton(part.system, part.interface, cutoff=2 * omitted)
+    assert several.info["n_modes"] > 15
+    assert several.info["first_omitted_frequency"] > 2 * omitted
+    assert craig_bampton(part.system, part.interface, cutoff=1.0).info["n_modes"] == 0
+    for both in ({}, {"n_modes": 3, "cutoff": 1e3}):
+        with pytest.raises(ValueError, match="one of the two"):
+            craig_bampton(part.system, part.interface, **both)
+    with pytest.raises(ValueError, match="not masters"):
+        craig_bampton(part.system, part.interface, n_modes=part.system.n_dof)
+
+
+def test_damping_of_the_full_system_is_projected(part, model):
+    damped = replace(part.system, damping=1e-6 * part.system.stiffness)
+    reduced = craig_bampton(damped, part.interface, n_modes=15)
+    assert np.abs(reduced.system.damping - 1e-6 * model.system.stiffness).max() < 1e-6 * 1e-8 * np.max(
+        model.system.stiffness
+    )
+
+
+def test_modal_damping(model):
+    C = modal_damping(model.system, 0.01)
+    omega, phi = 2 * np.pi * linear_modes(model, n=model.system.n_dof)[0], linear_modes(model, n=model.system.n_dof)[1]
+    modal = phi.T @ C @ phi
+    assert np.diag(modal) == pytest.approx(0.02 * omega, rel=1e-6)
+    assert np.abs(modal - np.diag(np.diag(modal))).max() < 1e-6 * omega.max()
+    with pytest.raises(ValueError, match="0 or more"):
+        modal_damping(model.system, -0.01)
+
+
+def test_rigid_bodies_are_not_damped():
+    part = make(nx=3, clamped=False)
+    model = craig_bampton(part.system, part.interface, n_modes=10)
+    C = modal_damping(model.system, 0.05)
+    omega, phi = linear_modes(model, n=8)
+    assert omega[5] < 1e-3 * omega[6]
+    assert np.abs(np.diag(phi.T @ C @ phi))[:6].max() < 1e-6 * 0.1 * omega[6]
+    assert model.info["free_frequency_error"][:6].max() < 1e-6
+    C = rayleigh(model.system, 2.0, 3e-7)
+    assert np.diag(phi.T @ C @ phi)[6:] == pytest.approx(2 + 3e-7 * (2 * np.pi * omega[6:]) ** 2, rel=1e-6)
+    with pytest.raises(ValueError, match="must not be negative"):
+        rayleigh(model.system, -1, 0)
+
+
+def test_store_roundtrip(model, tmp_path):
+    path = tmp_path / "model.h5"
+    damped = model.with_damping(lambda system, B: modal_damping(system, 0.01))
+    save(damped, path)
+    back = load(path)
+    for one, other in ((damped.system, back.system), (damped.interface, back.interface)):
+        for name, value in vars(one).items():
+            again = getattr(other, name)
+            if isinstance(value, dict):
+                assert list(value) == list(again)
+                assert all((value[key] == again[key]).all() for key in value)
+            else:
+                assert np.array_equal(value, again)
+    assert back.interface.components == ("t1", "t2", "n")
+    assert (back.basis == model.basis).all()
+    assert back.info["factorisation"] == model.info["factorisation"]
+    assert back.info["n_modes"] == 15
+    save(replace(model, basis=None), path)
+    assert load(path).basis is None
+    assert [p.name for p in tmp_path.iterdir()] == ["model.h5"]
+
+
+def test_store_refuses(model, tmp_path):
+    import h5py
+
+    with pytest.raises(ValueError, match="no such file"):
+        load(tmp_path / "none.h5")
+    (tmp_path / "text.h5").write_text("not HDF5")
+    with pytest.raises(ValueError, match="not an HDF5 file"):
+        load(tmp_path / "text.h5")
+    with h5py.File(tmp_path / "other.h5", "w"):
+        pass
+    with pytest.raises(ValueError, match="no reduced model"):
+        load(tmp_path / "other.h5")
+    save(model, tmp_path / "old.h5")
+    with h5py.File(tmp_path / "old.h5", "a") as file:
+        file.attrs["version"] = 0
+    with pytest.raises(ValueError, match="version 0"):
+        load(tmp_path / "old.h5")
+    with pytest.raises(ValueError, match="harmonic to harmonic"):
+        save(replace(model, per_harmonic=lambda h: (model.system, model.interface.B)), tmp_path / "no.h5")

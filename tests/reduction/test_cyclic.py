@@ -1,0 +1,166 @@
+"""The reduced sector: exact where it must be, near the full sector where modes are left out."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.linalg as sla
+
+from tests.helpers import small_wheel as small
+from tribodyn.fem import cyclic, wheel
+from tribodyn.fem.cyclic import at_index, projected
+from tribodyn.fem.hermitian import hermitian_modes
+from tribodyn.fem.part import Contact
+from tribodyn.reduction import cyclic as waves
+from tribodyn.reduction.damping import modal_damping
+from tribodyn.reduction.linear import linear_modes, system_modes
+from tribodyn.reduction.store import load, save
+from tribodyn.workflows.cases.blade import model as blade_model
+from tribodyn.workflows.scene import scene_file
+
+
+@pytest.fixture(scope="module", params=[0.0, 0.02], ids=["rigid disk", "flexible disk"])
+def reduced(request, tmp_path_factory):
+    return small.reduced_sector(tmp_path_factory.mktemp("wheel") / "s.msh", request.param)
+
+
+@pytest.fixture(scope="module")
+def published():
+    """The blade as its scene has it, on its rigid disk, full and reduced."""
+    blade = blade_model.build(scene_file.read("blade"))
+    return blade.full, blade.reduced
+
+
+def test_reduced_sector_and_reduced_wheel_agree_to_rounding(reduced):
+    """Item 1 of the issue, reduced: every frequency of the wheel, free and stuck, is one of a sector."""
+    k = reduced.sector.interface.stiffness(*small.STIFFNESS)
+    system, interface = wheel.assemble(reduced.sector)
+    n = at_index(reduced.sector, 0)[0].n_dof
+    for springs, all_springs in ((None, None), (k, np.tile(k, (small.N, 1)))):
+        mine = np.sort(waves.nodal_diameters(reduced.sector, range(small.N), n, springs).ravel())
+        theirs, _ = system_modes(system, interface, all_springs, system.n_dof)
+        assert np.abs(theirs / mine - 1).max() < 1e-8
+
+
+def test_reduced_against_full_sector(published):
+    """Item 3 of the issue: nodal diameters 0, 1, 2, 5, 10, 20 within 0.5 %; free blades are alone, 0 and 1 tell all."""
+    full, reduced = published
+    assert full.n_sectors == 40
+    for k, diameters in ((None, (0, 1)), (full.interface.stiffness(93e6, 113e6), (0, 1, 2, 5, 10, 20))):
+        exact = waves.nodal_diameters(full, diameters, 4, k)
+        error = waves.nodal_diameters(reduced.sector, diameters, 4, k) / exact - 1
+        assert error.min() > -1e-9  # Rayleigh-Ritz: never below
+        assert error.max() < 5e-3
+        assert error[:, :2].max() < 1.5e-3
+    assert reduced.sector.system.n_dof < 150
+    assert reduced.basis.shape == (full.system.n_dof, reduced.sector.system.n_dof)
+
+
+def test_blade_is_what_the_scene_says(published):
+    """Free blades are alone, and contact raises their first bending mode."""
+    _, reduced = published
+    free = waves.nodal_diameters(reduced.sector, range(21), 1)
+    stuck = waves.nodal_diameters(reduced.sector, range(21), 1, reduced.sector.interface.stiffness(93e6, 113e6))
+    assert np.ptp(free) < 1e-6 * free.max()  # a rigid disk: blades are alone
+    assert free[0, 0] == pytest.approx(175.1, abs=0.5)
+    assert stuck[:3, 0] == pytest.approx([248.3, 341.1, 501.4], abs=1.5)
+    assert (stuck > free).all()
+
+
+def test_relative_coordinates_are_the_contact_itself(reduced):
+    for index in (0, 1, 3, 4, 7):
+        T, n_masters = waves.relative_map(reduced.sector, index)
+        n_contact = len(reduced.sector.left)
+        S = cyclic.seam_map(reduced.sector, index)
+        system, B = at_index(reduced.sector, index)
+        z = np.random.default_rng(index).normal(size=T.shape[1])
+        q = T @ z
+        kept = np.setdiff1d(np.arange(len(q)), reduced.sector.seam_left)
+        assert S @ q[kept] == pytest.approx(q, abs=1e-12)
+        assert B @ q[kept] == pytest.approx(z[:n_contact], abs=1e-12)
+        assert T.shape[1] == system.n_dof
+        assert n_masters == n_contact + 4  # two of the couple, the driven node, the tip
+        small_system = projected(reduced.sector.system, T)
+        same = [hermitian_modes(s.stiffness, s.mass, system.n_dof)[0] for s in (system, small_system)]
+        assert same[1] == pytest.approx(same[0], rel=1e-7)
+
+
+def test_contact_of_fewer_components_leaves_the_others_free(tmp_path):
+    contact = Contact("shroud_right", (1, 0, 0), "shroud_left", components=("t1", "n"), vertices_only=True)
+    _, full = small.full_sector(tmp_path / "s.msh", contact=contact)
+    sector = waves.reduce_sector(full, n_modes=4).sector
+    T, _ = waves.relative_map(sector, 1)
+    _, B = at_index(sector, 1)
+    assert T.shape == (sector.system.n_dof, sector.system.n_dof)
+    assert np.linalg.matrix_rank(T) == sector.system.n_dof
+    x = np.eye(len(B), T.shape[1])
+    assert np.abs(B @ T - x).max() < 1e-12
+
+
+def test_model_of_a_wave(reduced):
+    undamped = waves.travelling_wave(reduced, 3)
+    model = undamped.with_damping(lambda system, B: modal_damping(system, 0.02))
+    assert undamped.at_harmonic(1)[0].damping is None
+    n_contact = len(reduced.sector.left)
+    for h, index in ((0, 0), (1, 3), (2, 6), (3, 1), (5, 7), (8, 0), (9, 3)):
+        system, B = model.at_harmonic(h)
+        assert (np.eye(n_contact, system.n_dof) == B).all()
+        assert system is model.at_harmonic(h + small.N)[0]
+        expected = hermitian_modes(*(getattr(at_index(reduced.sector, index)[0], m) for m in ("stiffness", "mass")), 3)
+        assert hermitian_modes(system.stiffness, system.mass, 3)[0] == pytest.approx(expected[0], rel=1e-8)
+        assert np.iscomplexobj(system.stiffness) == (index not in (0, 4))
+        lam, phi = sla.eigh(system.stiffness, system.mass)
+        modal = phi.conj().T @ system.damping @ phi
+        assert np.abs(modal - np.diag(0.04 * np.sqrt(lam))).max() < 1e-6 * modal.max()
+    assert model.at_harmonic(0)[0] is model.at_harmonic(8)[0]
+    assert model.at_harmonic(0)[0] is not model.at_harmonic(1)[0]
+    assert model.system is model.at_harmonic(1)[0]
+    k = reduced.sector.interface.stiffness(*small.STIFFNESS)
+    stuck, _ = linear_modes(model, k, 2)
+    assert stuck == pytest.approx(waves.nodal_diameters(reduced.sector, [3], 2, k)[0], rel=1e-8)
+
+
+def test_condensed_coordinates_keep_statics_exact_and_frequencies_near(reduced):
+    fine = waves.travelling_wave(reduced, 1)
+    coarse = waves.travelling_wave(reduced, 1, cutoff=20e3)
+    for h in (0, 1):
+        (a, B), (b, B_small) = fine.at_harmonic(h), coarse.at_harmonic(h)
+        assert b.n_dof < a.n_dof
+        row, small_row = a.outputs["tip"], b.outputs["tip"]
+        for name in small.LOADS:
+            full_answer = np.linalg.solve(a.stiffness, a.loads[name])
+            small_answer = np.linalg.solve(b.stiffness, b.loads[name])
+            assert row @ full_answer == pytest.approx(small_row @ small_answer, rel=1e-9)
+            assert B @ full_answer == pytest.approx(B_small @ small_answer, rel=1e-6, abs=1e-15)
+        exact = hermitian_modes(a.stiffness, a.mass, 3)[0]
+        assert hermitian_modes(b.stiffness, b.mass, 3)[0] == pytest.approx(exact, rel=5e-3)
+
+
+def test_shared_nodes_of_contact_and_seam_are_one_sentence(reduced):
+    broken = replace(reduced.sector, left=np.asarray(reduced.sector.interface.B))
+    with pytest.raises(ValueError, match="the right contact face of a cyclic part must be of master nodes"):
+        waves.relative_map(broken, 1)
+
+
+def test_wave_survives_its_file(reduced, tmp_path):
+    """Stored harmonic by harmonic: the same matrices, shared where they were, the same way back to the full field."""
+    model = waves.travelling_wave(reduced, 4).with_damping(lambda system, B: modal_damping(system, 0.01))
+    path = tmp_path / "wave.h5"
+    with pytest.raises(ValueError, match="say which harmonics are to be stored"):
+        save(model, path)
+    save(model, path, harmonics=(0, 1, 2, 3))
+    back = load(path)
+    for h in (0, 1, 2, 3):
+        (one, B), (other, B_back) = model.at_harmonic(h), back.at_harmonic(h)
+        assert np.array_equal(B, B_back)
+        for name in ("mass", "stiffness", "damping"):
+            assert np.array_equal(getattr(one, name), getattr(other, name))
+        assert np.array_equal(one.loads["couple"], other.loads["couple"])
+        assert np.array_equal(one.outputs["tip"], other.outputs["tip"])
+        q = np.random.default_rng(h).normal(size=model.at_harmonic(h)[0].n_dof)
+        assert np.array_equal(model.reconstruct(q, h), back.reconstruct(q, h))
+    assert back.at_harmonic(0)[0] is back.at_harmonic(2)[0]  # engine order 4 of 8: even harmonics are in phase
+    assert back.at_harmonic(1)[0] is back.at_harmonic(3)[0]
+    assert back.info["engine_order"] == 4
+    with pytest.raises(ValueError, match="harmonic 5 of this model is not in its file, which holds 0, 1, 2, 3"):
+        back.at_harmonic(5)

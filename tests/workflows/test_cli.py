@@ -1,0 +1,261 @@
+"""The command: exit codes with one sentence, summaries, and which packages stay out."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.helpers.synthetic_result import result
+from tribodyn.workflows.command import exits
+from tribodyn.workflows.command import main as cli
+from tribodyn.workflows.result import store, summary
+
+ROOT = Path(__file__).parents[2]
+
+BAD = {
+    "no scene": (["run", "bim"], 'no scene "bim"'),
+    "no file": (["run", "nowhere.toml"], 'no scene file "nowhere.toml"'),
+    "no command": (["fly"], "fly"),
+    "no option": (["run", "beam", "--sett", "x"], "--sett"),
+    "no value": (["run"], "scene"),
+    "unknown key": (["run", "beam", "--set", "contact.fricton=1"], "did you mean friction?"),
+    "wrong unit": (["run", "beam", "--set", "loads.static.press.value=20 mm"], "loads.static.press.value"),
+    "negative stiffness": (["run", "beam", "--set", "contact.normal_stiffness=-1"], "contact.normal_stiffness"),
+    "no law": (["run", "beam", "--set", "contact.law=glue"], "no contact law 'glue'"),
+    "no wear law": (["run", "beam", "--set", "wear.law=rust"], "no wear law 'rust'"),
+    "no option of a method": (["run", "beam", "--set", "response.options.points=9"], "did you mean n_points?"),
+    "no number": (["run", "beam", "--set", "response.options.refinements=x"], "expected a whole number, got 'x'"),
+    "no method": (["run", "beam", "--set", "response.method=guess"], "no continuation 'guess'"),
+    "no face": (["run", "beam", "--set", "contact.group=foot"], "no face 'foot'"),
+    "a patch with no nodes": (["run", "beam", "--set", "contact.group=response"], "no face 'response'"),
+    "no clamp": (["run", "beam", "--set", "geometry.fixed=['root']"], "no node set 'root'"),
+    "no load group": (["run", "beam", "--set", "loads.static.press.group=top"], "no node set 'top'"),
+    "no output group": (["plan", "beam", "--set", "response.group=tip"], "no node set 'tip'"),
+    "no result": (["show", "nowhere"], 'no result file "nowhere"'),
+    "nothing to render": (["render", "nowhere"], 'no result file "nowhere"'),
+}
+
+
+def leave(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error of the command."""
+    code = 0
+    try:
+        cli.main(arguments)
+    except SystemExit as stop:
+        code = int(stop.code or 0)
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_one_sentence_and_exit_code_2(
+    case: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    arguments, words = BAD[case]
+    code, _, err = leave(arguments, capsys)
+    assert code == 2
+    assert words in err
+    assert err.count("\n") == 1
+    assert err.endswith((".\n", "?\n"))
+
+
+def test_a_mesh_file_that_is_not_there(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    text = (ROOT / "workflows" / "cases" / "beam" / "beam.toml").read_text()
+    start, end = text.index("[geometry]"), text.index("[material]")
+    scene = tmp_path / "own.toml"
+    scene.write_text(text[:start] + '[geometry]\nmesh = "gone.msh"\nfixed = ["clamp"]\n' + text[end:])
+    code, _, err = leave(["run", str(scene), "--out", str(tmp_path / "out")], capsys)
+    assert code == 2
+    assert "gone.msh' does not exist" in err
+    assert err.count("\n") == 1
+
+
+WRITING = {
+    "a folder at a file": (["run", "beam"], "file", "no folder can be made at .*file, file exists"),
+    "a folder in a file": (["converge", "beam"], "file/folder", "no folder can be made"),
+    "a table that is none": (["trade", "beam"], "table.png", "give a file that ends with .json"),
+    "a picture at a folder": (["extremes"], "folder.png", "a folder is there, give a file"),
+    "a picture of no kind": (["bench", "--scaling"], "picture", "give a file that ends with .png or .pdf or .svg"),
+}
+
+
+@pytest.mark.parametrize("case", WRITING)
+def test_what_cannot_be_written_is_refused_before_long_work(
+    case: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "file").touch()
+    (tmp_path / "folder.png").mkdir()
+    words, out, says = WRITING[case]
+    code, _, err = leave([*words, "--out", str(tmp_path / out)], capsys)
+    assert code == 2
+    assert re.search(says, err)
+    assert err.count("\n") == 1
+
+
+def test_closed_standard_streams_do_not_matter() -> None:
+    command = f"{sys.executable} -m workflows.cli list >&-"
+    done = subprocess.run(command, shell=True, cwd=ROOT, capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+def test_list_names_every_scene(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = leave(["list"], capsys)
+    assert code == 0
+    assert "beam" in out
+
+
+def test_plan_says_what_will_be_modelled(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = leave(["plan", "beam"], capsys)
+    assert code == 0
+    for words in ("169 node pairs", "524 DOFs", "1521 in each", "GB", "about 33 steps", "whole run"):
+        assert words in out
+
+
+def test_show_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    written = result(9)
+    store.save(tmp_path / "result.h5", written)
+    code, out, _ = leave(["show", str(tmp_path), "--json"], capsys)
+    numbers = json.loads(out)
+    wear, patch = written.wear, written.patch
+    assert code == 0
+    assert wear is not None
+    assert patch is not None
+    assert numbers["depth_max_m"] == wear.depth[-1].max()
+    assert numbers["depth_mean_m"] == pytest.approx(wear.depth[-1].mean())
+    assert numbers["separated_cycles"] == wear.cycles[-1]
+    assert wear.cycles[-2] < numbers["life_cycles"] < wear.cycles[-1]
+    assert numbers["energy_J"] == pytest.approx(wear.work.sum())
+    assert numbers["volume_m3"] == pytest.approx(wear.depth[-1] @ patch.area)
+    assert numbers["wear_steps"] == 8
+    assert numbers["hbm_solves"] == 36
+    assert numbers["peak_hz"] == pytest.approx([500, 415])
+    assert numbers["peak_m"] == [wear.amplitude[0], wear.amplitude[-1]]
+    assert numbers["preload_N"] == [6e3, 0.0]
+    assert numbers["seconds"] == 12.5
+
+
+def test_show_for_people(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    store.save(tmp_path / "result.h5", result())
+    code, out, _ = leave(["show", str(tmp_path / "result.h5")], capsys)
+    assert code == 0
+    for words in ("contact lost", "wear depth", "mm", "balance solves"):
+        assert words in out
+
+
+def test_a_reader_that_has_seen_enough_ends_the_command_in_silence(tmp_path: Path) -> None:
+    """As in `tribodyn list | head -1`; here nobody reads at all."""
+    store.save(tmp_path / "result.h5", result(9))
+    for words in (["show", str(tmp_path)], ["show", str(tmp_path), "--json"], ["list"]):
+        read_end, write_end = os.pipe()
+        os.close(read_end)
+        command = [sys.executable, "-m", "tribodyn", *words]
+        done = subprocess.run(command, cwd=ROOT, stdout=write_end, stderr=subprocess.PIPE, check=False)
+        os.close(write_end)
+        assert (done.returncode, done.stderr) == (exits.READER_LEFT, b"")
+
+
+CTRL_C_WHILE_AN_OBJECT_IS_FREED = """
+import os, signal, time
+from tribodyn.workflows.command import exits
+
+class Freed:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0)
+
+def command():
+    Freed()
+    while True:
+        time.sleep(1)
+
+exits.guard(command)
+"""
+
+
+def test_ctrl_c_is_not_lost_while_an_object_is_freed() -> None:
+    command = [sys.executable, "-c", CTRL_C_WHILE_AN_OBJECT_IS_FREED]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (exits.INTERRUPTED, "tribodyn: stopped.\n")
+
+
+def curve(peak: int, unstable: range | None = None):
+    """A made-up result without wear, its response highest at one of its points, unstable at some."""
+    made = result()
+    assert made.frf is not None
+    assert made.stability is not None
+    response = made.frf.response.copy()
+    response[peak, 0, 1] = 10 * np.abs(response).max()
+    marks = None if unstable is None else ~np.isin(np.arange(61), unstable)
+    stability = None if marks is None else replace(made.stability, stable=marks)
+    return replace(made, wear=None, frf=replace(made.frf, response=response), stability=stability)
+
+
+def test_a_peak_where_no_vibration_stays_is_told() -> None:
+    steady, falls = curve(30, range(20, 25)), curve(30, range(28, 33))
+    assert summary.summary(steady)["peak_is_stable"] is True
+    assert not any("unstable, no vibration" in text for _, text in summary.lines(steady))
+    numbers, frf = summary.summary(falls), falls.frf
+    assert numbers["peak_is_stable"] is False
+    best = max((i for i in range(61) if not 28 <= i < 33), key=lambda i: frf.amplitude("response")[i])
+    assert numbers["stable_peak_hz"] == frf.frequency[best]
+    assert numbers["stable_peak_m"] == frf.amplitude("response")[best]
+    told = [text for _, text in summary.lines(falls) if "unstable, no vibration stays at it" in text]
+    assert len(told) == 1
+    assert f"{frf.frequency[best]:.5g} Hz" in told[0]
+    assert any("no point is stable" in text for _, text in summary.lines(curve(30, range(61))))
+    assert summary.summary(curve(30))["peak_is_stable"] is None
+
+
+def test_the_end_of_the_range_is_no_peak() -> None:
+    for point, at_end in ((0, True), (30, False), (60, True)):
+        made = curve(point)
+        assert summary.summary(made)["peak_at_end"] is at_end
+        assert any("no peak: " in text for _, text in summary.lines(made)) is at_end
+
+
+def test_separation_is_told_only_where_contact_was_lost() -> None:
+    made = result()
+    assert made.wear is not None
+    unfinished = replace(made, wear=replace(made.wear, end="stopped after 8 wear steps"))
+    numbers = summary.summary(unfinished)
+    assert numbers["separated_cycles"] is None
+    assert numbers["cycles"] == made.wear.cycles[-1]
+
+
+def test_a_result_before_any_solve_has_a_summary() -> None:
+    numbers = summary.summary(replace(result(), wear=None, frf=None, state="model built"))
+    assert numbers["depth_max_m"] is None
+    assert numbers["peak_hz"] is None
+    assert numbers["finished"] is False
+    assert summary.lines(replace(result(), wear=None, frf=None))
+
+
+def test_render_draws_the_pictures_of_a_result(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    store.save(tmp_path / "result.h5", result())
+    code, out, _ = leave(["render", str(tmp_path)], capsys)
+    assert code == 0
+    assert (tmp_path / "pictures" / "frf.png").is_file()
+    assert "worn_part.png" in out or "no renders: " in out
+
+
+@pytest.mark.parametrize(
+    ("statement", "banned"),
+    [
+        ("import workflows.cli", {"gmsh", "pyvista", "vtk", "matplotlib", "numba", "skfem", "h5py"}),
+        ("import workflows.pipeline", {"gmsh", "pyvista", "vtk", "matplotlib"}),
+        ("import workflows.summary, workflows.store", {"gmsh", "pyvista", "vtk", "matplotlib", "skfem"}),
+    ],
+)
+def test_packages_are_imported_only_where_they_are_used(statement: str, banned: set[str]) -> None:
+    code = f"{statement}; import sys; print(' '.join(sorted(set(sys.modules) & {banned!r})))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []

@@ -1,0 +1,105 @@
+"""What a scene may ask about its response curve: chosen harmonics, stability, bounds of residual shear, any method."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.workflows.test_cli import leave
+from tests.workflows.test_matrices import folder as folder  # the fixture
+from tribodyn.hbm.harmonic_choice import estimate, widened
+from tribodyn.hbm.stability import mark
+from tribodyn.workflows.result import store
+from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.scene_file import from_json, read
+
+QUICK = ["wear.max_steps=0", "response.points=20"]
+
+
+def run(folder: Path, *overrides: str) -> store.Result:
+    return pipeline.run(read(str(folder / "own.toml"), [*QUICK, *overrides]), folder, Progress())
+
+
+def test_harmonics_are_chosen_and_told(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    overrides = ["harmonics.kept=auto", "harmonics.tolerance=2 %", "harmonics.highest=9", "harmonics.samples=512"]
+    result = run(folder, *overrides)
+    kept = result.harmonics
+    assert {0, 1} < set(kept)
+    assert max(kept) <= 9
+    assert result.frf is not None
+    assert result.frf.response.shape[2] == 2 * len(kept) - 1
+    assert 0 < float(result.facts["harmonics_error"]) <= 0.02
+    code, out, _ = leave(["show", str(folder), "--json"], capsys)
+    numbers = json.loads(out)
+    assert code == 0
+    assert numbers["harmonics"] == list(kept)
+    assert numbers["harmonics_error"] == result.facts["harmonics_error"]
+    assert "estimated truncation error" in leave(["show", str(folder)], capsys)[1]
+    # the estimate is that of the balance which was solved, at the peak
+    file = read(str(folder / "own.toml"), [*QUICK, *overrides])
+    balance = pipeline.build(file, folder, Progress(), kept).balance
+    assert balance.basis.harmonics == kept
+    peak = pipeline.peak_of(file.scene).first(balance).state
+    own = estimate(widened(balance, 9), kept, peak.omega, peak.x, split=False).error
+    assert own == pytest.approx(float(result.facts["harmonics_error"]), rel=0.3)
+    assert from_json(result.provenance["scene"]) == file.scene
+
+
+def test_stability_and_bounds_are_marked_kept_and_drawn(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    result = run(folder, "response.stability=true", "response.bounds=true", "loads.harmonic.shaker.value=12 N")
+    frf, marks, bounds = result.frf, result.stability, result.bounds
+    assert frf is not None
+    assert marks is not None
+    assert bounds is not None
+    file = read(str(folder / "own.toml"), [*QUICK, "loads.harmonic.shaker.value=12 N"])
+    again = mark(pipeline.build(file, folder, Progress()).balance, frf)
+    assert np.array_equal(marks.stable, again.stable)
+    height = frf.amplitude("response")
+    assert np.all(bounds.amplitude_low <= height * (1 + 1e-9))
+    assert np.all(bounds.amplitude_high >= height * (1 - 1e-9))
+    assert np.all(bounds.energy_low <= bounds.energy_high)
+    forgetful = bounds.stuck == 0  # every pair slips or lifts in each cycle
+    assert forgetful.any()
+    assert bounds.spread[forgetful] == pytest.approx(0, abs=1e-6)
+    assert bounds.spread.max() > 1e-3
+    loaded = store.load(folder / "result.h5")
+    assert loaded.stability is not None
+    assert loaded.stability.kinds == marks.kinds
+    assert loaded.bounds is not None
+    assert np.array_equal(loaded.bounds.amplitude_high, bounds.amplitude_high)
+    code, out, _ = leave(["show", str(folder)], capsys)
+    assert code == 0
+    assert "unstable points" in out
+    assert "moves the amplitude by up to" in out
+    assert leave(["render", str(folder)], capsys)[0] == 0
+    assert (folder / "pictures" / "frf.png").is_file()
+
+
+@pytest.mark.parametrize("method", ["arc_length", "adaptive"])
+def test_every_continuation_gives_the_same_curve(folder: Path, method: str) -> None:
+    """The peak of each method's curve is that of a natural sweep with fine steps."""
+    natural = run(folder, "response.points=400").frf
+    other = run(folder, f"response.method={method}").frf
+    assert natural is not None
+    assert other is not None
+    assert other.end.startswith("the end of the") or "reached" in other.end
+    assert other.amplitude("response").max() == pytest.approx(natural.amplitude("response").max(), rel=2e-2)
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("harmonics.kept=some", "harmonics.kept"),
+        ("harmonics.kept=[]", "rising harmonic numbers"),
+        ("harmonics.tolerance=1 %", 'only with kept = "auto"'),
+        ("harmonics={kept = 'auto', samples = 30}", "expected more than 48 samples"),
+        ("response.stability=yes", "true or false"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(folder: Path, override: str, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        read(str(folder / "own.toml"), [override])

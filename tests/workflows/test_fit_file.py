@@ -1,0 +1,187 @@
+"""tribodyn identify: numbers of a scene that made the measured ones are found again, and bad files end well."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from tests.cases.test_rig import COARSE as RIG
+from tests.cases.test_scene_blade import COARSE as BLADE
+from tribodyn.workflows.cases.rig.model import Rig
+from tribodyn.workflows.command import main as cli
+from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies import fit_file
+from tribodyn.workflows.studies.fit_file import Bench, Known, Task
+from tribodyn.workflows.studies.identification import Measured, Parameter, fit
+
+BEAM = (
+    "geometry.n_patch=3", "reduction.modes=5", "harmonics.samples=32", "harmonics.transitions=sampled",
+    "response.points=20", "wear.tolerance=20 %", "wear.at=700 Hz",
+)  # fmt: skip
+
+
+def quiet(sentence):
+    pass
+
+
+def found_again(scene, overrides, true, looked, measured):
+    """Measure the scene with the true numbers, then look for them from the scene as it stands."""
+    known = {name: Known(value=1.0, **table) for name, table in measured.items()}
+    answers = Bench().predict(scene_file.read(scene, (*overrides, *true)), known)
+    assert (answers > 0).all()
+    task = Task.model_validate(
+        {
+            "parameters": looked,
+            "measured": {
+                name: {**table, "value": float(answer)}
+                for (name, table), answer in zip(measured.items(), answers, strict=True)
+            },
+        }
+    )
+    return fit_file.run(scene, overrides, task, quiet)
+
+
+def test_contact_springs_and_friction_are_found_again():
+    true = ("contact.tangential_stiffness=300e6", "contact.friction=0.42")
+    looked = {
+        "k_t": {"keys": ["contact.tangential_stiffness"], "low": "100 N/um", "high": "1 N/nm"},
+        "mu": {"keys": ["contact.friction"], "low": 0.1, "high": 0.9, "ratio": False},
+    }
+    measured = {
+        "mode": {"of": "stuck frequency", "mode": 1},
+        "energy": {"of": "energy", "at": "700 Hz", "load": 2.0},
+    }
+    found, changes = found_again("beam", BEAM, true, looked, measured)
+    assert found.values == pytest.approx([300e6, 0.42], rel=1e-3)
+    assert found.origin == pytest.approx([470e6, 0.5])  # the scene's own, where it starts
+    assert changes[0].startswith("contact.tangential_stiffness=3")
+    assert changes[0].endswith(" N/m")
+    assert scene_file.read("beam", (*BEAM, *changes)).scene.contact.friction == pytest.approx(0.42, rel=1e-3)
+    assert abs(found.sensitivity[0, 1]) < 1e-9  # a stuck mode knows no friction
+
+
+def test_the_wear_coefficient_is_found_from_life_and_work():
+    """Life and work both go with its inverse, as the volume that is to be worn is given."""
+    looked = {"alpha": {"keys": ["wear.coefficient"], "low": "2e2 um3/J", "high": "2e4 um3/J"}}
+    measured = {"life": {"of": "life", "left": 0.5}, "work": {"of": "work", "left": 0.5}}
+    found, _ = found_again("beam", BEAM, ("wear.coefficient=5e3 um3/J",), looked, measured)
+    assert found.values == pytest.approx([5e-15], rel=1e-3)
+    assert found.sensitivity.ravel() == pytest.approx([-1.0, -1.0], abs=0.01)
+
+
+def test_mating_height_is_found_from_the_preload_and_the_part_is_made_once(monkeypatch):
+    """From the scene's own zero, where a relative step would have no length; against the rig's own preload."""
+    made = []
+    original = pipeline.make_mesh
+    monkeypatch.setattr(pipeline, "make_mesh", lambda *args: made.append(1) or original(*args))
+    task = Task.model_validate(
+        {
+            "parameters": {"height": {"keys": ["surfaces.mating_height"], "low": "-5 um", "high": "5 um"}},
+            "measured": {"rest": {"of": "preload", "value": "36 N"}},
+        }
+    )
+    found, changes = fit_file.run("rig", RIG, task, quiet)
+    assert len(made) == 1
+    assert 1e-6 < found.values[0] < 4e-6
+    assert changes[0].endswith(" m")
+    rig = Rig.of(scene_file.read("rig", (*RIG, *changes)))
+    assert rig.at_rest().preload == pytest.approx(36.0, rel=1e-4)
+
+
+def test_a_joint_makes_another_reduction_and_a_cycle_is_that_of_the_run(monkeypatch):
+    measured = {
+        "open": Known(of="open frequency", mode=3, value=300.0),
+        "energy": Known(of="energy", at="290 Hz", value=1.0),
+        "shaken": Known(of="preload", at="290 Hz", value=31.0),
+    }
+    bench, answers = Bench(), []
+    for overrides in ((), ("springs.base_across.stiffness=5e8",), ("springs.base_across.stiffness=5e8", "wear=")):
+        file = scene_file.read("rig", (*RIG, *overrides))
+        plain = bench.plain
+        answers.append(bench.predict(file, measured))
+        assert (bench.plain is plain) == ("wear=" in overrides)
+    assert answers[1][0] < 0.99 * answers[0][0]
+    assert answers[2] == pytest.approx(answers[1])
+    rig = Rig.of(scene_file.read("rig", RIG))
+    cycle = rig.cycle()
+    assert answers[0][1:] == pytest.approx([cycle.energy, cycle.preload], rel=1e-6)
+
+
+def test_a_wheel_has_the_frequencies_of_its_wave():
+    known = {"first": Known(of="stuck frequency", mode=1, value=341.0)}
+    bench = Bench()
+    one, two = (bench.predict(scene_file.read("blade", (*BLADE, f"wheel.engine_order={o}")), known) for o in (1, 2))
+    assert 300 < one[0] < 400 < two[0] < 550
+
+
+def test_derivatives_at_zero_and_at_a_bound_are_those_of_the_prediction():
+    """An unknown that starts at zero, and one that starts at its upper bound, both find their way."""
+    parameters = [Parameter("x", -1.0, 1.0, (0.0,), ratio=False), Parameter("y", 1.0, 2.0, (2.0,))]
+    found = fit(
+        parameters,
+        [Measured("a", 1.3), Measured("b", 2.6)],
+        lambda v: np.array([1.0 + v["x"], v["y"] * (1 + v["x"])]) * (1 + 1e-7 * np.sin(1e9 * v["x"])),  # rounding
+    )
+    assert found.values == pytest.approx([0.3, 2.0], rel=1e-3)
+    assert found.evaluations < 60
+
+
+PARAMETER = '[parameters.k]\nkeys = ["damping.modal"]\nlow = 0.01\nhigh = 0.06\n'
+MEASURED = '[measured.e]\nof = "energy"\nat = "290 Hz"\nvalue = "1 mJ"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x = [", "is not valid TOML"),
+        (PARAMETER, "measured is missing"),
+        (MEASURED, "parameters is missing"),
+        (PARAMETER.replace("low = 0.01\n", "") + MEASURED, "parameters.k.low is missing"),
+        (PARAMETER.replace("high", "highest") + MEASURED, "unknown key parameters.k.highest"),
+        (PARAMETER.replace("modal", "modall") + MEASURED, "the scene has no damping.modall: give start"),
+        (PARAMETER.replace("damping.modal", "scene.title") + MEASURED, "scene.title is not a number"),
+        (PARAMETER.replace("0.01", "0.03") + MEASURED, "between 0.03 and 0.06 but 0.026: give start"),
+        (PARAMETER.replace("0.01", '"1 um"').replace("0.06", '"1 N"') + MEASURED, "k.high: expected a length"),
+        (
+            PARAMETER.replace("0.01", '"1 um"').replace("0.06", '"3 um"\nstart = ["2 um"]') + MEASURED,
+            "damping.modal: expected a number such as",
+        ),
+        (PARAMETER + MEASURED.replace("energy", "heat"), "measured.e.of: expected 'open frequency'"),
+        (PARAMETER + MEASURED.replace('at = "290 Hz"\n', ""), 'expected at for of = "energy"'),
+        (PARAMETER + MEASURED + "left = 0.5\n", 'expected no left for of = "energy"'),
+        (PARAMETER + MEASURED.replace("1 mJ", "1 N"), "measured.e.value: expected an energy"),
+        (PARAMETER + MEASURED.replace("1 mJ", "-1 mJ"), "measured numbers above 0"),
+    ],
+)
+def test_a_bad_file_is_one_sentence_and_exit_code_2(text, words, tmp_path, capsys):
+    (tmp_path / "fit.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["identify", "rig", str(tmp_path / "fit.toml"), *(w for o in RIG for w in ("--set", o))])
+    assert stop.value.code == 2
+    sentence = capsys.readouterr().err.strip().splitlines()[-1]
+    assert sentence.startswith("tribodyn: ")
+    assert words in sentence
+
+
+def test_a_life_without_wear_and_a_run_that_stops_early_are_told():
+    life = {"life": Known(of="life", left=0.1, value=1e6)}
+    with pytest.raises(ValueError, match=r"the scene has no \[wear\]"):
+        Bench().predict(scene_file.read("beam", (*BEAM, "wear=")), life)
+    with pytest.raises(pipeline.SolveFailed, match=r"measured.life: the preload did not fall to 0.1 .* stopped"):
+        Bench().predict(scene_file.read("beam", (*BEAM, "wear.max_steps=1")), life)
+
+
+def test_the_file_that_comes_with_the_program_is_sound_and_the_command_prints(tmp_path, capsys):
+    task = fit_file.read(scene_file.CASES / "rig" / "rig.fit.toml")
+    assert set(task.parameters) == {"mating_height", "damping"}
+    (tmp_path / "fit.toml").write_text(PARAMETER + MEASURED, encoding="utf-8")
+    words = ["identify", "rig", str(tmp_path / "fit.toml"), *(w for o in RIG for w in ("--set", o))]
+    with pytest.raises(SystemExit) as stop:
+        cli.main([*words, "--json"])
+    assert not stop.value.code
+    record = json.loads(capsys.readouterr().out)
+    assert record["set"][0].startswith("damping.modal=")
+    assert record["numbers"][0]["measured"] == 1e-3

@@ -1,0 +1,113 @@
+"""Identification: known parameters are found again, and what the numbers do not determine is said, not hidden."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from tribodyn.workflows.studies.identification import Measured, Parameter, fit
+
+
+def springs_in_a_row(values):
+    """Frequencies of two unit masses between a wall and each other."""
+    a, b = values["a"], values["b"]
+    return np.sqrt(np.linalg.eigvalsh([[a + b, -b], [-b, b]]))
+
+
+A, B = 40.0, 9.0
+TRUE = springs_in_a_row({"a": A, "b": B})
+PAIR = [Parameter("a", 1.0, 1e3, (10.0,), "N/m"), Parameter("b", 1.0, 1e3, (10.0, 100.0), "N/m")]
+
+
+def numbers(values):
+    return [Measured(f"mode {i}", float(value), "rad/s") for i, value in enumerate(values)]
+
+
+def test_known_parameters_are_found_from_exact_numbers():
+    found = fit(PAIR, numbers(TRUE), springs_in_a_row)
+    # a = 18, b = 20 has the same two frequencies: either may be found
+    np.testing.assert_allclose(springs_in_a_row(found.named()), TRUE, rtol=1e-6)
+    np.testing.assert_allclose(found.before, springs_in_a_row({"a": 10.0, "b": 10.0}))
+    assert found.rms < 1e-6
+    assert "as many numbers as parameters" in found.report()
+
+
+def test_sensitivities_are_those_of_the_closed_form():
+    found = fit(
+        [Parameter("k", 1.0, 1e3, (10.0,)), Parameter("m", 0.1, 10.0, (3.0,))],
+        [Measured("omega", 4.0), Measured("force", 48.0)],
+        lambda v: np.array([np.sqrt(v["k"] / v["m"]), v["k"] * v["m"] ** 2]),
+    )
+    np.testing.assert_allclose(found.sensitivity, [[0.5, -0.5], [1.0, 2.0]], atol=1e-6)
+    assert found.named() == pytest.approx({"k": 48 ** (1 / 3) * 16 ** (2 / 3), "m": (48 / 16) ** (1 / 3)}, rel=1e-6)
+
+
+def test_standard_error_is_that_of_the_mean():
+    """Scatter about one constant: the logarithm's standard error is s / sqrt(n)."""
+    scatter = 0.05 * np.random.default_rng(2).standard_normal(40)
+    found = fit(
+        [Parameter("level", 0.1, 10.0, (1.0,))],
+        numbers(3.0 * np.exp(scatter)),
+        lambda v: np.full(40, v["level"]),
+    )
+    assert found.values[0] == pytest.approx(3.0 * np.exp(scatter.mean()), rel=1e-6)
+    assert found.deviation[0] == pytest.approx(scatter.std(ddof=1) / np.sqrt(40), rel=1e-6)
+    assert found.verdict(0).startswith("+- ")
+
+
+def test_weights_pull_towards_the_number_that_counts_more():
+    def level(weight):
+        measured = [Measured("low", 1.0), Measured("high", 4.0, weight=weight)]
+        return fit([Parameter("x", 0.1, 10.0, (2.0,))], measured, lambda v: np.full(2, v["x"])).values[0]
+
+    assert level(1.0) == pytest.approx(2.0, rel=1e-6)
+    assert level(3.0) == pytest.approx(4 ** (9 / 10), rel=1e-6)
+
+
+def test_bounds_hold_and_are_told():
+    found = fit([Parameter("x", 1.0, 3.0, (2.0,))], numbers([5.0, 5.0]), lambda v: np.full(2, v["x"]))
+    assert found.values[0] == pytest.approx(3.0)
+    assert found.values[0] <= 3.0
+    assert found.verdict(0) == "at its upper bound"
+
+
+def test_what_the_numbers_do_not_determine_is_said():
+    """Only the product counts: both are open; a parameter without any influence is open too."""
+    three = [Parameter(name, 0.1, 10.0, (1.0,)) for name in ("p", "q", "idle")]
+    found = fit(three, numbers([2.0, 2.1, 1.9]), lambda v: np.full(3, v["p"] * v["q"]))
+    assert np.isinf(found.deviation).all()
+    assert found.report().count("not determined by these numbers") == 3
+    record = json.loads(json.dumps(found.record()))
+    assert [p["deviation"] for p in record["parameters"]] == [None] * 3
+
+
+def test_the_best_of_several_starts_is_kept():
+    """Two valleys: the start in the wrong one does not decide, and "before" is the first start."""
+
+    def folded(values):
+        x = values["x"]
+        return np.array([2.0 + (x - 1) ** 2 * (x - 4) ** 2 + 0.3 * (4 - x)])
+
+    found = fit([Parameter("x", 0.5, 5.0, (1.0, 4.5), ratio=False)], [Measured("y", 1.9)], folded)
+    assert found.values[0] == pytest.approx(4.0, abs=0.2)
+    assert found.before[0] == pytest.approx(folded({"x": 1.0})[0])
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: Parameter("k", 2.0, 1.0, (1.5,)), "bounds low < high"),
+        (lambda: Parameter("k", 1.0, 2.0, (3.0,)), "starts between them"),
+        (lambda: Parameter("k", 1.0, 2.0, ()), "starts between them"),
+        (lambda: Parameter("k", 0.0, 2.0, (1.0,)), "a ratio needs bounds above 0"),
+        (lambda: fit(PAIR, numbers([1.0, 0.0]), springs_in_a_row), "measured numbers above 0"),
+        (lambda: fit(PAIR, numbers([1.0, 2.0, 3.0]), springs_in_a_row), "instead of 3 numbers"),
+        (lambda: fit(PAIR, numbers([1.0]), lambda v: np.array([-1.0])), "narrow the bounds"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(call, words):
+    with pytest.raises(ValueError, match=words) as refusal:
+        call()
+    assert "\n" not in str(refusal.value)

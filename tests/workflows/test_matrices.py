@@ -1,0 +1,194 @@
+"""Models that come as matrices: a scene of a file and DOF lists, end to end, and the documented Python example."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.helpers.verification_models import random_structure
+from tests.workflows.test_cli import leave
+from tribodyn.hbm import thesis_rule
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.continuation import natural
+from tribodyn.hbm.evolution import Duty, WearProblem
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.law import ContactParameters
+from tribodyn.hbm.operating_point import AtPeak
+from tribodyn.reduction import foreign as reduction_foreign
+from tribodyn.reduction.foreign import read_matrices, reduced_model
+from tribodyn.workflows.result import store
+from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.scene_file import parse, read
+
+SCENE = """
+[scene]
+title = "Matrices of another program"
+
+[model]
+file = "part.npz"
+
+[contact]
+dofs = [[0, 1, 2], [3, 4, 5]]
+area = "10 mm2"
+tangential_stiffness = "2 N/um"
+normal_stiffness = "3 N/um"
+friction = 0.4
+
+[loads.static.press]
+dofs = [2, 5]
+value = "50 N"
+
+[loads.harmonic.shaker]
+dofs = [8]
+value = "20 N"
+
+[response]
+dofs = [9]
+frequency = ["35 Hz", "120 Hz"]
+points = 30
+
+[response.others.mid]
+dofs = [6, 7]
+
+[harmonics]
+kept = [0, 1, 2, 3]
+
+[wear]
+coefficient = "2e3 um3/J"
+step = "1 um"
+max_steps = 4
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with a scene and its matrices, and with lists that a scene may name."""
+    system = random_structure(2, n_extra=12).system
+    np.savez(
+        tmp_path / "part.npz", M=system.mass, K=system.stiffness, C=system.damping,
+        touching=np.arange(6).reshape(2, 3), areas=np.full((2, 1), 5e-6), tip=np.eye(18)[9], half=[0.5, 1.0, 1.5],
+        corners=np.array([[0.0, 0, 0], [1e-3, 0, 0]]),
+    )  # fmt: skip
+    (tmp_path / "own.toml").write_text(SCENE)
+    return tmp_path
+
+
+def test_a_scene_of_matrices_runs_to_wear_and_pictures(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = leave(["run", str(folder / "own.toml"), "--out", str(folder / "out")], capsys)
+    assert code == 0, err
+    assert "18 DOFs, as they came" in out
+    assert (folder / "out" / "pictures" / "frf.png").is_file()
+    assert (folder / "out" / "pictures" / "hysteresis.png").is_file()
+    result = store.load(folder / "out" / "result.h5")
+    assert result.state == "complete: stopped after 4 wear steps"
+    assert result.frf is not None
+    assert result.wear is not None
+    assert result.frf.output_names == ("response", "mid")
+    assert set(result.frf.outcome) == {CONVERGED}
+    assert result.wear.worn.max(axis=1) == pytest.approx(1e-6, rel=1e-3)  # the step of the scene, whole cycles
+    # worn volume is the coefficient times the friction work
+    assert result.wear.worn.sum(0) @ np.full(2, 5e-6) == pytest.approx(2e-15 * result.wear.work.sum(), rel=1e-12)
+    for command in (["show", "--json"], ["render"], ["verify", "--at", "60 Hz", "--steps", "128", "--json"]):
+        code, out, err = leave([command[0], str(folder / "out"), *command[1:]], capsys)
+        assert code == 0, err
+    assert json.loads(out)["frequency_hz"] == pytest.approx(60)
+    code, out, _ = leave(["plan", str(folder / "own.toml")], capsys)
+    assert code == 0
+    assert "2 node pairs" in out
+
+
+def test_the_scene_is_the_same_as_the_documented_python(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The example of reduction_foreign, word for word, gives what the scene gives.
+
+    With located transitions: sampled ones put kinks into the curve, among which rounding chooses the peak.
+    """
+    text = reduction_foreign.__doc__ or ""
+    example = textwrap.dedent(text[text.index("    matrices =") : text.index("with `ContactParameters`")])
+    assert len(example.strip().splitlines()) < 15
+    monkeypatch.chdir(folder)
+    names = {
+        kind.__name__.rpartition(".")[2]: kind
+        for kind in (
+            ContactParameters, HarmonicBalance, HarmonicBasis, Excitation, natural, AtPeak, Duty, WearProblem,
+            thesis_rule, read_matrices, reduced_model,
+        )
+    }  # fmt: skip
+    exec(example, names)
+    overrides = [
+        f"response.frequency=['{200 / (2 * np.pi)!r} Hz', '{800 / (2 * np.pi)!r} Hz']",
+        "response.points=60",
+        "wear.max_steps=5",
+        "harmonics.transitions=located",
+    ]
+    result = pipeline.run(read("own.toml", overrides), folder, Progress())
+    assert result.frf is not None
+    assert result.wear is not None
+    ours, theirs = names["response"], result.frf
+    assert theirs.amplitude("response") == pytest.approx(ours.amplitude("tip"), rel=1e-6)
+    assert result.wear.cycles == pytest.approx(names["history"].cycles, rel=1e-5)
+    assert result.wear.depth == pytest.approx(names["history"].depth, rel=1e-5)
+
+
+def test_lists_may_stand_in_the_file_and_be_reduced(folder: Path) -> None:
+    written = pipeline.build(read(str(folder / "own.toml")), folder, Progress()).balance
+    named = [
+        "contact.dofs={variable = 'touching'}",
+        "contact.area={variable = 'areas'}",
+        "contact.points={variable = 'corners'}",
+        "response.dofs=",
+        "response.vector={variable = 'tip'}",
+        "reduction.modes=8",
+    ]
+    # every mode kept: Craig-Bampton is exact
+    reduced = pipeline.build(read(str(folder / "own.toml"), named), folder, Progress())
+    assert reduced.part is None
+    assert reduced.reduced.interface.points[1, 0] == 1e-3
+    stuck = [balance.compliance.at(300.0) for balance in (written, reduced.balance)]
+    assert stuck[1].x_lin == pytest.approx(stuck[0].x_lin, rel=1e-7)
+    assert stuck[1].outputs_lin == pytest.approx(stuck[0].outputs_lin, rel=1e-7)
+
+
+def test_damping_is_that_of_the_files_or_of_the_scene(folder: Path) -> None:
+    given = pipeline.build(read(str(folder / "own.toml"), ["model.names.damping=C"]), folder, Progress())
+    assert given.reduced.system.damping == pytest.approx(random_structure(2, n_extra=12).system.damping)
+    with pytest.raises(ValueError, match=r"hold a damping matrix: leave \[damping\] out"):
+        pipeline.build(read(str(folder / "own.toml"), ["damping.modal=1 %"]), folder, Progress())
+
+
+BAD = {
+    "no file": ("model.file=gone.npz", "there is no file"),
+    "no variable": ("contact.dofs={variable = 'faces'}", "has no variable 'faces'"),
+    "no whole numbers": ("contact.dofs={variable = 'half'}", "not whole"),
+    "no such DOF": ("response.dofs=[99]", "DOF 99 is outside 0 .. 17"),
+    "not a list": ("response.dofs=9", "expected a list such as [17]"),
+    "too short a row": ("contact.dofs=[[0, 1]]", "rows of 3 DOFs"),
+    "a group": ("contact.group=foot", "unknown key contact.group"),
+    "no labels": ('response.dofs=[[7, "z"]]', "no labels"),
+    "no matrices": ("model.file=", "expected file"),
+    "unit": ("contact.area=10 mm", "contact.area: expected"),
+    "geometry": ("geometry.part=beam", "unknown key geometry"),
+    "two kinds": ("response.vector={variable = 'tip'}", "expected either dofs = [17] or vector"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_cannot_be_is_one_sentence(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    override, words = BAD[case]
+    where = ["--out", str(folder / "out")]
+    code, _, err = leave(["run", str(folder / "own.toml"), "--set", override, *where], capsys)
+    assert code == 2
+    assert words in err
+    assert err.count("\n") == 1
+    assert not (folder / "out" / "result.h5").exists()
+
+
+def test_a_scene_of_matrices_has_no_mesh() -> None:
+    with pytest.raises(ValueError, match="made of matrices and has no mesh"):
+        pipeline.make_mesh(parse(SCENE, "own.toml"), Path())

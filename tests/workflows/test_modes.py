@@ -1,0 +1,62 @@
+"""`tribodyn backbone`: from the stuck to the free mode of a small beam, and what is refused."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.workflows.test_cli import leave
+from tribodyn.reduction.linear import linear_modes
+from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.scene_file import read
+
+SMALL = ["geometry.n_patch=3", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=4"]
+SET = [word for override in SMALL for word in ("--set", override)]
+
+
+def test_the_backbone_goes_from_the_stuck_to_the_free_mode(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    model = pipeline.build(read("beam", SMALL), tmp_path, Progress())
+    free = linear_modes(model.reduced, n=1)[0][0]
+    code, out, err = leave(
+        ["backbone", "beam", *SET, "--from", "0.01um", "--to", "10mm", "--out", str(tmp_path), "--json"], capsys
+    )
+    assert code == 0, err
+    found = json.loads(out)
+    assert found["end"] == "reached the amplitude asked for"
+    assert found["frequency_hz"][0] == pytest.approx(found["reference_hz"], rel=1e-4)
+    assert found["frequency_hz"][-1] == pytest.approx(free, rel=2e-3)
+    assert max(found["damping"]) > 10 * found["damping"][0]  # friction peaks where the contact begins to slide
+    assert found["damping"][-1] < 0.1 * max(found["damping"])
+    with (tmp_path / "backbone.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert np.array([float(row["frequency_hz"]) for row in rows]) == pytest.approx(np.array(found["frequency_hz"]))
+    assert (tmp_path / "backbone.png").is_file()
+    code, out, _ = leave(
+        ["backbone", "beam", *SET, "--from", "1um", "--to", "4um", "--points", "5", "--out", str(tmp_path)], capsys
+    )
+    assert code == 0
+    assert "at rest" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--from", "1", "--to", "1mm"], "--from: expected"),
+        (["--from", "1mm", "--to", "1mm"], "must be > 0 and differ"),
+        (["--from", "1um", "--to", "1mm", "--mode", "-1"], "mode"),
+    ],
+)
+def test_what_cannot_be_is_refused(
+    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    code, _, err = leave(["backbone", "beam", *SET, *arguments, "--out", str(tmp_path)], capsys)
+    assert code == 2
+    assert words in err
+    assert err.count("\n") == 1

@@ -1,0 +1,102 @@
+"""A part of one's own, as the README has it: drawing, scene, run, and a study of its grids beside it."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tribodyn.workflows.command import main as cli
+from tribodyn.workflows.result import store
+from tribodyn.workflows.result.summary import summary
+
+README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+
+
+def fence(label: str) -> str:
+    (text,) = re.findall(rf"^```{label}\n(.*?)^```", README, re.M | re.S)
+    return str(text)
+
+
+def gmsh(*words: str, folder: Path) -> None:
+    program = Path(sys.executable).with_name("gmsh")
+    subprocess.run([sys.executable, str(program), *words], cwd=folder, check=True, capture_output=True)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("own")
+    (made / "arm.geo").write_text(fence("geo"))
+    (made / "arm.toml").write_text(fence("toml"))
+    return made
+
+
+def test_the_example_runs_from_its_drawing_to_its_worn_surface(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh, run = fence("sh own").splitlines()
+    assert mesh.startswith(".venv/bin/gmsh ")
+    gmsh(*mesh.split()[1:], folder=folder)
+    monkeypatch.chdir(folder)
+    assert run.startswith("./tribodyn ")
+    cli.app(run.split()[1:], result_action="return_value")
+    result = store.load(folder / "results/arm/result.h5")
+    assert result.state.startswith("complete")
+    numbers = summary(result)
+    free, pressed = numbers["free_hz"], numbers["peak_hz"][0]
+    assert free[1] < pressed < 3000  # the first mode across the load, stiffened by the stop
+    assert numbers["peak_hz"][1] == pytest.approx(free[1], rel=0.02)  # worn off, the arm is free
+    assert (folder / "results/arm/pictures/worn_part.png").stat().st_size > 10_000
+
+
+def test_the_error_without_vertices_only_names_the_cure(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    gmsh("-3", "-setnumber", "size", "0.02", "arm.geo", "-o", "arm.msh", folder=folder)
+    words = ["run", str(folder / "arm.toml"), "--set", "contact.vertices_only=false", "--out", str(folder / "out")]
+    with pytest.raises(SystemExit) as left:
+        cli.main(words)
+    assert left.value.code == 2
+    assert "contact.vertices_only = true" in capsys.readouterr().err
+
+
+GRIDS = """
+[converge.mesh]
+sizes = [1, 1.33, 2]
+set = [['geometry.mesh="arm_16.msh"'], ['geometry.mesh="arm_12.msh"'], ['geometry.mesh="arm_8.msh"']]
+"""
+
+
+def test_a_study_beside_the_scene_is_found(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for size in (16, 12, 8):
+        gmsh("-3", "-setnumber", "size", f"{1e-3 * size}", "arm.geo", "-o", f"arm_{size}.msh", folder=folder)
+    (folder / "arm.study.toml").write_text(GRIDS)
+    words = ["converge", str(folder / "arm.toml"), "--set", "response.points=20", "--json", "--out", str(folder)]
+    cli.app(words, result_action="return_value")
+    rows = json.loads(capsys.readouterr().out)
+    assert [row["size"] for row in rows] == [1, 1.33, 2]
+    assert all(row["outcome"] == "converged" for row in rows)
+    assert rows[0]["pairs"] < rows[2]["pairs"]
+    assert (folder / "converge_arm_mesh.png").is_file()
+
+
+@pytest.mark.parametrize(
+    ("study", "sentence"),
+    [
+        ("", "has no study of its grids"),
+        ("[knob.x]", "a study has no knob, but knobs"),
+        ("knobs = 3", "is no study"),
+        ("[converge.x]\nsizes = [1, 2]", "needs sizes"),
+        ("[converge", "arm.study.toml"),
+    ],
+)
+def test_a_study_that_is_none_is_refused(
+    folder: Path, study: str, sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "arm.study.toml").write_text(study)
+    with pytest.raises(SystemExit) as left:
+        cli.main(["converge", str(folder / "arm.toml")])
+    assert left.value.code == 2
+    said = capsys.readouterr().err
+    assert sentence in said
+    assert said.count("\n") == 1

@@ -1,0 +1,287 @@
+"""A whole run of a small beam: balances of the result, checkpoints, resuming after kills, Ctrl-C, failed solves."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.helpers.killed_runs import go_on
+from tribodyn.workflows.pictures import plots
+from tribodyn.workflows.result import store
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.summary import summary
+from tribodyn.workflows.run import checkpoint, fields, pipeline
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.scene_file import read
+
+ROOT = Path(__file__).parents[2]
+SMALL = [
+    "geometry.n_patch=5",
+    "geometry.n_length=4",
+    "geometry.n_height=1",
+    "reduction.modes=4",
+    "response.points=25",
+    "wear.rule=thesis",
+    "wear.step=30 %",
+    "wear.lost_below=0",
+]
+COMMAND = [sys.executable, "-m", "tribodyn", "run", "beam", "--no-pictures"]
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Result:
+    return pipeline.run(read("beam", SMALL), tmp_path_factory.mktemp("run"), Progress())
+
+
+def start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
+    overrides = [word for override in SMALL for word in ("--set", override)]
+    command = [*COMMAND, "--out", str(folder), *overrides, *arguments]
+    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def wait_for_rows(process: subprocess.Popen[str], path: Path, count: int) -> None:
+    """Wait until a result file holds so many wear rows; reading it must work at every moment."""
+    while process.poll() is None:
+        if path.exists():
+            wear = store.load(path).wear
+            if wear is not None and len(wear.cycles) >= count:
+                return
+        time.sleep(0.02)
+
+
+def test_the_run_ends_with_contact_lost(finished: Result) -> None:
+    assert finished.state == "complete: contact lost at every pair"
+    assert finished.contact_lost
+    assert finished.wear is not None
+    assert finished.wear.preload[0] > 1e3
+    assert finished.wear.preload[-1] == 0.0
+    assert finished.wear.depth[-1].max() > float(finished.facts["delta_max_m"])
+
+
+def test_worn_volume_is_coefficient_times_energy(finished: Result) -> None:
+    wear, patch = finished.wear, finished.patch
+    assert wear is not None
+    assert patch is not None
+    assert wear.depth[-1] @ patch.area == pytest.approx(2e-15 * wear.work.sum(), rel=1e-12)
+
+
+def test_static_forces_balance_in_the_full_field(finished: Result) -> None:
+    """The displacement field of every node, projected on the contact, is what the balance solved for."""
+    wear, patch, fields = finished.wear, finished.patch, finished.fields
+    assert wear is not None
+    assert patch is not None
+    assert fields is not None
+    for row, field in zip(fields.row, fields.displacement, strict=True):
+        local = np.einsum("pij,pjc->pic", patch.frames, field[patch.nodes])
+        solved = wear.displacement[row].reshape(local.shape)
+        assert np.abs(local - solved).max() < 1e-7 * np.abs(solved).max()
+
+
+def test_loops_enclose_the_energy(finished: Result, tmp_path: Path) -> None:
+    """Polygons of 4096 points do, down to the last touch; the loops kept are 64 of them, marched in coarser steps."""
+    wear, loops = finished.wear, finished.loops
+    assert wear is not None
+    assert loops is not None
+    balance = pipeline.build(read("beam", SMALL), tmp_path, Progress()).balance.with_samples(4096, located=False)
+    fine = fields.hysteresis_loops(balance, wear.rows(), loops.row)
+    for row, x, force in zip(loops.row, fine.displacement, fine.force, strict=True):
+        following = np.roll(x, -1, -1) - np.roll(x, 1, -1)
+        area = 0.5 * np.sum(force * following, axis=(1, 2))
+        assert area.sum() == pytest.approx(wear.energy[row].sum(), rel=1e-3)
+    for kept, all_of_them in ((loops.displacement, fine.displacement), (loops.force, fine.force)):
+        every = all_of_them.shape[-1] // kept.shape[-1]
+        np.testing.assert_allclose(kept, all_of_them[..., ::every], atol=0.02 * np.abs(kept).max())
+
+
+def test_references_peak_where_the_modes_are(finished: Result) -> None:
+    references = finished.references
+    assert references is not None
+    hertz = references.omega / (2 * np.pi)
+    spacing = hertz[1] - hertz[0]
+    free = np.asarray(finished.facts["free_hz"])[0]
+    assert hertz[np.argmax(references.free)] == pytest.approx(free, abs=2 * spacing)
+    assert finished.wear is not None
+    # without contact the peak is the free one, 1 % damping: amplitudes agree where the grid of 5 Hz allows
+    assert finished.wear.amplitude[-1] >= 0.99 * references.free.max()
+
+
+def test_killed_runs_resume_to_the_same_bits(tmp_path: Path) -> None:
+    undisturbed = start(tmp_path / "whole")
+    undisturbed.communicate()
+    whole = store.load(tmp_path / "whole" / "result.h5")
+    assert whole.wear is not None
+    path, total = tmp_path / "result.h5", len(whole.wear.cycles)
+    for count in (1, total // 3, 2 * total // 3):
+        process = start(tmp_path, "--resume")
+        wait_for_rows(process, path, count)
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+        assert store.load(path).state.startswith(("unfinished", "complete"))
+    process = start(tmp_path, "--resume")
+    _, err = process.communicate()
+    assert process.returncode == 0, err
+    assert_same_wear(store.load(path), whole)
+
+
+def test_a_run_killed_again_and_again_at_its_last_row_keeps_one_of_it(
+    finished: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the loss of contact is stored but not yet the sentence that says so."""
+    assert finished.wear is not None
+    kept: list[Result] = []
+    monkeypatch.setattr(store, "save", lambda path, state: kept.append(state))
+    earlier = replace(finished, state="unfinished", wear=replace(finished.wear, end="unfinished"))
+    for _ in range(2):
+        kept.clear()
+        resumed = pipeline.run(read("beam", SMALL), tmp_path, Progress(), earlier)
+        assert_same_wear(resumed, finished)
+        earlier = next(state for state in kept if state.state.startswith("unfinished: "))
+        assert_same_wear(replace(earlier, state=finished.state), finished)
+
+
+@pytest.mark.parametrize("rule", ["thesis", "error_controlled"])
+def test_ten_kills_at_random_moments_change_no_bit(rule: str, tmp_path: Path) -> None:
+    overrides = (*SMALL, f"wear.rule={rule}", "wear.step=40 %", "wear.tolerance=0.2", "wear.lost_below=0.01")
+    server = multiprocessing.get_context("forkserver")
+    server.set_forkserver_preload(["tests.killed_runs"])
+    undisturbed = server.Process(target=go_on, args=(tmp_path, overrides))
+    undisturbed.start()
+    undisturbed.join()
+    whole = store.load(tmp_path / "result.h5")
+    assert whole.state.startswith("complete")
+    path, kills, rng = tmp_path / "killed" / "result.h5", 0, np.random.default_rng(7)
+    path.parent.mkdir()
+    while kills < 10:
+        process = server.Process(target=go_on, args=(path.parent, overrides))
+        process.start()
+        process.join(rng.uniform(0.0, 0.5 * float(whole.facts["seconds"])))
+        if process.is_alive():
+            process.kill()
+            process.join()
+            kills += 1
+            if path.exists():
+                assert store.load(path).state.startswith(("model built", "response computed", "unfinished", "complete"))
+        else:  # it came to its end: once more from the start
+            assert_same_wear(store.load(path), whole)
+            path.unlink()
+    last = server.Process(target=go_on, args=(path.parent, overrides))
+    last.start()
+    last.join()
+    assert_same_wear(store.load(path), whole)
+
+
+def assert_same_wear(resumed: Result, whole: Result) -> None:
+    assert resumed.state == whole.state
+    assert resumed.wear is not None
+    for name in ("cycles", "depth", "energy", "preload", "omega", "displacement", "force", "solves", "plan"):
+        assert np.array_equal(getattr(resumed.wear, name), getattr(whole.wear, name)), name
+
+
+def test_ctrl_c_keeps_what_was_computed_and_says_where(tmp_path: Path) -> None:
+    process = start(tmp_path, "--set", "wear.step=0.01 %")  # of more steps than any machine takes in the meantime
+    wait_for_rows(process, tmp_path / "result.h5", 2)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate()
+    assert process.returncode == 130
+    assert err.count("\n") == 1
+    assert str(tmp_path / "result.h5") in err
+    assert err.endswith("--set 'wear.step=0.01 %' --resume.\n")
+    wear = store.load(tmp_path / "result.h5").wear
+    assert wear is not None
+    assert len(wear.cycles) >= 2
+
+
+def test_a_failed_solve_says_where_and_leaves_with_3(tmp_path: Path) -> None:
+    process = start(tmp_path, "--set", "solver.tolerance=1e-300")
+    _, err = process.communicate()
+    assert process.returncode == 3
+    assert err.count("\n") == 1
+    assert "ended at 380 Hz" in err
+    assert store.load(tmp_path / "result.h5").frf is not None
+
+
+def test_resuming_another_scene_is_refused(finished: Result, tmp_path: Path) -> None:
+    store.save(tmp_path / "result.h5", finished)
+    process = start(tmp_path, "--resume", "--set", "contact.friction=0.4")
+    _, err = process.communicate()
+    assert process.returncode == 2
+    assert "contact.friction differs" in err
+
+
+def test_an_earlier_result_is_set_aside(finished: Result, tmp_path: Path) -> None:
+    store.save(tmp_path / "result.h5", finished)
+    pipeline.run(read("beam", [*SMALL, "wear.max_steps=0"]), tmp_path, Progress())
+    assert store.load(tmp_path / "result.previous.h5").contact_lost
+    assert store.load(tmp_path / "result.h5").wear_steps == 0
+
+
+def test_a_mesh_file_gives_what_its_part_gives(finished: Result, tmp_path: Path) -> None:
+    file = read("beam", SMALL)
+    pipeline.make_mesh(file, tmp_path)
+    text = file.text
+    begin, end = text.index("[geometry]"), text.index("[material]")
+    own = tmp_path / "own.toml"
+    own.write_text(text[:begin] + '[geometry]\nmesh = "mesh.msh"\nfixed = ["clamp"]\n' + text[end:])
+    overrides = [override for override in SMALL if not override.startswith("geometry.")]
+    result = pipeline.run(read(str(own), [*overrides, "wear="]), tmp_path, Progress())
+    assert result.frf is not None
+    assert finished.frf is not None
+    assert np.array_equal(result.frf.response, finished.frf.response)
+
+
+def test_more_steps_go_on_from_a_run_that_stopped(finished: Result, tmp_path: Path) -> None:
+    short, longer = read("beam", [*SMALL, "wear.max_steps=2"]), read("beam", [*SMALL, "wear.max_steps=4"])
+    stopped = pipeline.run(short, tmp_path, Progress())
+    assert stopped.state == "complete: stopped after 2 wear steps"
+    assert checkpoint.is_complete(stopped, short.scene)
+    assert not checkpoint.is_complete(stopped, longer.scene)
+    assert checkpoint.same_problem(short.scene, longer.scene) == ""
+    more = pipeline.run(longer, tmp_path, Progress(), stopped)
+    assert more.wear is not None
+    assert finished.wear is not None
+    assert np.array_equal(more.wear.depth, finished.wear.depth[:4])
+
+
+def test_a_share_of_no_deflection_is_refused_before_long_work(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"wear\.step: a share of delta_max needs static loads"):
+        pipeline.run(read("beam", [*SMALL, "loads.static.press.value=0 N"]), tmp_path, Progress())
+    assert not (tmp_path / "result.h5").exists()
+
+
+def test_curves_of_the_worn_contact_walk_to_the_free_one(finished: Result, tmp_path: Path) -> None:
+    result = pipeline.run(read("beam", [*SMALL, "wear.responses=3"]), tmp_path, Progress())
+    worn = store.load(tmp_path / "result.h5").worn
+    assert worn is not None
+    assert result.wear is not None
+    assert finished.wear is not None
+    assert np.array_equal(result.wear.depth, finished.wear.depth)
+    assert len(worn.row) == 3
+    assert worn.row[-1] == len(finished.wear.cycles) - 1
+    peaks = worn.omega[np.arange(3), np.nanargmax(worn.amplitude, axis=1)] / (2 * np.pi)
+    assert peaks[-1] == pytest.approx(np.atleast_1d(finished.facts["free_hz"])[0], rel=0.05)
+    assert np.all(np.diff(peaks) <= 0)
+    assert summary(result)["surface_volumes_m3"] == pytest.approx([0.5 * summary(result)["volume_m3"]] * 2)
+    drawn = {path.name for path in plots.draw(result, tmp_path)}
+    assert {"frf.png", "depth.png"} <= drawn
+
+
+def test_the_error_controlled_rule_runs_from_a_scene(tmp_path: Path) -> None:
+    mission = 'wear.mission=[{at = "peak", share = "60 %"}, {at = "98 % of peak", share = "40 %"}]'
+    overrides = [*SMALL, "wear.rule=error_controlled", "wear.step=", "wear.at=", "wear.max_steps=3", mission]
+    result = pipeline.run(read("beam", overrides), tmp_path, Progress())
+    wear, patch = result.wear, result.patch
+    assert wear is not None
+    assert patch is not None
+    assert result.state == "complete: stopped after 3 wear steps"
+    assert wear.duty_omega.shape == (3, 2)
+    assert wear.duty_omega[:, 1] == pytest.approx(0.98 * wear.duty_omega[:, 0], rel=1e-4)
+    assert wear.step_error.max() <= 1.0
+    assert wear.worn.sum(0) @ patch.area == pytest.approx(2e-15 * wear.work.sum(), rel=1e-12)

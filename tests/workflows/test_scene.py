@@ -1,0 +1,120 @@
+"""Scenes: what is wrong is one sentence that names the key; conversions happen once."""
+
+from __future__ import annotations
+
+import pytest
+
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.scene_file import SceneError, read
+
+WRONG = {
+    "contact.normal_stifness=3": ["unknown key contact.normal_stifness", "did you mean normal_stiffness?", "friction"],
+    "contact.normal_stiffness=-5 N/um": ["contact.normal_stiffness", "above 0", "-5 N/um"],
+    "contact.friction=20 mm": ["contact.friction", "a number", "which is a length"],
+    "contact.t1=k": ["contact.t1", "axis"],
+    "contact.t1=[0,0,0]": ["contact.t1", "not all zero"],
+    'contact.components=["t1","q"]': ["contact.components[1]", "'t2'", "'q'"],
+    "contact=": ["contact is missing"],
+    "loads.static.press.valu=3": ["unknown key loads.static.press.valu", "did you mean value?"],
+    "loads.harmonic.shake.value=10 mm": ["loads.harmonic.shake.value", "a force"],
+    "loads.harmonic={}": ["loads", "at least one harmonic load"],
+    "wear.step=0": ["wear.step", "above 0"],
+    "wear.step=5 N": ["wear.step", "share of delta_max"],
+    "wear.at=somewhere": ["wear.at", '"peak"'],
+    "wear.at=3 mm of peak": ["wear.at", '"98 % of peak"'],
+    'wear={law="energy", coefficient="2e3 um3/J"}': ["wear", "step", "thesis"],
+    "wear.rule=guess": ["wear.rule", "'thesis'"],
+    "wear.max_steps=-1": ["wear.max_steps", "at least 0"],
+    "harmonics.kept=[0, 3.5]": ["harmonics.kept[1]", "whole number"],
+    "harmonics.kept=[0]": ["harmonics", "rising harmonic numbers"],
+    "harmonics.samples=2": ["harmonics.samples", "at least 4"],
+    "reduction.cutoff=3 kHz": ["reduction", "either modes", "cutoff"],
+    "response.frequency=[600, 300]": ["response", "low below high"],
+    "response.frequency=300 Hz": ["response.frequency", "a list"],
+    "solver.tolerance=0": ["solver.tolerance", "above 0"],
+    "damping.mass=1 1/s": ["damping", "either modal"],
+    "scene.title=3": ["scene.title", "a text in quotes"],
+    "geometry=3": ["geometry", "a table"],
+    "geometry.lenght=1": ["unknown key geometry.lenght", "did you mean length?"],
+    "geometry.n_patch=12": ["geometry.n_patch", "odd"],
+    "geometry.length=20 N": ["geometry.length", "a length"],
+    "geometry.part=bim": ["no part 'bim'", "beam"],
+    "geometry.part=": ["geometry", 'mesh = "file.msh"'],
+    "foo.bar=3": ["unknown key foo", "geometry", "wear"],
+    "pictures.plots=1": ["pictures.plots", "true or false"],
+}
+
+
+@pytest.mark.parametrize("override", WRONG)
+def test_wrong_scene_is_one_sentence_with_its_key(override: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        read("beam", [override])
+    sentence = str(caught.value)
+    assert "\n" not in sentence
+    assert sentence.startswith("beam.toml: ")
+    for word in WRONG[override]:
+        assert word in sentence
+
+
+@pytest.mark.parametrize("override", ["x", "=3", "a.=3"])
+def test_override_needs_key_and_value(override: str) -> None:
+    with pytest.raises(SceneError, match=r"--set expects section\.key=value"):
+        read("beam", [override])
+
+
+def test_no_such_scene_lists_those_there_are() -> None:
+    with pytest.raises(SceneError, match="the scenes are beam"):
+        read("bim")
+    with pytest.raises(SceneError, match=r'no scene file "nowhere/bim\.toml"'):
+        read("nowhere/bim.toml")
+
+
+def test_broken_toml_says_where(tmp_path) -> None:
+    path = tmp_path / "broken.toml"
+    path.write_text("[scene\n")
+    with pytest.raises(SceneError, match=r"broken\.toml is not valid TOML.*line 1"):
+        read(str(path))
+
+
+def test_values_arrive_in_si_units() -> None:
+    scene = read("beam").scene
+    assert scene.loads.static["press"].value == 20e3
+    assert scene.loads.static["press"].direction == (0.0, 0.0, -1.0)
+    assert scene.contact.tangential_stiffness == 470e6
+    assert scene.contact.normal_stiffness == 583e6
+    assert scene.geometry.parameters["length"] == 0.2
+    assert scene.geometry.parameters["n_patch"] == 13
+    assert scene.wear is not None
+    assert scene.wear.coefficient == 2e-15
+    assert scene.wear.step.share == 0.1
+
+
+def test_overrides_change_add_and_take_out() -> None:
+    scene = read("beam", ["reduction.modes=", "reduction.cutoff=5 kHz", "wear.step=50 um", "wear.at=430 Hz"]).scene
+    assert scene.reduction.modes is None
+    assert scene.reduction.cutoff == 5e3
+    assert scene.wear is not None
+    assert scene.wear.step.depth == 50e-6
+    assert scene.wear.at.frequency == 430.0
+    wear = read("beam", ["wear.at=98 % of peak"]).scene.wear
+    assert wear is not None
+    assert wear.at.peak == 0.98
+
+
+def test_a_mission_shares_its_cycles_out() -> None:
+    mission = 'wear.mission=[{at = "peak", share = "60 %"}, {at = "400 Hz", share = 0.4, load = "50 %"}]'
+    wear = read("beam", ["wear.at=", mission]).scene.wear
+    assert wear is not None
+    assert [duty.share for duty in wear.mission] == [0.6, 0.4]
+    assert wear.mission[1].load == 0.5
+    with pytest.raises(SceneError, match="either at or mission"):
+        read("beam", [mission])
+    with pytest.raises(SceneError, match=r"sum to 1, got 0\.9"):
+        read("beam", ["wear.at=", mission.replace("60", "50")])
+
+
+@pytest.mark.parametrize("name", scene_file.names())
+def test_every_scene_reads_and_survives_json(name: str) -> None:
+    scene = read(name).scene
+    assert type(scene).model_validate_json(scene.model_dump_json()) == scene
+    assert scene_file.title(name) == scene.scene.title

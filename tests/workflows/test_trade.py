@@ -1,0 +1,70 @@
+"""The trade of the wear step on a small beam, and what its table says."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from tribodyn.workflows.accuracy import trade
+from tribodyn.workflows.command import main as cli
+
+SMALL = (
+    "geometry.n_patch=3",
+    "geometry.n_length=4",
+    "geometry.n_height=2",
+    "reduction.modes=4",
+    "response.points=40",
+    "harmonics.samples=32",
+)
+
+
+@pytest.fixture(scope="module")
+def table() -> trade.Table:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(trade, "THESIS_STEPS", (0.4, 0.2))
+        patch.setattr(trade, "FINER_STEPS", (0.05,))
+        patch.setattr(trade, "REFERENCE_TOLERANCES", (0.06, 0.02))
+        patch.setattr(trade, "TOLERANCES", (0.3,))
+        return trade.wear_step("beam", lambda _: None, SMALL)
+
+
+def test_errors_fall_with_the_step(table: trade.Table) -> None:
+    thesis = [row for row in table.rows if row.rule == "thesis"]
+    assert [row.step for row in thesis] == [0.4, 0.2, 0.05]
+    errors = [abs(row.life_error or 0.0) for row in thesis]
+    assert errors[-1] < errors[0]
+    assert all(row.life_cycles > 0 and 0 < row.depth_m < 0.02 for row in table.rows)
+    assert all(row.wear_steps <= row.hbm_solves for row in table.rows)
+
+
+def test_finer_steps_cost_more(table: trade.Table) -> None:
+    steps = [row.wear_steps for row in table.rows if row.rule == "thesis"]
+    assert steps == sorted(steps)
+
+
+def test_text_and_records_hold_every_row(table: trade.Table) -> None:
+    text = trade.as_text(table)
+    assert text.count("thesis  ") >= 2
+    assert "extrapolated" in text
+    records = json.loads(json.dumps(trade.as_records(table)))
+    keys = {"rule", "step", "hbm_solves", "wear_steps", "seconds"}
+    keys |= {"depth_m", "depth_error", "life_cycles", "life_error"}
+    assert all(keys <= set(record) for record in records)
+
+
+def test_roughness_of_a_plane_is_nothing_and_of_a_spike_is_its_share() -> None:
+    x = np.array([0.0, 0.1, 0.3, 0.6, 1.0])
+    points = np.array([[a, b, 0.0] for a in x for b in x])
+    plane = 1.0 + points @ [0.2, 0.3, 0.0]
+    assert trade.roughness(points, plane) < 1e-14
+    plane[12] += 0.5
+    assert trade.roughness(points, plane) == pytest.approx(0.5 / plane.max(), rel=1e-12)
+
+
+def test_a_scene_without_wear_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as left:
+        cli.main(["trade", "beam", "--knob", "wear_step", "--set", "wear="])
+    assert left.value.code == 2
+    assert capsys.readouterr().err.count("\n") == 1

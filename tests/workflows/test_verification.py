@@ -1,0 +1,110 @@
+"""`tribodyn verify`: a small beam against time integration, unworn and worn, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.workflows.test_cli import leave
+from tribodyn.workflows.accuracy import verification
+from tribodyn.workflows.result import store
+from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.scene_file import read
+
+SMALL = [
+    "geometry.n_patch=3",
+    "geometry.n_length=4",
+    "geometry.n_height=1",
+    "reduction.modes=4",
+    "response.points=20",
+    "response.frequency=['380 Hz', '1000 Hz']",
+    "wear.rule=thesis",
+    "wear.step=30 %",
+    "wear.lost_below=0",
+    "wear.max_steps=2",
+    "harmonics.kept=[0, 1, 2, 3]",
+]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("verify")
+    pipeline.run(read("beam", SMALL), made, Progress())
+    return made
+
+
+def test_the_command_compares_and_draws(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = leave(["verify", str(folder), "--at", "640Hz", "--steps", "128", "--json"], capsys)
+    assert code == 0, err
+    numbers = json.loads(out)
+    assert numbers["frequency_hz"] == pytest.approx(640)
+    assert numbers["outcome"] == "converged"
+    assert numbers["drift"] <= verification.TOLERANCE
+    response, energy = numbers["outputs"]["response"], numbers["energy"]
+    assert response["balance_m"] == pytest.approx(response["time_m"] * (1 + response["difference"]))
+    assert energy["balance_J"] == pytest.approx(energy["time_J"] * (1 + energy["difference"]))
+    assert Path(numbers["picture"]).is_file()
+
+
+def test_a_motion_that_hill_finds_unstable_is_said_to_be_and_time_leaves_it(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = {}
+    for hertz in (500, 640):
+        code, out, err = leave(["verify", str(folder), "--at", f"{hertz}Hz", "--steps", "128", "--json"], capsys)
+        assert code == 0, err
+        found[hertz] = json.loads(out)
+    assert not found[500]["stable"]
+    assert abs(found[500]["outputs"]["response"]["difference"]) > 0.1
+    assert found[640]["stable"]
+    assert abs(found[640]["outputs"]["response"]["difference"]) < 0.1
+
+
+def test_more_harmonics_come_closer(folder: Path) -> None:
+    """The differences fall with the harmonics kept: this beam lifts and slides, its third harmonic is near a mode."""
+    result = store.load(folder / "result.h5")
+    found = []
+    for highest in (3, 9, 15):
+        override = [f"harmonics.kept={list(range(highest + 1))}"]
+        found.append(verification.compare(result, 2 * np.pi * 700, None, override, 512, Progress()).found)
+    assert all(one.outcome == "converged" for one in found)
+    for values in zip(*((one.waveform["response"], abs(one.energy), one.largest) for one in found), strict=True):
+        assert values[0] > 2 * values[1] > 4 * values[2]
+    assert found[2].largest < 0.03
+
+
+def test_a_worn_row_is_compared_where_it_was_solved(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    result = store.load(folder / "result.h5")
+    assert result.wear is not None
+    comparison = verification.compare(result, None, 1, [], 128, Progress())
+    assert comparison.found.omega == result.wear.omega[1]
+    assert comparison.solution.steps == 0  # it starts at the solution of the row
+    assert comparison.record()["preload"]["balance_N"] == pytest.approx(result.wear.preload[1], rel=1e-6)
+    code, out, _ = leave(["verify", str(folder), "--row", "1", "--steps", "128", "--out", str(folder / "own")], capsys)
+    assert code == 0
+    assert "worn as in row 1" in out
+    assert "waveform response" in out
+    assert list((folder / "own").glob("verify_*Hz_row1.png"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--at", "410"], "--at: expected"),
+        (["--at=-3 Hz"], "outside what the scene models"),
+        (["--at", "5 kHz"], "change response.frequency"),
+        (["--row", "9"], "no wear row 9: it has 0 to"),
+        (["--at", "500 Hz", "--steps", "3"], "at least 8"),
+    ],
+)
+def test_what_cannot_be_is_refused(
+    folder: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
+) -> None:
+    code, _, err = leave(["verify", str(folder), *arguments], capsys)
+    assert code == 2
+    assert words in err
+    assert err.count("\n") == 1

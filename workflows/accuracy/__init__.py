@@ -1,0 +1,1 @@
+"""What a result is worth: budget, trade, promises, convergence, time integration beside it."""

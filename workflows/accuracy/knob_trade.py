@@ -1,0 +1,163 @@
+"""The trade of a scene: every setting of every knob against where that knob tends to, with what it costs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
+from typing import Any
+
+from tribodyn.hbm.branch import CONVERGED
+from tribodyn.workflows.accuracy.knobs import Knob, Setting, chosen, knobs_of, study_of
+from tribodyn.workflows.accuracy.limit import limit_of
+from tribodyn.workflows.accuracy.measure import Measured, measure
+from tribodyn.workflows.accuracy.trade_table import NAMES, QUANTITIES, Row, Trade, key_of, known_of, plain
+from tribodyn.workflows.scene import scene_file
+
+BASE = "base"
+
+
+def run(
+    scene: str,
+    names: Sequence[str],
+    overrides: Sequence[str],
+    say: Callable[[str], None],
+    most: int = 99,
+    keep: Callable[[Trade], None] = lambda trade: None,
+    earlier: Trade | None = None,
+) -> Trade:
+    """Measure knobs of a scene, all that it has where none is named.
+
+    overrides : of the scene, on top of its study's base; most : settings of each knob, the finest ones
+    keep : called after each knob with what is there
+    earlier : table of the same scene, whose other knobs are taken over
+    Raises  ValueError for a knob that the scene does not have
+    """
+    plain = scene_file.read(scene, overrides)
+    study = study_of(plain)
+    base = (*study.base, *overrides)
+    file = scene_file.read(scene, base)
+    knobs = chosen(knobs_of(file, study), names)
+    measure(file, wears=False)  # compiles what the others only use
+    meter = Meter()
+    response, once = meter.of(file, wears=False), meter.of(file)
+    say(f"{BASE}: {once.seconds:.1f} s, {once.outcome}")
+    found = Trade(file.name, key_of(plain), base, once.seconds, ())
+    if earlier is not None and (earlier.key, earlier.base) == (found.key, found.base):
+        measured = {knob.name for knob in knobs}
+        found = replace(found, rows=tuple(row for row in earlier.rows if row.knob not in measured))
+    for knob in knobs:
+        rows = []
+        for row in _rows_of(scene, knob, knob.settings[-most:], base, meter, say):
+            worn = row.values["life_cycles"] is not None or once.values["life_cycles"] is None
+            less = 0.0 if worn else once.seconds - response.seconds
+            rows.append(replace(row, share=(row.seconds + less) / once.seconds))
+        found = replace(found, rows=(*found.rows, *rows))
+        keep(found)
+    return found
+
+
+class Meter:
+    """Measures every scene once, however many knobs have it among their settings."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, Measured] = {}
+
+    def of(self, file: scene_file.SceneFile, wears: bool = True, refined: bool = True) -> Measured:
+        """As `measure`."""
+        wears = wears and file.scene.wears
+        key = f"{file.scene.model_dump_json()} {wears} {refined}"
+        if key not in self._known:
+            self._known[key] = measure(file, wears, refined)
+        return self._known[key]
+
+
+def _rows_of(
+    scene: str,
+    knob: Knob,
+    settings: Sequence[Setting],
+    base: tuple[str, ...],
+    meter: Meter,
+    say: Callable[[str], None],
+) -> list[Row]:
+    found = []
+    for setting in settings:
+        file = scene_file.read(scene, (*base, *setting.overrides))
+        try:
+            measured = meter.of(file, knob.wears(setting), setting.refined)
+        except ValueError as refusal:  # such as more interface modes than there are contact DOFs
+            say(f"{knob.name}: {setting.label}: left out: {refusal}")
+            continue
+        say(f"{knob.name}: {setting.label}: {measured.seconds:.1f} s, {measured.outcome}")
+        found.append(_row(knob, setting, measured))
+    return judged(found)
+
+
+def _row(knob: Knob, setting: Setting, measured: Measured) -> Row:
+    unknown: dict[str, float | None] = dict.fromkeys(QUANTITIES)
+    return Row(
+        knob=knob.name,
+        setting=setting.label,
+        size=setting.size,
+        overrides=setting.overrides,
+        values=measured.values,
+        errors=unknown,
+        doubts=unknown,
+        seconds=measured.seconds,
+        share=1.0,
+        memory=measured.memory,
+        outcome=measured.outcome,
+        tunable=knob.tunable and bool(setting.overrides),
+    )
+
+
+def judged(rows: Sequence[Row]) -> list[Row]:
+    """The rows of a knob with their errors, and with what is doubtful about the limit that these are relative to."""
+    known = {name: known_of(rows, name) for name in QUANTITIES}
+    limits = {name: limit_of(*zip(*points, strict=True)) for name, points in known.items() if points}
+
+    def error(row: Row, name: str) -> float | None:
+        value = row.values[name]
+        return None if value is None or name not in limits else value / limits[name].value - 1
+
+    def doubt(row: Row, name: str) -> float | None:
+        return None if row.values[name] is None or name not in limits else limits[name].doubt
+
+    return [
+        replace(row, errors={n: error(row, n) for n in QUANTITIES}, doubts={n: doubt(row, n) for n in QUANTITIES})
+        for row in rows
+    ]
+
+
+def as_records(trade: Trade) -> list[dict[str, Any]]:
+    """The rows for JSON, with the observed orders of their knob."""
+    orders = {knob: {name: trade.order(knob, name) for name in QUANTITIES} for knob in trade.knobs}
+    return [{**plain(asdict(row)), "scene": trade.scene, "order": orders[row.knob]} for row in trade.rows]
+
+
+def as_text(trade: Trade) -> str:
+    """The table for people: errors in per cent of the limit of each knob; ~ with what is doubtful about that limit."""
+    lines = [f"{'knob':15} {'setting':46} {'seconds':>7} {'MB':>6} " + " ".join(f"{name:>16}" for name in NAMES)]
+    for knob in trade.knobs:
+        for row in trade.of(knob):
+            cells = [_cell(row, name) for name in QUANTITIES]
+            head = f"{knob:15} {row.setting[:46]:46} {row.seconds:7.2f} {row.memory / 1e6:6.0f} "
+            lines.append(head + " ".join(f"{cell:>16}" for cell in cells) + _failure(row))
+        orders = [trade.order(knob, name) for name in QUANTITIES]
+        if any(order is not None for order in orders):
+            cells = ["" if order is None else f"order {order:.1f}" for order in orders]
+            lines.append(f"{knob:15} {'':46} {'':7} {'':6} " + " ".join(f"{cell:>16}" for cell in cells))
+    lines.append(f"every knob alone on {trade.scene} with {'; '.join(trade.base) or 'nothing changed'}")
+    lines.append("errors from where the knob tends to, behind ~ the doubt in that")
+    return "\n".join(lines)
+
+
+def _cell(row: Row, quantity: str) -> str:
+    error, doubt = row.errors[quantity], row.doubts[quantity]
+    if error is None or doubt is None:
+        return ""
+    known = f"{100 * error:+.3g}" if error else "0"
+    return f"{known} ~{100 * doubt:.2g} %" if doubt else f"{known} %"
+
+
+def _failure(row: Row) -> str:
+    return "" if row.outcome == CONVERGED else f"  {row.outcome}"

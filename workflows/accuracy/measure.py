@@ -1,0 +1,105 @@
+"""What a scene answers and what the answer costs: peak, energy, preload, depth and life; seconds and memory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import process_time
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.operating_point import OperatingPoint
+from tribodyn.hbm.wear_history import LIFE_SHARE, WearHistory, cycles_to_preload
+from tribodyn.workflows.accuracy.trade_table import QUANTITIES
+from tribodyn.workflows.run import memory, pipeline
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.references import free_deflection
+from tribodyn.workflows.scene.scene_file import SceneFile
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Answers by QUANTITIES, None where the scene does not ask or the solve failed, as `outcome` says.
+
+    patch : (n_pair, 2) contact nodes in their plane [m]; area : (n_pair,) [m2]
+    depth : (n_pair,) at the end of life [m], zeros without wear; energy : (n_pair,) per cycle at the peak [J]
+    seconds : of one processor; memory : its peak [bytes]
+    """
+
+    values: dict[str, float | None]
+    patch: np.ndarray
+    area: np.ndarray
+    depth: np.ndarray
+    energy: np.ndarray
+    seconds: float
+    memory: float
+    outcome: str
+
+
+def measure(file: SceneFile, wears: bool = True, refined: bool = True) -> Measured:
+    """Run a scene as far as its answers need.
+
+    wears : whether depth and life are wanted; refined : whether the peak is refined beyond the points of the curve
+    Raises  ValueError for what the scene cannot be
+    """
+    values: dict[str, float | None] = dict.fromkeys(QUANTITIES)
+    clock = process_time()
+    memory.forget_peak()
+    with TemporaryDirectory() as folder, threadpool_limits(1):
+        model = pipeline.build(file, Path(folder), Progress())
+        balance, interface = model.balance, model.reduced.interface
+        depth = energy = np.zeros(interface.n_pair)
+        outcome = CONVERGED
+        try:
+            point = _peak(file, model, refined)
+            outcome = point.solution.outcome
+            if point.solution.converged:
+                energy = balance.energy(point.state)
+                values["peak_hz"] = point.state.omega / (2 * np.pi)
+                values["peak_m"] = point.amplitude
+                values["energy_J"] = float(energy.sum()) or None  # a contact without friction has no error in energy
+                values["preload_N"] = balance.preload(point.state) or None
+            if wears and file.scene.wears:
+                worn = wear(file, model)
+                life = cycles_to_preload(worn)
+                if life is None:
+                    outcome = worn.end
+                else:
+                    depth = depth_at(worn, life)
+                    values["depth_m"], values["life_cycles"] = float(depth.max()), life
+        except RuntimeError as failure:
+            outcome = str(failure)
+    spent, needed = process_time() - clock, memory.peak()
+    flat = (interface.points - interface.points.mean(axis=0)) @ interface.frames.mean(axis=0)[:2].T
+    return Measured(values, flat, interface.area, depth, energy, spent, needed, outcome)
+
+
+def wear(file: SceneFile, model: pipeline.Model, left: float = LIFE_SHARE) -> WearHistory:
+    """Wear by the scene's rule until a share `left` of the preload is left."""
+    wanted, balance = file.scene.wear, model.balance
+    assert wanted is not None
+    problem = pipeline.wear_problem(file.scene, file.folder, balance, left)
+    limit = pipeline.step_limit(file.scene, free_deflection(balance), problem.area)
+    return pipeline.evolve(problem, wanted, limit, wanted.max_steps)
+
+
+def depth_at(worn: WearHistory, cycles: float) -> np.ndarray:
+    """Depth (n_pair,) [m] after a number of cycles."""
+    return np.array([np.interp(cycles, worn.cycles, pair) for pair in worn.depth.T])
+
+
+def _peak(file: SceneFile, model: pipeline.Model, refined: bool) -> OperatingPoint:
+    """The highest point of the response in the scene's range."""
+    balance, site = model.balance, pipeline.peak_of(file.scene)
+    branch = pipeline.follow_response(file.scene, balance, lambda share, note: None)
+    pipeline.check_branch(branch)
+    height = branch.amplitude(pipeline.OUTPUT)
+    best = int(np.argmax(np.where([outcome == CONVERGED for outcome in branch.outcome], height, -1.0)))
+    x = branch.contact[best].reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
+    omega = float(branch.omega[best])
+    if refined:
+        return site.next(balance, omega, x)
+    return pipeline.AtFrequency(pipeline.OUTPUT, omega, site.newton).next(balance, omega, x)

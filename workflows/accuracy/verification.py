@@ -1,0 +1,245 @@
+"""A result beside direct time integration of the same reduced model, at one frequency, unworn or as worn in one row."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from threadpoolctl import threadpool_limits
+
+from tribodyn.hbm import aft, newton, stability
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.branch import CONVERGED, amplitude
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.newton import Solution
+from tribodyn.hbm.time_integration import Options
+from tribodyn.hbm.verify import Verification, verify
+from tribodyn.hbm.wear_history import WearRow
+from tribodyn.workflows.pictures.plots import axes_of, force_unit, length_unit
+from tribodyn.workflows.pictures.style import BLUE, ORANGE
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.schema import Scene
+
+STEPS, STEPS_PER_HARMONIC = 256, 32  # per period; per period of the highest harmonic kept
+TOLERANCE = 1e-6  # drift over a period, far below the differences that are looked for
+PERIODS = 150
+STRIDE = 5e-3  # of the frequency, from the nearest solution to the one asked for
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The balance at one frequency and what time integration says.
+
+    balance, solution : the problem, with the wear of `row` (None: unworn), and its solution
+    found : the comparison; stable : of the balance solution, by Hill's method; steps : per period; seconds : spent
+    """
+
+    balance: HarmonicBalance
+    solution: Solution
+    found: Verification
+    stable: bool
+    row: int | None
+    steps: int
+    seconds: float
+
+    @property
+    def hertz(self) -> float:
+        """Frequency [Hz]."""
+        return self.found.omega / (2 * np.pi)
+
+    def record(self) -> dict[str, Any]:
+        """Numbers for machines: balance, time integration and the difference over the latter; nan is None."""
+        state, found, motion = self.solution.state, self.found, self.found.motion
+        ours = amplitude(self.balance.outputs(state))
+        swing = motion.outputs - motion.outputs.mean(axis=1, keepdims=True)
+        theirs = np.sqrt(2 * np.mean(swing**2, axis=1))
+        outputs = {
+            name: {
+                "balance_m": float(ours[i]),
+                "time_m": float(theirs[i]),
+                "difference": found.amplitude[name],
+                "waveform_difference": found.waveform[name],
+                "mean_difference": found.mean[name],
+            }
+            for i, name in enumerate(found.amplitude)
+        }
+        energy, preload = float(self.balance.energy(state).sum()), self.balance.preload(state)
+        return {
+            "frequency_hz": self.hertz,
+            "row": self.row,
+            "harmonics": list(self.balance.basis.harmonics),
+            "outputs": outputs,
+            "energy": {
+                "balance_J": energy,
+                "time_J": float(motion.energy.sum()),
+                "difference": found.energy,
+                "largest_pair_difference": found.energy_pairs,
+            },
+            "preload": {"balance_N": preload, "time_N": motion.preload, "difference": found.preload},
+            "contact_difference": found.contact,
+            "largest_difference": found.largest,
+            "stable": self.stable,
+            "steps_per_period": self.steps,
+            "step_error": found.step_error if np.isfinite(found.step_error) else None,
+            "periods": found.periods,
+            "drift": found.drift,
+            "outcome": found.outcome,
+            "seconds": self.seconds,
+        }
+
+    def lines(self) -> list[tuple[str, str]]:
+        """The comparison as pairs of a name and a readable value."""
+        record = self.record()
+        worn = "unworn" if self.row is None else f"worn as in row {self.row}"
+        harmonics = ", ".join(map(str, record["harmonics"]))
+        shown = [("frequency", f"{self.hertz:.6g} Hz, {worn}, harmonics {harmonics}")]
+        shown += [("", f"{'balance':>14} {'time':>14} {'difference':>12}")]
+
+        def row(name: str, ours: float, theirs: float, difference: float, unit: str) -> None:
+            shown.append((name, f"{ours:14.6g} {theirs:14.6g} {difference:12.2%} {unit}"))
+
+        for name, output in record["outputs"].items():
+            row(name, output["balance_m"], output["time_m"], output["difference"], "m")
+        energy, preload = record["energy"], record["preload"]
+        row("energy", energy["balance_J"], energy["time_J"], energy["difference"], "J per cycle")
+        row("preload", preload["balance_N"], preload["time_N"], preload["difference"], "N")
+        for name, output in record["outputs"].items():
+            shown.append((f"waveform {name}", f"{output['waveform_difference']:.2%} at the worst instant"))
+        shown.append(("contact", f"{self.found.contact:.2%} at the worst pair and instant"))
+        error = "unknown" if record["step_error"] is None else f"{record['step_error']:.1e}"
+        shown.append(("time steps", f"{self.steps} per period, their own error {error}"))
+        shown.append(("periodic", f"{self.found.outcome}, {self.found.periods} periods, drift {self.found.drift:.1e}"))
+        shown.append(("stable", "yes" if self.stable else "no: the motion may leave the balance solution"))
+        return shown
+
+
+def compare(
+    result: Result,
+    at: float | None,
+    row: int | None,
+    overrides: Sequence[str],
+    steps: int | None,
+    progress: Progress,
+) -> Comparison:
+    """Rebuild the model of a result, solve the balance at a frequency and integrate it in time.
+
+    at : [rad/s]; the peak of the response, or the frequency of the row, where None
+    row : of the wear history whose depth the contact has, None for unworn
+    overrides : "section.key=value" on top of those of the run, such as more harmonics; steps : per period
+    Raises  ValueError: the result has no such row or no solution to start from; SolveFailed: no balance solution
+    """
+    start = time.perf_counter()
+    file = rebuilt(result, overrides)
+    with TemporaryDirectory() as folder, threadpool_limits(file.scene.solver.threads):
+        unworn = pipeline.build(file, Path(folder), progress, result.harmonics).balance
+        balance, omega, x = _start(result, file.scene, unworn, at, row)
+        target = omega if at is None else at
+        if not 0 < target <= balance.omega_max:
+            raise ValueError(
+                f"{target / (2 * np.pi):g} Hz is outside what the scene models, up to "
+                f"{balance.omega_max / (2 * np.pi):g} Hz: change response.frequency with --set"
+            )
+        with progress.stage("harmonic balance"):
+            solution = _walk(balance, omega, target, x, pipeline.newton_options(file.scene))
+        if not solution.converged:
+            raise pipeline.SolveFailed(f"no balance at {target / (2 * np.pi):g} Hz: {solution.outcome}")
+        steps = steps or max(STEPS, STEPS_PER_HARMONIC * balance.basis.harmonics[-1])
+        with progress.stage("time integration"):
+            found = verify(balance, solution.state, Options(steps, tolerance=TOLERANCE, max_periods=PERIODS))
+        stable = stability.stability(balance, solution.state).stable
+    return Comparison(balance, solution, found, stable, row, steps, time.perf_counter() - start)
+
+
+def rebuilt(result: Result, overrides: Sequence[str] = ()) -> scene_file.SceneFile:
+    """The scene that a result was computed from, with further overrides."""
+    given = result.provenance
+    before = [text for text in given["overrides"].split("\n") if text]
+    return scene_file.parse(
+        given["scene_text"], f"{given['scene_name']}.toml", [*before, *overrides], Path(given["folder"])
+    )
+
+
+def _start(
+    result: Result, scene: Scene, unworn: HarmonicBalance, at: float | None, row: int | None
+) -> tuple[HarmonicBalance, float, np.ndarray]:
+    """The problem, and the known solution to begin at: its frequency and x on the harmonics of the problem."""
+    basis = HarmonicBasis(result.harmonics, scene.harmonics.samples)
+    if row is not None:
+        held = 0 if result.wear is None else len(result.wear.cycles)
+        if not 0 <= row < held:
+            raise ValueError(f"the result has no wear row {row}: it has {f'0 to {held - 1}' if held else 'none'}")
+        assert result.wear is not None
+        worn: WearRow = result.wear.rows()[row]
+        load = pipeline.mission(scene)[0].load if scene.wear is not None else 1.0
+        balance = unworn.with_gap(unworn.parameters.gap + worn.depth).with_load(load)
+        return balance, worn.omega, _carried(worn.displacement, basis, balance)
+    frf = result.frf
+    good = [] if frf is None else [i for i, outcome in enumerate(frf.outcome) if outcome == CONVERGED]
+    if frf is None or not good:
+        raise ValueError("the result has no response curve to start from: run its scene first")
+    height = frf.amplitude(frf.output_names[0])
+    best = max(good, key=lambda i: height[i]) if at is None else min(good, key=lambda i: abs(frf.omega[i] - at))
+    return unworn, frf.omega[best], _carried(frf.contact[best], basis, unworn)
+
+
+def _carried(flat: np.ndarray, basis: HarmonicBasis, balance: HarmonicBalance) -> np.ndarray:
+    """A solution (n_contact, n_coeff) on the harmonics of a balance, as x (n_pair, n_component, n_coeff)."""
+    return basis.transfer(flat, balance.basis).reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
+
+
+def _walk(
+    balance: HarmonicBalance, omega: float, target: float, x: np.ndarray, options: newton.NewtonOptions
+) -> Solution:
+    """Natural steps from a known solution to a frequency; from rest where they fail."""
+    count = 1 + int(np.ceil(abs(target / omega - 1) / STRIDE))
+    for w in np.linspace(omega, target, count):
+        solution = newton.solve(balance, w, x, options)
+        if solution.converged:
+            x = solution.state.x
+    return solution if solution.converged else newton.solve_from_rest(balance, target, options)
+
+
+def picture(comparison: Comparison) -> Figure:
+    """Waveform of the first output over a period, and the loop of the pair that dissipates most, both ways."""
+    balance, state, motion = comparison.balance, comparison.solution.state, comparison.found.motion
+    angle = comparison.found.omega * motion.time
+    ours = balance.outputs(state)[0] @ balance.basis.functions(angle).T
+    theirs = motion.outputs[0]
+    mean = theirs.mean()
+    with axes_of(9.0, 3.8, columns=2) as (figure, (left, right)):
+        unit, scale = length_unit(np.abs(theirs - mean).max())
+        phase = angle / (2 * np.pi)
+        left.plot(phase, scale * (theirs - mean), color=ORANGE, lw=3.0, alpha=0.6, label="time integration")
+        left.plot(phase, scale * (ours - mean), color=BLUE, lw=1.2, label="harmonic balance")
+        name = balance.compliance.output_names[0]
+        left.set(xlabel="period", ylabel=f"{name} about its mean / {unit}", title=f"{comparison.hertz:.6g} Hz")
+        left.legend(loc="best", fontsize=9)
+        pair = int(np.argmax(np.abs(motion.energy)))
+        component = int(np.argmax(np.abs(_loop_areas(motion.force[pair], motion.x[pair]))))
+        x, force = aft.history(balance.law, state.x, balance.parameters, balance.basis, balance.memory)
+        unit, scale = length_unit(np.ptp(motion.x[pair, component]))
+        unit_f, scale_f = force_unit(np.abs(motion.force[pair, component]).max())
+        middle = motion.x[pair, component].mean()
+        for a, b, style in (
+            (motion.x, motion.force, {"color": ORANGE, "lw": 3.0, "alpha": 0.6}),
+            (x, force, {"color": BLUE, "lw": 1.2}),
+        ):
+            closed = [np.append(v[pair, component], v[pair, component, 0]) for v in (a, b)]
+            right.plot(scale * (closed[0] - middle), scale_f * closed[1], **style)
+        direction = balance.parameters.components[component]
+        right.set(xlabel=f"{direction} / {unit}", ylabel=f"force / {unit_f}", title=f"Pair {pair}")
+    return figure
+
+
+def _loop_areas(force: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """(n_component,) work over the closed cycle of samples (n_component, n_sample) [J]."""
+    return np.asarray(np.sum(force * (np.roll(x, -1, axis=1) - np.roll(x, 1, axis=1)), axis=1) / 2)

@@ -1,0 +1,1 @@
+"""Speed against the dense algorithm, growth of cost, numerical extremes."""

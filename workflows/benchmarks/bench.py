@@ -1,0 +1,205 @@
+"""The solver against the dense algorithm of the thesis: tables 7.1 to 7.3 on the beam scene, both in one run.
+
+Both follow the same frequencies with the same predictor, contact law, samples and tolerance. The dense one is timed on
+windows of consecutive points spread over the range, started from the fast one's solution outside the clock; the ratio
+compares the two on just these points.
+"""
+
+from __future__ import annotations
+
+import cProfile
+import pstats
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter, process_time
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation import natural
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.reference import DenseBalance
+from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene import scene_file
+
+POINTS, SAMPLES, TOLERANCE = 200, 100, 1e-8  # thesis 7.6
+THESIS_SECONDS = {"0+1": 150.0, "0+3": 1002.0}  # tables 7.1 and 7.2, one core
+THESIS_SHARES = {  # contact, balance, inversion in % of one core, tables 7.1 and 7.2
+    "0+1": (28.0, 20.0, 46.0),
+    "0+3": (6.0, 14.0, 78.0),
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the benchmark.
+
+    harmonics : such as "0+3", 0 to 3; unknowns : of the dense algorithm, and of ours at the contact
+    seconds : of the whole response curve by the compliance form, of the processor on one thread and of the clock on
+        two; newton_steps : of it
+    ratio : seconds of the dense algorithm over ours on the same dense_points; dense_seconds : of these
+    max_difference : of the contact displacement, both refined to rounding, relative to its largest value
+    contact, balance, direction : share of our time by routine; thesis_seconds : published, one core, or None
+    """
+
+    harmonics: str
+    threads: int
+    points: int
+    converged: int
+    unknowns: int
+    dense_unknowns: int
+    seconds: float
+    newton_steps: int
+    ratio: float | None
+    dense_points: int
+    dense_seconds: float
+    max_difference: float | None
+    contact: float
+    balance: float
+    direction: float
+    dense_inversion: float | None
+    thesis_seconds: float | None
+
+
+def run(quick: bool, say: Callable[[str], None]) -> list[Row]:
+    """The table: 0+1 and 0+3 on one thread when quick, else 0+1, 0+3, 0+5 on one and two threads."""
+    plans = [("0+1", 1, (6, 4)), ("0+3", 1, (2, 2))]
+    if not quick:
+        plans = [("0+1", 1, (10, 5)), ("0+3", 1, (6, 4)), ("0+5", 1, (2, 2))]
+        plans += [("0+1", 2, (10, 5)), ("0+3", 2, (4, 3)), ("0+5", 2, (2, 2))]
+    problem = _problem()
+    rows = []
+    for harmonics, threads, windows in plans:
+        say(f"harmonics {harmonics}, {threads} thread{'s' if threads > 1 else ''}")
+        with threadpool_limits(threads):
+            rows.append(_measure(problem(harmonics), harmonics, threads, windows))
+    return rows
+
+
+def _problem() -> Callable[[str], HarmonicBalance]:
+    """The beam scene's balance for chosen harmonics; mesh and reduction are made once."""
+    file = scene_file.read("beam", ())
+    with TemporaryDirectory() as folder, threadpool_limits(1):
+        model = pipeline.build(file, Path(folder), Progress())
+    reduced, unworn = model.reduced, model.balance
+
+    def of(harmonics: str) -> HarmonicBalance:
+        basis = HarmonicBasis(tuple(range(int(harmonics[2:]) + 1)), SAMPLES)
+        b = unworn
+        return HarmonicBalance(reduced, b.law_name, b.parameters, basis, b.excitation, b.omega_max)
+
+    return of
+
+
+def _measure(balance: HarmonicBalance, harmonics: str, threads: int, windows: tuple[int, int]) -> Row:
+    low, high = pipeline.response_range(scene_file.read("beam", ()).scene)
+    options = natural.Options(POINTS, newton=NewtonOptions(TOLERANCE))
+    natural.follow(balance, high, high * 0.999, replace(options, n_points=2))  # compiles outside the clock
+    now = process_time if threads == 1 else perf_counter  # other work on the machine does not count
+    times = [now()]
+    branch = natural.follow(balance, high, low, options, lambda done, wanted: times.append(now()))
+    seconds = now() - times[0]
+    per_point = np.diff(times)  # the first entry holds the first two points
+    profiler = cProfile.Profile()
+    profiler.runcall(natural.follow, balance, high, low, options)
+    shares = _shares(pstats.Stats(profiler))
+
+    dense = DenseBalance(balance)
+    wanted = np.linspace(high, low, POINTS)
+    count, length = windows
+    starts = np.linspace(3, POINTS - length - 1, count).astype(int)
+    dense_seconds = own_seconds = difference = 0.0
+    for start in starts:
+        q = _refined(balance, dense, branch.omega, branch.contact, wanted[start - 3 : start])
+        for i in range(start, start + length):
+            clock = now()
+            guess = natural.extrapolate(wanted[i - 3 : i], q[-3:], wanted[i])
+            solution = dense.solve(wanted[i], guess, TOLERANCE)
+            dense_seconds += now() - clock
+            own_seconds += per_point[i - 1]
+            q.append(solution.q)
+        last = wanted[start + length - 1]
+        own = branch.contact[int(np.argmin(np.abs(branch.omega - last)))].reshape(solution.x.shape)
+        exact = newton.solve(balance, last, own, NewtonOptions(1e-12)).state.x
+        polished = dense.solve(last, q[-1], 1e-12, max_steps=6).x
+        difference = float(np.maximum(difference, np.abs(polished - exact).max() / np.abs(exact).max()))
+    p = dense.profile
+    return Row(
+        harmonics=harmonics,
+        threads=threads,
+        points=len(branch.omega),
+        converged=sum(outcome == newton.CONVERGED for outcome in branch.outcome),
+        unknowns=balance.n_unknown,
+        dense_unknowns=balance.model.system.n_dof * balance.basis.n_coeff,
+        seconds=seconds,
+        newton_steps=int(branch.newton_steps.sum()),
+        ratio=dense_seconds / own_seconds,
+        dense_points=count * length,
+        dense_seconds=dense_seconds,
+        max_difference=difference,
+        contact=shares["contact"],
+        balance=shares["balance"],
+        direction=shares["direction"],
+        dense_inversion=p.inversion / max(p.contact + p.balance + p.inversion, 1e-300),
+        thesis_seconds=THESIS_SECONDS.get(harmonics) if threads == 1 else None,
+    )
+
+
+def _refined(
+    balance: HarmonicBalance, dense: DenseBalance, omegas: np.ndarray, contact: np.ndarray, wanted: np.ndarray
+) -> list[np.ndarray]:
+    """Reduced coordinates of the fast solutions at three frequencies, for the dense predictor."""
+    found = []
+    for omega in wanted:
+        nearest = int(np.argmin(np.abs(omegas - omega)))
+        x = contact[nearest].reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
+        found.append(dense.coordinates_of(omega, newton.solve(balance, omega, x).state.x))
+    return found
+
+
+def _shares(stats: pstats.Stats) -> dict[str, float]:
+    """Share of the profiled time by routine, named as in the thesis: contact, balance, direction of the Newton step."""
+    names = {("law.py", "cycle"): "contact", ("balance.py", "solve"): "direction"}
+    seconds = dict.fromkeys(names.values(), 0.0)
+    entries = stats.stats  # type: ignore[attr-defined]
+    for (path, _, function), (_, _, _, cumulative, _) in entries.items():
+        name = names.get((Path(path).name, function))
+        if name is not None and Path(path).parent.name == "hbm":
+            seconds[name] += cumulative
+    total = max(cumulative for *_, cumulative, _ in entries.values())
+    shares = {name: value / total for name, value in seconds.items()}
+    return shares | {"balance": 1.0 - sum(shares.values())}
+
+
+def as_records(rows: list[Row]) -> list[dict[str, object]]:
+    """The rows for JSON."""
+    return [asdict(row) for row in rows]
+
+
+def as_text(rows: list[Row]) -> str:
+    """The rows for people, the thesis's figures beside ours."""
+    lines = [
+        "harmonics threads   points   seconds  Newton    ratio  largest difference  thesis 1 core   "
+        "contact/balance/direction %"
+    ]
+    for r in rows:
+        thesis = f"{r.thesis_seconds:.0f} s" if r.thesis_seconds else "-"
+        shares = f"{100 * r.contact:.0f}/{100 * r.balance:.0f}/{100 * r.direction:.0f}"
+        published = THESIS_SHARES.get(r.harmonics)
+        if published and r.threads == 1:
+            shares += " (thesis " + "/".join(f"{v:.0f}" for v in published) + ")"
+        lines.append(
+            f"{r.harmonics:>9} {r.threads:7d} {r.converged:4d}/{r.points:<4d} {r.seconds:8.2f} {r.newton_steps:7d} "
+            f"{r.ratio:8.1f} {r.max_difference:19.1e} {thesis:>14}   {shares}"
+        )
+    lines.append(
+        "ratio: seconds of the dense algorithm over ours on the same points "
+        f"({', '.join(f'{r.harmonics}/{r.threads}: {r.dense_points}' for r in rows)} points)"
+    )
+    return "\n".join(lines)

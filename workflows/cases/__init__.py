@@ -1,0 +1,1 @@
+"""Published cases: scene, study, trade, published numbers, figures and commands of each."""

@@ -1,0 +1,263 @@
+"""The command `tribodyn`: thin words around scene, pipeline, store and pictures."""
+
+from __future__ import annotations
+
+import json
+import math
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import cyclopts
+from cyclopts import Parameter
+
+from tribodyn.workflows.command import cases as cli_cases
+from tribodyn.workflows.command import exits
+from tribodyn.workflows.command import studies as cli_studies
+from tribodyn.workflows.command.words import Flag, Json, Overrides, make_room, print_lines, quantity
+from tribodyn.workflows.scene import scene_file
+
+if TYPE_CHECKING:
+    from tribodyn.workflows.result.result import Result
+
+app = cyclopts.App(
+    name="tribodyn",
+    help="From geometry to worn surface: vibration, friction and fretting wear of jointed parts.",
+    version_flags=["--version"],
+    suppress_keyboard_interrupt=False,
+)
+for module in (cli_studies, cli_cases):
+    for command in module.COMMANDS:
+        app.command(command)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command and leave with its exit code, see workflows.exits."""
+    exits.guard(lambda: app(arguments, exit_on_error=False, print_error=False))
+
+
+@app.command
+def run(
+    scene: str,
+    *,
+    overrides: Overrides = (),
+    accuracy: str | None = None,
+    table: Path | None = None,
+    out: Path | None = None,
+    resume: Flag = False,
+    pictures: Annotated[bool, Parameter(negative="--no-pictures")] = True,
+) -> None:
+    """Run a scene and leave its result and pictures in a folder.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene (see `tribodyn list`) or a .toml file.
+    accuracy
+        Relative error wanted, of as much as can be promised, such as "1 %", or of what is named, "1 % of energy": the
+        cheapest settings that promise it are taken; without depth or life in it nothing is worn. "1 % of life given
+        harmonics" leaves a knob as the scene has it, and its error out.
+    table
+        The trade to go by; results/NAME/trade.json or the one that comes with the program unless told.
+    out
+        Folder of the result; results/NAME unless told.
+    resume
+        Go on from an unfinished result in the folder.
+    pictures
+        Draw curves, maps and renders when done.
+    """
+    from tribodyn.workflows.accuracy.accuracy import tuned
+    from tribodyn.workflows.run import checkpoint, pipeline
+    from tribodyn.workflows.run.progress import console_progress
+
+    make_room(out)
+    progress = console_progress()
+    if accuracy is None:
+        file = scene_file.read(scene, overrides)
+    else:
+        file, promise = tuned(scene, overrides, accuracy, table)
+        progress.say(promise.sentence)
+    folder = out or Path("results") / file.name
+    path = folder / "result.h5"
+    earlier = _earlier(path, file) if resume else None
+    if earlier is not None and checkpoint.is_complete(earlier, file.scene):
+        progress.say(f"{path} is complete already")
+        result = earlier
+    else:
+        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            result = pipeline.run(file, folder, progress, earlier)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(_kept(path, scene, file.overrides)) from None
+        except pipeline.SolveFailed as failure:
+            raise pipeline.SolveFailed(f"{failure}; what was computed before is kept in {path}") from None
+    _print_summary(result)
+    progress.say(f"result: {path}")
+    if pictures:
+        _draw(result, folder / "pictures")
+
+
+def _earlier(path: Path, file: scene_file.SceneFile) -> Result | None:
+    """The unfinished result to go on from, None where there is none yet."""
+    from tribodyn.workflows.result import store
+    from tribodyn.workflows.run import checkpoint
+
+    if not path.exists():
+        return None
+    result = store.load(path)
+    key = checkpoint.same_problem(scene_file.from_json(result.provenance["scene"]), file.scene)
+    if key:
+        raise ValueError(f"{path} is the result of another scene, {key} differs: run its scene, or without --resume")
+    return result
+
+
+def _kept(path: Path, scene: str, overrides: Sequence[str]) -> str:
+    from tribodyn.workflows.result import store
+
+    if not path.exists():
+        return "stopped before anything was computed"
+    words = [scene, "--out", str(path.parent), *(word for text in overrides for word in ("--set", text))]
+    return f"stopped, {store.load(path).state}, kept in {path}: go on with tribodyn run {shlex.join(words)} --resume"
+
+
+@app.command(name="list")
+def list_() -> None:
+    """List the scenes that come with the program."""
+    for name in scene_file.names():
+        print(f"{name:12} {scene_file.title(name)}")
+
+
+@app.command
+def show(result: Path, *, as_json: Json = False) -> None:
+    """Say what a result holds.
+
+    Parameters
+    ----------
+    result
+        Folder or file of a result.
+    as_json
+        Print JSON for machines.
+    """
+    from tribodyn.workflows.result import store, summary
+
+    loaded = store.load(_result_file(result))
+    if as_json:
+        print(json.dumps(summary.summary(loaded), indent=2))
+    else:
+        _print_summary(loaded)
+
+
+@app.command
+def render(result: Path, *, out: Path | None = None) -> None:
+    """Draw the pictures of a result again.
+
+    Parameters
+    ----------
+    result
+        Folder or file of a result.
+    out
+        Folder of the pictures; beside the result unless told.
+    """
+    from tribodyn.workflows.result import store
+
+    make_room(out)
+    path = _result_file(result)
+    _draw(store.load(path), out or path.parent / "pictures")
+
+
+@app.command
+def verify(
+    result: Path,
+    *,
+    at: str | None = None,
+    row: int | None = None,
+    steps: int | None = None,
+    overrides: Overrides = (),
+    out: Path | None = None,
+    as_json: Json = False,
+) -> None:
+    """Check a result against direct time integration of the same model with the same contact law.
+
+    Parameters
+    ----------
+    result
+        Folder or file of a result.
+    at
+        Frequency such as 410Hz; the peak of the response, or the frequency of the row, unless told.
+    row
+        Wear row whose depth the contact has; unworn unless told.
+    steps
+        Time steps per period; 256 or 32 for each harmonic unless told.
+    out
+        Folder of the picture; beside the result unless told.
+    as_json
+        Print JSON for machines.
+    """
+    from tribodyn.workflows.accuracy import verification
+    from tribodyn.workflows.result import store
+    from tribodyn.workflows.run import pipeline
+    from tribodyn.workflows.run.progress import Progress, console_progress
+
+    path = _result_file(result)
+    make_room(out)
+    omega = None if at is None else 2 * math.pi * quantity("--at", at, "Hz")
+    progress = Progress() if as_json else console_progress()
+    found = verification.compare(store.load(path), omega, row, overrides, steps, progress)
+    folder = out or path.parent / "pictures"
+    folder.mkdir(parents=True, exist_ok=True)
+    picture = folder / f"verify_{found.hertz:.6g}Hz{'' if row is None else f'_row{row}'}.png"
+    verification.picture(found).savefig(picture)
+    if as_json:
+        print(json.dumps({**found.record(), "picture": str(picture)}, indent=2))
+    else:
+        print_lines(found.lines())
+        print(picture)
+    if found.found.outcome != "converged":
+        raise pipeline.SolveFailed(f"the time integration found no periodic motion: {found.found.outcome}")
+
+
+@app.command
+def plan(scene: str, *, overrides: Overrides = ()) -> None:
+    """Say what a scene will model, and what it will cost, before running it.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene (see `tribodyn list`) or a .toml file.
+    """
+    from tribodyn.workflows.run import planning
+
+    print_lines(planning.plan(scene_file.read(scene, overrides)).lines())
+
+
+def _result_file(path: Path) -> Path:
+    return path / "result.h5" if path.is_dir() else path
+
+
+def _print_summary(result: Result) -> None:
+    from tribodyn.workflows.result import summary
+
+    print_lines(summary.lines(result))
+
+
+def _draw(result: Result, folder: Path) -> None:
+    """Draw what the scene of a result wants drawn; curves come first, they need no system libraries."""
+    from tribodyn.workflows.pictures import plots
+
+    wanted = scene_file.from_json(result.provenance["scene"]).pictures
+    folder.mkdir(parents=True, exist_ok=True)
+    written = plots.draw(result, folder) if wanted.plots else []
+    if wanted.renders:
+        from tribodyn.workflows.pictures import render as renders
+
+        try:
+            written += renders.draw(result, folder, wanted.deformation_scale, wanted.wear_scale)
+        except renders.RenderingUnavailable as missing:
+            print(f"no renders: {missing}")
+    for path in written:
+        print(path)
+
+
+if __name__ == "__main__":
+    main()

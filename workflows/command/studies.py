@@ -1,0 +1,317 @@
+"""Words of the command `tribodyn` that measure cost and accuracy, follow a number, or fit numbers to measured ones."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from tribodyn.workflows.command.words import PICTURE, Flag, Json, Overrides, aside, make_room, print_lines, quantity
+
+Knobs = Annotated[tuple[str, ...], Parameter(name="--knob", negative=(), consume_multiple=False)]
+
+
+def bench(
+    *,
+    quick: Flag = False,
+    scaling: Flag = False,
+    out: Path = Path("scaling.png"),
+    as_json: Json = False,
+) -> None:
+    """Measure the solver beside the dense algorithm of the thesis on the beam scene (tables 7.1 to 7.3).
+
+    Parameters
+    ----------
+    quick
+        Harmonics 0+1 and 0+3 on one thread, in under a minute; with --scaling up to 13 x 13 contact nodes.
+    scaling
+        Time and memory of one response at 0+3 from 5 x 5 to 31 x 31 contact nodes instead, with a plot.
+    out
+        File of that plot.
+    as_json
+        Print JSON for machines.
+    """
+    from tribodyn.workflows.benchmarks import bench as benchmark
+
+    if scaling:
+        make_room(out, PICTURE)
+        _scaling(quick, out, as_json)
+        return
+    rows = benchmark.run(quick, aside)
+    print(json.dumps(benchmark.as_records(rows), indent=2) if as_json else benchmark.as_text(rows))
+
+
+def _scaling(quick: bool, out: Path, as_json: bool) -> None:
+    from tribodyn.workflows.benchmarks import scaling as measured
+    from tribodyn.workflows.run.progress import Progress, console_progress
+
+    progress = Progress() if as_json else console_progress()
+    rows = measured.run(measured.QUICK if quick else measured.FULL, progress.say)
+    measured.picture(rows).savefig(out)
+    if as_json:
+        print(json.dumps({**measured.as_records(rows), "picture": str(out)}, indent=2))
+    else:
+        print(measured.as_text(rows))
+        print(out)
+
+
+def trade(
+    scene: str,
+    *,
+    knob: Knobs = (),
+    overrides: Overrides = (),
+    most: int = 99,
+    out: Path | None = None,
+    check: str | None = None,
+    as_json: Json = False,
+) -> None:
+    """Measure what each knob costs and what it is worth, against where it tends to on the same scene.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene or a .toml file.
+    knob
+        Knob to measure, can be repeated; the other knobs of an earlier table stay. All knobs unless told.
+        wear_step alone is table 4.2 of the thesis with life added.
+    most
+        Settings of each knob, the finest ones.
+    out
+        Table to write (.json), its plot beside it (.png); results/NAME/trade.json unless told.
+    check
+        Measure no table, but run what `run --accuracy` would choose for this accuracy, such as "1 %" or "1 % of
+        life", against a run that is finer in every knob; exit code 1 where the promise is broken. --out: the table
+        to go by.
+    as_json
+        Print JSON for machines.
+    """
+    if most < 1:
+        raise ValueError(f"--most {most}: a knob needs one setting at least")
+    from tribodyn.workflows.accuracy import accuracy, knob_trade, promise, trade_picture, trade_table
+    from tribodyn.workflows.accuracy import trade as wear_step
+
+    if knob == ("wear_step",):
+        make_room(out, PICTURE)
+        table = wear_step.wear_step(scene, aside, overrides)
+        if out is not None:
+            wear_step.picture(table).savefig(out)
+        print(json.dumps(wear_step.as_records(table), indent=2) if as_json else wear_step.as_text(table))
+        return
+    if check is not None:
+        kept = promise.check(scene, overrides, check, out, aside)
+        print(promise.as_json(kept) if as_json else promise.as_text(kept))
+        if not kept.kept:
+            sys.exit(1)
+        return
+    make_room(out, (".json",))
+    path = out or Path("results") / Path(scene).stem / "trade.json"
+    earlier = trade_table.load(path) if knob and path.exists() else None
+    found = knob_trade.run(scene, knob, overrides, aside, most, lambda table: trade_table.save(table, path), earlier)
+    trade_picture.picture(found).savefig(path.with_suffix(".png"))
+    if as_json:
+        print(json.dumps(knob_trade.as_records(found), indent=2))
+    else:
+        print(knob_trade.as_text(found))
+        print(*accuracy.advice(found), path, path.with_suffix(".png"), sep="\n")
+
+
+def converge(
+    scene: str, *, overrides: Overrides = (), most: float = 99, out: Path | None = None, as_json: Json = False
+) -> None:
+    """Refine the contact grid and the mesh until the answers settle, and say which grid a per cent needs.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene with a study of its grids.
+    most
+        Finest grid, in nodes along the patch.
+    out
+        Folder of the plots; results/NAME unless told.
+    as_json
+        Print JSON for machines.
+    """
+    from tribodyn.workflows.accuracy import converge as study
+
+    make_room(out)
+    found = study.run(scene, overrides, most, aside)
+    folder = out or Path("results") / found[0].scene
+    folder.mkdir(parents=True, exist_ok=True)
+    pictures = [folder / f"converge_{one.scene}_{one.ladder}.png" for one in found]
+    for one, path in zip(found, pictures, strict=True):
+        study.picture(one).savefig(path, dpi=110)
+    if as_json:
+        print(json.dumps(study.as_records(found), indent=2))
+    else:
+        print(study.as_text(found), *pictures, sep="\n")
+
+
+def extremes(
+    *, quick: Flag = False, out: Path = Path("extremes.png"), as_json: Json = False
+) -> None:
+    """Try the solver at its numerical extremes: each cell converged and checked, or refused with a sentence.
+
+    Parameters
+    ----------
+    quick
+        Every third cell, on smaller models.
+    out
+        File of the picture.
+    as_json
+        Print JSON for machines.
+    """
+    from tribodyn.workflows.benchmarks import extremes as table
+    from tribodyn.workflows.benchmarks import extremes_picture
+
+    make_room(out, PICTURE)
+    rows = table.run(quick, aside)
+    extremes_picture.picture(rows).savefig(out)
+    print(json.dumps(table.as_records(rows), indent=2) if as_json else table.as_text(rows))
+    wrong = table.counts(rows)["wrong"]
+    if wrong:
+        raise RuntimeError(f"{wrong} of {len(rows)} extreme settings ended with a wrong number, see the table")
+
+
+def track(
+    scene: str,
+    *,
+    against: Literal["load", "gap", "stiffness", "friction", "wear"],
+    start: Annotated[str, Parameter(name="--from")],
+    stop: Annotated[str, Parameter(name="--to")],
+    fold: int | None = None,
+    points: int | None = None,
+    worn: Path | None = None,
+    overrides: Overrides = (),
+    out: Path | None = None,
+    as_json: Json = False,
+) -> None:
+    """Follow the resonance peak, or a fold of the response, while load, gap, stiffness, friction or wear changes.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene (see `tribodyn list`) or a .toml file.
+    against
+        What changes: a factor on the harmonic loads, an opening added to every gap, a factor on the contact springs or
+        on the friction coefficients, or the share of the depth of a worn result.
+    start
+        Value to begin at, such as 1 or, for the gap, 0um.
+    stop
+        Value to end at.
+    fold
+        Number of the fold to follow, 1 for that of the highest frequency; the peak unless told.
+    points
+        Values of the peak (21), or the most that a line of folds may have (500).
+    worn
+        Folder of the result whose last depth is a wear of one.
+    out
+        Folder of track.csv and track.png; results/NAME unless told.
+    as_json
+        Print JSON for machines.
+    """
+    from tribodyn.workflows.run.progress import Progress, console_progress
+    from tribodyn.workflows.scene import scene_file
+    from tribodyn.workflows.studies import tracking
+
+    make_room(out)
+    unit = tracking.UNITS[against]
+    ends = quantity("--from", start, unit), quantity("--to", stop, unit)
+    file = scene_file.read(scene, overrides)
+    most = points if points is not None else (21 if fold is None else 500)
+    progress = Progress() if as_json else console_progress()
+    found = tracking.follow(file, against, *ends, fold, most, worn, progress)
+    folder = out or Path("results") / file.name
+    folder.mkdir(parents=True, exist_ok=True)
+    tracking.write(found, folder / "track.csv")
+    tracking.picture(found).savefig(folder / "track.png")
+    if as_json:
+        print(json.dumps(found.record(), indent=2))
+    else:
+        for value, hertz, amplitude in zip(found.value, found.frequency, found.amplitude, strict=True):
+            print(f"{found.name} {f'{value:.6g} {found.unit}':14} {hertz:12.6g} Hz {amplitude:12.6g} m")
+        print(f"{found.what}: {found.end}", folder / "track.csv", folder / "track.png", sep="\n")
+
+
+def backbone(
+    scene: str,
+    *,
+    start: Annotated[str, Parameter(name="--from")],
+    stop: Annotated[str, Parameter(name="--to")],
+    mode: int = 0,
+    points: int = 40,
+    overrides: Overrides = (),
+    out: Path | None = None,
+    as_json: Json = False,
+) -> None:
+    """Follow a nonlinear mode: frequency and damping against amplitude, as a table and a plot.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene (see `tribodyn list`) or a .toml file; its harmonic loads play no part.
+    start
+        Amplitude of the response to begin at, such as 1um.
+    stop
+        Amplitude to end at, such as 1mm.
+    mode
+        Number of the mode about the static equilibrium, from 0.
+    points
+        Points on an easy way; there are more where the backbone bends.
+    out
+        Folder of backbone.csv and backbone.png; results/NAME unless told.
+    as_json
+        Print JSON for machines.
+    """
+    from tribodyn.workflows.run.progress import Progress, console_progress
+    from tribodyn.workflows.scene import scene_file
+    from tribodyn.workflows.studies import modes
+
+    make_room(out)
+    file = scene_file.read(scene, overrides)
+    ends = quantity("--from", start, "m"), quantity("--to", stop, "m")
+    found = modes.follow(file, *ends, mode, points, Progress() if as_json else console_progress())
+    folder = out or Path("results") / file.name
+    folder.mkdir(parents=True, exist_ok=True)
+    modes.write(found, folder / "backbone.csv")
+    modes.picture(found).savefig(folder / "backbone.png")
+    if as_json:
+        print(json.dumps(modes.record(found), indent=2))
+    else:
+        hertz, damping = found.omega / (2 * math.pi), 100 * found.damping
+        print_lines(
+            [
+                ("at rest", f"{found.reference_omega / (2 * math.pi):.6g} Hz"),
+                ("frequency", f"{hertz[0]:.6g} -> {hertz[-1]:.6g} Hz"),
+                ("damping", f"{damping[0]:.4g} -> {damping[-1]:.4g} %, largest {damping.max():.4g} %"),
+                ("end", found.end),
+            ]
+        )
+        print(folder / "backbone.csv", folder / "backbone.png", sep="\n")
+
+
+def identify(scene: str, task: Path, *, overrides: Overrides = (), as_json: Json = False) -> None:
+    """Fit named numbers of a scene to measured ones, within bounds, and say how well these determine them.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene or a .toml file; nothing is written into it.
+    task
+        File with the numbers that are looked for and those that were measured, as cases/rig/rig.fit.toml.
+    as_json
+        Print JSON for machines.
+    """
+    from tribodyn.workflows.studies import fit_file
+
+    found, changes = fit_file.run(scene, overrides, fit_file.read(task), aside)
+    if as_json:
+        print(json.dumps({**found.record(), "set": changes}, indent=2))
+    else:
+        print(found.report(), "", "to go on with what was found:", *(f'  --set "{c}"' for c in changes), sep="\n")
+
+
+COMMANDS = (bench, trade, converge, extremes, track, backbone, identify)

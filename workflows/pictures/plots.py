@@ -1,0 +1,280 @@
+"""Curves of a result, drawn with matplotlib: each function draws one figure, `draw` writes all that can be drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.wear_history import WearHistory
+from tribodyn.workflows.pictures import maps
+from tribodyn.workflows.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, RED, STYLE, WEAR_MAP
+from tribodyn.workflows.result.result import Result
+
+BIFURCATIONS = {"fold": "o", "flip": "s", "Neimark-Sacker": "D"}  # markers
+FAINT = 1e-3  # share of the first preload below which a touch is faint
+
+
+def draw(result: Result, folder: Path) -> list[Path]:
+    """Write every figure that the result has data for as a PNG; returns their paths."""
+    figures: list[tuple[str, Callable[[Result], Figure], bool]] = [
+        ("frf", frequency_response, result.frf is not None or result.wear is not None),
+        ("cycles_per_step", cycles_per_step, result.wear_steps > 0),
+        ("peak", amplitude_against_cycles, result.wear_steps > 0),
+        ("preload", preload_against_cycles, result.wear_steps > 0),
+        ("depth", depth_against_cycles, result.wear_steps > 0),
+        ("energy", energy_against_cycles, result.wear_steps > 0),
+        ("hysteresis", hysteresis_loops, result.loops is not None and has_friction(result)),
+        ("patch", maps.patch_maps, result.wear_steps > 0 and result.patch is not None and len(result.patch.faces) > 0),
+    ]
+    written = []
+    for name, function, possible in figures:
+        if possible:
+            with mpl.rc_context(STYLE):
+                path = folder / f"{name}.png"
+                function(result).savefig(path)
+                written.append(path)
+    return written
+
+
+def frequency_response(result: Result) -> Figure:
+    """Unworn response between its free and stuck references, and the path of the peak under wear."""
+    with axes_of(7.2, 4.6) as (figure, axes):
+        unit, scale = length_unit(_largest_amplitude(result))
+        if result.references is not None:
+            hertz = result.references.omega / (2 * np.pi)
+            axes.plot(hertz, scale * result.references.free, "--", color=GREY, label="free (contact absent)")
+            axes.plot(hertz, scale * result.references.stuck, ":", color=INK, label="stuck (closed, no slip)")
+        if result.frf is not None:
+            good = np.array([outcome == CONVERGED for outcome in result.frf.outcome])
+            amplitude = scale * result.frf.amplitude(result.frf.output_names[0])
+            _curve(axes, result, good, amplitude, scale)
+        if result.wear is not None and result.wear_steps:
+            wear = result.wear
+            hertz = wear.omega / (2 * np.pi)
+            unit_cycles, scale_cycles = _cycles(shown_cycles(wear))
+            axes.plot(hertz, scale * wear.amplitude, color=ORANGE, lw=1.0, zorder=3)
+            dots = axes.scatter(
+                hertz, scale * wear.amplitude, 16, scale_cycles * wear.cycles, cmap=WEAR_MAP, zorder=4,
+                vmax=scale_cycles * shown_cycles(wear), label="cycle at each wear step",
+            )  # fmt: skip
+            figure.colorbar(dots, ax=axes, label=f"vibration cycles{unit_cycles}", pad=0.02)
+            if result.worn is not None:
+                colors = mpl.colormaps[WEAR_MAP](wear.cycles[result.worn.row] / shown_cycles(wear))
+                for omega, amplitude, color in zip(result.worn.omega, result.worn.amplitude, colors, strict=True):
+                    axes.plot(omega / (2 * np.pi), scale * amplitude, color=color, lw=1.2)
+        axes.set(yscale="log", xlabel="frequency / Hz", ylabel=f"amplitude / {unit}", title="Frequency response")
+        axes.legend(loc="best", fontsize=9)
+    return figure
+
+
+def _curve(axes: Any, result: Result, good: np.ndarray, amplitude: np.ndarray, scale: float) -> None:
+    """The response curve: unstable stretches dashed, bifurcations marked, the range over load paths as a band."""
+    frf, marks, bounds = result.frf, result.stability, result.bounds
+    assert frf is not None
+    hertz = frf.frequency
+    if bounds is not None:
+        low, high = scale * bounds.amplitude_low, scale * bounds.amplitude_high
+        axes.fill_between(hertz[good], low[good], high[good], color=BLUE, alpha=0.25, lw=0, label="any load path")
+    if marks is None:
+        axes.plot(hertz[good], amplitude[good], color=BLUE, label="unworn contact")
+        return
+    # each stretch between neighbouring points is stable where both are
+    both = marks.stable[:-1] & marks.stable[1:]
+    solved = good[:-1] & good[1:]
+    for kind, style, name in ((both, "-", "unworn contact, stable"), (~both, ":", "unstable")):
+        ends = np.flatnonzero(kind & solved)
+        x = np.stack([hertz[ends], hertz[ends + 1], np.full(len(ends), np.nan)], axis=1).ravel()
+        y = np.stack([amplitude[ends], amplitude[ends + 1], np.full(len(ends), np.nan)], axis=1).ravel()
+        axes.plot(x, y, style, color=BLUE if style == "-" else RED, label=name if len(ends) else None)
+    for kind, marker in BIFURCATIONS.items():
+        at = [p for p, found in zip(marks.position, marks.kinds, strict=True) if found == kind]
+        if at:
+            x, y = (np.interp(at, np.arange(len(hertz)), values) for values in (hertz, amplitude))
+            axes.plot(x, y, marker, color=RED, ms=6, label=kind)
+
+
+def cycles_per_step(result: Result) -> Figure:
+    """Cycles that each wear step stands for."""
+    wear = _wear(result)
+    with axes_of() as (figure, axes):
+        count = wear.cycles_in_step[: result.wear_steps]
+        unit, scale = _cycles(count.max())
+        axes.step(np.arange(1, len(count) + 1), scale * count, where="mid", color=BLUE)
+        axes.set(xlabel="wear step", ylabel=f"cycles in the step{unit}", title="Cycles per wear step")
+        if count.max() > 30 * count.min():
+            axes.set_yscale("log")
+        else:
+            axes.set_ylim(bottom=0)
+    return figure
+
+
+def amplitude_against_cycles(result: Result) -> Figure:
+    """Amplitude and frequency of the cycle that wears, against cycles."""
+    wear = _wear(result)
+    with axes_of(7.2, 5.6, rows=2) as (figure, (upper, lower)):
+        scale_cycles = _cycle_axis(lower, wear)
+        unit, scale = length_unit(wear.amplitude.max())
+        upper.plot(scale_cycles * wear.cycles, scale * wear.amplitude, ".-", color=BLUE, ms=4)
+        upper.set(ylabel=f"amplitude / {unit}", title="Response under wear")
+        lower.plot(scale_cycles * wear.cycles, wear.omega / (2 * np.pi), ".-", color=ORANGE, ms=4)
+        lower.set(ylabel="frequency / Hz")
+    return figure
+
+
+def preload_against_cycles(result: Result) -> Figure:
+    """Static normal force of the contact against cycles."""
+    wear = _wear(result)
+    with axes_of() as (figure, axes):
+        scale_cycles = _cycle_axis(axes, wear)
+        unit, scale = ("kN", 1e-3) if wear.preload.max() >= 1e3 else ("N", 1.0)
+        axes.plot(scale_cycles * wear.cycles, scale * wear.preload, ".-", color=BLUE, ms=4)
+        axes.set(ylabel=f"preload / {unit}", title="Contact preload")
+        axes.set_ylim(bottom=0)
+    return figure
+
+
+def depth_against_cycles(result: Result) -> Figure:
+    """Largest, mean and smallest wear depth of the patch, and the worn part of its area, against cycles."""
+    wear, patch = _wear(result), result.patch
+    assert patch is not None
+    with axes_of(7.2, 5.6, rows=2) as (figure, (axes, below)):
+        scale_cycles = _cycle_axis(axes, wear)
+        unit, scale = length_unit(wear.depth.max())
+        x = scale_cycles * wear.cycles
+        mean = wear.depth @ patch.area / patch.area.sum()
+        axes.fill_between(x, scale * wear.depth.min(1), scale * wear.depth.max(1), color=BLUE, alpha=0.18, lw=0)
+        axes.plot(x, scale * wear.depth.max(1), color=RED, label="largest")
+        axes.plot(x, scale * mean, color=BLUE, label="mean over the area")
+        axes.plot(x, scale * wear.depth.min(1), color=GREEN, label="smallest")
+        axes.set(ylabel=f"total wear depth / {unit}", title="Wear depth")
+        axes.legend(loc="best", fontsize=9)
+        axes.set_xlabel("")
+        _cycle_axis(below, wear)
+        below.plot(x, 1e6 * worn_area(wear.depth, patch.area), color=ORANGE)
+        below.set(ylabel="worn area / mm²", ylim=(0, 1.05e6 * patch.area.sum()))
+    return figure
+
+
+def worn_area(depth: np.ndarray, area: np.ndarray) -> np.ndarray:
+    """(n_row,) area of the pairs that have worn a thousandth of the depth that is largest in the end [m2].
+
+    depth : (n_row, n_pair) [m]; area : (n_pair,) [m2]
+    """
+    return (depth > 1e-3 * depth[-1].max()) @ area
+
+
+def energy_against_cycles(result: Result) -> Figure:
+    """Energy per cycle against cycles, and worn volume against accumulated energy."""
+    wear, patch = _wear(result), result.patch
+    assert patch is not None
+    with axes_of(7.2, 5.6, rows=2, share=False) as (figure, (upper, lower)):
+        scale_cycles = _cycle_axis(upper, wear)
+        upper.plot(scale_cycles * wear.cycles, wear.energy.sum(1), ".-", color=BLUE, ms=4)
+        upper.set(ylabel="energy per cycle / J", title="Dissipated energy")
+        spent = np.concatenate([[0.0], np.cumsum(wear.work.sum(1))[:-1]])
+        lower.plot(spent * 1e-6, 1e9 * wear.depth @ patch.area, ".-", color=ORANGE, ms=4)
+        lower.set(xlabel="accumulated energy / MJ", ylabel="worn volume / mm³")
+    return figure
+
+
+def has_friction(result: Result) -> bool:
+    """Whether the contact has a tangential component, so that it can have hysteresis."""
+    return result.patch is not None and any(name != "n" for name in result.patch.components)
+
+
+def hysteresis_loops(result: Result) -> Figure:
+    """Tangential loops at chosen wear steps (columns) of the pairs that dissipate most in one of them (rows)."""
+    loops, patch, wear = result.loops, result.patch, _wear(result)
+    assert loops is not None
+    assert patch is not None
+    pairs = list(dict.fromkeys(int(np.argmax(wear.energy[row])) for row in loops.row))
+    tangential = [c for c, name in enumerate(patch.components) if name != "n"]
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(2.6 * len(loops.row) + 0.4, 2.2 * len(pairs) + 0.5), layout="constrained")
+        grid = figure.subplots(len(pairs), len(loops.row), squeeze=False)
+        for line, pair in enumerate(pairs):
+            # the direction in which this pair moves most
+            swing = [np.ptp(loops.displacement[:, pair, c], axis=-1).max() for c in tangential]
+            component = tangential[int(np.argmax(swing))]
+            for column, row in enumerate(loops.row):
+                axes = grid[line, column]
+                x, force = loops.displacement[column, pair, component], loops.force[column, pair, component]
+                x = x - (x.max() + x.min()) / 2  # the static offset says nothing about the loop
+                (unit_x, scale_x), (unit_f, scale_f) = length_unit(x.max()), force_unit(np.abs(force).max())
+                axes.plot(scale_x * np.append(x, x[0]), scale_f * np.append(force, force[0]), color=BLUE)
+                axes.set_xlabel(f"{patch.components[component]} / {unit_x}", fontsize=9)
+                axes.set_ylabel(f"pair {pair}: force / {unit_f}", fontsize=9)
+                if line == 0:
+                    axes.set_title(f"wear step {row + 1}", fontsize=10)
+    return figure
+
+
+@contextmanager
+def axes_of(
+    width: float = 7.2, height: float = 4.2, rows: int = 1, share: bool = True, columns: int = 1
+) -> Iterator[tuple[Figure, Any]]:
+    """A figure in the common style with its axes: one, or an array where there are several rows or columns."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(width, height), layout="constrained")
+        yield figure, figure.subplots(rows, columns, sharex=share and columns == 1)
+
+
+def _wear(result: Result) -> WearHistory:
+    assert result.wear is not None
+    return result.wear
+
+
+def shown_cycles(wear: WearHistory) -> float:
+    """Cycles up to which curves are drawn: all, unless a last faint touch takes more than half of them."""
+    last = float(wear.cycles[-1])
+    faint = np.flatnonzero(wear.preload < FAINT * wear.preload[0])
+    if len(faint) and 0 < wear.cycles[faint[0]] < 0.5 * last:
+        return 1.15 * float(wear.cycles[faint[0]])
+    return last
+
+
+def _cycle_axis(axes: Any, wear: WearHistory) -> float:
+    """Label the axis of cycles, and say where the run ends if that is not drawn; returns the factor of the axis."""
+    shown, last = shown_cycles(wear), float(wear.cycles[-1])
+    unit, scale = _cycles(shown)
+    if shown < last:
+        axes.set_xlim(-0.03 * scale * shown, scale * shown)
+    end = f" (the last touch ends at {scale * last:.3g})" if shown < last else ""
+    axes.set_xlabel(f"vibration cycles{unit}{end}")
+    return scale
+
+
+def _largest_amplitude(result: Result) -> float:
+    found = [0.0]
+    if result.references is not None:
+        found.append(float(result.references.free.max()))
+    if result.wear is not None and len(result.wear.amplitude):
+        found.append(float(result.wear.amplitude.max()))
+    return max(found)
+
+
+def length_unit(largest: float) -> tuple[str, float]:
+    """Unit and factor in which lengths [m] of this size read well."""
+    if largest >= 0.5e-3:
+        return "mm", 1e3
+    return ("nm", 1e9) if 0 < largest < 0.5e-6 else ("µm", 1e6)
+
+
+def force_unit(largest: float) -> tuple[str, float]:
+    """Unit and factor in which forces [N] of this size read well."""
+    if largest >= 1e3:
+        return "kN", 1e-3
+    return ("mN", 1e3) if 0 < largest < 1 else ("N", 1.0)
+
+
+def _cycles(largest: float) -> tuple[str, float]:
+    """Text after "cycles" and the factor that goes with it."""
+    power = 3 * int(np.log10(max(largest, 1)) // 3)
+    return ("", 1.0) if power == 0 else (f" / 10$^{power}$", 10.0**-power)

@@ -1,0 +1,219 @@
+"""What a run leaves behind: everything that the summary and the pictures need, and nothing that needs a solver."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tribodyn.hbm.branch import Branch
+from tribodyn.hbm.evolution import LOST
+from tribodyn.hbm.wear_history import WearHistory
+
+PRELOAD_LOST = "preload fell below"  # how hbm.evolution begins the other sentence for a lost contact
+
+
+@dataclass(frozen=True)
+class PartMesh:
+    """The mesh of the part as pictures need it.
+
+    kind : VTK cell type name, such as "triquadratic_hexahedron"
+    points : (n_node, 3) [m]
+    cells : (n_cell, n_corner) node indices in VTK order
+    """
+
+    kind: str
+    points: np.ndarray
+    cells: np.ndarray
+
+
+@dataclass(frozen=True)
+class Patch:
+    """The contact patch: a ContactInterface without its map to a model's coordinates.
+
+    components : contact components in the order of the history's rows
+    nodes : (n_pair,) node of the part at each pair, -1 where there is no mesh
+    points, frames, area, gap, faces : as in fem.interface.ContactInterface
+    free_deflection : (n_pair,) normal approach under the static loads with body 2 absent, nan without wear [m]
+    """
+
+    components: tuple[str, ...]
+    nodes: np.ndarray
+    points: np.ndarray
+    frames: np.ndarray
+    area: np.ndarray
+    gap: np.ndarray
+    faces: np.ndarray
+    free_deflection: np.ndarray
+
+    @property
+    def flat(self) -> np.ndarray:
+        """(n_pair, 2) positions in the mean tangential plane, from the middle of the patch [m]."""
+        return np.asarray((self.points - self.points.mean(0)) @ self.frames.mean(0)[:2].T)
+
+    def moved(self, mesh: np.ndarray, points: np.ndarray, frames: np.ndarray) -> Patch:
+        """The same patch elsewhere on the part, at the nodes of the mesh (n_node, 3) [m] nearest to its points."""
+        return replace(self, nodes=cKDTree(mesh).query(points)[1], points=points, frames=frames)
+
+    def shares(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Cut every face into one quadrangle for each of its corners, to show what has one value for each pair.
+
+        points : (n_pair, d) where the pairs are drawn
+        Returns (n_share, 4, d) corners of the quadrangles, and (n_share,) the pair each belongs to
+        """
+        corner = points[self.faces]
+        before, after = np.roll(corner, 1, axis=1), np.roll(corner, -1, axis=1)
+        middle = np.broadcast_to(corner.mean(1, keepdims=True), corner.shape)
+        share = np.stack([corner, (corner + after) / 2, middle, (corner + before) / 2], axis=2)
+        return share.reshape(-1, 4, points.shape[1]), self.faces.ravel()
+
+
+@dataclass(frozen=True)
+class References:
+    """Linear amplitudes of the observed output around the nonlinear one.
+
+    omega : (n_reference,) [rad/s]
+    free : (n_reference,) amplitude with the contact absent [m]
+    stuck : (n_reference,) amplitude with every contact closed and sticking [m]
+    """
+
+    omega: np.ndarray
+    free: np.ndarray
+    stuck: np.ndarray
+
+
+@dataclass(frozen=True)
+class CurveStability:
+    """Stability of the response curve, point by point.
+
+    stable : (n_point,) False also where the point did not converge
+    growth : (n_point,) largest growth rate of a perturbation [1/s], nan where the point did not converge
+    omega, position : (n_bifurcation,) [rad/s], and between which points, see hbm.stability.Bifurcation
+    kinds : "fold", "flip" or "Neimark-Sacker" of each bifurcation
+    """
+
+    stable: np.ndarray
+    growth: np.ndarray
+    omega: np.ndarray
+    position: np.ndarray
+    kinds: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ShearBounds:
+    """How far the curve depends on the load path of stuck pairs, see hbm.residual_shear.
+
+    amplitude_low, amplitude_high : (n_point,) range of the first output's amplitude [m]
+    energy_low, energy_high : (n_point,) range of the friction work per cycle [J]
+    stuck : (n_point,) share of the tangential directions that stick all the time; failed : extreme starts not solved
+    """
+
+    amplitude_low: np.ndarray
+    amplitude_high: np.ndarray
+    energy_low: np.ndarray
+    energy_high: np.ndarray
+    stuck: np.ndarray
+    failed: np.ndarray
+
+    @property
+    def spread(self) -> np.ndarray:
+        """(n_point,) width of the range of amplitudes over its middle."""
+        return np.asarray(2 * (self.amplitude_high - self.amplitude_low) / (self.amplitude_high + self.amplitude_low))
+
+
+@dataclass(frozen=True)
+class Fields:
+    """Full displacement of the part at chosen wear steps.
+
+    row : (n_field,) rows of the wear history
+    displacement : (n_field, n_node, 3, n_coeff) Fourier coefficients [m]
+    """
+
+    row: np.ndarray
+    displacement: np.ndarray
+
+
+@dataclass(frozen=True)
+class Loops:
+    """Periodic contact displacement and force over one cycle, at the same wear steps as the fields.
+
+    row : (n_field,) rows of the wear history
+    displacement, force : (n_field, n_pair, n_component, n_sample) [m], [N]
+    """
+
+    row: np.ndarray
+    displacement: np.ndarray
+    force: np.ndarray
+
+
+@dataclass(frozen=True)
+class WornResponses:
+    """Response curves of the worn contact.
+
+    row : (n_curve,) rows of the wear history whose depth the curves have
+    omega, amplitude : (n_curve, n_curve_point) [rad/s], of the first output [m]; nan after the end of a curve and where
+        a point did not converge
+    """
+
+    row: np.ndarray
+    omega: np.ndarray
+    amplitude: np.ndarray
+
+
+@dataclass(frozen=True)
+class Result:
+    """A run, finished or not.
+
+    provenance : scene text and overrides, versions, seed, start time, threads
+    facts : what was modelled and how long it took: sizes, solver names, delta_max_m, seconds, ...
+    state : sentence that says how far the run came
+    frf : response curve of the unworn contact; stability, bounds : of it, where the scene asks for them
+    """
+
+    provenance: Mapping[str, str]
+    facts: Mapping[str, str | int | float | np.ndarray]
+    state: str
+    patch: Patch | None = None
+    part: PartMesh | None = None
+    references: References | None = None
+    frf: Branch | None = None
+    stability: CurveStability | None = None
+    bounds: ShearBounds | None = None
+    wear: WearHistory | None = None
+    worn: WornResponses | None = None
+    fields: Fields | None = None
+    loops: Loops | None = None
+
+    @property
+    def harmonics(self) -> tuple[int, ...]:
+        """Harmonics that it was computed with."""
+        return tuple(int(h) for h in np.atleast_1d(self.facts["harmonics"]))
+
+    @property
+    def wear_steps(self) -> int:
+        """Number of wear steps taken."""
+        return 0 if self.wear is None else int(np.count_nonzero(self.wear.cycles_in_step))
+
+    @property
+    def contact_lost(self) -> bool:
+        """Whether wear went on until every pair was separated."""
+        return self.wear is not None and self.wear.end.startswith((LOST, PRELOAD_LOST))
+
+    def shown_rows(self) -> np.ndarray:
+        """Wear rows that pictures show: those of the fields, else the first, the middle and the last worn."""
+        if self.fields is not None:
+            return self.fields.row
+        last = max(self.wear_steps - 1, 0)
+        return np.unique([0, last // 2, last])
+
+    def depth_after(self, row: int) -> np.ndarray:
+        """(n_pair,) wear depth when the step of a row is done [m]."""
+        assert self.wear is not None
+        return np.asarray(self.wear.depth[row] + self.wear.worn[row])
+
+    def cycles_after(self, row: int) -> float:
+        """Cycles when the step of a row is done."""
+        assert self.wear is not None
+        return float(self.wear.cycles[row] + self.wear.cycles_in_step[row])

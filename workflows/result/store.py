@@ -1,0 +1,228 @@
+"""The result file: HDF5 with dimension scales, replaced as a whole at every checkpoint.
+
+Whoever opens the file, at any moment and after any kill, finds one complete checkpoint.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from tribodyn.hbm.branch import Branch
+from tribodyn.hbm.wear_history import WearHistory
+from tribodyn.workflows.result.result import (
+    CurveStability,
+    Fields,
+    Loops,
+    PartMesh,
+    Patch,
+    References,
+    Result,
+    ShearBounds,
+    WornResponses,
+)
+from tribodyn.workflows.result.whole_file import replacing
+
+FORMAT = "tribodyn result 1"
+
+# group -> (type, {array: (dimensions, unit)}); what is not an array is an attribute of the group
+SCHEMA: dict[str, tuple[type, dict[str, tuple[tuple[str, ...], str]]]] = {
+    "patch": (
+        Patch,
+        {
+            "nodes": (("pair",), ""),
+            "points": (("pair", "xyz"), "m"),
+            "frames": (("pair", "axis", "xyz"), ""),
+            "area": (("pair",), "m2"),
+            "gap": (("pair",), "m"),
+            "faces": (("face", "face_corner"), ""),
+            "free_deflection": (("pair",), "m"),
+        },
+    ),
+    "part": (PartMesh, {"points": (("node", "xyz"), "m"), "cells": (("cell", "cell_corner"), "")}),
+    "references": (
+        References,
+        {"omega": (("reference",), "rad/s"), "free": (("reference",), "m"), "stuck": (("reference",), "m")},
+    ),
+    "frf": (
+        Branch,
+        {
+            "omega": (("point",), "rad/s"),
+            "response": (("point", "output", "coefficient"), "m"),
+            "contact": (("point", "contact", "coefficient"), "m"),
+            "energy": (("point",), "J"),
+            "newton_steps": (("point",), ""),
+            "folds": (("fold",), ""),
+            "parameter": (("point",), ""),
+        },
+    ),
+    "stability": (
+        CurveStability,
+        {
+            "stable": (("point",), ""),
+            "growth": (("point",), "1/s"),
+            "omega": (("bifurcation",), "rad/s"),
+            "position": (("bifurcation",), ""),
+        },
+    ),
+    "bounds": (
+        ShearBounds,
+        {
+            "amplitude_low": (("point",), "m"),
+            "amplitude_high": (("point",), "m"),
+            "energy_low": (("point",), "J"),
+            "energy_high": (("point",), "J"),
+            "stuck": (("point",), ""),
+            "failed": (("point",), ""),
+        },
+    ),
+    "wear": (
+        WearHistory,
+        {
+            "cycles": (("row",), ""),
+            "cycles_in_step": (("row",), ""),
+            "depth": (("row", "pair"), "m"),
+            "worn": (("row", "pair"), "m"),
+            "energy": (("row", "pair"), "J"),
+            "preload": (("row",), "N"),
+            "normal_force": (("row", "pair"), "N"),
+            "status": (("row", "pair"), ""),
+            "omega": (("row",), "rad/s"),
+            "amplitude": (("row",), "m"),
+            "force": (("row", "contact", "coefficient"), "N"),
+            "response": (("row", "output", "coefficient"), "m"),
+            "solves": (("row",), ""),
+            "step_error": (("row",), ""),
+            "plan": (("row", "plan"), ""),
+            "work": (("row", "pair"), "J"),
+            "duty_omega": (("row", "duty"), "rad/s"),
+            "duty_displacement": (("row", "duty", "contact", "coefficient"), "m"),
+        },
+    ),
+    "worn": (
+        WornResponses,
+        {
+            "row": (("curve",), ""),
+            "omega": (("curve", "curve_point"), "rad/s"),
+            "amplitude": (("curve", "curve_point"), "m"),
+        },
+    ),
+    "fields": (
+        Fields,
+        {"row": (("field",), ""), "displacement": (("field", "node", "xyz", "coefficient"), "m")},
+    ),
+    "loops": (
+        Loops,
+        {
+            "row": (("field",), ""),
+            "displacement": (("field", "pair", "component", "sample"), "m"),
+            "force": (("field", "pair", "component", "sample"), "N"),
+        },
+    ),
+}
+
+
+class ResultError(ValueError):
+    """A result file cannot be used; the message is one sentence."""
+
+
+def save(path: Path, result: Result) -> None:
+    """Write a result so that `path` holds either the old or the new one, never a part of it."""
+    with replacing(path) as new, h5py.File(new, "w", libver="v110") as file:
+        _write(file, result)
+
+
+def set_aside(path: Path) -> Path | None:
+    """Keep a result that is about to be replaced as result.previous.h5; returns where it is now, None if none was."""
+    if not path.exists():
+        return None
+    previous = path.with_name(f"{path.stem}.previous{path.suffix}")
+    os.replace(path, previous)
+    return previous
+
+
+def _write(file: h5py.File, result: Result) -> None:
+    file.attrs["format"] = FORMAT
+    file.attrs["state"] = result.state
+    for name in ("provenance", "facts"):
+        group = file.create_group(name)
+        for key, value in getattr(result, name).items():
+            group.attrs[key] = value
+    for name, (_, arrays) in SCHEMA.items():
+        part = getattr(result, name)
+        if part is None:
+            continue
+        group = file.create_group(name)
+        for item in fields(part):
+            value = getattr(part, item.name)
+            if item.name in arrays:
+                # numpy takes an empty tuple for one of floats
+                dtype = np.int64 if isinstance(value, tuple) and not value else None
+                _write_array(file, group, item.name, np.asarray(value, dtype), *arrays[item.name])
+            else:
+                group.attrs[item.name] = value if isinstance(value, str) else np.array(value, dtype=h5py.string_dtype())
+
+
+def _write_array(
+    file: h5py.File, group: h5py.Group, name: str, value: np.ndarray, dimensions: tuple[str, ...], unit: str
+) -> None:
+    data = group.create_dataset(name, data=value)
+    if unit:
+        data.attrs["units"] = unit
+    for axis, (dimension, size) in enumerate(zip(dimensions, value.shape, strict=True)):
+        data.dims[axis].attach_scale(_scale(file, dimension, size))
+
+
+def _scale(file: h5py.File, dimension: str, size: int) -> h5py.Dataset:
+    """The scale of a dimension: its index, shared by all arrays of the file."""
+    if dimension not in file:
+        file.create_dataset(dimension, data=np.arange(size))
+        file[dimension].make_scale(dimension)
+    if len(file[dimension]) != size:
+        raise ValueError(f"dimension {dimension} has {len(file[dimension])} entries, an array has {size}")
+    return file[dimension]
+
+
+def load(path: Path) -> Result:
+    """Read a result file; raises ResultError where there is none."""
+    try:
+        file = h5py.File(path, "r")
+    except FileNotFoundError:
+        raise ResultError(f'there is no result file "{path}"') from None
+    except OSError:
+        raise ResultError(f'"{path}" is not a result file of tribodyn') from None
+    with file:
+        if file.attrs.get("format") != FORMAT:
+            raise ResultError(f'"{path}" is not a result file of this version of tribodyn')
+        try:
+            parts = {name: _read(file[name], kind, arrays) for name, (kind, arrays) in SCHEMA.items() if name in file}
+        except KeyError:
+            raise ResultError(f'"{path}" was written by another version of tribodyn: run its scene again') from None
+        return Result(
+            provenance=_attributes(file["provenance"].attrs),
+            facts=_attributes(file["facts"].attrs),
+            state=str(file.attrs["state"]),
+            **parts,
+        )
+
+
+def _read(group: h5py.Group, kind: type, arrays: Mapping[str, Any]) -> Any:
+    values: dict[str, Any] = {}
+    for item in fields(kind):
+        if item.name in arrays:
+            value = group[item.name][()]
+            values[item.name] = tuple(value.tolist()) if str(item.type).startswith("tuple") else value
+        else:
+            value = group.attrs[item.name]
+            values[item.name] = value if isinstance(value, str) else tuple(str(entry) for entry in value)
+    return kind(**values)
+
+
+def _attributes(attributes: h5py.AttributeManager) -> dict[str, Any]:
+    return {key: value.item() if isinstance(value, np.generic) else value for key, value in attributes.items()}

@@ -1,0 +1,201 @@
+"""What a result says, in numbers: for `tribodyn show`, for machines and for people."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.wear_events import events
+from tribodyn.hbm.wear_history import LIFE_SHARE, cycles_to_preload
+from tribodyn.workflows.accuracy import budget
+from tribodyn.workflows.accuracy.trade_table import plain
+from tribodyn.workflows.result.result import Result
+
+EVENT_SAMPLES = 256  # of a cycle, to see whether a pair opens
+
+
+def summary(result: Result) -> dict[str, Any]:
+    """The numbers of a result; what was not computed is None.
+
+    depth_max_m, depth_mean_m : largest, and mean over the area of, the total wear depth
+    cycles : vibration cycles so far; separated_cycles : the same if the last touch has ended, else None
+    first_lift_cycles, first_loss_cycles : until a closed pair first opens in the cycle, until a pair touches no more
+    surface_volumes_m3 : worn off the scene's own part or first face, and off the other one
+    life_cycles : until the preload had fallen to LIFE_SHARE of its first value, None if it has not
+    energy_J, volume_m3 : friction work and worn volume, accumulated
+    wear_steps, hbm_solves : steps taken and balance solves spent on wear
+    peak_hz, peak_m, preload_N : [first, last] of the wear run, or the peak of the response curve without one
+    peak_at_end : whether that peak is no peak, but an end of the response curve
+    peak_is_stable : whether that peak of the curve is a motion that stays, None where this was not asked for
+    stable_peak_hz, stable_peak_m : the highest point of the curve that is
+    seconds : of computing, interrupted runs included
+    error_budget : what each discretisation contributes, see workflows.budget.Entry
+    """
+    numbers: dict[str, Any] = {"state": result.state, "finished": result.state.startswith("complete")}
+    numbers |= {"seconds": result.facts.get("seconds"), "wear_steps": result.wear_steps}
+    numbers |= _wear(result) | _peak(result) | _stable_peak(result)
+    for name in ("full_dofs", "model_dofs", "contact_pairs", "unknowns", "delta_max_m"):
+        numbers[name] = result.facts.get(name)
+    numbers |= _curve(result)
+    free = result.facts.get("free_hz")
+    numbers["free_hz"] = None if free is None else [float(hertz) for hertz in np.atleast_1d(free)]
+    numbers["error_budget"] = budget.of_result(result)
+    return {name: plain(value) for name, value in numbers.items()}
+
+
+def _wear(result: Result) -> dict[str, Any]:
+    names = ["depth_max_m", "depth_mean_m", "cycles", "separated_cycles", "life_cycles"]
+    names += ["first_lift_cycles", "first_loss_cycles", "energy_J", "volume_m3", "surface_volumes_m3", "hbm_solves"]
+    wear, patch = result.wear, result.patch
+    if wear is None or patch is None or not len(wear.cycles):
+        return dict.fromkeys(names)
+    depth, cycles = result.depth_after(-1), result.cycles_after(-1)
+    volume, split = float(depth @ patch.area), float(np.squeeze(result.facts.get("wear_split", 0.5)))
+    basis = HarmonicBasis(result.harmonics, max(EVENT_SAMPLES, 2 * result.harmonics[-1] + 1))
+    when = events(wear, patch.components, patch.gap, basis)
+    return {
+        "first_lift_cycles": None if when is None else when.first_lift,
+        "first_loss_cycles": None if when is None else when.first_loss,
+        "surface_volumes_m3": [split * volume, (1 - split) * volume],
+        "depth_max_m": float(depth.max()),
+        "depth_mean_m": float(depth @ patch.area / patch.area.sum()),
+        "cycles": cycles,
+        "separated_cycles": cycles if result.contact_lost else None,
+        "life_cycles": cycles_to_preload(wear),
+        "energy_J": float(wear.work.sum()),
+        "volume_m3": volume,
+        "hbm_solves": int(wear.solves.sum()),
+        "wear_end": wear.end,
+    }
+
+
+def _peak(result: Result) -> dict[str, Any]:
+    wear, frf = result.wear, result.frf
+    if wear is not None and len(wear.omega):
+        ends = [0, -1]
+        return {
+            "peak_hz": [float(w) for w in wear.omega[ends] / (2 * np.pi)],
+            "peak_m": [float(a) for a in wear.amplitude[ends]],
+            "preload_N": [float(n) for n in wear.preload[ends]],
+            "peak_at_end": None,
+        }
+    if frf is not None:
+        amplitude = frf.amplitude(frf.output_names[0])
+        best = int(np.argmax(np.where([outcome == CONVERGED for outcome in frf.outcome], amplitude, -1.0)))
+        hertz, height = float(frf.frequency[best]), float(amplitude[best])
+        at_end = best in (0, len(amplitude) - 1)
+        return {"peak_hz": [hertz, hertz], "peak_m": [height, height], "preload_N": None, "peak_at_end": at_end}
+    return dict.fromkeys(("peak_hz", "peak_m", "preload_N", "peak_at_end"))
+
+
+def _stable_peak(result: Result) -> dict[str, Any]:
+    """An unstable motion is a solution of the balance that no vibration stays at, however high it is."""
+    frf, marks = result.frf, result.stability
+    if frf is None or marks is None:
+        return dict.fromkeys(("peak_is_stable", "stable_peak_hz", "stable_peak_m"))
+    height = np.where([outcome == CONVERGED for outcome in frf.outcome], frf.amplitude(frf.output_names[0]), -1.0)
+    stable = np.where(marks.stable, height, -1.0)
+    best, found = int(np.argmax(stable)), bool(stable.max() >= 0)
+    return {
+        "peak_is_stable": bool(marks.stable[np.argmax(height)]),
+        "stable_peak_hz": float(frf.frequency[best]) if found else None,
+        "stable_peak_m": float(height[best]) if found else None,
+    }
+
+
+def _curve(result: Result) -> dict[str, Any]:
+    harmonics, frf = result.facts.get("harmonics"), result.frf
+    numbers: dict[str, Any] = {
+        "harmonics": None if harmonics is None else [int(h) for h in np.atleast_1d(harmonics)],
+        "harmonics_error": result.facts.get("harmonics_error"),
+        "response_end": None if frf is None else frf.end,
+        "folds_hz": [] if frf is None else [float(frf.frequency[i]) for i in frf.folds],
+        "unstable_points": None,
+        "bifurcations": None,
+        "shear_spread": None,
+        "shear_spread_at_peak": None,
+    }
+    if frf is None:
+        return numbers
+    good = np.array([outcome == CONVERGED for outcome in frf.outcome])
+    if result.stability is not None:
+        where = zip(result.stability.omega / (2 * np.pi), result.stability.kinds, strict=True)
+        numbers["unstable_points"] = int(np.sum(good & ~result.stability.stable))
+        numbers["bifurcations"] = [{"hz": float(hertz), "kind": kind} for hertz, kind in where]
+    if result.bounds is not None and good.any():
+        best = int(np.argmax(np.where(good, frf.amplitude(frf.output_names[0]), -1.0)))
+        numbers["shear_spread"] = float(np.nanmax(result.bounds.spread))
+        numbers["shear_spread_at_peak"] = float(result.bounds.spread[best])
+    return numbers
+
+
+def lines(result: Result) -> list[tuple[str, str]]:
+    """The summary as pairs of a name and a readable value."""
+    numbers = summary(result)
+
+    def pair(name: str, scale: float, unit: str) -> str:
+        first, last = (float("nan") if value is None else scale * value for value in numbers[name])
+        return f"{first:.5g} {unit}" if numbers["wear_steps"] == 0 else f"{first:.5g} -> {last:.5g} {unit}"
+
+    shown = [
+        ("scene", result.provenance["scene_name"]),
+        ("state", result.state),
+        ("model", _sizes(numbers["full_dofs"], numbers["model_dofs"])),
+        ("contact", f"{numbers['contact_pairs']} node pairs, {numbers['unknowns']} unknowns"),
+    ]
+    if "sectors" in result.facts:
+        shown.append(("wheel", "{sectors} sectors, engine order {engine_order}".format(**result.facts)))
+    if numbers["free_hz"]:
+        shown.append(("free modes", ", ".join(f"{hertz:.2f}" for hertz in numbers["free_hz"][:4]) + " Hz"))
+    if numbers["delta_max_m"] is not None:
+        shown.append(("delta_max", f"{1e3 * numbers['delta_max_m']:.4f} mm"))
+    if numbers["peak_hz"] is not None:
+        shown.append(("frequency", pair("peak_hz", 1, "Hz")))
+        shown.append(("amplitude", pair("peak_m", 1e3, "mm")))
+    if numbers["peak_at_end"]:
+        shown.append(("", "no peak: the response is highest at an end of response.frequency, widen it"))
+    if numbers["peak_is_stable"] is False and not numbers["wear_steps"]:
+        hertz, height = numbers["stable_peak_hz"], numbers["stable_peak_m"]
+        below = "no point is stable" if hertz is None else f"the highest that is: {hertz:.5g} Hz, {1e3 * height:.5g} mm"
+        shown.append(("", f"this peak is unstable, no vibration stays at it; {below}"))
+    if numbers["harmonics"] is not None:
+        error = numbers["harmonics_error"]
+        chosen = "" if error is None else f", chosen: estimated truncation error {error:.1e}"
+        shown.append(("harmonics", ", ".join(map(str, numbers["harmonics"])) + chosen))
+    if numbers["response_end"] is not None:
+        shown.append(("response", numbers["response_end"]))
+    if numbers["bifurcations"] is not None:
+        places = ", ".join(f"{b['kind']} at {b['hz']:.5g} Hz" for b in numbers["bifurcations"])
+        shown.append(("stability", f"{numbers['unstable_points']} unstable points; {places or 'no bifurcations'}"))
+    if numbers["shear_spread"] is not None:
+        spread, peak = numbers["shear_spread"], numbers["shear_spread_at_peak"]
+        shown.append(("load path", f"moves the amplitude by up to {spread:.2%}, {peak:.2%} at the peak"))
+    if numbers["depth_max_m"] is not None:
+        deepest, mean = 1e3 * numbers["depth_max_m"], 1e3 * numbers["depth_mean_m"]
+        life = "contact not lost" if numbers["separated_cycles"] is None else "contact lost"
+        if numbers["life_cycles"] is not None:
+            life += f"; life until {100 * LIFE_SHARE:g} % of the preload: {numbers['life_cycles']:.4g}"
+        happened = [("first opening", numbers["first_lift_cycles"]), ("first pair lost", numbers["first_loss_cycles"])]
+        shown += [(name, f"after {count:.4g} cycles") for name, count in happened if count is not None]
+        shown += [
+            ("preload", pair("preload_N", 1, "N")),
+            ("cycles", f"{numbers['cycles']:.4g} ({life})"),
+            ("wear depth", f"{deepest:.4f} mm largest, {mean:.4f} mm mean"),
+            ("worn volume", f"{1e9 * numbers['volume_m3']:.5g} mm3, of it {_volumes(numbers['surface_volumes_m3'])}"),
+            ("friction work", f"{numbers['energy_J']:.5g} J"),
+            ("wear steps", f"{numbers['wear_steps']} with {numbers['hbm_solves']} balance solves"),
+        ]
+    shown += budget.lines(result)
+    shown.append(("computing", f"{numbers['seconds']:.1f} s"))
+    return shown
+
+
+def _volumes(volumes: list[float]) -> str:
+    return f"{1e9 * volumes[0]:.4g} on the part, {1e9 * volumes[1]:.4g} on what it rubs on"
+
+
+def _sizes(full: int | None, model: int | None) -> str:
+    return f"{full} DOFs, as they came" if full == model else f"{full} DOFs reduced to {model}"

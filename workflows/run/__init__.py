@@ -1,0 +1,1 @@
+"""From a scene to a result: mesh, part, reduced model, balance, response, wear."""

@@ -1,0 +1,67 @@
+"""Checkpoints: what is kept of a run on its way, and which kept result a scene can go on from."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from tribodyn.workflows.result import store
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.scene.schema import Scene
+
+
+class Clock:
+    """Seconds of computing, those of an interrupted run included."""
+
+    def __init__(self, earlier: Result | None):
+        self._before = 0.0 if earlier is None else float(earlier.facts["seconds"])
+        self._start = time.perf_counter()
+
+    def seconds(self) -> float:
+        """Seconds so far."""
+        return self._before + time.perf_counter() - self._start
+
+
+@dataclass(frozen=True)
+class Keeper:
+    """Writes each new state of the result to its file."""
+
+    path: Path
+    clock: Clock
+
+    def __call__(self, result: Result) -> Result:
+        """Write a result with the seconds it took, and give it back."""
+        timed = replace(result, facts={**result.facts, "seconds": self.clock.seconds()})
+        store.save(self.path, timed)
+        return timed
+
+
+def is_complete(result: Result, scene: Scene) -> bool:
+    """Whether a result holds everything that a scene of the same problem asks for."""
+    if not result.state.startswith("complete") or not scene.wears:
+        return result.state.startswith("complete")
+    assert scene.wear is not None
+    stopped = result.wear is None or result.wear.end.startswith("stopped after")
+    return not stopped or result.wear_steps >= scene.wear.max_steps
+
+
+def same_problem(first: Scene, second: Scene) -> str:
+    """Empty where one scene's result can be gone on from by the other, else the first key that differs.
+
+    What is drawn, how many wear steps are wanted, how their result is told and how many threads work may differ.
+    """
+    ignored: dict[str, Any] = {"scene": True, "pictures": True, "solver": {"threads"}}
+    ignored["wear"] = {"max_steps", "responses", "split"}
+    return _difference(first.model_dump(exclude=ignored), second.model_dump(exclude=ignored))
+
+
+def _difference(first: Any, second: Any) -> str:
+    if isinstance(first, dict) and isinstance(second, dict):
+        for key in [*first, *(k for k in second if k not in first)]:
+            below = _difference(first.get(key), second.get(key))
+            if below:
+                return f"{key}.{below}".rstrip(".")
+        return ""
+    return "" if first == second else "."

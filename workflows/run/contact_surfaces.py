@@ -1,0 +1,85 @@
+"""From measured or made-up faces to the gap of every node pair."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tribodyn.fem.interface import COMPONENTS, ContactInterface
+from tribodyn.geometry import surface_io
+from tribodyn.geometry.surface import HeightMap, prepare
+from tribodyn.geometry.surface_pair import centred, facing_gap, mirrored, onto_nodes, synthetic_pair
+from tribodyn.workflows.scene.contact import Surfaces
+
+FLAT = 1e-6  # part of its size by which a flat patch may bulge
+
+
+@dataclass(frozen=True)
+class SurfaceGap:
+    """gap : (n_pair,) before loading [m]; repairs : a sentence for each thing that was changed in a height map;
+    heights : waviness of the faces at the pairs (2, n_pair) [m]; maps : the prepared waviness of each face
+    """
+
+    gap: np.ndarray
+    repairs: tuple[str, ...]
+    heights: np.ndarray
+    maps: tuple[HeightMap, ...]
+
+
+def surface_gap(surfaces: Surfaces, interface: ContactInterface, folder: Path) -> SurfaceGap:
+    """Gap of a flat contact from the faces that a scene names, files relative to `folder`.
+
+    Raises  ValueError where the patch is not flat, or where a height map or the mating height cannot be what the scene
+        says
+    """
+    nodes = patch_coordinates(interface, surfaces.axes)
+    size = np.ptp(nodes, axis=0)
+    if abs(surfaces.mating_height) > size.max():
+        raise ValueError(
+            f'surfaces.mating_height is {surfaces.mating_height:g} m, more than the face is long: give its unit, "3 um"'
+        )
+    waves: list[HeightMap] = []
+    repairs: list[str] = []
+    for face in faces(surfaces, folder):
+        prepared = prepare(face, surfaces.cutoff, (float(size[0]), float(size[1])))
+        waves.append(centred(prepared.waviness))
+        repairs += prepared.repairs
+    heights = np.zeros((2, len(nodes)))
+    for i, wave in enumerate(waves):
+        heights[i] = onto_nodes(wave, nodes)
+    return SurfaceGap(facing_gap(heights[0], heights[1], surfaces.mating_height), tuple(repairs), heights, tuple(waves))
+
+
+def faces(surfaces: Surfaces, folder: Path) -> list[HeightMap]:
+    """The face of body 1, and that of body 2 unless it is flat, in the same coordinates."""
+    if surfaces.synthetic is not None:
+        made = surfaces.synthetic
+        pair = synthetic_pair(made.seed, made.size, ridge=made.ridge, waviness=made.waviness, roughness=made.roughness)
+        return list(pair)
+    read = [
+        surface_io.read(
+            folder / name,
+            spacing=surfaces.spacing,
+            lateral_unit=surfaces.lateral_unit,
+            height_unit=surfaces.height_unit,
+        )
+        for name in (surfaces.first, surfaces.second)
+        if name is not None
+    ]
+    return [*read[:1], *(mirrored(face, surfaces.mirror) if surfaces.mirror else face for face in read[1:])]
+
+
+def patch_coordinates(interface: ContactInterface, axes: tuple[str, str]) -> np.ndarray:
+    """Pairs (n_pair, 2) in the plane of a flat patch along signed components, from the middle of its extent [m].
+
+    Raises  ValueError where the patch is not flat
+    """
+    frame = interface.frames.mean(axis=0)
+    along = np.stack([(-1.0 if name.startswith("-") else 1.0) * frame[COMPONENTS.index(name[-2:])] for name in axes])
+    nodes = interface.points @ along.T
+    size = float(np.ptp(nodes, axis=0).max())
+    if np.ptp(interface.points @ frame[2]) > FLAT * size or np.ptp(interface.frames, axis=0).max() > FLAT:
+        raise ValueError("surfaces: the contact is not flat, so that a height map cannot be laid on it; leave them out")
+    return nodes - (nodes.max(axis=0) + nodes.min(axis=0)) / 2

@@ -1,0 +1,75 @@
+"""What a scene may ask about its response curve besides the curve: harmonics, stability, bounds of residual shear."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tribodyn.hbm import harmonic_choice, residual_shear, stability
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.branch import CONVERGED, Branch
+from tribodyn.hbm.harmonic_choice import HarmonicChoice
+from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.operating_point import AtPeak
+from tribodyn.workflows.result.result import CurveStability, ShearBounds
+
+CHOICES = 3  # times that harmonics are chosen, at the peak that the last choice has
+SAME_PEAK = 1e-3  # distance of peaks, relative, that is none
+
+
+def choose_harmonics(
+    balance: HarmonicBalance, peak: AtPeak, tolerance: float, highest: int, newton: NewtonOptions
+) -> HarmonicChoice:
+    """Harmonics that make the response of every output right to a tolerance at its resonance.
+
+    The harmonics chosen move the resonance: it is looked for again with them, and they are chosen anew there.
+    peak : where the resonance is looked for, with the harmonics of the balance at first
+    Raises  harmonic_choice.NotSolved
+    """
+    options = harmonic_choice.Options(tolerance, highest, newton=newton)
+    before = 0.0
+    for _ in range(CHOICES):
+        point = peak.first(balance)
+        if not point.solution.converged:
+            raise harmonic_choice.NotSolved(f"harmonics cannot be chosen: no peak was found: {point.solution.outcome}")
+        omega = point.state.omega
+        if abs(omega - before) <= SAME_PEAK * omega:
+            break
+        choice = harmonic_choice.choose(balance, [omega], options)
+        balance, before = choice.balance, omega
+    return choice
+
+
+def stability_of(balance: HarmonicBalance, branch: Branch) -> CurveStability:
+    """Stability of every point of a curve by Hill's method, and its bifurcations."""
+    found = stability.mark(balance, branch)
+    return CurveStability(
+        found.stable,
+        found.leading.real,
+        np.array([b.value for b in found.bifurcations]),
+        np.array([b.position for b in found.bifurcations]),
+        tuple(b.kind for b in found.bifurcations),
+    )
+
+
+def shear_bounds(
+    balance: HarmonicBalance, branch: Branch, output: str, newton: NewtonOptions, advance: Callable[[float, str], None]
+) -> ShearBounds:
+    """Range of amplitude and energy at every point of a curve, over the two extreme starts of the friction memory.
+
+    Raises  ValueError where the law has no friction memory or harmonic 0 is not kept
+    """
+    n = len(branch.omega)
+    low, high = np.full((2, n), np.nan), np.full((2, n), np.nan)
+    stuck, failed = np.zeros(n), np.zeros(n, int)
+    for i in range(n):
+        if branch.outcome[i] == CONVERGED:
+            x = branch.contact[i].reshape(balance.parameters.n_pair, -1, branch.contact.shape[2])
+            found = residual_shear.response_bounds(balance, branch.omega[i], x, None, newton)
+            failed[i] = np.sum(~found.converged)
+            if found.converged.any():
+                low[:, i], high[:, i] = zip(found.amplitude_range(output), found.energy_range(), strict=True)
+            stuck[i] = found.stuck[0].mean()
+        advance((i + 1) / n, "")
+    return ShearBounds(low[0], high[0], low[1], high[1], stuck, failed)

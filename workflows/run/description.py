@@ -1,0 +1,99 @@
+"""What a result says about itself before anything is solved: provenance, sizes, patch and mesh."""
+
+from __future__ import annotations
+
+import platform
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tribodyn.fem.part import Part
+from tribodyn.geometry import mesh as mesh_reader
+from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.harmonic_choice import HarmonicChoice
+from tribodyn.workflows.result.result import PartMesh, Patch, Result
+from tribodyn.workflows.run.references import delta_max, free_deflection
+from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.schema import PartScene
+
+VTK_KIND = {27: ("hexahedron27", "triquadratic_hexahedron"), 10: ("tetra10", "quadratic_tetra")}
+PACKAGES = ("tribodyn", "numpy", "scipy", "numba", "scikit-fem", "gmsh", "meshio", "h5py", "pydantic")
+SEED = 0  # of every random start vector and probe in the packages used
+
+
+def described(
+    file: SceneFile, part: Part | None, balance: HarmonicBalance, choice: HarmonicChoice | None = None
+) -> Result:
+    """The result before anything was solved: where it comes from and what is modelled; part None for matrices."""
+    reduced, i = balance.model, balance.model.interface
+    nodes = np.full(i.n_pair, -1) if part is None else cKDTree(part.points).query(i.points)[1]
+    wears = file.scene.wear is not None
+    free = free_deflection(balance) if wears else np.full(i.n_pair, np.nan)
+    patch = Patch(i.components, nodes, i.points, i.frames, i.area, i.gap, i.faces, free)
+    facts: dict[str, str | int | float | np.ndarray] = {
+        "full_dofs": int(str(reduced.info["n_full"])),
+        "model_dofs": reduced.system.n_dof,
+        "free_hz": np.asarray(reduced.info["free_frequency"]),
+        "contact_pairs": i.n_pair,
+        "harmonics": np.array(balance.basis.harmonics),
+        "unknowns": balance.n_unknown,
+        "compliance_error": balance.compliance.error,
+    }
+    if part is not None:
+        facts |= {
+            "elements": int(part.mesh.nelements),
+            "nodes": len(part.points),
+            "scaled_jacobian": mesh_reader.quality(part.mesh).scaled_jacobian,
+        }
+    if "factorisation" in reduced.info:  # reduced here, not as the matrices came
+        facts |= {
+            "retained_modes": int(str(reduced.info["n_modes"])),
+            "first_omitted_hz": float(str(reduced.info["first_omitted_frequency"])),
+            "factorisation": str(reduced.info["factorisation"]),
+        }
+    if "n_interface_modes" in reduced.info:
+        facts |= {"interface_modes": int(str(reduced.info["n_interface_modes"]))}
+    if file.scene.wear is not None:
+        facts |= {"delta_max_m": delta_max(file.scene, free, i.area), "wear_split": file.scene.wear.split}
+    if isinstance(file.scene, PartScene) and (around := file.scene.wheel) is not None:
+        facts |= {"sectors": around.sectors, "engine_order": around.engine_order, "axis": np.array(around.axis)}
+    if choice is not None:
+        facts |= {"harmonics_error": choice.estimate.error, "harmonics_choice": choice.outcome}
+    mesh = part_mesh(part) if part is not None and wears and file.scene.pictures.renders else None
+    return Result(provenance(file), facts, "model built", patch=patch, part=mesh)
+
+
+def provenance(file: SceneFile) -> dict[str, str]:
+    """Where a result comes from, as texts."""
+    return {
+        "scene_name": file.name,
+        "scene_text": file.text,
+        "overrides": "\n".join(file.overrides),
+        "folder": str(file.folder),
+        "scene": file.scene.model_dump_json(),
+        "versions": ", ".join(f"{name} {package_version(name)}" for name in PACKAGES),
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "seed": str(SEED),
+        "threads": str(file.scene.solver.threads),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def package_version(name: str) -> str:
+    """Version of an installed package; a source tree that is run without being installed has none."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def part_mesh(part: Part) -> PartMesh:
+    """The mesh of a part in the node order of VTK."""
+    cells = part.mesh.dofs.element_dofs.T
+    reference, kind = VTK_KIND[cells.shape[1]]
+    to_vtk = permutation(part.mesh.elem.doflocs, REFERENCE_POINTS[reference])
+    return PartMesh(kind, part.points, cells[:, to_vtk])

@@ -1,0 +1,88 @@
+"""From a scene with matrices to its reduced model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tribodyn.reduction.craig_bampton import craig_bampton
+from tribodyn.reduction.foreign import ForeignMatrices, read_matrices, reduced_model
+from tribodyn.reduction.linear import linear_modes
+from tribodyn.reduction.matrix_files import read_array
+from tribodyn.reduction.model import ReducedModel
+from tribodyn.workflows.scene.matrices import DofOutput, MatrixFiles, MatrixScene, Variable
+
+OUTPUT = "response"
+MODES_TOLD = 10
+
+Take = Callable[[Variable], np.ndarray]
+
+
+def read(files: MatrixFiles, folder: Path) -> ForeignMatrices:
+    """The matrices of a scene; names of files begin in `folder`. Raises ValueError for files that cannot be used."""
+    named = {key: folder / name for key in ("mass", "stiffness", "damping", "mapping") if (name := getattr(files, key))}
+    path = None if files.file is None else folder / files.file
+    return read_matrices(path, **named, names=files.names, scale=files.scale)
+
+
+def make(scene: MatrixScene, folder: Path) -> ReducedModel:
+    """The model of a scene, with the damping of its files.
+
+    Raises  ValueError: files, variables or DOFs that cannot be used
+    """
+    matrices, contact, response = read(scene.model, folder), scene.contact, scene.response
+
+    def take(variable: Variable) -> np.ndarray:
+        if scene.model.file is None:
+            raise ValueError(f'variable = "{variable.variable}" needs model.file, the file that holds it')
+        return read_array(folder / scene.model.file, variable.variable)
+
+    system = matrices.system(
+        _vectors({**scene.loads.static, **scene.loads.harmonic}, take),
+        _vectors({OUTPUT: response, **response.others}, take),
+    )
+    interface = matrices.contact(
+        _table(contact.dofs, take),
+        None if contact.opposite is None else _table(contact.opposite, take),
+        area=_per_pair(contact.area, take),
+        components=contact.components,
+        normal=contact.normal,
+        t1=contact.t1,
+        signs=contact.signs,
+        gap=_per_pair(contact.gap, take),
+        points=None if contact.points is None else take(contact.points),
+    )
+    if scene.reduction is not None:
+        return craig_bampton(system, interface, scene.reduction.modes, scene.reduction.cutoff)
+    model = reduced_model(system, interface)
+    free = linear_modes(model, n=min(MODES_TOLD, model.system.n_dof))[0]
+    return replace(model, info={**model.info, "n_full": system.n_dof, "free_frequency": free})
+
+
+def _table(rows: Any, take: Take) -> Any:
+    """Rows of DOFs, those of the file as whole numbers."""
+    if not isinstance(rows, Variable):
+        return rows
+    table = np.atleast_2d(take(rows))
+    if (table != np.round(table)).any():
+        raise ValueError(f'variable = "{rows.variable}" holds numbers that are not whole: DOFs count from 0')
+    return table.astype(int)
+
+
+def _per_pair(value: float | tuple[float, ...] | Variable, take: Take) -> float | np.ndarray:
+    if isinstance(value, Variable):
+        return take(value).ravel()
+    return value if isinstance(value, float) else np.array(value)
+
+
+def _vectors(entries: Mapping[str, DofOutput], take: Take) -> dict[str, Any]:
+    """name -> DOF factors: equal shares of the DOFs, or the vector of the file."""
+    found: dict[str, Any] = {}
+    for name, entry in entries.items():
+        dofs = entry.dofs or ()
+        found[name] = {dof: 1 / len(dofs) for dof in dofs} if entry.vector is None else take(entry.vector).ravel()
+    return found

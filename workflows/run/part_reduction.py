@@ -1,0 +1,127 @@
+"""From a part to its reduced model: masters, relative coordinates, prescribed displacement, a sector of a wheel."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tribodyn.fem import cyclic
+from tribodyn.fem import part as fem_part
+from tribodyn.fem.cyclic import Sector
+from tribodyn.fem.matching import Mismatch
+from tribodyn.fem.material import Material
+from tribodyn.fem.part import Part
+from tribodyn.fem.prestress import spinning
+from tribodyn.fem.springs import Spring
+from tribodyn.reduction.craig_bampton import craig_bampton
+from tribodyn.reduction.cyclic import ReducedSector, reduce_sector, travelling_wave
+from tribodyn.reduction.interface_modes import interface_modes
+from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.prescribed import StaticReaction, prescribe
+from tribodyn.reduction.relative import relative
+from tribodyn.workflows.scene.schema import PartScene
+
+SEAM = ("cyclic_right", "cyclic_left")  # what a part calls the faces where its wheel is one piece
+REACTION = "reaction"  # where the facts of a model keep its StaticReaction
+
+
+def material(scene: PartScene) -> Material:
+    """What the part is made of."""
+    return Material(scene.material.young, scene.material.poisson, scene.material.density)
+
+
+def contacts(scene: PartScene, alone: bool = False) -> list[fem_part.Contact]:
+    """The contact of every face; alone : without what it meets, as it is in a sector before the wheel is closed."""
+    c = scene.contact
+    opposite = None if alone else c.opposite
+    return [
+        fem_part.Contact(
+            face, c.t1, opposite, c.components, c.gap, c.vertices_only, c.plane, c.inclination
+        )
+        for face in c.groups
+    ]
+
+
+def reduce(scene: PartScene, part: Part) -> ReducedModel:
+    """The part on its contact, load and prescribed nodes and a few modes; not damped yet, nothing prescribed yet."""
+    if scene.wheel is not None:
+        return travelling_wave(reduced_sector(scene, part), scene.wheel.engine_order)
+    wanted, system, interface, back = scene.reduction, part.system, part.interface, None
+    held = [part.dofs(given.group, given.axis) for given in scene.prescribed.values()]
+    if held and len(part.held):
+        raise ValueError("prescribed: a part whose turning is held cannot have prescribed nodes; hold it by springs")
+    if wanted.relative:
+        system, interface, back = relative(system, interface)
+    extra = np.concatenate([[], *held]).astype(int)
+    reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, extra)
+    if wanted.interface_modes is not None:
+        masters = np.asarray(reduced.info["masters"])
+        touched = np.flatnonzero(np.abs(np.asarray(reduced.interface.B)[:, : len(masters)]).max(axis=0))
+        keep = np.union1d(np.delete(masters, touched), extra)
+        if wanted.interface_keep is not None:
+            named = [part.dofs(group, axis) for group in wanted.interface_keep for axis in "xyz"]
+            keep = np.union1d(np.intersect1d(np.concatenate([[], *named]), masters), extra)
+        reduced = interface_modes(reduced, wanted.interface_modes, keep.astype(int), apart=extra)
+    return reduced if back is None else replace(reduced, basis=back @ reduced.basis)
+
+
+def sector(scene: PartScene, part: Part) -> Sector:
+    """The full sector of the scene's wheel, stiffened by its stress where the wheel spins.
+
+    Raises  ValueError where its faces do not match those of its neighbours, or where the disk is left cut open
+    """
+    wheel = scene.wheel
+    assert wheel is not None
+    if wheel.seam is None and all(name in part.node_sets for name in SEAM):
+        raise ValueError(
+            f"wheel.seam is missing, but the part has {' and '.join(SEAM)}, where its disk would be cut open: "
+            f'give wheel.seam = ["{SEAM[0]}", "{SEAM[1]}"]'
+        )
+    try:
+        cut = cyclic.cut_from(part, contacts(scene), wheel.sectors, wheel.seam, wheel.axis)
+    except Mismatch as miss:
+        raise ValueError(
+            f"{miss}, and let wheel.sectors = {wheel.sectors} and wheel.axis be those that the part was made for"
+        ) from None
+    if not wheel.speed:
+        return cut
+    tie = cyclic.seam_map(cut, 0)
+    return replace(cut, system=spinning(part, material(scene), wheel.axis, 2 * np.pi * wheel.speed, tie).system)
+
+
+def reduced_sector(scene: PartScene, part: Part) -> ReducedSector:
+    """The sector on its shroud, seam and load nodes and a few modes: what serves every engine order."""
+    return reduced_from(scene, sector(scene, part))
+
+
+def reduced_from(scene: PartScene, full: Sector) -> ReducedSector:
+    """The full sector reduced as the scene says; raises ValueError where it cannot stand, by itself or at its speed."""
+    try:
+        return reduce_sector(full, scene.reduction.modes, scene.reduction.cutoff)
+    except ValueError as trouble:
+        if scene.wheel is None or not scene.wheel.speed:
+            raise
+        rpm = 60 * scene.wheel.speed
+        raise ValueError(f"at wheel.speed = {rpm:.6g} rpm {trouble}, or let it turn slower") from None
+
+
+def with_prescribed(scene: PartScene, part: Part, reduced: ReducedModel) -> ReducedModel:
+    """The reduced model with the static displacement that the scene prescribes as a static load of that name."""
+    for name, given in scene.prescribed.items():
+        dofs = part.dofs(given.group, given.axis)
+        support = np.zeros(len(dofs))
+        for spring in (scene.springs[spring] for spring in given.springs):
+            matrix = Spring(spring.group, spring.direction, spring.stiffness).matrix(part.mesh, part.node_sets)
+            support += matrix.diagonal()[part.free[dofs]]
+        masters = np.searchsorted(np.asarray(reduced.info["masters"]), dofs)
+        reduced, reaction = prescribe(reduced, masters, name, support=support)
+        reduced = replace(reduced, info={**reduced.info, REACTION: reaction})
+    return reduced
+
+
+def reaction_of(reduced: ReducedModel) -> StaticReaction:
+    """What gives the static force at the prescribed nodes of a model that `with_prescribed` made."""
+    reaction = reduced.info[REACTION]
+    assert isinstance(reaction, StaticReaction)
+    return reaction

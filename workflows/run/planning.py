@@ -1,0 +1,171 @@
+"""What a scene will model and what it will cost, from its mesh alone: nothing is assembled, factorised or solved.
+
+The costs are rules of thumb, measured on the beam scene with one thread and on clamped cubes for the factorisation.
+They are meant to tell seconds from hours, and are good to a factor of about three.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tribodyn.fem.constraints import free_dofs, named
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.reduction.craig_bampton import POINT_LOAD
+from tribodyn.workflows.run import matrix_model
+from tribodyn.workflows.run.pipeline import check_names, clamps, make_mesh
+from tribodyn.workflows.scene.matrices import MatrixScene
+from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.schema import PartScene, Scene
+
+FACTOR_BYTES = 15e3  # of a sparse Cholesky factor, for each DOF
+FACTOR_SECONDS = 2e-7  # N^1.5 law
+BACK_SUBSTITUTION_SECONDS = 1.5e-7  # for each DOF and right-hand side
+DENSE_SECONDS = 3e-9  # for each cubed coordinate of the reduced model, all eigenvalue problems together
+SOLVE_SECONDS = 6e-8  # of a balance solve, for each squared contact coordinate and harmonic coefficient
+SOLVES_AT_PEAK = 10
+LIKELY = tuple(range(8))  # harmonics where a scene leaves the choice
+CONTROLLED_STEPS, CONTROLLED_EXPONENT = 23, -0.4  # at a tolerance of 5 %; beam scene
+STEPS_AT_ONE_PERCENT, STEPS_EXPONENT = 411, -0.5  # to loss of contact; Tamatam 2021, table 4.2
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Sizes, memory [bytes] and time [s] of a scene; wear_steps is None where it cannot be told, 0 without wear."""
+
+    elements: int
+    nodes: int
+    full_dofs: int
+    contact_pairs: int
+    model_dofs: str
+    unknowns: int
+    memory: float
+    reduction_seconds: float
+    response_solves: int
+    wear_steps: int | None
+    wear_solves: int
+    solve_seconds: float
+
+    @property
+    def seconds(self) -> float:
+        """Expected time of the whole run [s]."""
+        return self.reduction_seconds + (self.response_solves + self.wear_solves) * self.solve_seconds
+
+    def lines(self) -> list[tuple[str, str]]:
+        """The plan as pairs of a name and a readable value."""
+        steps = "as many as it takes" if self.wear_steps is None else f"about {self.wear_steps}"
+        response, wear = (_time(count * self.solve_seconds) for count in (self.response_solves, self.wear_solves))
+        return [
+            ("mesh", f"{self.elements} elements, {self.nodes} nodes" if self.elements else "none: matrices"),
+            ("full model", f"{self.full_dofs} DOFs"),
+            ("contact", f"{self.contact_pairs} node pairs"),
+            ("reduced model", f"{self.model_dofs} DOFs"),
+            ("unknowns", f"{self.unknowns} in each balance solve"),
+            ("memory", f"about {self.memory / 1e9:.1g} GB"),
+            ("reduction", f"about {_time(self.reduction_seconds)}"),
+            ("response", f"{self.response_solves} solves, about {response}"),
+            ("wear", f"{steps} steps, about {wear}" if self.wear_solves else "none"),
+            ("whole run", f"about {_time(self.seconds)} on one core, to a factor of three"),
+        ]
+
+
+def plan(file: SceneFile) -> Plan:
+    """Plan a scene; raises ValueError for what the run would refuse after reading the mesh."""
+    scene = file.scene
+    check_names(scene, file.folder)
+    elements = nodes = held = 0
+    if isinstance(scene, MatrixScene):
+        reduced = matrix_model.make(scene, file.folder)
+        full, pairs, masters = int(str(reduced.info["n_full"])), reduced.interface.n_pair, reduced.system.n_dof
+        modes: int | None = 0
+    else:
+        with tempfile.TemporaryDirectory() as folder:
+            mesh, node_sets = make_mesh(file, Path(folder))
+        elements, nodes = int(mesh.nelements), mesh.doflocs.shape[1]
+        free = free_dofs(3 * nodes, clamps(file.part_scene), node_sets)
+        full = len(free)
+        pairs, masters = _contact(file.part_scene, mesh, node_sets, free)
+        held = int(file.part_scene.geometry.no_turning is not None)
+        modes, cutoff = file.part_scene.reduction.modes, file.part_scene.reduction.cutoff
+    basis = HarmonicBasis(scene.harmonics.kept or LIKELY, scene.harmonics.samples, scene.harmonics.transitions)
+    contact = pairs * len(scene.contact.components)
+    model = masters + (modes if modes is not None else 50) - held
+    memory = (
+        200e6  # the program itself
+        + FACTOR_BYTES * full
+        + 3 * 8.0 * full * model
+        + 10 * 8.0 * model**2
+        + 8 * 8.0 * contact**2
+        + 4 * 8.0 * pairs * (len(scene.contact.components) * basis.n_coeff) ** 2
+    )
+    reduction = (
+        FACTOR_SECONDS * full**1.5 + BACK_SUBSTITUTION_SECONDS * full * model + 4 * DENSE_SECONDS * model**3
+    )
+    steps, solves = _wear(scene)
+    return Plan(
+        elements=elements,
+        nodes=nodes,
+        full_dofs=full,
+        contact_pairs=pairs,
+        model_dofs=str(model) if modes is not None else f"{masters} and the modes up to {cutoff:g} Hz",
+        unknowns=contact * basis.n_coeff,
+        memory=memory,
+        reduction_seconds=1.0 + reduction,
+        response_solves=scene.response.points,
+        wear_steps=steps,
+        wear_solves=solves,
+        solve_seconds=5e-3 + SOLVE_SECONDS * contact**2 * basis.n_coeff,
+    )
+
+
+def _contact(scene: PartScene, mesh: object, node_sets: dict[str, np.ndarray], free: np.ndarray) -> tuple[int, int]:
+    """Number of node pairs, and of master DOFs that the contact, point loads and the output make."""
+    contact = scene.contact
+    faces = [*contact.groups, *([] if contact.opposite is None else [contact.opposite])]
+    loads = [*scene.loads.static.values(), *scene.loads.harmonic.values()]
+    points = [
+        (group, load.direction)
+        for load in loads
+        for group in (load.group, load.opposite)
+        if load.direction is not None and group is not None
+    ]
+    points += [(output.group, output.direction) for output in (scene.response, *scene.response.others.values())]
+    nodes = [named(node_sets, name, "face") for name in faces]
+    corners = np.arange(int(mesh.nvertices))  # type: ignore[attr-defined]
+    if contact.vertices_only:
+        nodes = [np.intersect1d(side, corners) for side in nodes]
+    axes = np.arange(3)
+    if contact.plane is not None and contact.components == ("n",):
+        axes = np.flatnonzero(contact.plane)
+    masters = [(side[:, None] * 3 + axes).ravel() for side in (nodes[:1] if scene.reduction.relative else nodes)]
+    masters += [named(node_sets, given.group) * 3 + "xyz".index(given.axis) for given in scene.prescribed.values()]
+    touched = [(named(node_sets, group)[:, None] * 3 + np.flatnonzero(axis)).ravel() for group, axis in points]
+    masters += [dofs for dofs in touched if len(dofs) <= POINT_LOAD]
+    pairs = sum(len(side) for side in nodes[: len(contact.groups)])
+    return pairs, len(np.intersect1d(np.concatenate(masters), free))
+
+
+def _wear(scene: Scene) -> tuple[int | None, int]:
+    """Wear steps and balance solves to expect."""
+    if scene.wear is None or scene.wear.max_steps == 0:
+        return 0, 0
+    most, share = scene.wear.max_steps, None if scene.wear.step is None else scene.wear.step.share
+    if scene.wear.rule == "error_controlled":
+        share = scene.wear.tolerance
+        likely = round(CONTROLLED_STEPS * (share / 0.05) ** CONTROLLED_EXPONENT)
+    else:
+        likely = most if share is None else round(STEPS_AT_ONE_PERCENT * (100 * share) ** STEPS_EXPONENT)
+    steps = min(most, likely)
+    solves = 0
+    for place in [duty.at for duty in scene.wear.mission] or [scene.wear.at]:
+        solves += steps if place.peak is None else steps * SOLVES_AT_PEAK + scene.response.points
+    return (None if share is None else steps), solves
+
+
+def _time(seconds: float) -> str:
+    if seconds < 100:
+        return f"{seconds:.2g} s"
+    return f"{seconds / 60:.2g} min" if seconds < 6000 else f"{seconds / 3600:.2g} h"

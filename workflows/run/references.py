@@ -1,0 +1,92 @@
+"""Linear references of a nonlinear response: the contact absent, and the contact closed and stuck."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as sla
+
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.branch import amplitude
+from tribodyn.reduction.linear import stuck_stiffness
+from tribodyn.workflows.result.result import References
+from tribodyn.workflows.scene.schema import PartScene, Scene
+
+POINTS = 401
+MODES = 100
+
+
+def linear_references(balance: HarmonicBalance, output: str, start: float, stop: float) -> References:
+    """Amplitudes of an output, free and stuck, from one frequency to another [rad/s], under the loads of the balance.
+
+    The free amplitude is nan where the part is loose without its contact.
+    """
+    omega = np.linspace(start, stop, POINTS)
+    stuck = _amplitudes(balance, balance.parameters.stiffness, output, omega)
+    return References(omega, _amplitudes(balance, None, output, omega), stuck)
+
+
+def delta_max(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:
+    """The depth that wear steps are a share of: largest approach of the pairs without their contact [m].
+
+    approach : (n_pair,) as `free_deflection`; area : (n_pair,) [m2]
+    Of a wheel: mean over the area of the displacement of one face, half the approach of two (Tamatam 2021, 4.3.1)
+    """
+    if isinstance(scene, PartScene) and scene.wheel is not None:
+        return float(0.5 * approach @ area / area.sum())
+    return float(approach.max())
+
+
+def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: str, omega: np.ndarray) -> np.ndarray:
+    """Amplitude by the lowest modes and the static remainder of the others; off by (h w / w_omitted)^2 of that.
+
+    springs : (n_pair, n_component) stuck contact [N/m], through which a moving body 2 pulls, or None for no contact
+    """
+    basis = balance.basis
+    base = None if balance.excitation.base is None else basis.to_complex(balance.excitation.base)
+    amplitudes = np.zeros((len(omega), len(basis.harmonics)), complex)
+    for position, h in enumerate(basis.harmonics):
+        system, B = balance.model.at_harmonic(h)
+        loads = [value * system.loads[name] for (order, name), value in balance.excitation.loads.items() if order == h]
+        force = np.sum([np.zeros(system.n_dof), *loads], axis=0)
+        if springs is not None and base is not None:
+            force = force + B.conj().T @ (springs.ravel() * base[:, position])
+        if h:
+            force = balance.load_factor * force
+        if not force.any():
+            continue
+        stiffness = system.stiffness if springs is None else stuck_stiffness(system.stiffness, B, springs)
+        try:
+            factor = sla.cho_factor(stiffness)
+        except np.linalg.LinAlgError:
+            return np.full(len(omega), np.nan)
+        lam, phi = sla.eigh(stiffness, system.mass, subset_by_index=(0, min(MODES, system.n_dof) - 1))
+        damping = np.zeros((len(lam),) * 2) if system.damping is None else phi.conj().T @ system.damping @ phi
+        row = system.outputs[output]
+        modal = phi.conj().T @ force
+        remainder = row @ sla.cho_solve(factor, force) - (row @ phi) @ (modal / lam)
+        for i, s in enumerate(1j * h * omega):
+            dynamic = np.diag(lam + s**2) + s * damping
+            amplitudes[i, position] = remainder + (row @ phi) @ np.linalg.solve(dynamic, modal)
+    return amplitude(basis.to_real(amplitudes))
+
+
+def free_deflection(balance: HarmonicBalance) -> np.ndarray:
+    """Normal approach of the pairs (n_pair,) under the static loads with body 2 absent [m].
+
+    Of a cyclic part: approach of neighbours. It is nan where the part is loose without its contact, or where the normal
+    direction or harmonic 0 is not modelled.
+    """
+    interface = balance.model.interface
+    missing = np.full(interface.n_pair, np.nan)
+    if "n" not in interface.components or not balance.basis.has_static:
+        return missing
+    system, B = balance.model.at_harmonic(0)
+    force = np.zeros(system.n_dof)
+    for (harmonic, name), value in balance.excitation.loads.items():
+        if harmonic == 0:
+            force += np.real(value) * system.loads[name]
+    try:
+        q = sla.cho_solve(sla.cho_factor(system.stiffness), force)
+    except np.linalg.LinAlgError:
+        return missing
+    return np.asarray((B @ q)[interface.components.index("n") :: len(interface.components)])

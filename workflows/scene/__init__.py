@@ -1,0 +1,1 @@
+"""A scene: its tables, their units, and reading it from TOML."""

@@ -1,0 +1,46 @@
+"""Kinds of values in a scene file: quantities with units, directions, tables that refuse what they do not know."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict
+
+from tribodyn.workflows.scene.units import to_si
+
+
+class Table(BaseModel):
+    """A table of the scene file: nothing may be added to it, nothing changed."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+def quantity(unit: str) -> BeforeValidator:
+    """Validator that turns a text with a unit, or a bare number, into a float counted in `unit`."""
+    return BeforeValidator(lambda value: to_si(value, unit))
+
+
+Length = Annotated[float, quantity("m")]
+Force = Annotated[float, quantity("N")]
+Pressure = Annotated[float, quantity("Pa")]
+Stiffness = Annotated[float, quantity("N/m")]
+Frequency = Annotated[float, quantity("Hz")]
+Angle = Annotated[float, quantity("rad")]
+Number = Annotated[float, quantity("")]
+WearCoefficient = Annotated[float, quantity("m3/J")]
+
+
+def _direction(value: object) -> tuple[float, float, float]:
+    named = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+    if isinstance(value, str) and value.lstrip("+-") in named and len(value) <= 2:
+        x, y, z = named[value[-1]]
+        return (-x or 0.0, -y or 0.0, -z or 0.0) if value.startswith("-") else (x, y, z)
+    numbers = isinstance(value, (list, tuple)) and all(type(c) in (int, float) for c in value)
+    if isinstance(value, (list, tuple)) and numbers and len(value) == 3 and 0 < np.linalg.norm(value) < np.inf:
+        x, y, z = (float(component) for component in np.asarray(value) / np.linalg.norm(value))
+        return x, y, z
+    raise ValueError(f'expected an axis such as "x" or "-z", or three numbers that are not all zero, got {value!r}')
+
+
+Direction = Annotated[tuple[float, float, float], BeforeValidator(_direction)]

@@ -1,0 +1,157 @@
+"""A scene whose model is matrices from a file: no geometry, no mesh; contacts, loads and responses are DOF lists.
+
+A DOF is a number from 0, or [node, component] where the file carries labels. What is long may stand in the file with
+the matrices (.npz, .mat): {variable = "name"} in place of a list.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, StrictInt, model_validator
+
+from tribodyn.workflows.scene.schema import (
+    Angle,
+    Contact,
+    Direction,
+    Force,
+    Loads,
+    Number,
+    Reduction,
+    Response,
+    Scene,
+    Table,
+)
+from tribodyn.workflows.scene.units import to_si
+
+Dof = int | tuple[int, int | str]
+
+
+class Variable(Table):
+    """A named array of the file that holds the matrices."""
+
+    variable: str
+
+
+def _dof(value: object) -> Dof:
+    if type(value) is int:
+        return value
+    if isinstance(value, (list, tuple)) and len(value) == 2 and type(value[0]) is int and type(value[1]) in (int, str):
+        return value[0], value[1]
+    raise ValueError(f'expected a DOF, such as 17 or [node, "z"], got {value!r}')
+
+
+def _listed(value: object, item: Any, example: str) -> Any:
+    if not isinstance(value, (list, tuple)) or not value:
+        raise ValueError(f"expected a list such as {example}, got {value!r}")
+    return tuple(item(entry) for entry in value)
+
+
+def _dofs(value: object) -> tuple[Dof, ...]:
+    return tuple(_listed(value, _dof, '[17] or [[12, "z"], [13, "z"]]'))
+
+
+def _rows(value: object) -> Any:
+    if isinstance(value, (dict, Variable)):
+        return value
+    return _listed(value, _dofs, "[[3, 4, 5], [6, 7, 8]], one row for each pair")
+
+
+def per_pair(unit: str) -> BeforeValidator:
+    """Validator of a quantity that is one for all pairs, a list with one for each, or a variable of the file."""
+
+    def convert(value: object) -> Any:
+        if isinstance(value, (dict, Variable)):
+            return value
+        if isinstance(value, (list, tuple)):
+            return tuple(to_si(entry, unit) for entry in value)
+        return to_si(value, unit)
+
+    return BeforeValidator(convert)
+
+
+class MatrixFiles(Table):
+    """The files with the matrices, as reduction.foreign.read_matrices takes them.
+
+    file : one that holds all, as M, K and, if present, C; names : other variables, such as {mass = "Mred"}
+    mass, stiffness, damping : one file for each instead; mapping : ANSYS .mapping file that labels the rows
+    scale : factor on all matrices to reach SI
+    """
+
+    file: str | None = None
+    mass: str | None = None
+    stiffness: str | None = None
+    damping: str | None = None
+    mapping: str | None = None
+    names: dict[str, str] = Field(default_factory=dict)
+    scale: Annotated[Number, Field(gt=0)] = 1.0
+
+    @model_validator(mode="after")
+    def _both(self) -> MatrixFiles:
+        if self.file is None and (self.mass is None or self.stiffness is None):
+            raise ValueError('expected file = "part.npz", or mass and stiffness with one file each')
+        return self
+
+
+class DofContact(Contact):
+    """DOFs that touch, pair by pair, each other or the ground; see ForeignMatrices.contact.
+
+    dofs, opposite : a row for each pair, its DOFs t1, t2, n as `components` says, or x, y, z where `normal` is given
+    area : of the patch, shared equally, or of each pair; points : of each pair, for maps
+    """
+
+    dofs: Annotated[tuple[tuple[Dof, ...], ...] | Variable, BeforeValidator(_rows)]
+    opposite: Annotated[tuple[tuple[Dof, ...], ...] | Variable, BeforeValidator(_rows)] | None = None
+    area: Annotated[float | tuple[float, ...] | Variable, per_pair("m2")]
+    gap: Annotated[float | tuple[float, ...] | Variable, per_pair("m")] = 0.0
+    normal: Direction | None = None
+    t1: Direction | None = None
+    signs: tuple[StrictInt, ...] | None = None
+    points: Variable | None = None
+
+
+class DofOutput(Table):
+    """A displacement that is observed: the mean of DOFs, or a row of factors."""
+
+    dofs: Annotated[tuple[Dof, ...], BeforeValidator(_dofs)] | None = None
+    vector: Variable | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> DofOutput:
+        if (self.dofs is None) == (self.vector is None):
+            raise ValueError('expected either dofs = [17] or vector = {variable = "name"}')
+        return self
+
+
+class DofLoad(DofOutput):
+    """A force that does not change: shared equally by DOFs, or times a vector of factors."""
+
+    value: Force
+
+    @property
+    def amplitude(self) -> float:
+        """Its size [N]."""
+        return self.value
+
+
+class HarmonicDofLoad(DofLoad):
+    """A load that goes as cos(harmonic * w t + phase)."""
+
+    phase: Angle = 0.0
+    harmonic: Annotated[StrictInt, Field(ge=1)] = 1
+
+
+class DofResponse(Response, DofOutput):
+    """The displacement whose response is computed; others : displacements observed besides, by name."""
+
+    others: dict[str, DofOutput] = Field(default_factory=dict)
+
+
+class MatrixScene(Scene):
+    """Which matrices, contact, loads, response and wear are modelled; without reduction they stay as they are."""
+
+    model: MatrixFiles
+    contact: DofContact
+    loads: Loads[DofLoad, HarmonicDofLoad]
+    response: DofResponse
+    reduction: Reduction | None = None

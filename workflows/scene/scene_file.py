@@ -1,0 +1,212 @@
+"""Reading a scene: find the file, apply overrides, check it, and say what is wrong in one sentence."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from tribodyn.workflows.scene.matrices import MatrixScene
+from tribodyn.workflows.scene.schema import PartScene, Scene, unknown_key
+
+CASES = Path(__file__).parents[1] / "cases"
+MOST_PROBLEMS = 3  # told in one sentence
+
+Kind = TypeVar("Kind", bound=BaseModel)
+
+
+class SceneError(ValueError):
+    """A scene asks for something that cannot be; the message is one sentence with the key and the cure."""
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """A scene with where it came from.
+
+    name : file name without its ending
+    text : the TOML text as it stands in the file
+    overrides : "section.key=value" texts in the order they were applied
+    folder : where relative file names of the scene begin
+    """
+
+    name: str
+    text: str
+    overrides: tuple[str, ...]
+    folder: Path
+    scene: Scene
+
+    @property
+    def word(self) -> str:
+        """By what a command knows it: the name of a scene that comes with the program, the path of another one."""
+        return self.name if self.comes_along else str(self.folder / f"{self.name}.toml")
+
+    @property
+    def comes_along(self) -> bool:
+        """Whether it is a scene that comes with the program."""
+        return self.folder.resolve().parent == CASES.resolve()
+
+    @property
+    def part_scene(self) -> PartScene:
+        """The scene, for what needs a mesh; raises SceneError where it is one of matrices."""
+        if not isinstance(self.scene, PartScene):
+            raise SceneError(f"{self.name} is made of matrices and has no mesh")
+        return self.scene
+
+
+def _shipped() -> dict[str, Path]:
+    """Files of the scenes that come with the program, by their names; studies and fits have two endings."""
+    return {path.stem: path for path in CASES.glob("*/*.toml") if "." not in path.stem}
+
+
+def names() -> list[str]:
+    """Scenes that come with the program."""
+    return sorted(_shipped())
+
+
+def title(name: str) -> str:
+    """Title of a scene that comes with the program, without checking the rest of it."""
+    return str(tomllib.loads(_shipped()[name].read_text(encoding="utf-8"))["scene"]["title"])
+
+
+def find(name: str) -> Path:
+    """File of a scene: one that comes with the program, or a path to a .toml file; raises SceneError."""
+    path = _shipped().get(name, Path(name))
+    if path.is_file():
+        return path
+    if path.suffix == ".toml":
+        raise SceneError(f'there is no scene file "{name}"')
+    raise SceneError(f'there is no scene "{name}": the scenes are {", ".join(names())}, or give a path to a .toml file')
+
+
+def read(name: str, overrides: Sequence[str] = ()) -> SceneFile:
+    """Read and check a scene.
+
+    name : name of a scene that comes with the program, or path of a .toml file
+    overrides : texts "section.key=value", the value as TOML or, failing that, as it stands
+    Raises  SceneError: one sentence that names the file, the key and what is expected
+    """
+    path = find(name)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise SceneError(f'the scene file "{path}" cannot be read as text ({error})') from None
+    return parse(text, path.name, overrides, path.resolve().parent)
+
+
+def parse(text: str, label: str, overrides: Sequence[str] = (), folder: Path = CASES) -> SceneFile:
+    """Check the text of a scene; label names it in errors. Raises SceneError."""
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{label} is not valid TOML: {str(error)[0].lower()}{str(error)[1:]}") from None
+    for override in overrides:
+        _override(data, override)
+    return SceneFile(Path(label).stem, text, tuple(overrides), folder, checked(kind_of(data), data, label))
+
+
+def checked(kind: type[Kind], data: dict[str, Any], label: str) -> Kind:
+    """The data of a file as a table of a kind; raises SceneError that names the file `label` and the keys."""
+    try:
+        return kind.model_validate(data)
+    except ValidationError as error:
+        problems = [_sentence(problem, kind) for problem in error.errors()]
+        more = f"; and {len(problems) - MOST_PROBLEMS} more" if len(problems) > MOST_PROBLEMS else ""
+        raise SceneError(f"{label}: {'; '.join(problems[:MOST_PROBLEMS])}{more}") from None
+
+
+def kind_of(data: dict[str, Any]) -> type[Scene]:
+    """A scene with a [model] is one of matrices, any other one of a part."""
+    return MatrixScene if "model" in data else PartScene
+
+
+def from_json(text: str) -> Scene:
+    """The scene that a result holds, as `Scene.model_dump_json` wrote it."""
+    data = json.loads(text)
+    return kind_of(data).model_validate(data)
+
+
+def _override(data: dict[str, Any], text: str) -> None:
+    """Put "section.key=value" into the parsed file, making tables on the way; an empty value takes the key out."""
+    key, equals, value = text.partition("=")
+    path = key.strip().split(".")
+    if not equals or not all(path):
+        raise SceneError(f'--set expects section.key=value, got "{text}"')
+    table = data
+    for name in path[:-1]:
+        table = table.setdefault(name, {})
+        if not isinstance(table, dict):
+            raise SceneError(f'--set {text}: "{name}" is not a table of the scene')
+    if not value.strip():
+        table.pop(path[-1], None)
+        return
+    try:
+        table[path[-1]] = tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        table[path[-1]] = value.strip()
+
+
+def _sentence(problem: Any, kind_of_file: type[BaseModel]) -> str:
+    """One clause out of a problem that pydantic found: the key, what was expected, what was given."""
+    location = [item for item in problem["loc"] if isinstance(item, (str, int))]
+    kind, given, context = problem["type"], problem["input"], problem.get("ctx", {})
+    key = _key(location)
+    if kind == "extra_forbidden":
+        return unknown_key(key, _fields(location[:-1], kind_of_file))
+    if kind == "missing":
+        return f"{key} is missing"
+    if kind == "value_error":
+        sentence = str(context["error"])
+        return sentence if key in sentence else f"{key}: {sentence}"
+    limits = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "at least")}
+    limits |= {"less_than": ("lt", "below"), "less_than_equal": ("le", "at most")}
+    if kind in limits:
+        bound, word = limits[kind]
+        return f"{key}: expected a value {word} {context[bound]:g}, got {given!r}"
+    if kind == "literal_error":
+        return f"{key}: expected {context['expected']}, got {given!r}"
+    what = {
+        "string_type": "a text in quotes",
+        "int_type": "a whole number",
+        "bool_type": "true or false",
+        "model_type": "a table",
+        "dict_type": "a table",
+        "tuple_type": "a list",
+        "too_long": "a shorter list",
+    }.get(kind)
+    return f"{key}: {f'expected {what}' if what else problem['msg'].lower()}, got {given!r}"
+
+
+def _key(location: Sequence[str | int]) -> str:
+    """Dotted key of a location, list positions in brackets."""
+    key = ""
+    for item in location:
+        key += f"[{item}]" if isinstance(item, int) else f".{item}" if key else item
+    return key or "the scene"
+
+
+def _fields(location: Sequence[str | int], kind: type[BaseModel]) -> list[str]:
+    """Names of the keys that the table at a location may have."""
+    table: Any = kind
+    for item in location:
+        if isinstance(item, int):  # of a list of tables, which `_table` has entered
+            continue
+        table = table.model_fields[item].annotation if _table(table) is table else get_args(table)[1]
+        if not _is_mapping(table):  # else dict[str, Table], whose next key is a name
+            table = _table(table) or table
+    return list(table.model_fields)
+
+
+def _table(annotation: Any) -> Any:
+    """The first table inside an annotation, itself where it is one."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((table for inner in get_args(annotation) if (table := _table(inner))), None)
+
+
+def _is_mapping(annotation: Any) -> bool:
+    return getattr(annotation, "__origin__", None) is dict

@@ -1,0 +1,437 @@
+"""The scene: what one TOML file asks for, checked and in SI units.
+
+Every key of the file is a field below; a key that is not here is an error. What a scene leaves out is not modelled.
+"""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import asdict, fields
+from typing import Annotated, Any, Generic, Literal, TypeVar
+
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    StrictBool,
+    StrictInt,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+    field_serializer,
+    model_serializer,
+    model_validator,
+)
+
+from tribodyn.geometry import parts
+from tribodyn.workflows.scene.contact import Contact, FaceContact, Surfaces
+from tribodyn.workflows.scene.fields import (
+    Angle,
+    Direction,
+    Force,
+    Frequency,
+    Length,
+    Number,
+    Pressure,
+    Stiffness,
+    Table,
+    quantity,
+)
+from tribodyn.workflows.scene.units import to_si
+from tribodyn.workflows.scene.wear import Wear
+from tribodyn.workflows.scene.wheel import Wheel
+
+CENTRIFUGAL = "centrifugal"
+HIGHEST = 15  # harmonic that kept = "auto" may keep
+
+
+class Heading(Table):
+    """What the scene is and where its numbers come from."""
+
+    title: str
+    source: str = ""
+    notes: str = ""
+
+
+class Geometry(Table):
+    """A part of geometry/ or a mesh file, and the groups that are held fixed.
+
+    fixed_axes : groups held along some axes only, group -> letters out of "xyz"
+    no_turning : axis about which the part as a whole cannot turn
+    All other keys of the table are parameters of the part; those left out have the part's own defaults.
+    """
+
+    part: str | None = None
+    mesh: str | None = None
+    fixed: tuple[str, ...] = ()
+    fixed_axes: dict[str, str] = Field(default_factory=dict)
+    no_turning: Direction | None = None
+    parameters: dict[str, int | float] = Field(default_factory=dict)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _gather_parameters(cls, table: Any) -> Any:
+        if not isinstance(table, dict) or "parameters" in table:
+            return table
+        own = {key: value for key, value in table.items() if key in cls.model_fields}
+        other = {key: value for key, value in table.items() if key not in cls.model_fields}
+        if ("part" in own) == ("mesh" in own):
+            raise ValueError('expected either part = "name" or mesh = "file.msh", and not both')
+        if not isinstance(own.get("part"), str):
+            return own | other  # a mesh file has no parameters: the other keys are unknown ones
+        return own | {"parameters": part_parameters(own["part"], other)}
+
+
+def part_parameters(part: str, given: dict[str, Any]) -> dict[str, int | float]:
+    """Parameters of a part of geometry/ in SI units, all of them.
+
+    given : key -> number or text with a unit (a length, an angle or a pure number)
+    Raises  ValueError: no such part, unknown key, or a value that the part refuses
+    """
+    kind = parts.load(part).Parameters
+    known = {item.name: item.type for item in fields(kind)}
+    values = {}
+    for key, value in given.items():
+        if key not in known:
+            raise ValueError(unknown_key(f"geometry.{key}", [*Geometry.model_fields, *known]))
+        values[key] = _parameter(key, value, whole=known[key] in (int, "int"))
+    return asdict(kind(**values))
+
+
+def _parameter(key: str, value: Any, whole: bool) -> int | float:
+    if whole:
+        if type(value) is not int:
+            raise ValueError(f"geometry.{key}: expected a whole number, got {value!r}")
+        return value
+    for unit in ("m", "rad", ""):
+        try:
+            return to_si(value, unit)
+        except ValueError:
+            continue
+    raise ValueError(f"geometry.{key}: expected a length, an angle or a number, got {value!r}")
+
+
+def unknown_key(key: str, known: list[str]) -> str:
+    """Clause about a key that does not exist, with the one that was probably meant and all that exist."""
+    names = [name for name in known if name != "parameters"]
+    close = difflib.get_close_matches(key.rpartition(".")[2], names, n=1)
+    hint = f" (did you mean {close[0]}?)" if close else ""
+    return f"unknown key {key}{hint}, known here: {', '.join(names)}"
+
+
+class Material(Table):
+    """Linear isotropic elasticity and density."""
+
+    young: Annotated[float, quantity("Pa"), Field(gt=0)]
+    density: Annotated[float, quantity("kg/m3"), Field(gt=0)]
+    poisson: Annotated[Number, Field(gt=-1, lt=0.5)]
+
+
+class Spring(Table):
+    """A spring from a group to the ground, or to the matching nodes of another group, that acts in one direction."""
+
+    group: str
+    direction: Direction
+    stiffness: Annotated[Stiffness, Field(ge=0)]
+    opposite: str | None = None
+
+
+class Prescribed(Table):
+    """Nodes whose static displacement is given along an axis; the force that it takes is a result, vibration is free.
+
+    springs : names of springs between these nodes and the ground that act about the prescribed position
+    """
+
+    group: str
+    axis: Literal["x", "y", "z"]
+    displacement: Length
+    springs: tuple[str, ...] = ()
+
+
+class StaticLoad(Table):
+    """A load that does not change: a force shared equally by the nodes of a group, or a pressure into a face.
+
+    opposite : group on which the same force acts the other way: a couple
+    """
+
+    group: str
+    direction: Direction | None = None
+    value: Force | None = None
+    pressure: Pressure | None = None
+    opposite: str | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> StaticLoad:
+        if (self.pressure is None) == (self.value is None) or (self.value is None) != (self.direction is None):
+            raise ValueError("expected either value and direction, for a force, or pressure alone")
+        if self.opposite is not None and self.pressure is not None:
+            raise ValueError("expected opposite only with value and direction, for a couple of forces")
+        return self
+
+    @model_serializer(mode="wrap")
+    def _without_none(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """A force that is no couple is told as ever, so that results and tables made before are of the same scene."""
+        said: dict[str, Any] = write(self)
+        if self.opposite is None:
+            said.pop("opposite", None)
+        return said
+
+    @property
+    def amplitude(self) -> float:
+        """Its size [N] or [Pa]."""
+        return self.pressure or self.value or 0.0
+
+
+class HarmonicLoad(StaticLoad):
+    """A load that goes as cos(harmonic * w t + phase)."""
+
+    phase: Angle = 0.0
+    harmonic: Annotated[StrictInt, Field(ge=1)] = 1
+
+
+class Motion(Table):
+    """The ground of a contact face moves: static + harmonic * cos(w t + phase), along a direction."""
+
+    direction: Direction
+    static: Length = 0.0
+    harmonic: Length = 0.0
+    phase: Angle = 0.0
+
+
+Static = TypeVar("Static")
+Harmonic = TypeVar("Harmonic")
+
+
+class Loads(Table, Generic[Static, Harmonic]):
+    """Named loads."""
+
+    static: dict[str, Static] = Field(default_factory=dict)
+    harmonic: dict[str, Harmonic] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _distinct(self) -> Loads[Static, Harmonic]:
+        both = sorted(set(self.static) & set(self.harmonic))
+        if both:
+            raise ValueError(f'expected one load named "{both[0]}", found it under static and under harmonic')
+        if not self.harmonic:
+            raise ValueError("expected at least one harmonic load, for example [loads.harmonic.drive]")
+        return self
+
+
+class Output(Table):
+    """A displacement that is observed, the mean of a group."""
+
+    group: str
+    direction: Direction
+
+
+class Response(Table):
+    """The frequency response that is computed.
+
+    references : the range in which the linear references are drawn, the same as frequency unless told
+    stability : mark where the curve is stable and where it bifurcates
+    bounds : at every point, how far the response depends on the load path of pairs that stick all the time
+    """
+
+    frequency: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]]
+    references: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]] | None = None
+    points: Annotated[StrictInt, Field(ge=2)] = 60
+    method: str = "natural"
+    stability: StrictBool = False
+    bounds: StrictBool = False
+    options: dict[str, Any] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _range(self) -> Response:
+        for key, (low, high) in (("frequency", self.frequency), ("references", self.references or self.frequency)):
+            if low >= high:
+                raise ValueError(f"expected {key} = [low, high] with low below high, got {low:g} Hz and {high:g} Hz")
+        return self
+
+
+class PartResponse(Response, Output):
+    """The displacement whose response is computed; others : displacements observed besides, by name."""
+
+    others: dict[str, Output] = Field(default_factory=dict)
+
+
+class Reduction(Table):
+    """Craig-Bampton: how many fixed-interface modes, or up to which frequency.
+
+    relative : keep the relative displacement of node pairs instead of both nodes
+    interface_modes : replace the masters by so many characteristic constraint modes
+    interface_keep : groups whose masters stay physical all the same, [] for none (SCC); unless told, every master that
+        does not belong to the contact stays (SCCe)
+    """
+
+    method: Literal["craig_bampton"] = "craig_bampton"
+    relative: StrictBool = False
+    modes: Annotated[StrictInt, Field(ge=0)] | None = None
+    cutoff: Annotated[Frequency, Field(gt=0)] | None = None
+    interface_modes: Annotated[StrictInt, Field(ge=1)] | None = None
+    interface_keep: tuple[str, ...] | None = None
+
+    @model_validator(mode="after")
+    def _interface(self) -> Reduction:
+        if self.interface_modes is None and self.interface_keep is not None:
+            raise ValueError("expected interface_keep only with interface_modes")
+        return self
+
+    @model_validator(mode="after")
+    def _one_truncation(self) -> Reduction:
+        if (self.modes is None) == (self.cutoff is None):
+            raise ValueError("expected either modes = number or cutoff = frequency, and not both")
+        return self
+
+
+def _kept(value: object, check: ValidatorFunctionWrapHandler) -> tuple[int, ...]:
+    if value == "auto":
+        return ()
+    kept: tuple[int, ...] = check(value)
+    if not kept or list(kept) != sorted(set(kept)) or max(kept) < 1:
+        raise ValueError(f'expected kept as rising harmonic numbers up to 1 or more, or "auto", got {list(kept)}')
+    return kept
+
+
+class Harmonics(Table):
+    """Harmonics of the response that are kept, and time samples of one cycle.
+
+    kept : harmonic numbers, or "auto" (then empty here): as many as the response needs at the peak of the unworn
+        contact, so that what is left out changes it by less than `tolerance`, up to `highest`
+    """
+
+    kept: Annotated[tuple[Annotated[StrictInt, Field(ge=0)], ...], WrapValidator(_kept)] = (0, 1)
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] | None = None
+    highest: Annotated[StrictInt, Field(ge=1)] | None = None
+    samples: Annotated[StrictInt, Field(ge=4, le=65536)] = 128
+    transitions: Literal["sampled", "located"] = "sampled"
+
+    @property
+    def automatic(self) -> bool:
+        """Whether harmonics are chosen."""
+        return not self.kept
+
+    @field_serializer("kept")
+    def _auto(self, kept: tuple[int, ...]) -> tuple[int, ...] | str:
+        return kept or "auto"
+
+    @model_validator(mode="after")
+    def _resolved(self) -> Harmonics:
+        for name in ("tolerance", "highest"):
+            if not self.automatic and getattr(self, name) is not None:
+                raise ValueError(f'expected {name} only with kept = "auto"')
+        top = 3 * ((self.highest or HIGHEST) + 1) // 2 if self.automatic else max(self.kept)
+        if self.samples <= 2 * top:
+            raise ValueError(f"expected more than {2 * top} samples for harmonic {top}, got {self.samples}")
+        return self
+
+
+class Damping(Table):
+    """Structural damping: a ratio for every mode, or Rayleigh's two coefficients.
+
+    state : whose modes these are, "free" without the contact or "stuck" with every pair closed
+    """
+
+    modal: Annotated[Number, Field(ge=0, lt=1)] | None = None
+    state: Literal["free", "stuck"] = "free"
+    mass: Annotated[float, quantity("1/s"), Field(ge=0)] | None = None
+    stiffness: Annotated[float, quantity("s"), Field(ge=0)] | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Damping:
+        if self.modal is not None and (self.mass is not None or self.stiffness is not None):
+            raise ValueError("expected either modal, or mass and stiffness, and not both")
+        return self
+
+    @property
+    def given(self) -> bool:
+        """Whether there is any."""
+        return not (self.modal is None and self.mass is None and self.stiffness is None)
+
+
+class Pictures(Table):
+    """What is drawn after a run."""
+
+    plots: StrictBool = True
+    renders: StrictBool = True
+    deformation_scale: Annotated[Number, Field(gt=0)] | None = None
+    wear_scale: Annotated[Number, Field(gt=0)] | None = None
+
+
+class Solver(Table):
+    """Newton's tolerance on the contact displacement relative to its size, and threads of the linear algebra.
+
+    krylov : how exactly each Newton direction is solved, at the least
+    """
+
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-8
+    krylov: Annotated[Number, Field(gt=0, lt=1)] = 0.1
+    threads: Annotated[StrictInt, Field(ge=1)] = 1
+
+
+class Scene(Table):
+    """What every scene says, whatever its model is made from; see PartScene, and MatrixScene in matrix_scene."""
+
+    scene: Heading
+    contact: Contact
+    loads: Loads[Any, Any]
+    response: Response
+    harmonics: Harmonics = Harmonics()
+    damping: Damping = Damping()
+    wear: Wear | None = None
+    pictures: Pictures = Pictures()
+    solver: Solver = Solver()
+
+    @property
+    def wears(self) -> bool:
+        """Whether wear steps are asked for."""
+        return self.wear is not None and self.wear.max_steps > 0
+
+
+class PartScene(Scene):
+    """Which geometry, material, contact, loads, reduction, response and wear are modelled."""
+
+    geometry: Geometry
+    material: Material
+    contact: FaceContact
+    springs: dict[str, Spring] = Field(default_factory=dict)
+    prescribed: dict[str, Prescribed] = Field(default_factory=dict)
+    surfaces: Surfaces | None = None
+    motion: dict[str, Motion] = Field(default_factory=dict)
+    loads: Loads[StaticLoad, HarmonicLoad]
+    response: PartResponse
+    reduction: Reduction
+    wheel: Wheel | None = None
+
+    @model_validator(mode="after")
+    def _what_a_sector_is(self) -> PartScene:
+        if self.wheel is None:
+            return self
+        if self.contact.opposite is None or not isinstance(self.contact.group, str):
+            raise ValueError("wheel: the contact needs one group, the right face, and its opposite, the left one")
+        for key, has in (
+            ("contact.plane", self.contact.plane is not None),
+            ("motion", bool(self.motion)),
+            ("prescribed", bool(self.prescribed)),
+            ("reduction.relative", self.reduction.relative),
+            ("reduction.interface_modes", self.reduction.interface_modes is not None),
+            ("geometry.no_turning", self.geometry.no_turning is not None),
+            ("response.stability", self.response.stability),  # perturbations see other waves than the solution does
+        ):
+            if has:
+                raise ValueError(f"{key} has no meaning for a sector of a wheel: leave it out")
+        if CENTRIFUGAL in (*self.loads.static, *self.loads.harmonic):
+            raise ValueError(f"loads: {CENTRIFUGAL} is the load that wheel.speed makes: give yours another name")
+        return self
+
+    @model_validator(mode="after")
+    def _one_prescribed(self) -> PartScene:
+        if len(self.prescribed) > 1:
+            raise ValueError(f"expected one table under prescribed, got {', '.join(self.prescribed)}")
+        for name, held in self.prescribed.items():
+            if name in (*self.loads.static, *self.loads.harmonic):
+                raise ValueError(f"prescribed.{name} has the name of a load: give it another")
+            for spring in held.springs:
+                if spring not in self.springs:
+                    raise ValueError(unknown_key(f"springs.{spring}", [f"springs.{known}" for known in self.springs]))
+                if self.springs[spring].group != held.group or self.springs[spring].opposite is not None:
+                    raise ValueError(f"prescribed.{name}: springs.{spring} must hold {held.group} to the ground")
+        return self

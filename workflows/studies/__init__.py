@@ -1,0 +1,1 @@
+"""Work on one scene beyond a run: tracking, backbones, identification."""

@@ -1,0 +1,78 @@
+"""The backbone of a scene: frequency and damping of one nonlinear mode of the unworn contact against its amplitude."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from threadpoolctl import threadpool_limits
+
+from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.nonlinear_modes import Backbone, Options, backbone
+from tribodyn.workflows.pictures.plots import axes_of, length_unit
+from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
+from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.scene_file import SceneFile
+
+
+def follow(file: SceneFile, start: float, stop: float, mode: int, points: int, progress: Progress) -> Backbone:
+    """The backbone of a scene's observed displacement from one amplitude to another [m].
+
+    mode : number of the mode about the static equilibrium, from 0; points : on an easy way
+    Raises  ValueError for what cannot be; pipeline.SolveFailed where not even the first point is found
+    """
+    with TemporaryDirectory() as folder, threadpool_limits(file.scene.solver.threads):
+        balance = pipeline.build(file, Path(folder), progress).balance
+        with progress.stage("backbone"):
+            options = Options(points, newton=pipeline.newton_options(file.scene))
+            found = backbone(balance, start, stop, mode, pipeline.OUTPUT, options)
+    if CONVERGED not in found.outcome:
+        raise pipeline.SolveFailed(f"the backbone {found.end}")
+    return found
+
+
+def record(found: Backbone) -> dict[str, Any]:
+    """The converged points for machines."""
+    good = _good(found)
+    return {
+        "reference_hz": found.reference_omega / (2 * np.pi),
+        "amplitude_m": found.amplitude[good].tolist(),
+        "frequency_hz": (found.omega[good] / (2 * np.pi)).tolist(),
+        "damping": found.damping[good].tolist(),
+        "energy_J": found.energy[good].tolist(),
+        "end": found.end,
+    }
+
+
+def write(found: Backbone, path: Path) -> None:
+    """The converged points as comma-separated values."""
+    columns = {name: value for name, value in record(found).items() if isinstance(value, list)}
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
+
+
+def picture(found: Backbone) -> Figure:
+    """Frequency and damping ratio against amplitude."""
+    good = _good(found)
+    unit, scale = length_unit(found.amplitude[good].max())
+    amplitude = scale * found.amplitude[good]
+    with axes_of(7.2, 5.6, rows=2) as (figure, (upper, lower)):
+        upper.plot(amplitude, found.omega[good] / (2 * np.pi), ".-", color=BLUE, ms=4)
+        upper.axhline(found.reference_omega / (2 * np.pi), color=GREY, ls="--", lw=1.2, label="at rest")
+        upper.set(ylabel="frequency / Hz", title="Backbone")
+        upper.legend(loc="best", fontsize=9)
+        lower.plot(amplitude, 100 * found.damping[good], ".-", color=ORANGE, ms=4)
+        lower.set(xscale="log", xlabel=f"amplitude in the mode at rest / {unit}", ylabel="damping ratio / %")
+        lower.set_ylim(bottom=0)
+    return figure
+
+
+def _good(found: Backbone) -> np.ndarray:
+    return np.array([outcome == CONVERGED for outcome in found.outcome])
