@@ -13,10 +13,15 @@ class Contact(Table):
     """The contact law of every node pair; stiffness is that of all pairs together, shared by their area."""
 
     components: tuple[Literal["t1", "t2", "n"], ...] = ("t1", "t2", "n")
+    """Contact components that are modelled."""
     law: str = "jenkins"
+    """Contact law."""
     tangential_stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
+    """Tangential stiffness of all pairs together."""
     normal_stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
+    """Normal stiffness of all pairs together."""
     friction: Annotated[Number, Field(ge=0)] | None = None
+    """Coefficient of friction."""
 
     @model_validator(mode="after")
     def _only_what_the_components_need(self) -> Contact:
@@ -40,23 +45,25 @@ class Contact(Table):
 
 
 class FaceContact(Contact):
-    """Faces of the part against the ground or a face against another one.
-
-    punch : sides of a rectangular punch along t1 and t2, whose contact stiffness is taken instead of given numbers
-    group : one face, or a list of faces
-    t1 is the direction that the first tangential component follows; vertices_only leaves the mid-side nodes out.
-    plane : direction towards a ground that is a plane, which each face touches with its nearest node
-    inclination : of that plane about t1, by the right hand
-    """
+    """Faces of the part against the ground, or a face against another one."""
 
     group: str | tuple[str, ...]
+    """One face, or a list of faces."""
     opposite: str | None = None
+    """Face that the group touches; the ground by default."""
     t1: Direction
+    """Direction that the first tangential component follows."""
     vertices_only: StrictBool = False
+    """Leave the mid-side nodes of the mesh out."""
     gap: Length = 0.0
+    """Initial gap of all pairs."""
     plane: Direction | None = None
+    """Direction towards a ground that is a plane, which each face touches with its nearest node."""
     inclination: Angle = 0.0
+    """Inclination of that plane about t1, by the right hand."""
     punch: tuple[Annotated[Length, Field(gt=0)], Annotated[Length, Field(gt=0)]] | None = None
+    """Sides of a rectangular punch along t1 and t2, from which the contact stiffness is calculated instead of given
+    numbers."""
 
     @property
     def stiffness_is_given(self) -> bool:
@@ -73,33 +80,40 @@ class SyntheticPair(Table):
     """A made-up pair of faces, see geometry.surface_pair.synthetic_pair."""
 
     seed: Annotated[StrictInt, Field(ge=0)]
+    """Seed of the random numbers."""
     size: tuple[Annotated[Length, Field(gt=0)], Annotated[Length, Field(gt=0)]]
+    """Sides of the faces."""
     ridge: Annotated[Length, Field(ge=0)]
+    """Height of two ridges along the long edges of the first face."""
     waviness: Annotated[Length, Field(ge=0)]
+    """Root mean square of waves about 1 mm long."""
     roughness: Annotated[Length, Field(ge=0)]
+    """Root mean square of waves about 50 um long."""
 
 
 class Surfaces(Table):
-    """Measured faces of a flat contact, whose waviness becomes the gap before loading.
-
-    first, second : height map of body 1, and of body 2 where it is not taken as flat; or a synthetic pair
-    axes : contact components that x and y of the maps follow, "-t1" for against it
-    mirror : axis of the second map that is reversed before it faces the first, see geometry.surface_pair
-    cutoff : wavelength that parts waviness from roughness
-    mating_height : how far the faces are pushed on from their first touch
-    lateral_unit, height_unit, spacing : of text files, see geometry.surface_io
-    """
+    """Measured faces of a flat contact, whose waviness becomes the gap before loading."""
 
     first: str | None = None
+    """Height map of body 1."""
     second: str | None = None
+    """Height map of body 2; flat by default."""
     synthetic: SyntheticPair | None = None
+    """A synthetic pair of faces instead of files."""
     axes: tuple[Literal["t1", "t2", "-t1", "-t2"], Literal["t1", "t2", "-t1", "-t2"]] = ("t1", "t2")
+    """Contact components that x and y of the maps follow, "-t1" for against it."""
     mirror: Literal["x", "y"] | None = None
+    """Axis of the second map that is reversed before it faces the first."""
     cutoff: Annotated[Length, Field(gt=0)]
+    """Wavelength that separates waviness from roughness."""
     mating_height: Length = 0.0
+    """How far the faces are pushed on from their first touch."""
     lateral_unit: Annotated[Length, Field(gt=0)] = 1.0
+    """Unit of lateral coordinates in text files."""
     height_unit: Annotated[Length, Field(gt=0)] = 1.0
+    """Unit of heights in text files."""
     spacing: tuple[float, float] | None = None
+    """Lateral spacing of text files that hold a matrix of heights."""
 
     @model_validator(mode="after")
     def _one_source(self) -> Surfaces:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
@@ -11,14 +12,24 @@ from tribodyn.workflows.scene.units import to_si
 
 
 class Table(BaseModel):
-    """A table of the scene file: nothing may be added to it, nothing changed."""
+    """A table of the scene file: nothing may be added to it, nothing changed.
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    The text below a key is its meaning; the list of keys in the documentation is made from it.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
 
-def quantity(unit: str) -> BeforeValidator:
+@dataclass(frozen=True)
+class Quantity(BeforeValidator):
+    """Mark of a key that takes a text with a unit; the documentation reads the unit from it."""
+
+    unit: str = ""
+
+
+def quantity(unit: str) -> Quantity:
     """Validator that turns a text with a unit, or a bare number, into a float counted in `unit`."""
-    return BeforeValidator(lambda value: to_si(value, unit))
+    return Quantity(lambda value: to_si(value, unit), unit=unit)
 
 
 Length = Annotated[float, quantity("m")]

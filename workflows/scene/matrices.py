@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
+from tribodyn.workflows.scene.fields import Quantity
 from tribodyn.workflows.scene.schema import (
     Angle,
     Contact,
@@ -31,6 +32,7 @@ class Variable(Table):
     """A named array of the file that holds the matrices."""
 
     variable: str
+    """Its name in the file."""
 
 
 def _dof(value: object) -> Dof:
@@ -57,7 +59,7 @@ def _rows(value: object) -> Any:
     return _listed(value, _dofs, "[[3, 4, 5], [6, 7, 8]], one row for each pair")
 
 
-def per_pair(unit: str) -> BeforeValidator:
+def per_pair(unit: str) -> Quantity:
     """Validator of a quantity that is one for all pairs, a list with one for each, or a variable of the file."""
 
     def convert(value: object) -> Any:
@@ -67,24 +69,26 @@ def per_pair(unit: str) -> BeforeValidator:
             return tuple(to_si(entry, unit) for entry in value)
         return to_si(value, unit)
 
-    return BeforeValidator(convert)
+    return Quantity(convert, unit=unit)
 
 
 class MatrixFiles(Table):
-    """The files with the matrices, as reduction.foreign.read_matrices takes them.
-
-    file : one that holds all, as M, K and, if present, C; names : other variables, such as {mass = "Mred"}
-    mass, stiffness, damping : one file for each instead; mapping : ANSYS .mapping file that labels the rows
-    scale : factor on all matrices to reach SI
-    """
+    """The files with the matrices, as reduction.foreign.read_matrices takes them."""
 
     file: str | None = None
+    """One file that holds all, as M, K and, if present, C."""
     mass: str | None = None
+    """File of the mass matrix."""
     stiffness: str | None = None
+    """File of the stiffness matrix."""
     damping: str | None = None
+    """File of the damping matrix."""
     mapping: str | None = None
+    """ANSYS .mapping file that labels the rows."""
     names: dict[str, str] = Field(default_factory=dict)
+    """Other names of the variables, such as {mass = "Mred"}."""
     scale: Annotated[Number, Field(gt=0)] = 1.0
+    """Factor on all matrices to reach SI."""
 
     @model_validator(mode="after")
     def _both(self) -> MatrixFiles:
@@ -94,27 +98,33 @@ class MatrixFiles(Table):
 
 
 class DofContact(Contact):
-    """DOFs that touch, pair by pair, each other or the ground; see ForeignMatrices.contact.
-
-    dofs, opposite : a row for each pair, its DOFs t1, t2, n as `components` says, or x, y, z where `normal` is given
-    area : of the patch, shared equally, or of each pair; points : of each pair, for maps
-    """
+    """DOFs that touch, pair by pair, each other or the ground."""
 
     dofs: Annotated[tuple[tuple[Dof, ...], ...] | Variable, BeforeValidator(_rows)]
+    """A row for each pair: its DOFs t1, t2, n as `components` says, or x, y, z where `normal` is given."""
     opposite: Annotated[tuple[tuple[Dof, ...], ...] | Variable, BeforeValidator(_rows)] | None = None
+    """DOFs that they touch, in the same form; the ground by default."""
     area: Annotated[float | tuple[float, ...] | Variable, per_pair("m2")]
+    """Area of the patch, shared equally, or of each pair."""
     gap: Annotated[float | tuple[float, ...] | Variable, per_pair("m")] = 0.0
+    """Initial gap, one for all pairs or one for each."""
     normal: Direction | None = None
+    """Direction in which the pairs close, for DOFs along x, y, z."""
     t1: Direction | None = None
+    """Direction of the first tangential component."""
     signs: tuple[StrictInt, ...] | None = None
+    """Signs of the components."""
     points: Variable | None = None
+    """Position of each pair, for maps."""
 
 
 class DofOutput(Table):
     """A displacement that is observed: the mean of DOFs, or a row of factors."""
 
     dofs: Annotated[tuple[Dof, ...], BeforeValidator(_dofs)] | None = None
+    """DOFs whose mean is observed, or that share a force."""
     vector: Variable | None = None
+    """A row of factors of the file instead."""
 
     @model_validator(mode="after")
     def _one_kind(self) -> DofOutput:
@@ -127,6 +137,7 @@ class DofLoad(DofOutput):
     """A force that does not change: shared equally by DOFs, or times a vector of factors."""
 
     value: Force
+    """The force."""
 
     @property
     def amplitude(self) -> float:
@@ -138,20 +149,28 @@ class HarmonicDofLoad(DofLoad):
     """A load that goes as cos(harmonic * w t + phase)."""
 
     phase: Angle = 0.0
+    """Phase of the load."""
     harmonic: Annotated[StrictInt, Field(ge=1)] = 1
+    """Multiple of the excitation frequency."""
 
 
 class DofResponse(Response, DofOutput):
-    """The displacement whose response is computed; others : displacements observed besides, by name."""
+    """The displacement whose response is computed."""
 
     others: dict[str, DofOutput] = Field(default_factory=dict)
+    """Displacements observed besides, by name."""
 
 
 class MatrixScene(Scene):
     """Which matrices, contact, loads, response and wear are modelled; without reduction they stay as they are."""
 
     model: MatrixFiles
+    """The matrix files."""
     contact: DofContact
+    """The contact and its law."""
     loads: Loads[DofLoad, HarmonicDofLoad]
+    """The loads."""
     response: DofResponse
+    """The response that is computed."""
     reduction: Reduction | None = None
+    """Craig-Bampton reduction; left out, the matrices stay as they are."""

@@ -47,24 +47,31 @@ class Heading(Table):
     """What the scene is and where its numbers come from."""
 
     title: str
+    """What the scene is, in one line; `tribodyn list` and every picture show it."""
     source: str = ""
+    """Where its numbers come from."""
     notes: str = ""
+    """Remarks for the reader."""
 
 
 class Geometry(Table):
     """A part of geometry/ or a mesh file, and the groups that are held fixed.
 
-    fixed_axes : groups held along some axes only, group -> letters out of "xyz"
-    no_turning : axis about which the part as a whole cannot turn
     All other keys of the table are parameters of the part; those left out have the part's own defaults.
     """
 
     part: str | None = None
+    """Name of a parametric part; its parameters are further keys of this table."""
     mesh: str | None = None
+    """Mesh file of second order, relative to the scene file, instead of a part."""
     fixed: tuple[str, ...] = ()
+    """Groups of the mesh that are clamped."""
     fixed_axes: dict[str, str] = Field(default_factory=dict)
+    """Groups held along some axes only: group = letters out of "xyz"."""
     no_turning: Direction | None = None
+    """Axis about which the part as a whole cannot turn."""
     parameters: dict[str, int | float] = Field(default_factory=dict)
+    """Parameters of the part, gathered from the other keys of the table."""
 
     @model_validator(mode="before")
     @classmethod
@@ -121,42 +128,52 @@ class Material(Table):
     """Linear isotropic elasticity and density."""
 
     young: Annotated[float, quantity("Pa"), Field(gt=0)]
+    """Young's modulus."""
     density: Annotated[float, quantity("kg/m3"), Field(gt=0)]
+    """Density."""
     poisson: Annotated[Number, Field(gt=-1, lt=0.5)]
+    """Poisson's ratio."""
 
 
 class Spring(Table):
     """A spring from a group to the ground, or to the matching nodes of another group, that acts in one direction."""
 
     group: str
+    """Group of nodes that the spring holds; on a face each node has a share by its tributary area."""
     direction: Direction
+    """Direction in which it acts."""
     stiffness: Annotated[Stiffness, Field(ge=0)]
+    """Stiffness of all nodes together."""
     opposite: str | None = None
+    """Group whose matching nodes it connects to, instead of the ground."""
 
 
 class Prescribed(Table):
-    """Nodes whose static displacement is given along an axis; the force that it takes is a result, vibration is free.
-
-    springs : names of springs between these nodes and the ground that act about the prescribed position
-    """
+    """Nodes whose static displacement along an axis is given; its force is a result, vibration is free."""
 
     group: str
+    """Group of nodes."""
     axis: Literal["x", "y", "z"]
+    """Axis of the displacement."""
     displacement: Length
+    """The static displacement."""
     springs: tuple[str, ...] = ()
+    """Names of springs between these nodes and the ground that act about the prescribed position."""
 
 
 class StaticLoad(Table):
-    """A load that does not change: a force shared equally by the nodes of a group, or a pressure into a face.
-
-    opposite : group on which the same force acts the other way: a couple
-    """
+    """A load that does not change: a force shared equally by the nodes of a group, or a pressure into a face."""
 
     group: str
+    """Group that is loaded."""
     direction: Direction | None = None
+    """Direction of the force."""
     value: Force | None = None
+    """The whole force on the group."""
     pressure: Pressure | None = None
+    """Pressure into the face, instead of a force."""
     opposite: str | None = None
+    """Group on which the same force acts the other way: a couple."""
 
     @model_validator(mode="after")
     def _one_kind(self) -> StaticLoad:
@@ -184,16 +201,22 @@ class HarmonicLoad(StaticLoad):
     """A load that goes as cos(harmonic * w t + phase)."""
 
     phase: Angle = 0.0
+    """Phase of the load."""
     harmonic: Annotated[StrictInt, Field(ge=1)] = 1
+    """Multiple of the excitation frequency."""
 
 
 class Motion(Table):
     """The ground of a contact face moves: static + harmonic * cos(w t + phase), along a direction."""
 
     direction: Direction
+    """Direction of the motion."""
     static: Length = 0.0
+    """Its static part."""
     harmonic: Length = 0.0
+    """Its amplitude."""
     phase: Angle = 0.0
+    """Its phase."""
 
 
 Static = TypeVar("Static")
@@ -204,7 +227,9 @@ class Loads(Table, Generic[Static, Harmonic]):
     """Named loads."""
 
     static: dict[str, Static] = Field(default_factory=dict)
+    """Static loads by name."""
     harmonic: dict[str, Harmonic] = Field(default_factory=dict)
+    """Harmonic loads by name; at least one."""
 
     @model_validator(mode="after")
     def _distinct(self) -> Loads[Static, Harmonic]:
@@ -220,24 +245,28 @@ class Output(Table):
     """A displacement that is observed, the mean of a group."""
 
     group: str
+    """Group whose mean displacement is observed."""
     direction: Direction
+    """Direction in which it is observed."""
 
 
 class Response(Table):
-    """The frequency response that is computed.
-
-    references : the range in which the linear references are drawn, the same as frequency unless told
-    stability : mark where the curve is stable and where it bifurcates
-    bounds : at every point, how far the response depends on the load path of pairs that stick all the time
-    """
+    """The frequency response that is computed."""
 
     frequency: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]]
+    """Range of the response, [low, high]."""
     references: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]] | None = None
+    """Range in which the linear references are drawn; the same as `frequency` by default."""
     points: Annotated[StrictInt, Field(ge=2)] = 60
+    """Number of frequency steps of the continuation."""
     method: str = "natural"
+    """Continuation method: natural, arc_length or adaptive."""
     stability: StrictBool = False
+    """Mark where the curve is stable and where it bifurcates."""
     bounds: StrictBool = False
+    """At every point, how far the response depends on the load path of pairs that always stick."""
     options: dict[str, Any] = Field(default_factory=dict)
+    """Options of the continuation method."""
 
     @model_validator(mode="after")
     def _range(self) -> Response:
@@ -248,26 +277,28 @@ class Response(Table):
 
 
 class PartResponse(Response, Output):
-    """The displacement whose response is computed; others : displacements observed besides, by name."""
+    """The displacement whose response is computed."""
 
     others: dict[str, Output] = Field(default_factory=dict)
+    """Displacements observed besides, by name."""
 
 
 class Reduction(Table):
-    """Craig-Bampton: how many fixed-interface modes, or up to which frequency.
-
-    relative : keep the relative displacement of node pairs instead of both nodes
-    interface_modes : replace the masters by so many characteristic constraint modes
-    interface_keep : groups whose masters stay physical all the same, [] for none (SCC); unless told, every master that
-        does not belong to the contact stays (SCCe)
-    """
+    """Craig-Bampton: how many fixed-interface modes, or up to which frequency."""
 
     method: Literal["craig_bampton"] = "craig_bampton"
+    """Reduction method."""
     relative: StrictBool = False
+    """Keep the relative displacement of node pairs instead of both nodes."""
     modes: Annotated[StrictInt, Field(ge=0)] | None = None
+    """Number of fixed-interface modes."""
     cutoff: Annotated[Frequency, Field(gt=0)] | None = None
+    """Frequency up to which fixed-interface modes are kept, instead of their number."""
     interface_modes: Annotated[StrictInt, Field(ge=1)] | None = None
+    """Replace the masters by this number of characteristic constraint modes."""
     interface_keep: tuple[str, ...] | None = None
+    """Groups whose masters stay physical all the same, [] for none (SCC); by default every master that does not belong
+    to the contact stays (SCCe)."""
 
     @model_validator(mode="after")
     def _interface(self) -> Reduction:
@@ -292,17 +323,20 @@ def _kept(value: object, check: ValidatorFunctionWrapHandler) -> tuple[int, ...]
 
 
 class Harmonics(Table):
-    """Harmonics of the response that are kept, and time samples of one cycle.
-
-    kept : harmonic numbers, or "auto" (then empty here): as many as the response needs at the peak of the unworn
-        contact, so that what is left out changes it by less than `tolerance`, up to `highest`
-    """
+    """Harmonics of the response that are kept, and time samples of one cycle."""
 
     kept: Annotated[tuple[Annotated[StrictInt, Field(ge=0)], ...], WrapValidator(_kept)] = (0, 1)
+    """Rising harmonic numbers, or "auto": as many as the response needs at the peak of the unworn contact, so that
+    what is left out changes it by less than `tolerance`, up to `highest`."""
     tolerance: Annotated[Number, Field(gt=0, lt=1)] | None = None
+    """Relative change allowed by kept = "auto"."""
     highest: Annotated[StrictInt, Field(ge=1)] | None = None
+    """Highest harmonic that kept = "auto" may keep; 15 by default."""
     samples: Annotated[StrictInt, Field(ge=4, le=65536)] = 128
+    """Time samples of one cycle."""
     transitions: Literal["sampled", "located"] = "sampled"
+    """"sampled" takes contact forces at equidistant samples; "located" finds the instants of stick, slip, contact and
+    separation."""
 
     @property
     def automatic(self) -> bool:
@@ -325,15 +359,16 @@ class Harmonics(Table):
 
 
 class Damping(Table):
-    """Structural damping: a ratio for every mode, or Rayleigh's two coefficients.
-
-    state : whose modes these are, "free" without the contact or "stuck" with every pair closed
-    """
+    """Structural damping: a ratio for every mode, or Rayleigh's two coefficients."""
 
     modal: Annotated[Number, Field(ge=0, lt=1)] | None = None
+    """Damping ratio of every mode."""
     state: Literal["free", "stuck"] = "free"
+    """Whose modes these are: "free" without the contact, or "stuck" with every pair closed."""
     mass: Annotated[float, quantity("1/s"), Field(ge=0)] | None = None
+    """Rayleigh's coefficient of the mass matrix."""
     stiffness: Annotated[float, quantity("s"), Field(ge=0)] | None = None
+    """Rayleigh's coefficient of the stiffness matrix."""
 
     @model_validator(mode="after")
     def _one_kind(self) -> Damping:
@@ -351,34 +386,47 @@ class Pictures(Table):
     """What is drawn after a run."""
 
     plots: StrictBool = True
+    """Draw curves and maps."""
     renders: StrictBool = True
+    """Draw the part in 3-D."""
     deformation_scale: Annotated[Number, Field(gt=0)] | None = None
+    """Factor on displacements in renders; chosen by size by default."""
     wear_scale: Annotated[Number, Field(gt=0)] | None = None
+    """Factor on wear depth in renders; chosen by size by default."""
 
 
 class Solver(Table):
-    """Newton's tolerance on the contact displacement relative to its size, and threads of the linear algebra.
-
-    krylov : how exactly each Newton direction is solved, at the least
-    """
+    """Tolerances of the solver, and threads of the linear algebra."""
 
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-8
+    """Newton's tolerance on the contact displacement, relative to its size."""
     krylov: Annotated[Number, Field(gt=0, lt=1)] = 0.1
+    """How exactly each Newton direction is solved, at the least."""
     threads: Annotated[StrictInt, Field(ge=1)] = 1
+    """Threads of the linear algebra."""
 
 
 class Scene(Table):
     """What every scene says, whatever its model is made from; see PartScene, and MatrixScene in matrix_scene."""
 
     scene: Heading
+    """Title and source."""
     contact: Contact
+    """The contact."""
     loads: Loads[Any, Any]
+    """The loads."""
     response: Response
+    """The response that is computed."""
     harmonics: Harmonics = Harmonics()
+    """Harmonics and time samples."""
     damping: Damping = Damping()
+    """Structural damping."""
     wear: Wear | None = None
+    """Wear; left out, nothing wears."""
     pictures: Pictures = Pictures()
+    """What is drawn."""
     solver: Solver = Solver()
+    """Tolerances and threads."""
 
     @property
     def wears(self) -> bool:
@@ -390,16 +438,27 @@ class PartScene(Scene):
     """Which geometry, material, contact, loads, reduction, response and wear are modelled."""
 
     geometry: Geometry
+    """Part or mesh."""
     material: Material
+    """Material."""
     contact: FaceContact
+    """The contact faces and their law."""
     springs: dict[str, Spring] = Field(default_factory=dict)
+    """Springs by name."""
     prescribed: dict[str, Prescribed] = Field(default_factory=dict)
+    """A prescribed static displacement, by name; at most one."""
     surfaces: Surfaces | None = None
+    """Measured surfaces of the contact."""
     motion: dict[str, Motion] = Field(default_factory=dict)
+    """Motion of the ground of a contact face, by the name of the face."""
     loads: Loads[StaticLoad, HarmonicLoad]
+    """The loads."""
     response: PartResponse
+    """The response that is computed."""
     reduction: Reduction
+    """The reduction."""
     wheel: Wheel | None = None
+    """The wheel of which the part is one sector."""
 
     @model_validator(mode="after")
     def _what_a_sector_is(self) -> PartScene:

@@ -14,7 +14,9 @@ class WearStep(Table):
     """Largest depth that one wear step may add: a share of delta_max, or a depth [m]."""
 
     share: Annotated[float, Field(gt=0)] | None = None
+    """Share of delta_max, the largest static deflection of the contact without its counterpart."""
     depth: Annotated[float, Field(gt=0)] | None = None
+    """Depth."""
 
 
 def _step(value: object) -> object:
@@ -32,7 +34,9 @@ class Place(Table):
     """Where the cycle that wears is taken: a frequency [Hz], or a ratio to the frequency of the resonance peak."""
 
     frequency: Annotated[float, Field(gt=0)] | None = None
+    """Frequency."""
     peak: Annotated[float, Field(gt=0)] | None = None
+    """Ratio to the frequency of the resonance peak."""
 
 
 def _place(value: object) -> object:
@@ -57,32 +61,38 @@ class MissionDuty(Table):
     """A part of the mission: a share of all cycles at one place, with the harmonic loads times `load`."""
 
     at: At
+    """Where the cycles are taken."""
     share: Annotated[Number, Field(ge=0, le=1)]
+    """Share of all cycles."""
     load: Annotated[Number, Field(ge=0)] = 1.0
+    """Factor on the harmonic loads."""
 
 
 class Wear(Table):
-    """Wear of the patch until contact is lost or max_steps are done.
-
-    rule : "thesis" takes `step`, "error_controlled" takes `tolerance`, its local error as a share
-    lost_below : share of the first preload at which the run ends; 0 waits until the last touch ends
-    at, mission : one place where all cycles are taken, or a list of duties that share them
-    law : name of a wear law, or a file my_law.py beside the scene
-    split : share of the depth that the scene's own part loses, or the first of two faces; the rest wears the other one
-    responses : curves of the worn contact, evenly spread over what is worn
-    """
+    """Wear of the contact until it is lost or max_steps are done."""
 
     law: str = "energy"
+    """Name of a wear law, or a file my_law.py beside the scene."""
     split: Annotated[Number, Field(ge=0, le=1)] = 0.5
+    """Share of the depth that the scene's own part loses, or the first of two faces; the rest wears the other one."""
     responses: Annotated[StrictInt, Field(ge=0, le=100)] = 0
+    """Number of response curves of the worn contact, evenly spread over the worn depth."""
     coefficient: Annotated[WearCoefficient, Field(ge=0)]
+    """Wear coefficient: volume per friction work."""
     rule: Literal["thesis", "error_controlled"] = "thesis"
+    """How the steps are chosen: "thesis" takes `step`, "error_controlled" takes `tolerance`."""
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 0.01
+    """Error that one wear step of the error-controlled rule may make, relative."""
     lost_below: Annotated[Number, Field(ge=0, lt=1)] = 0.0
+    """Share of the first preload at which the run ends; 0 waits until the last touch ends."""
     step: Annotated[WearStep, BeforeValidator(_step)] | None = None
+    """Largest depth that one step of the thesis's rule may add: a share of delta_max such as "5 %", or a depth."""
     at: At = Place(peak=1.0)
+    """Where the cycles are taken: "peak", a share of its frequency such as "98 % of peak", or a frequency."""
     mission: tuple[MissionDuty, ...] = ()
+    """List of duties that share the cycles, instead of `at`."""
     max_steps: Annotated[StrictInt, Field(ge=0)] = 10_000
+    """Largest number of wear steps."""
 
     @model_validator(mode="after")
     def _whole(self) -> Wear:
