@@ -19,6 +19,7 @@ from tribodyn.hbm.evolution import (
     WearProblem,
     WearState,
     assess,
+    first_at_rest,
     first_preload,
     reason_to_stop,
     row_of,
@@ -26,6 +27,7 @@ from tribodyn.hbm.evolution import (
     worn_state,
 )
 from tribodyn.hbm.operating_point import point_of
+from tribodyn.hbm.preload_at_rest import PreloadAtRest
 from tribodyn.hbm.wear_history import LIFE_SHARE, WearHistory, WearRow, history, rows_to_go_on
 from tribodyn.hbm.wearing import WearingBalance, WornState
 
@@ -68,9 +70,11 @@ def evolve(
         rows.append(again)
     else:
         state = assess(problem, np.zeros_like(problem.area), 0.0, None)
+    at_rest = PreloadAtRest(problem)
     end = f"stopped after {max_steps} wear steps"
     while len(rows) < max_steps and state is not None:
-        reason = reason_to_stop(problem, state, first_preload(problem, rows, state))
+        state = at_rest.of(state)
+        reason = reason_to_stop(problem, state, first_preload(problem, rows, state), first_at_rest(rows, state))
         if reason:
             nothing = np.zeros_like(problem.area)
             rows.append(row_of(problem, state, 0.0, nothing, nothing, 0.0, np.zeros(1 + len(state.points))))

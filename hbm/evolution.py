@@ -14,6 +14,7 @@ from tribodyn.hbm.operating_point import OperatingPoint, Site
 from tribodyn.hbm.wear_history import WearRow
 
 LOST = "contact lost at every pair"
+LOST_AT_REST = "preload at rest fell below"  # the beginning of its sentence
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,8 @@ class WearProblem:
     law : name of a wear law; coefficient : (n_pair,) or scalar, in the unit the law states; area : (n_pair,) [m2]
     lost_below : contact counts as lost when the preload falls below this share of its first value; the last touch
         of a vibrating contact wears ever more slowly, so that the time until it ends has no limit (see README)
+    lost_below_at_rest : the run ends when the preload without the harmonic loads falls to this share of its first
+        value, see hbm.preload_at_rest; None: it is not looked at
     """
 
     balance: HarmonicBalance
@@ -41,6 +44,7 @@ class WearProblem:
     coefficient: np.ndarray | float
     area: np.ndarray
     lost_below: float = 0.0
+    lost_below_at_rest: float | None = None
     spread: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
@@ -50,6 +54,10 @@ class WearProblem:
         coefficient = np.array(np.broadcast_to(np.asarray(self.coefficient, float), self.area.shape))
         if not np.all(np.isfinite(coefficient)) or np.any(coefficient < 0):
             raise ValueError("the wear coefficient must be finite and >= 0 at every pair")
+        if self.lost_below_at_rest is not None and (
+            "n" not in self.balance.parameters.components or not self.balance.basis.has_static
+        ):
+            raise ValueError("the preload at rest needs a contact with component n and harmonic 0 among those kept")
         object.__setattr__(self, "spread", coefficient)
 
     def at_depth(self, depth: np.ndarray) -> HarmonicBalance:
@@ -63,6 +71,7 @@ class WearState:
 
     depth : (n_pair,) [m]; cycles : passed before; points : one per duty
     rate : (n_pair,) wear depth per cycle [m], work : (n_pair,) friction work per cycle [J]; averages over the mission
+    preload_at_rest : [N], nan where it was not asked for; failure_at_rest : why it was not found
     """
 
     depth: np.ndarray
@@ -71,6 +80,8 @@ class WearState:
     rate: np.ndarray
     work: np.ndarray
     solves: int
+    preload_at_rest: float = float("nan")
+    failure_at_rest: str = ""
 
     @property
     def failure(self) -> str:
@@ -78,7 +89,7 @@ class WearState:
         for point in self.points:
             if not point.solution.converged:
                 return f"solve failed at {point.state.omega / (2 * np.pi):.6g} Hz: {point.solution.outcome}"
-        return ""
+        return self.failure_at_rest
 
     @property
     def separated(self) -> bool:
@@ -151,10 +162,18 @@ def _carry(before: HarmonicBalance, omega: float, x: np.ndarray, opening: np.nda
     return x, solves
 
 
-def reason_to_stop(problem: WearProblem, state: WearState, first_preload: float) -> str:
-    """Why a run ends at a state, as a sentence; empty where it goes on."""
+def reason_to_stop(
+    problem: WearProblem, state: WearState, first_preload: float, first_at_rest: float = float("nan")
+) -> str:
+    """Why a run ends at a state, as a sentence; empty where it goes on.
+
+    first_preload, first_at_rest : of the unworn contact, vibrating and at rest [N]
+    """
     if state.failure:
         return state.failure
+    share = problem.lost_below_at_rest
+    if share is not None and state.preload_at_rest <= share * first_at_rest:
+        return f"{LOST_AT_REST} {share:.3g} of its first value"
     if state.separated:
         return LOST
     preload = problem.balance.preload(state.points[0].state)
@@ -176,7 +195,7 @@ def row_of(
 ) -> WearRow:
     """The history row of a state, with what its step wears [m] and dissipates [J]."""
     balance = problem.at_depth(state.depth).with_load(problem.mission[0].load)
-    taken = (cycles_in_step, worn, work, state.solves, step_error, plan)
+    taken = (cycles_in_step, worn, work, state.solves, step_error, plan, state.preload_at_rest)
     return WearRow.of(balance, state.points, state.depth, state.cycles, *taken)
 
 
@@ -195,3 +214,8 @@ def state_of(problem: WearProblem, row: WearRow) -> WearState:
 def first_preload(problem: WearProblem, rows: Sequence[WearRow], state: WearState) -> float:
     """Preload of the unworn contact [N]."""
     return rows[0].preload if rows else problem.balance.preload(state.points[0].state)
+
+
+def first_at_rest(rows: Sequence[WearRow], state: WearState) -> float:
+    """Preload of the unworn contact at rest [N]; nan where it was not asked for."""
+    return rows[0].preload_at_rest if rows else state.preload_at_rest

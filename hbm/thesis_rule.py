@@ -9,7 +9,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tribodyn.hbm.evolution import WearProblem, assess, first_preload, reason_to_stop, row_of, state_of
+from tribodyn.hbm.evolution import WearProblem, assess, first_at_rest, first_preload, reason_to_stop, row_of, state_of
+from tribodyn.hbm.preload_at_rest import PreloadAtRest
 from tribodyn.hbm.wear_history import WearHistory, WearRow, history, rows_to_go_on
 
 
@@ -33,10 +34,11 @@ def evolve(
     before = state_of(problem, rows[-1]) if rows else None
     depth = rows[-1].depth + rows[-1].worn if rows else np.zeros_like(problem.area)
     cycles = rows[-1].cycles + rows[-1].cycles_in_step if rows else 0.0
+    at_rest = PreloadAtRest(problem)
     end = f"stopped after {max_steps} wear steps"
     while len(rows) < max_steps:
-        state = assess(problem, depth, cycles, before)
-        reason = reason_to_stop(problem, state, first_preload(problem, rows, state))
+        state = at_rest.of(assess(problem, depth, cycles, before))
+        reason = reason_to_stop(problem, state, first_preload(problem, rows, state), first_at_rest(rows, state))
         whole = 0.0 if reason else max(1.0, float(np.floor(step_depth / state.rate.max())))  # eq. 3.30
         rows.append(row_of(problem, state, whole, whole * state.rate, whole * state.work))
         if on_row is not None:

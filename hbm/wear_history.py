@@ -41,6 +41,7 @@ class WearRow:
     work: np.ndarray
     duty_omega: np.ndarray
     duty_displacement: np.ndarray
+    preload_at_rest: float = float("nan")
 
     @property
     def displacement(self) -> np.ndarray:
@@ -60,6 +61,7 @@ class WearRow:
         solves: int,
         step_error: float = 0.0,
         plan: np.ndarray | None = None,
+        preload_at_rest: float = float("nan"),
     ) -> WearRow:
         """The row of solved operating points, one per duty; the first one is what the row shows."""
         point = points[0]
@@ -87,6 +89,7 @@ class WearRow:
             work=work,
             duty_omega=np.array([p.state.omega for p in points]),
             duty_displacement=np.stack([p.state.x.reshape(shape) for p in points]),
+            preload_at_rest=preload_at_rest,
         )
 
 
@@ -114,6 +117,8 @@ class WearHistory:
     duty_omega, duty_displacement : (n_row, n_duty) [rad/s], (n_row, n_duty, n_contact, n_coeff) [m]: every duty of a
         mission; the fields above show the first
     end : sentence that says why the run ended
+    preload_at_rest : (n_row,) static normal force of the whole contact without the harmonic loads [N]; nan where the
+        end of the run does not depend on it
     """
 
     cycles: np.ndarray
@@ -135,6 +140,7 @@ class WearHistory:
     duty_omega: np.ndarray
     duty_displacement: np.ndarray
     end: str
+    preload_at_rest: np.ndarray | None = None
 
     @property
     def displacement(self) -> np.ndarray:
@@ -143,7 +149,7 @@ class WearHistory:
 
     def rows(self) -> list[WearRow]:
         """The rows one by one."""
-        names = [f.name for f in fields(WearRow)]
+        names = [f.name for f in fields(WearRow) if getattr(self, f.name) is not None]
         return [WearRow(**{name: getattr(self, name)[i] for name in names}) for i in range(len(self.cycles))]
 
 
@@ -170,4 +176,7 @@ def rows_to_go_on(interrupted: WearHistory | None) -> list[WearRow]:
 
 def history(rows: list[WearRow], end: str) -> WearHistory:
     """Rows put together."""
-    return WearHistory(**{f.name: np.array([getattr(r, f.name) for r in rows]) for f in fields(WearRow)}, end=end)
+    columns = {f.name: np.array([getattr(r, f.name) for r in rows]) for f in fields(WearRow)}
+    if np.isnan(columns["preload_at_rest"]).all():
+        del columns["preload_at_rest"]
+    return WearHistory(**columns, end=end)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tribodyn.hbm.branch import Branch
-from tribodyn.hbm.evolution import LOST
+from tribodyn.hbm.evolution import LOST, LOST_AT_REST
 from tribodyn.hbm.wear_history import WearHistory
 
 PRELOAD_LOST = "preload fell below"  # how hbm.evolution begins the other sentence for a lost contact
@@ -199,7 +199,7 @@ class Result:
     @property
     def contact_lost(self) -> bool:
         """Whether wear went on until every pair was separated."""
-        return self.wear is not None and self.wear.end.startswith((LOST, PRELOAD_LOST))
+        return self.wear is not None and self.wear.end.startswith((LOST, PRELOAD_LOST, LOST_AT_REST))
 
     def shown_rows(self) -> np.ndarray:
         """Wear rows that pictures show: those of the fields, else the first, the middle and the last worn."""

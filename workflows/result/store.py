@@ -103,6 +103,7 @@ SCHEMA: dict[str, tuple[type, dict[str, tuple[tuple[str, ...], str]]]] = {
             "work": (("row", "pair"), "J"),
             "duty_omega": (("row", "duty"), "rad/s"),
             "duty_displacement": (("row", "duty", "contact", "coefficient"), "m"),
+            "preload_at_rest": (("row",), "N"),
         },
     ),
     "worn": (
@@ -161,6 +162,8 @@ def _write(file: h5py.File, result: Result) -> None:
         group = file.create_group(name)
         for item in fields(part):
             value = getattr(part, item.name)
+            if value is None:  # an array that this run did not ask for
+                continue
             if item.name in arrays:
                 # numpy takes an empty tuple for one of floats
                 dtype = np.int64 if isinstance(value, tuple) and not value else None
@@ -216,6 +219,8 @@ def _read(group: h5py.Group, kind: type, arrays: Mapping[str, Any]) -> Any:
     values: dict[str, Any] = {}
     for item in fields(kind):
         if item.name in arrays:
+            if item.name not in group and item.default is None:
+                continue
             value = group[item.name][()]
             values[item.name] = tuple(value.tolist()) if str(item.type).startswith("tuple") else value
         else:

@@ -383,7 +383,7 @@ def wear_down(
         done = float(patch.area @ (row.depth + row.worn)) / to_wear if to_wear > 0 else 0.0
         advance(done, f"step {len(rows)}, {row.cycles + row.cycles_in_step:.3g} cycles, {row.preload:.4g} N")
 
-    problem = wear_problem(scene, file.folder, model.balance, wear.lost_below)
+    problem = wear_problem(scene, file.folder, model.balance, wear.lost_below, wear.end_at == "at_rest")
     limit = step_limit(scene, patch.free_deflection, patch.area)
     worn = evolve(problem, wear, limit, wear.max_steps, on_row, result.wear)
     result = with_shown(scene, replace(result, wear=worn), model.balance.with_load(problem.mission[0].load), model.part)
@@ -393,11 +393,17 @@ def wear_down(
     return result
 
 
-def wear_problem(scene: Scene, folder: Path, balance: HarmonicBalance, lost_below: float = 0.0) -> WearProblem:
-    """What a scene wears, by its law and mission; folder : of the scene; the rest as `WearProblem` has it."""
+def wear_problem(
+    scene: Scene, folder: Path, balance: HarmonicBalance, lost_below: float = 0.0, at_rest: bool = False
+) -> WearProblem:
+    """What a scene wears, by its law and mission; folder : of the scene.
+
+    lost_below : share of the first preload at which the run ends, of that at rest where `at_rest`
+    """
     assert scene.wear is not None
     law, area = law_of(scene, folder), balance.model.interface.area
-    return WearProblem(balance, mission(scene), law, scene.wear.coefficient, area, lost_below)
+    vibrating, resting = (0.0, lost_below) if at_rest else (lost_below, None)
+    return WearProblem(balance, mission(scene), law, scene.wear.coefficient, area, vibrating, resting)
 
 
 def evolve(

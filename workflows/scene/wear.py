@@ -85,6 +85,8 @@ class Wear(Table):
     """Error that one wear step of the error-controlled rule may make, relative."""
     lost_below: Annotated[Number, Field(ge=0, lt=1)] = 0.0
     """Share of the first preload at which the run ends; 0 waits until the last touch ends."""
+    end_at: Literal["vibrating", "at_rest"] = "vibrating"
+    """Whose preload that is: of the vibrating contact, its mean force, or of the contact without harmonic loads."""
     step: Annotated[WearStep, BeforeValidator(_step)] | None = None
     """Largest depth that one step of the thesis's rule may add: a share of delta_max such as "5 %", or a depth."""
     at: At = Place(peak=1.0)
