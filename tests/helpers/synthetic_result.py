@@ -113,7 +113,7 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
         patch=where,
         part=part,
         references=References(omega, np.abs(resonance(415, 0.01)), np.abs(resonance(530, 0.01))),
-        frf=frf,
+        response=frf,
         stability=CurveStability(
             np.abs(np.arange(61) - 25) > 5, np.full(61, -1.0), omega[[20, 30]], np.array([20.5, 30.5]), ("fold", "fold")
         ),

@@ -119,8 +119,8 @@ def test_accuracy_meets_what_it_promises(table: Trade, tmp_path: Path, capsys: p
         ours, theirs = promised.values[quantity], reference.values[quantity]
         assert ours is not None
         assert ours == pytest.approx(theirs, rel=wanted), quantity
-    assert result.frf is not None
-    assert result.frf.amplitude("response").max() == pytest.approx(reference.values["peak_m"], rel=wanted)
+    assert result.response is not None
+    assert result.response.amplitude("response").max() == pytest.approx(reference.values["peak_m"], rel=wanted)
     choice = accuracy.choose(table, wanted)
     assert choice.error <= wanted
     assert choice.seconds <= accuracy.choose(table, wanted / 2).seconds

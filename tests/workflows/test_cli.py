@@ -190,20 +190,20 @@ def test_ctrl_c_is_not_lost_while_an_object_is_freed() -> None:
 def curve(peak: int, unstable: range | None = None):
     """A made-up result without wear, its response highest at one of its points, unstable at some."""
     made = result()
-    assert made.frf is not None
+    assert made.response is not None
     assert made.stability is not None
-    response = made.frf.response.copy()
+    response = made.response.response.copy()
     response[peak, 0, 1] = 10 * np.abs(response).max()
     marks = None if unstable is None else ~np.isin(np.arange(61), unstable)
     stability = None if marks is None else replace(made.stability, stable=marks)
-    return replace(made, wear=None, frf=replace(made.frf, response=response), stability=stability)
+    return replace(made, wear=None, response=replace(made.response, response=response), stability=stability)
 
 
 def test_a_peak_where_no_vibration_stays_is_told() -> None:
     steady, falls = curve(30, range(20, 25)), curve(30, range(28, 33))
     assert summary.summary(steady)["peak_is_stable"] is True
     assert not any("unstable, no vibration" in text for _, text in summary.lines(steady))
-    numbers, frf = summary.summary(falls), falls.frf
+    numbers, frf = summary.summary(falls), falls.response
     assert numbers["peak_is_stable"] is False
     best = max((i for i in range(61) if not 28 <= i < 33), key=lambda i: frf.amplitude("response")[i])
     assert numbers["stable_peak_hz"] == frf.frequency[best]
@@ -232,11 +232,11 @@ def test_separation_is_told_only_where_contact_was_lost() -> None:
 
 
 def test_a_result_before_any_solve_has_a_summary() -> None:
-    numbers = summary.summary(replace(result(), wear=None, frf=None, state="model built"))
+    numbers = summary.summary(replace(result(), wear=None, response=None, state="model built"))
     assert numbers["depth_max_m"] is None
     assert numbers["peak_hz"] is None
     assert numbers["finished"] is False
-    assert summary.lines(replace(result(), wear=None, frf=None))
+    assert summary.lines(replace(result(), wear=None, response=None))
 
 
 def test_render_draws_the_pictures_of_a_result(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -30,8 +30,8 @@ def test_harmonics_are_chosen_and_told(folder: Path, capsys: pytest.CaptureFixtu
     kept = result.harmonics
     assert {0, 1} < set(kept)
     assert max(kept) <= 9
-    assert result.frf is not None
-    assert result.frf.response.shape[2] == 2 * len(kept) - 1
+    assert result.response is not None
+    assert result.response.response.shape[2] == 2 * len(kept) - 1
     assert 0 < float(result.facts["harmonics_error"]) <= 0.02
     code, out, _ = leave(["show", str(folder), "--json"], capsys)
     numbers = json.loads(out)
@@ -51,7 +51,7 @@ def test_harmonics_are_chosen_and_told(folder: Path, capsys: pytest.CaptureFixtu
 
 def test_stability_and_bounds_are_marked_kept_and_drawn(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     result = run(folder, "response.stability=true", "response.bounds=true", "loads.harmonic.shaker.value=12 N")
-    frf, marks, bounds = result.frf, result.stability, result.bounds
+    frf, marks, bounds = result.response, result.stability, result.bounds
     assert frf is not None
     assert marks is not None
     assert bounds is not None
@@ -82,8 +82,8 @@ def test_stability_and_bounds_are_marked_kept_and_drawn(folder: Path, capsys: py
 @pytest.mark.parametrize("method", ["arc_length", "adaptive"])
 def test_every_continuation_gives_the_same_curve(folder: Path, method: str) -> None:
     """The peak of each method's curve is that of a natural sweep with fine steps."""
-    natural = run(folder, "response.points=400").frf
-    other = run(folder, f"response.method={method}").frf
+    natural = run(folder, "response.points=400").response
+    other = run(folder, f"response.method={method}").response
     assert natural is not None
     assert other is not None
     assert other.end.startswith("the end of the") or "reached" in other.end

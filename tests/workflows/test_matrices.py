@@ -88,10 +88,10 @@ def test_a_scene_of_matrices_runs_to_wear_and_pictures(folder: Path, capsys: pyt
     assert (folder / "out" / "pictures" / "hysteresis.png").is_file()
     result = store.load(folder / "out" / "result.h5")
     assert result.state == "complete: stopped after 4 wear steps"
-    assert result.frf is not None
+    assert result.response is not None
     assert result.wear is not None
-    assert result.frf.output_names == ("response", "mid")
-    assert set(result.frf.outcome) == {CONVERGED}
+    assert result.response.output_names == ("response", "mid")
+    assert set(result.response.outcome) == {CONVERGED}
     assert result.wear.worn.max(axis=1) == pytest.approx(1e-6, rel=1e-3)  # the step of the scene, whole cycles
     # worn volume is the coefficient times the friction work
     assert result.wear.worn.sum(0) @ np.full(2, 5e-6) == pytest.approx(2e-15 * result.wear.work.sum(), rel=1e-12)
@@ -128,9 +128,9 @@ def test_the_scene_is_the_same_as_the_documented_python(folder: Path, monkeypatc
         "harmonics.transitions=located",
     ]
     result = pipeline.run(read("own.toml", overrides), folder, Progress())
-    assert result.frf is not None
+    assert result.response is not None
     assert result.wear is not None
-    ours, theirs = names["response"], result.frf
+    ours, theirs = names["response"], result.response
     assert theirs.amplitude("response") == pytest.approx(ours.amplitude("tip"), rel=1e-6)
     assert result.wear.cycles == pytest.approx(names["history"].cycles, rel=1e-5)
     assert result.wear.depth == pytest.approx(names["history"].depth, rel=1e-5)

@@ -205,7 +205,7 @@ def test_a_failed_solve_says_where_and_leaves_with_3(tmp_path: Path) -> None:
     assert process.returncode == 3
     assert err.count("\n") == 1
     assert "ended at 380 Hz" in err
-    assert store.load(tmp_path / "result.h5").frf is not None
+    assert store.load(tmp_path / "result.h5").response is not None
 
 
 def test_resuming_another_scene_is_refused(finished: Result, tmp_path: Path) -> None:
@@ -232,9 +232,9 @@ def test_a_mesh_file_gives_what_its_part_gives(finished: Result, tmp_path: Path)
     own.write_text(text[:begin] + '[geometry]\nmesh = "mesh.msh"\nfixed = ["clamp"]\n' + text[end:])
     overrides = [override for override in SMALL if not override.startswith("geometry.")]
     result = pipeline.run(read(str(own), [*overrides, "wear="]), tmp_path, Progress())
-    assert result.frf is not None
-    assert finished.frf is not None
-    assert np.array_equal(result.frf.response, finished.frf.response)
+    assert result.response is not None
+    assert finished.response is not None
+    assert np.array_equal(result.response.response, finished.response.response)
 
 
 def test_more_steps_go_on_from_a_run_that_stopped(finished: Result, tmp_path: Path) -> None:

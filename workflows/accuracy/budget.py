@@ -87,7 +87,7 @@ def _of_reduction(balance: HarmonicBalance, file: SceneFile) -> Iterator[Entry]:
 
 
 def _of_response(balance: HarmonicBalance, result: Result) -> Iterator[Entry]:
-    frf = result.frf
+    frf = result.response
     if frf is None:
         return
     good = np.array([outcome == CONVERGED for outcome in frf.outcome])

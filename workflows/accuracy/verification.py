@@ -182,7 +182,7 @@ def _start(
         load = pipeline.mission(scene)[0].load if scene.wear is not None else 1.0
         balance = unworn.with_gap(unworn.parameters.gap + worn.depth).with_load(load)
         return balance, worn.omega, _carried(worn.displacement, basis, balance)
-    frf = result.frf
+    frf = result.response
     good = [] if frf is None else [i for i, outcome in enumerate(frf.outcome) if outcome == CONVERGED]
     if frf is None or not good:
         raise ValueError("the result has no response curve to start from: run its scene first")

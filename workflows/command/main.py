@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import cyclopts
 from cyclopts import Parameter
 
+from tribodyn.version import __version__
 from tribodyn.workflows.command import cases as cli_cases
 from tribodyn.workflows.command import exits
 from tribodyn.workflows.command import studies as cli_studies
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 app = cyclopts.App(
     name="tribodyn",
     help="From geometry to worn surface: vibration, friction and fretting wear of jointed parts.",
+    version=__version__,
     version_flags=["--version"],
     suppress_keyboard_interrupt=False,
 )
@@ -68,7 +70,8 @@ def run(
         Draw curves, maps and renders when done.
     """
     from tribodyn.workflows.accuracy.accuracy import tuned
-    from tribodyn.workflows.run import checkpoint, pipeline
+    from tribodyn.workflows.api import scenes
+    from tribodyn.workflows.run.pipeline import SolveFailed
     from tribodyn.workflows.run.progress import console_progress
 
     make_room(out)
@@ -80,36 +83,16 @@ def run(
         progress.say(promise.sentence)
     folder = out or Path("results") / file.name
     path = folder / "result.h5"
-    earlier = _earlier(path, file) if resume else None
-    if earlier is not None and checkpoint.is_complete(earlier, file.scene):
-        progress.say(f"{path} is complete already")
-        result = earlier
-    else:
-        folder.mkdir(parents=True, exist_ok=True)
-        try:
-            result = pipeline.run(file, folder, progress, earlier)
-        except KeyboardInterrupt:
-            raise KeyboardInterrupt(_kept(path, scene, file.overrides)) from None
-        except pipeline.SolveFailed as failure:
-            raise pipeline.SolveFailed(f"{failure}; what was computed before is kept in {path}") from None
+    try:
+        result = scenes.run(file, folder, progress=progress, resume=resume)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(_kept(path, scene, file.overrides)) from None
+    except SolveFailed as failure:
+        raise SolveFailed(f"{failure}; what was computed before is kept in {path}") from None
     _print_summary(result)
     progress.say(f"result: {path}")
     if pictures:
         _draw(result, folder / "pictures")
-
-
-def _earlier(path: Path, file: scene_file.SceneFile) -> Result | None:
-    """The unfinished result to go on from, None where there is none yet."""
-    from tribodyn.workflows.result import store
-    from tribodyn.workflows.run import checkpoint
-
-    if not path.exists():
-        return None
-    result = store.load(path)
-    key = checkpoint.same_problem(scene_file.from_json(result.provenance["scene"]), file.scene)
-    if key:
-        raise ValueError(f"{path} is the result of another scene, {key} differs: run its scene, or without --resume")
-    return result
 
 
 def _kept(path: Path, scene: str, overrides: Sequence[str]) -> str:
@@ -139,11 +122,11 @@ def show(result: Path, *, as_json: Json = False) -> None:
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.result import store, summary
+    from tribodyn.workflows.api import scenes
 
-    loaded = store.load(_result_file(result))
+    loaded = scenes.load(result)
     if as_json:
-        print(json.dumps(summary.summary(loaded), indent=2))
+        print(json.dumps(loaded.summary(), indent=2))
     else:
         _print_summary(loaded)
 
@@ -159,11 +142,10 @@ def render(result: Path, *, out: Path | None = None) -> None:
     out
         Folder of the pictures; beside the result unless told.
     """
-    from tribodyn.workflows.result import store
+    from tribodyn.workflows.api import scenes
 
     make_room(out)
-    path = _result_file(result)
-    _draw(store.load(path), out or path.parent / "pictures")
+    _draw(scenes.load(result), out or scenes.result_file(result).parent / "pictures")
 
 
 @app.command
@@ -195,16 +177,15 @@ def verify(
         Print JSON for machines.
     """
     from tribodyn.workflows.accuracy import verification
-    from tribodyn.workflows.result import store
-    from tribodyn.workflows.run import pipeline
+    from tribodyn.workflows.api import scenes
+    from tribodyn.workflows.run.pipeline import SolveFailed
     from tribodyn.workflows.run.progress import Progress, console_progress
 
-    path = _result_file(result)
     make_room(out)
     omega = None if at is None else 2 * math.pi * quantity("--at", at, "Hz")
     progress = Progress() if as_json else console_progress()
-    found = verification.compare(store.load(path), omega, row, overrides, steps, progress)
-    folder = out or path.parent / "pictures"
+    found = verification.compare(scenes.load(result), omega, row, overrides, steps, progress)
+    folder = out or scenes.result_file(result).parent / "pictures"
     folder.mkdir(parents=True, exist_ok=True)
     picture = folder / f"verify_{found.hertz:.6g}Hz{'' if row is None else f'_row{row}'}.png"
     verification.picture(found).savefig(picture)
@@ -214,7 +195,7 @@ def verify(
         print_lines(found.lines())
         print(picture)
     if found.found.outcome != "converged":
-        raise pipeline.SolveFailed(f"the time integration found no periodic motion: {found.found.outcome}")
+        raise SolveFailed(f"the time integration found no periodic motion: {found.found.outcome}")
 
 
 @app.command
@@ -226,13 +207,9 @@ def plan(scene: str, *, overrides: Overrides = ()) -> None:
     scene
         Name of a scene (see `tribodyn list`) or a .toml file.
     """
-    from tribodyn.workflows.run import planning
+    from tribodyn.workflows.api import scenes
 
-    print_lines(planning.plan(scene_file.read(scene, overrides)).lines())
-
-
-def _result_file(path: Path) -> Path:
-    return path / "result.h5" if path.is_dir() else path
+    print_lines(scenes.plan(scene, overrides).lines())
 
 
 def _print_summary(result: Result) -> None:
@@ -242,21 +219,12 @@ def _print_summary(result: Result) -> None:
 
 
 def _draw(result: Result, folder: Path) -> None:
-    """Draw what the scene of a result wants drawn; curves come first, they need no system libraries."""
-    from tribodyn.workflows.pictures import plots
+    from tribodyn.workflows.api import scenes
 
-    wanted = scene_file.from_json(result.provenance["scene"]).pictures
-    folder.mkdir(parents=True, exist_ok=True)
-    written = plots.draw(result, folder) if wanted.plots else []
-    if wanted.renders:
-        from tribodyn.workflows.pictures import render as renders
-
-        try:
-            written += renders.draw(result, folder, wanted.deformation_scale, wanted.wear_scale)
-        except renders.RenderingUnavailable as missing:
-            print(f"no renders: {missing}")
-    for path in written:
-        print(path)
+    written, missing = scenes.draw(result, folder)
+    if missing:
+        print(missing)
+    print(*written, sep="\n")
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ FAINT = 1e-3  # share of the first preload below which a touch is faint
 def draw(result: Result, folder: Path) -> list[Path]:
     """Write every figure that the result has data for as a PNG; returns their paths."""
     figures: list[tuple[str, Callable[[Result], Figure], bool]] = [
-        ("frf", frequency_response, result.frf is not None or result.wear is not None),
+        ("frf", frequency_response, result.response is not None or result.wear is not None),
         ("cycles_per_step", cycles_per_step, result.wear_steps > 0),
         ("peak", amplitude_against_cycles, result.wear_steps > 0),
         ("preload", preload_against_cycles, result.wear_steps > 0),
@@ -51,9 +51,9 @@ def frequency_response(result: Result) -> Figure:
             hertz = result.references.omega / (2 * np.pi)
             axes.plot(hertz, scale * result.references.free, "--", color=GREY, label="free (contact absent)")
             axes.plot(hertz, scale * result.references.stuck, ":", color=INK, label="stuck (closed, no slip)")
-        if result.frf is not None:
-            good = np.array([outcome == CONVERGED for outcome in result.frf.outcome])
-            amplitude = scale * result.frf.amplitude(result.frf.output_names[0])
+        if result.response is not None:
+            good = np.array([outcome == CONVERGED for outcome in result.response.outcome])
+            amplitude = scale * result.response.amplitude(result.response.output_names[0])
             _curve(axes, result, good, amplitude, scale)
         if result.wear is not None and result.wear_steps:
             wear = result.wear
@@ -76,7 +76,7 @@ def frequency_response(result: Result) -> Figure:
 
 def _curve(axes: Any, result: Result, good: np.ndarray, amplitude: np.ndarray, scale: float) -> None:
     """The response curve: unstable stretches dashed, bifurcations marked, the range over load paths as a band."""
-    frf, marks, bounds = result.frf, result.stability, result.bounds
+    frf, marks, bounds = result.response, result.stability, result.bounds
     assert frf is not None
     hertz = frf.frequency
     if bounds is not None:

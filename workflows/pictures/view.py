@@ -52,10 +52,15 @@ def swing(displacement: np.ndarray, harmonics: tuple[int, ...]) -> np.ndarray:
     displacement : (n_node, 3, n_coeff) on these harmonics [m]
     Returns (n_node, 3) [m]
     """
-    basis = HarmonicBasis(harmonics, max(INSTANTS, 2 * harmonics[-1] + 1))
-    dynamic = displacement @ (basis.synthesis * (basis.order > 0)).T
+    dynamic = cycle(displacement, harmonics)
     farthest = int(np.argmax(np.sum(dynamic**2, axis=(0, 1))))
     return np.asarray(dynamic[..., farthest])
+
+
+def cycle(displacement: np.ndarray, harmonics: tuple[int, ...]) -> np.ndarray:
+    """Vibration about the mean position (..., n_instant) over one cycle from coefficients (..., n_coeff) [m]."""
+    basis = HarmonicBasis(harmonics, max(INSTANTS, 2 * harmonics[-1] + 1))
+    return np.asarray(displacement @ (basis.synthesis * (basis.order > 0)).T)
 
 
 def deformation_scale(displacement: np.ndarray, size: float) -> float:

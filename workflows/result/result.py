@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -11,6 +12,10 @@ from scipy.spatial import cKDTree
 from tribodyn.hbm.branch import Branch
 from tribodyn.hbm.evolution import LOST, LOST_AT_REST
 from tribodyn.hbm.wear_history import WearHistory
+
+if TYPE_CHECKING:
+    import pyvista as pv
+    from matplotlib.figure import Figure
 
 PRELOAD_LOST = "preload fell below"  # how hbm.evolution begins the other sentence for a lost contact
 
@@ -164,12 +169,12 @@ class WornResponses:
 
 @dataclass(frozen=True)
 class Result:
-    """A run, finished or not.
+    """A run, finished or not: plain data, and methods that read or draw it and import what they need when called.
 
     provenance : scene text and overrides, versions, seed, start time, threads
     facts : what was modelled and how long it took: sizes, solver names, delta_max_m, seconds, ...
     state : sentence that says how far the run came
-    frf : response curve of the unworn contact; stability, bounds : of it, where the scene asks for them
+    response : curve of the unworn contact; stability, bounds : of it, where the scene asks for them
     """
 
     provenance: Mapping[str, str]
@@ -178,7 +183,7 @@ class Result:
     patch: Patch | None = None
     part: PartMesh | None = None
     references: References | None = None
-    frf: Branch | None = None
+    response: Branch | None = None
     stability: CurveStability | None = None
     bounds: ShearBounds | None = None
     wear: WearHistory | None = None
@@ -200,6 +205,69 @@ class Result:
     def contact_lost(self) -> bool:
         """Whether wear went on until every pair was separated."""
         return self.wear is not None and self.wear.end.startswith((LOST, PRELOAD_LOST, LOST_AT_REST))
+
+    def summary(self) -> dict[str, Any]:
+        """The numbers of the result as plain data, see result.summary: what `tribodyn show --json` prints."""
+        from tribodyn.workflows.result import summary
+
+        return summary.summary(self)
+
+    def mesh_fields(self, row: int | None = None) -> pv.UnstructuredGrid:
+        """The mesh of the part as a pyvista grid with fields at a wear row, see pictures.mesh_fields."""
+        from tribodyn.workflows.pictures import mesh_fields
+
+        return mesh_fields.mesh_fields(self, row)
+
+    def patch_fields(self, row: int = -1) -> pv.PolyData:
+        """The contact patch as a pyvista surface with fields at a wear row, see pictures.mesh_fields."""
+        from tribodyn.workflows.pictures import mesh_fields
+
+        return mesh_fields.patch_fields(self, row)
+
+    def plot_response(self) -> Figure:
+        """Response between its linear references, and the path of the peak under wear."""
+        from tribodyn.workflows.pictures import plots
+
+        return plots.frequency_response(self)
+
+    def plot_wear(self, what: Literal["depth", "peak", "preload", "energy", "cycles_per_step"] = "depth") -> Figure:
+        """Course of the wear: depth, resonance peak, preload or friction work against cycles, or cycles of each step.
+
+        Raises  ValueError where nothing was worn
+        """
+        from tribodyn.workflows.pictures import plots
+
+        if not self.wear_steps:
+            raise ValueError("the result holds no wear steps: its scene needs [wear] with max_steps above 0")
+        draw = {
+            "depth": plots.depth_against_cycles,
+            "peak": plots.amplitude_against_cycles,
+            "preload": plots.preload_against_cycles,
+            "energy": plots.energy_against_cycles,
+            "cycles_per_step": plots.cycles_per_step,
+        }
+        if what not in draw:
+            raise ValueError(f'no wear plot "{what}": there are {", ".join(draw)}')
+        return draw[what](self)
+
+    def plot_hysteresis(self) -> Figure:
+        """Friction force against displacement of some pairs over a cycle; raises ValueError where none are kept."""
+        from tribodyn.workflows.pictures import plots
+
+        if self.loops is None:
+            raise ValueError("the result holds no hysteresis loops: its scene needs [wear] and pictures.plots = true")
+        return plots.hysteresis_loops(self)
+
+    def plot_patch(self, rows: Sequence[int] | None = None) -> Figure:
+        """Maps of wear depth, contact status and pressure on the patch at wear rows, those of the pictures by default.
+
+        Raises  ValueError where nothing was worn or the patch has no faces
+        """
+        from tribodyn.workflows.pictures import maps
+
+        if not self.wear_steps or self.patch is None or not len(self.patch.faces):
+            raise ValueError("the result holds no worn patch with faces to draw a map on")
+        return maps.patch_maps(self, None if rows is None else np.asarray(rows))
 
     def shown_rows(self) -> np.ndarray:
         """Wear rows that pictures show: those of the fields, else the first, the middle and the last worn."""

@@ -30,6 +30,7 @@ from tribodyn.workflows.result.result import (
 from tribodyn.workflows.result.whole_file import replacing
 
 FORMAT = "tribodyn result 1"
+FIELD = {"frf": "response"}  # groups of the file that have another name than the field of a Result
 
 # group -> (type, {array: (dimensions, unit)}); what is not an array is an attribute of the group
 SCHEMA: dict[str, tuple[type, dict[str, tuple[tuple[str, ...], str]]]] = {
@@ -156,7 +157,7 @@ def _write(file: h5py.File, result: Result) -> None:
         for key, value in getattr(result, name).items():
             group.attrs[key] = value
     for name, (_, arrays) in SCHEMA.items():
-        part = getattr(result, name)
+        part = getattr(result, FIELD.get(name, name))
         if part is None:
             continue
         group = file.create_group(name)
@@ -204,7 +205,11 @@ def load(path: Path) -> Result:
         if file.attrs.get("format") != FORMAT:
             raise ResultError(f'"{path}" is not a result file of this version of tribodyn')
         try:
-            parts = {name: _read(file[name], kind, arrays) for name, (kind, arrays) in SCHEMA.items() if name in file}
+            parts = {
+                FIELD.get(name, name): _read(file[name], kind, arrays)
+                for name, (kind, arrays) in SCHEMA.items()
+                if name in file
+            }
         except KeyError:
             raise ResultError(f'"{path}" was written by another version of tribodyn: run its scene again') from None
         return Result(

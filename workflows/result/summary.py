@@ -73,7 +73,7 @@ def _wear(result: Result) -> dict[str, Any]:
 
 
 def _peak(result: Result) -> dict[str, Any]:
-    wear, frf = result.wear, result.frf
+    wear, frf = result.wear, result.response
     if wear is not None and len(wear.omega):
         ends = [0, -1]
         return {
@@ -93,7 +93,7 @@ def _peak(result: Result) -> dict[str, Any]:
 
 def _stable_peak(result: Result) -> dict[str, Any]:
     """An unstable motion is a solution of the balance that no vibration stays at, however high it is."""
-    frf, marks = result.frf, result.stability
+    frf, marks = result.response, result.stability
     if frf is None or marks is None:
         return dict.fromkeys(("peak_is_stable", "stable_peak_hz", "stable_peak_m"))
     height = np.where([outcome == CONVERGED for outcome in frf.outcome], frf.amplitude(frf.output_names[0]), -1.0)
@@ -107,7 +107,7 @@ def _stable_peak(result: Result) -> dict[str, Any]:
 
 
 def _curve(result: Result) -> dict[str, Any]:
-    harmonics, frf = result.facts.get("harmonics"), result.frf
+    harmonics, frf = result.facts.get("harmonics"), result.response
     numbers: dict[str, Any] = {
         "harmonics": None if harmonics is None else [int(h) for h in np.atleast_1d(harmonics)],
         "harmonics_error": result.facts.get("harmonics_error"),

@@ -9,6 +9,8 @@ from typing import Any
 
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import Scene
 
 
@@ -26,16 +28,31 @@ class Clock:
 
 @dataclass(frozen=True)
 class Keeper:
-    """Writes each new state of the result to its file."""
+    """Writes each new state of the result to its file; without one the result lives in memory alone."""
 
-    path: Path
+    path: Path | None
     clock: Clock
 
     def __call__(self, result: Result) -> Result:
         """Write a result with the seconds it took, and give it back."""
         timed = replace(result, facts={**result.facts, "seconds": self.clock.seconds()})
-        store.save(self.path, timed)
+        if self.path is not None:
+            store.save(self.path, timed)
         return timed
+
+
+def earlier(path: Path, file: SceneFile) -> Result | None:
+    """The result at `path` for a scene to resume from, None where there is none yet.
+
+    Raises  ValueError where it is the result of another scene
+    """
+    if not path.exists():
+        return None
+    result = store.load(path)
+    key = same_problem(scene_file.from_json(result.provenance["scene"]), file.scene)
+    if key:
+        raise ValueError(f"{path} is the result of another scene, {key} differs: run its scene, or without --resume")
+    return result
 
 
 def is_complete(result: Result, scene: Scene) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import platform
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -14,6 +13,7 @@ from tribodyn.geometry import mesh as mesh_reader
 from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.harmonic_choice import HarmonicChoice
+from tribodyn.version import package_version
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
 from tribodyn.workflows.run.references import delta_max, free_deflection
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -81,14 +81,6 @@ def provenance(file: SceneFile) -> dict[str, str]:
         "threads": str(file.scene.solver.threads),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
     }
-
-
-def package_version(name: str) -> str:
-    """Version of an installed package; a source tree that is run without being installed has none."""
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "not installed"
 
 
 def part_mesh(part: Part) -> PartMesh:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -71,32 +72,33 @@ class Model:
     choice: HarmonicChoice | None = None
 
 
-def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | None = None) -> Result:
+def run(file: SceneFile, folder: Path | None, progress: Progress, earlier: Result | None = None) -> Result:
     """Compute everything that a scene asks for, and keep it in `folder`/result.h5 while it grows.
 
+    folder : None keeps nothing on disk
     earlier : an unfinished result of the same scene to go on from
     Raises  ValueError: the scene asks for what cannot be, SolveFailed: after what was computed is kept
     """
     scene, clock = file.scene, Clock(earlier)
     check_names(scene, file.folder)
-    keep = Keeper(folder / "result.h5", clock)
-    with threadpool_limits(scene.solver.threads):
-        model = build(file, folder, progress, () if earlier is None else earlier.harmonics)
+    keep = Keeper(None if folder is None else folder / "result.h5", clock)
+    with threadpool_limits(scene.solver.threads), TemporaryDirectory() as scratch:
+        model = build(file, folder or Path(scratch), progress, () if earlier is None else earlier.harmonics)
         result = earlier or described(file, model.part, model.balance, model.choice)
         if scene.wears and result.patch is not None:
             step_limit(scene, result.patch.free_deflection, result.patch.area)  # raises before anything long is begun
-        previous = None if earlier else store.set_aside(keep.path)
+        previous = None if earlier or keep.path is None else store.set_aside(keep.path)
         if previous:
             progress.say(f"the result that was here is now {previous}")
         keep(result)
-        if result.frf is None:
+        if result.response is None:
             with progress.track("frequency response") as advance:
                 frf = follow_response(scene, model.balance, advance)
             with progress.stage("linear references"):
                 low, high = scene.response.references or scene.response.frequency
                 linear = references.linear_references(model.balance, OUTPUT, 2 * np.pi * low, 2 * np.pi * high)
-            result = keep(replace(result, frf=frf, references=linear, state="response computed"))
-        check_branch(result.frf)
+            result = keep(replace(result, response=frf, references=linear, state="response computed"))
+        check_branch(result.response)
         result = keep(judged(scene, model.balance, result, progress))
         if scene.wears:
             with progress.track("wear") as advance:
@@ -118,7 +120,7 @@ def run(file: SceneFile, folder: Path, progress: Progress, earlier: Result | Non
 
 def judged(scene: Scene, balance: HarmonicBalance, result: Result, progress: Progress) -> Result:
     """The result with what the scene asks about its response curve and is not there yet."""
-    frf = result.frf
+    frf = result.response
     assert frf is not None
     if scene.response.stability and result.stability is None:
         with progress.stage("stability"):

@@ -62,6 +62,29 @@ class Progress:
             self._console.print(text, highlight=False)
 
 
+Callback = Callable[[str, float | None], None]
+"""Called with a sentence or the name of a stage, and with the share of the stage that is done, None for a sentence."""
+
+
+class CallbackProgress(Progress):
+    """Reports to a function instead of a console."""
+
+    def __init__(self, callback: Callback):
+        super().__init__()
+        self._callback = callback
+
+    @contextmanager
+    def track(self, name: str) -> Iterator[Callable[[float, str], None]]:
+        """Long work: every advance goes to the callback as it comes."""
+        start = time.perf_counter()
+        yield lambda share, note: self._callback(f"{name}: {note}" if note else name, min(share, 1.0))
+        self.say(f"{name}: {time.perf_counter() - start:.1f} s")
+
+    def say(self, text: str) -> None:
+        """A sentence."""
+        self._callback(text, None)
+
+
 def console_progress() -> Progress:
     """Progress on standard output; standard error is kept for what goes wrong."""
     return Progress(Console())

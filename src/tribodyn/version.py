@@ -1,0 +1,16 @@
+"""The version of this program and of the packages that it uses, as they are installed."""
+
+from __future__ import annotations
+
+from importlib.metadata import PackageNotFoundError, version
+
+
+def package_version(name: str) -> str:
+    """Version of an installed package; a source tree that is run without being installed has none."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+__version__ = package_version("tribodyn")
