@@ -102,7 +102,7 @@ def test_what_cannot_be_written_is_refused_before_long_work(
 
 
 def test_closed_standard_streams_do_not_matter() -> None:
-    command = f"{sys.executable} -m workflows.cli list >&-"
+    command = f"{sys.executable} -m tribodyn list >&-"
     done = subprocess.run(command, shell=True, cwd=ROOT, capture_output=True, check=False)
     assert (done.returncode, done.stderr) == (0, b"")
 
@@ -250,9 +250,9 @@ def test_render_draws_the_pictures_of_a_result(capsys: pytest.CaptureFixture[str
 @pytest.mark.parametrize(
     ("statement", "banned"),
     [
-        ("import workflows.cli", {"gmsh", "pyvista", "vtk", "matplotlib", "numba", "skfem", "h5py"}),
-        ("import workflows.pipeline", {"gmsh", "pyvista", "vtk", "matplotlib"}),
-        ("import workflows.summary, workflows.store", {"gmsh", "pyvista", "vtk", "matplotlib", "skfem"}),
+        ("import tribodyn.workflows.command.main", {"gmsh", "pyvista", "vtk", "matplotlib", "numba", "skfem", "h5py"}),
+        ("import tribodyn.workflows.run.pipeline", {"gmsh", "pyvista", "vtk", "matplotlib"}),
+        ("import tribodyn.workflows.result.summary, tribodyn.workflows.result.store", {"gmsh", "pyvista", "vtk", "matplotlib", "skfem"}),
     ],
 )
 def test_packages_are_imported_only_where_they_are_used(statement: str, banned: set[str]) -> None:
