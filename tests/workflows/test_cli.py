@@ -252,7 +252,10 @@ def test_render_draws_the_pictures_of_a_result(capsys: pytest.CaptureFixture[str
     [
         ("import tribodyn.workflows.command.main", {"gmsh", "pyvista", "vtk", "matplotlib", "numba", "skfem", "h5py"}),
         ("import tribodyn.workflows.run.pipeline", {"gmsh", "pyvista", "vtk", "matplotlib"}),
-        ("import tribodyn.workflows.result.summary, tribodyn.workflows.result.store", {"gmsh", "pyvista", "vtk", "matplotlib", "skfem"}),
+        (
+            "import tribodyn.workflows.result.summary, tribodyn.workflows.result.store",
+            {"gmsh", "pyvista", "vtk", "matplotlib", "skfem"},
+        ),
     ],
 )
 def test_packages_are_imported_only_where_they_are_used(statement: str, banned: set[str]) -> None:
