@@ -1,0 +1,241 @@
+"""Pages made from the program itself: the keys of a scene, the commands, the layout of a result, the tree of the folders."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import re
+import subprocess
+import textwrap
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Literal, get_args, get_origin
+
+from cyclopts import App
+from pydantic import BaseModel
+from pydantic_core import PydanticUndefined
+
+from tribodyn.geometry import parts
+from tribodyn.hbm import continuation
+from tribodyn.workflows.command.main import app
+from tribodyn.workflows.result import store
+from tribodyn.workflows.scene.fields import Direction, Quantity
+from tribodyn.workflows.scene.matrices import MatrixScene
+from tribodyn.workflows.scene.schema import PartScene
+
+ROOT = Path(__file__).parents[1]
+AXES = get_args(Direction)[1]
+BOUNDS = (("gt", "above"), ("ge", "at least"), ("lt", "below"), ("le", "at most"))
+
+
+def version() -> str:
+    """Version of the program."""
+    return str(tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"])
+
+
+def write(folder: Path) -> None:
+    """Write all of them; a page that has not changed is left alone, so that Sphinx does not read it again."""
+    folder.mkdir(exist_ok=True)
+    pages = {
+        "scene_of_a_part": scene_keys(PartScene),
+        "scene_of_matrices": scene_keys(MatrixScene, without=PartScene),
+        "parts": parameters_of(f"tribodyn.geometry.{name}" for name in parts.names()),
+        "continuations": parameters_of((f"{continuation.__name__}.{name}" for name in continuation.names()), "Options"),
+        "commands": commands(app),
+        "result": result_layout(),
+    }
+    for name, text in pages.items():
+        path = folder / f"{name}.md"
+        if not path.exists() or path.read_text() != text:
+            path.write_text(text)
+
+
+# Keys of a scene
+
+
+def scene_keys(kind: type[BaseModel], without: type[BaseModel] | None = None) -> str:
+    """A section for each table of a scene; tables that the scene `without` has just so are left out."""
+    lines: list[str] = []
+    for path, table in _tables(kind, ()):
+        if without is not None and any(path == other and table is known for other, known in _tables(without, ())):
+            continue
+        lines += [f"## `[{'.'.join(path)}]`", "", _paragraph(table.__doc__), ""]
+        rows = [_row(name, field) for name, field in table.model_fields.items() if _is_key(name, field, path)]
+        lines += _table(("key", "unit", "default", "meaning"), rows)
+    return "\n".join(lines)
+
+
+def _tables(kind: type[BaseModel], path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], type[BaseModel]]]:
+    """Every table below a table, with its dotted path; NAME stands for a name that the scene chooses."""
+    if path:
+        yield path, kind
+    for name, field in kind.model_fields.items():
+        table = _inner(field.annotation)
+        if table is None or _is_value(table):
+            continue
+        named = "NAME" if _is_mapping(field.annotation) else None
+        yield from _tables(table, (*path, name, *filter(None, [named])))
+
+
+def _is_value(table: type[BaseModel]) -> bool:
+    """Whether a table stands for a value that is written as a text or a small inline table."""
+    return table.__name__ in ("Place", "WearStep", "Variable")
+
+
+def _is_key(name: str, field: Any, path: tuple[str, ...]) -> bool:
+    table = _inner(field.annotation)
+    return (table is None or _is_value(table)) and (path, name) != (("geometry",), "parameters")
+
+
+def _inner(annotation: Any) -> type[BaseModel] | None:
+    """The first table inside an annotation."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((table for inner in get_args(annotation) if (table := _inner(inner))), None)
+
+
+def _is_mapping(annotation: Any) -> bool:
+    return get_origin(annotation) is dict or any(_is_mapping(inner) for inner in get_args(annotation))
+
+
+def _row(name: str, field: Any) -> tuple[str, ...]:
+    marks = [*field.metadata, *_marks(field.annotation)]
+    if not field.description:
+        raise ValueError(f"the key {name} of a scene has no meaning written below it")
+    units = [mark.unit for mark in marks if isinstance(mark, Quantity)]
+    axes = AXES in marks
+    unit = ("ratio" if units[0] == "" else units[0]) if units else "axis" if axes else ""
+    bounds = [f"{word} {getattr(mark, key):g}" for mark in marks for key, word in BOUNDS if hasattr(mark, key)]
+    choices = [repr(choice).replace("'", '"') for choice in _choices(field.annotation)]
+    notes = [f"One of {', '.join(f'`{c}`' for c in choices)}." if choices else "", _bounds(bounds)]
+    meaning = " ".join(filter(None, [_paragraph(field.description), *notes]))
+    return f"`{name}`", unit, _default(field), meaning
+
+
+def _bounds(bounds: list[str]) -> str:
+    return f"{' and '.join(dict.fromkeys(bounds)).capitalize()}." if bounds else ""
+
+
+def _marks(annotation: Any) -> Iterator[Any]:
+    """Marks of Annotated types anywhere inside an annotation."""
+    yield from getattr(annotation, "__metadata__", ())
+    for inner in get_args(annotation):
+        yield from _marks(inner)
+
+
+def _choices(annotation: Any) -> tuple[Any, ...]:
+    if get_origin(annotation) is Literal:
+        return get_args(annotation)
+    return next((found for inner in get_args(annotation) if (found := _choices(inner))), ())
+
+
+def _default(field: Any) -> str:
+    if field.is_required():
+        return "required"
+    value = field.default_factory() if field.default_factory else field.default
+    if value is None or value is PydanticUndefined or value in ((), {}, ""):
+        return ""
+    if isinstance(value, BaseModel):
+        said = {key: part for key, part in value.model_dump().items() if part is not None}
+        return "`\"peak\"`" if said == {"peak": 1.0} else f"`{said}`"
+    if isinstance(value, tuple):
+        value = list(value)
+    text = str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else repr(value)
+    return "`" + text.replace("'", '"') + "`"
+
+
+# Parameters that a file declares
+
+
+def parameters_of(modules: Iterable[str], name: str = "Parameters") -> str:
+    """A section for each module that declares a dataclass of parameters, with defaults and meanings."""
+    lines: list[str] = []
+    for module in map(importlib.import_module, modules):
+        kind = getattr(module, name)
+        lines += [f"## `{module.__name__.rpartition('.')[2]}`", "", _paragraph(_head(module)), ""]
+        meanings = _meanings(kind)
+        rows = []
+        for item in dataclasses.fields(kind):
+            if item.name in ("newton", "guess"):  # given by the program, not by a scene
+                continue
+            default = "" if item.default is dataclasses.MISSING or item.default is None else f"`{item.default!r}`"
+            rows.append((f"`{item.name}`", default, _paragraph(meanings.get(item.name, ""))))
+        lines += _table(("key", "default", "meaning"), rows)
+    return "\n".join(lines)
+
+
+def _head(thing: ModuleType | type) -> str:
+    return (thing.__doc__ or "").strip().split("\n\n")[0]
+
+
+def _meanings(kind: type) -> dict[str, str]:
+    """Meaning of every name in the lines "name, name : meaning; name : meaning" of a docstring."""
+    meanings: dict[str, str] = {}
+    text = re.sub(r"\n {4,}", " ", textwrap.dedent("    " + (kind.__doc__ or "")))
+    names = {item.name for item in dataclasses.fields(kind)}
+    for line in text.splitlines():
+        for piece in re.split(r"; (?=\w+(?:, \w+)* : )", line):
+            said, colon, meaning = piece.partition(" : ")
+            listed = [name.strip() for name in said.split(",")]
+            if colon and names.issuperset(listed):
+                meanings |= dict.fromkeys(listed, meaning.strip())
+    return meanings
+
+
+# Commands
+
+
+def commands(program: App) -> str:
+    """A section for each command, from the help that the command itself prints."""
+    lines: list[str] = []
+    for name in sorted(word for word in program if not word.startswith("-")):
+        command = program[name]
+        lines += [f"## `tribodyn {name}`", "", _paragraph(command.help.split("Parameters\n")[0]), ""]
+        arguments = command.assemble_argument_collection()
+        rows = []
+        for argument in arguments:
+            words = ", ".join(f"`{word}`" for word in argument.names)
+            rows.append((words, _argument_default(argument), _paragraph(argument.parameter.help or "")))
+        lines += _table(("argument", "default", "meaning"), rows)
+    return "\n".join(lines)
+
+
+def _argument_default(argument: Any) -> str:
+    if argument.required:
+        return "required"
+    value = argument.field_info.default
+    return "" if value in (None, (), False) or value is argument.field_info.empty else f"`{value}`"
+
+
+# The result file
+
+
+def result_layout() -> str:
+    """A section for each group of the result file, with dimensions and units of its arrays."""
+    lines: list[str] = []
+    for name, (kind, arrays) in store.SCHEMA.items():
+        lines += [f"## `/{name}`", "", _paragraph(_head(kind)), ""]
+        meanings = _meanings(kind)
+        rows = []
+        for item in dataclasses.fields(kind):
+            shape, unit = arrays.get(item.name, (None, ""))
+            where = " x ".join(shape) if shape is not None else "attribute"
+            rows.append((f"`{item.name}`", where, unit, _paragraph(meanings.get(item.name, ""))))
+        lines += _table(("name", "dimensions", "unit", "meaning"), rows)
+    return "\n".join(lines)
+
+
+def _paragraph(text: str | None) -> str:
+    """Text of a docstring as one paragraph of Markdown."""
+    plain = " ".join((text or "").split())
+    pieces = re.split(r"(`[^`]*`)", plain)
+    return "".join(p if p.startswith("`") else re.sub(r"([*_|<>\[\]$])", r"\\\1", p) for p in pieces)
+
+
+def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
+    if not rows:
+        return []
+    lines = [f"| {' | '.join(cells)} |" for cells in (head, ("---",) * len(head), *rows)]
+    return [*lines, ""]
