@@ -1,14 +1,13 @@
-"""Pages made from the program itself: the keys of a scene, the commands, the layout of a result, the tree of the folders."""
+"""Pages made from the program itself: the keys of a scene, the commands, the layout of a result, the folders."""
 
 from __future__ import annotations
 
 import dataclasses
 import importlib
 import re
-import subprocess
 import textwrap
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal, get_args, get_origin
@@ -139,7 +138,7 @@ def _default(field: Any) -> str:
         return ""
     if isinstance(value, BaseModel):
         said = {key: part for key, part in value.model_dump().items() if part is not None}
-        return "`\"peak\"`" if said == {"peak": 1.0} else f"`{said}`"
+        return '`"peak"`' if said == {"peak": 1.0} else f"`{said}`"
     if isinstance(value, tuple):
         value = list(value)
     text = str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else repr(value)
