@@ -13,9 +13,7 @@ import cyclopts
 from cyclopts import Parameter
 
 from tribodyn.version import __version__
-from tribodyn.workflows.command import cases as cli_cases
-from tribodyn.workflows.command import exits
-from tribodyn.workflows.command import studies as cli_studies
+from tribodyn.workflows.command import exits, found
 from tribodyn.workflows.command.words import Flag, Json, Overrides, make_room, print_lines, quantity
 from tribodyn.workflows.scene import scene_file
 
@@ -29,9 +27,8 @@ app = cyclopts.App(
     version_flags=["--version"],
     suppress_keyboard_interrupt=False,
 )
-for module in (cli_studies, cli_cases):
-    for command in module.COMMANDS:
-        app.command(command)
+for command in found.commands():
+    app.command(command)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
