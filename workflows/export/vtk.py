@@ -1,0 +1,149 @@
+"""Series for ParaView: part and contact over wear and over a cycle, as .vtu and .vtp files with a .pvd that lists them.
+
+Point coordinates are those of the worn part at rest, not exaggerated; displacements are fields, to warp by in ParaView.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.workflows.result.faces import faces_of, worn_off
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.states import State, instant_status, over_a_cycle, shown_states, state_of
+
+INSTANTS = 32  # of a period
+
+
+def write_vtk(result: Result, folder: Path) -> list[Path]:
+    """wear/ and cycle_N/ with their files, and one .pvd for each series; returns the .pvd files.
+
+    Raises  ValueError where the result has neither faces of its contact nor a mesh
+    """
+    if result.patch is None or (not len(result.patch.faces) and result.part is None):
+        raise ValueError("vtk: the contact of this result has no faces and its part no mesh; nothing can be drawn of it")
+    written: list[Path] = []
+    if result.wear is not None and len(result.wear.cycles):
+        states = [state_of(result, row) for row in range(len(result.wear.cycles))]
+        times = [state.cycles for state in states]
+        for name, make in (("part", part_grid), ("contact", contact_surface)):
+            if _has(result, name):
+                written.append(_series(folder, f"{name}_wear", times, [lambda s=s, m=make: m(result, s) for s in states]))
+    for state in shown_states(result):
+        written += _cycle(result, state, folder)
+    return written
+
+
+def _has(result: Result, name: str) -> bool:
+    assert result.patch is not None
+    return result.part is not None if name == "part" else len(result.patch.faces) > 0
+
+
+def _cycle(result: Result, state: State, folder: Path) -> list[Path]:
+    """The series over one period of a state; time is the share of the period."""
+    written, times = [], (np.arange(INSTANTS) / INSTANTS).tolist()
+    if state.field is not None and result.part is not None:
+        _, moved = over_a_cycle(result, state.field, INSTANTS)
+
+        def moving(i: int) -> Any:
+            grid = part_grid(result, state)
+            grid.point_data["displacement"] = moved[i]
+            return grid
+
+        written.append(_series(folder, f"part_cycle_{state.number}", times, [lambda i=i: moving(i) for i in range(INSTANTS)]))
+    loops = result.loops
+    if loops is not None and state.number in loops.row.tolist() and _has(result, "contact"):
+        at = loops.row.tolist().index(state.number)
+        samples = loops.force.shape[-1]
+        status = instant_status(result, at)
+
+        def touching(i: int) -> Any:
+            surface, k = contact_surface(result, state), i * samples // INSTANTS
+            surface.point_data["relative_displacement"] = _vectors(result, loops.displacement[at, :, :, k])
+            surface.point_data["contact_force"] = _vectors(result, loops.force[at, :, :, k])
+            surface.point_data["status_now"] = status[:, k]
+            return surface
+
+        if samples % INSTANTS == 0:
+            names = [lambda i=i: touching(i) for i in range(INSTANTS)]
+            written.append(_series(folder, f"contact_cycle_{state.number}", times, names))
+    return written
+
+
+def _vectors(result: Result, components: np.ndarray) -> np.ndarray:
+    """Components (n_pair, n_component) along t1, t2, n as vectors (n_pair, 3) along x, y, z."""
+    assert result.patch is not None
+    names = ("t1", "t2", "n")
+    axes = result.patch.frames[:, [names.index(name) for name in result.patch.components]]
+    return np.asarray(np.einsum("pc,pcx->px", components, axes))
+
+
+def part_grid(result: Result, state: State) -> Any:
+    """The worn part as a pyvista grid with its fields at nodes, of one state."""
+    import pyvista as pv
+
+    part = result.part
+    assert part is not None
+    faces = faces_of(result)
+    moved = worn_off(faces, state.depth, len(part.points))
+    grid = pv.UnstructuredGrid({getattr(pv.CellType, part.kind.upper()): part.cells}, part.points + moved)
+    grid.point_data["worn_off"] = moved
+    depth, contact = np.zeros(len(part.points)), np.zeros(len(part.points), np.int8)
+    for number, face in enumerate(faces):
+        depth[face.nodes] = face.share * state.depth
+        contact[face.nodes] = number + 1
+    grid.point_data["depth_on_this_face"], grid.point_data["face"] = depth, contact
+    if state.field is not None and result.fields is not None:
+        terms = result.fields.displacement[state.field]
+        basis = HarmonicBasis(result.harmonics, 2 * result.harmonics[-1] + 1)
+        for k, order in enumerate(basis.order):
+            letter = "b" if k and basis.order[k - 1] == order else "a"
+            grid.point_data[f"displacement_{letter}{order}"] = terms[..., k]
+    grid.field_data["frequency_Hz"] = [state.omega / (2 * np.pi)]
+    grid.field_data["cycles"] = [state.cycles]
+    return grid
+
+
+def contact_surface(result: Result, state: State) -> Any:
+    """Body 1's face of the contact as a pyvista surface: fields of the pairs at its points, their means on its faces."""
+    import pyvista as pv
+
+    patch = result.patch
+    assert patch is not None
+    faces = np.column_stack([np.full(len(patch.faces), patch.faces.shape[1]), patch.faces]).ravel()
+    split = float(np.squeeze(np.asarray(result.facts.get("wear_split", 0.5), float)))
+    surface = pv.PolyData(patch.points - split * state.depth[:, None] * patch.frames[:, 2], faces)
+    fields: dict[str, np.ndarray] = {"depth": state.depth, "area": patch.area, "gap": patch.gap + state.depth}
+    if state.pressure is not None:
+        fields["pressure"] = state.pressure
+    if result.wear is not None and len(result.wear.cycles):
+        fields["energy_per_cycle"] = result.wear.energy[state.number]
+    for name, values in fields.items():
+        surface.point_data[name] = values
+        surface.cell_data[name] = values[patch.faces].mean(axis=1)
+    if state.status is not None:
+        surface.point_data["status"] = state.status
+    surface.point_data["normal"] = patch.frames[:, 2]
+    surface.field_data["frequency_Hz"] = [state.omega / (2 * np.pi)]
+    surface.field_data["cycles"] = [state.cycles]
+    return surface
+
+
+def _series(folder: Path, name: str, times: Sequence[float], make: Sequence[Callable[[], Any]]) -> Path:
+    """Write the data sets of a series and the .pvd that lists them with their times."""
+    place = folder / name
+    place.mkdir(parents=True, exist_ok=True)
+    lines = ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">', "<Collection>"]
+    for i, (time, data) in enumerate(zip(times, make, strict=True)):
+        found = data()
+        path = place / f"{name}_{i:04d}{'.vtp' if type(found).__name__ == 'PolyData' else '.vtu'}"
+        found.save(path)
+        lines.append(f'<DataSet timestep="{time:.17g}" part="0" file={quoteattr(f"{name}/{path.name}")}/>')
+    listing = folder / f"{name}.pvd"
+    listing.write_text("\n".join([*lines, "</Collection>", "</VTKFile>", ""]), encoding="utf-8")
+    return listing

@@ -1,0 +1,128 @@
+"""States of the contact that pictures, reports and exports show: along wear, at the peaks of a response, over a cycle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tribodyn.hbm.branch import CONVERGED, Branch
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS
+from tribodyn.workflows.result.result import Result
+
+PEAKS = 3  # of a response that does not wear
+CLOSE = 1e-9  # of the largest force: what counts as none, and as being on the friction limit times 1000
+
+
+@dataclass(frozen=True)
+class State:
+    """One vibrating state of the contact.
+
+    label : what a reader calls it; number : row of the wear history, or point of the response curve
+    omega : [rad/s]; cycles : before this state
+    depth : (n_pair,) total wear [m]; status : (n_pair,) bits over the cycle; pressure : (n_pair,) mean [Pa]
+    field : which of result.fields and result.loops belongs to it, None for none
+    """
+
+    label: str
+    number: int
+    omega: float
+    cycles: float
+    depth: np.ndarray
+    status: np.ndarray | None
+    pressure: np.ndarray | None
+    field: int | None
+
+
+def shown_states(result: Result) -> list[State]:
+    """The states that pictures show: of the wear history, else the peaks of the response curve."""
+    return [state_of(result, int(number)) for number in result.shown_rows()]
+
+
+def state_of(result: Result, number: int) -> State:
+    """The state of a wear row, or of a point of the response curve where nothing wears."""
+    patch = result.patch
+    assert patch is not None
+    held = [] if result.fields is None else result.fields.row.tolist()
+    field = held.index(number) if number in held else None
+    if result.wear is not None and len(result.wear.cycles):
+        wear = result.wear
+        last = number == len(wear.cycles) - 1 and wear.cycles_in_step[number] == 0
+        count = f"{wear.cycles[number]:.3g} cycles"
+        label = "unworn" if number == 0 else f"end, {count}" if last else f"after {count}"
+        return State(
+            label,
+            number,
+            float(wear.omega[number]),
+            float(wear.cycles[number]),
+            wear.depth[number],
+            wear.status[number],
+            wear.normal_force[number] / patch.area,
+            field,
+        )
+    assert result.frf is not None
+    omega = float(result.frf.omega[number])
+    status = pressure = None
+    if result.loops is not None and number in result.loops.row.tolist():
+        at = result.loops.row.tolist().index(number)
+        status = np.bitwise_or.reduce(instant_status(result, at), axis=1)
+        if "n" in patch.components:
+            pressure = result.loops.force[at, :, patch.components.index("n")].mean(axis=-1) / patch.area
+    none = np.zeros(len(patch.area))
+    return State(f"{omega / (2 * np.pi):.4g} Hz", number, omega, 0.0, none, status, pressure, field)
+
+
+def peaks(frf: Branch, count: int = PEAKS) -> np.ndarray:
+    """Points of the highest local maxima of a curve's first output, in the order of frequency; the highest point if none."""
+    height = np.where([o == CONVERGED for o in frf.outcome], frf.amplitude(frf.output_names[0]), -1.0)
+    inner = np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:]) & (height[1:-1] > 0)) + 1
+    best = inner[np.argsort(-height[inner])][:count] if len(inner) else np.array([int(np.argmax(height))])
+    return np.asarray(best[np.argsort(frf.omega[best])])
+
+
+def friction_of(result: Result) -> float | None:
+    """The friction coefficient of the scene, None where it has not one for all pairs."""
+    import json
+
+    contact = json.loads(result.provenance["scene"]).get("contact")
+    mu = contact.get("friction") if isinstance(contact, dict) else None
+    return None if mu is None else float(mu)
+
+
+def instant_status(result: Result, at: int) -> np.ndarray:
+    """(n_pair, n_sample) whether each pair sticks, slips or is separated at the instants of a kept loop.
+
+    A closed pair slips where its tangential force is at mu N; where mu is not one number, a closed pair counts as sticking
+    """
+    loops, patch = result.loops, result.patch
+    assert loops is not None
+    assert patch is not None
+    force = loops.force[at]
+    status = np.full(force[:, 0].shape, STICKS)
+    mu = friction_of(result)
+    tangential = [c for c, name in enumerate(patch.components) if name != "n"]
+    if "n" not in patch.components:
+        return status
+    normal = force[:, patch.components.index("n")]
+    largest = max(float(np.abs(normal).max()), 1e-300)
+    if mu is not None and tangential:
+        limit = mu * normal
+        near = limit - 1e3 * CLOSE * np.abs(limit) - CLOSE * largest
+        along, both = np.abs(force[:, tangential]).max(axis=1), np.linalg.norm(force[:, tangential], axis=1)
+        # where the limit holds for each direction alone, both together may pass it: then they are no sign of slip
+        planar = bool((both <= limit + 1e3 * CLOSE * largest).all())
+        status = np.where((both if planar else along) >= near, SLIPS, status)
+    return np.where(normal <= CLOSE * largest, SEPARATES, status)
+
+
+def over_a_cycle(result: Result, at: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement of the nodes at equal instants of a period.
+
+    at : which of result.fields
+    Returns phase (count,) [rad], displacement (count, n_node, 3) [m], static part included
+    """
+    assert result.fields is not None
+    phase = 2 * np.pi * np.arange(count) / count
+    basis = HarmonicBasis(result.harmonics, max(2 * result.harmonics[-1] + 1, 3))
+    return phase, np.moveaxis(result.fields.displacement[at] @ basis.functions(phase).T, -1, 0)
