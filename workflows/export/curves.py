@@ -82,7 +82,7 @@ def _units() -> dict[str, Any]:
 
 
 def _spectra(result: Result) -> list[dict[str, Any]]:
-    frf = result.frf
+    frf = result.response
     if frf is None:
         return []
     names, force = terms(result.harmonics), driving_force(result)
@@ -141,7 +141,9 @@ def _loops(result: Result) -> list[dict[str, Any]]:
                 ("displacement", kept.displacement, DISPLACEMENT, "m"), ("force", kept.force, FORCE, "N")
             ):  # fmt: skip
                 text = f"state {row}, pair {pair}, {component}, {what}"
-                found.append(_function(TIME, text, "phase", TIME_AXIS, "rad", phase, kind, unit, values[at, pair, c], pair))
+                found.append(
+                    _function(TIME, text, "phase", TIME_AXIS, "rad", phase, kind, unit, values[at, pair, c], pair)
+                )
     return found
 
 

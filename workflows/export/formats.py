@@ -14,7 +14,10 @@ FORMATS: dict[str, tuple[str, Callable[[Result, Path], list[Path]]]] = {
     "parquet": ("the same tables for pandas, polars, DuckDB", curves.write_parquet),
     "mat": ("the same tables as structs for MATLAB", curves.write_mat),
     "uff": ("universal file, dataset 58, for tools of measured data", curves.write_uff),
-    "mesh": ("worn part with its fields (.xdmf; another format with --mesh-ending)", lambda r, f: mesh.write_mesh(r, f / "part.xdmf")),
+    "mesh": (
+        "worn part with its fields (.xdmf; another format with --mesh-ending)",
+        lambda r, f: mesh.write_mesh(r, f / "part.xdmf"),
+    ),
     "npz": ("reduced matrices for NumPy, and for a scene's [model]", matrices.write_npz),
     "mtx": ("reduced matrices, Matrix Market", matrices.write_mtx),
     "abaqus": ("reduced matrices, Abaqus *MATRIX INPUT", matrices.write_abaqus),
@@ -28,7 +31,7 @@ def write(result: Result, wanted: Sequence[str], folder: Path, mesh_ending: str 
     """
     for name in wanted:
         if name not in FORMATS:
-            raise ValueError(f'--to {name}: no such format; there are {", ".join(FORMATS)}')
+            raise ValueError(f"--to {name}: no such format; there are {', '.join(FORMATS)}")
     written = []
     for name in dict.fromkeys(wanted):
         place = folder / name

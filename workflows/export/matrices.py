@@ -37,7 +37,12 @@ def arrays(model: ReducedModel, harmonic: int = 1) -> dict[str, np.ndarray]:
     found |= {f"load_{name}": _dense(vector) for name, vector in system.loads.items()}
     found |= {f"output_{name}": _dense(vector) for name, vector in system.outputs.items()}
     i = model.interface
-    return found | {"contact_area": i.area, "contact_gap": i.gap, "contact_points": i.points, "contact_frames": i.frames}
+    return found | {
+        "contact_area": i.area,
+        "contact_gap": i.gap,
+        "contact_points": i.points,
+        "contact_frames": i.frames,
+    }
 
 
 def _dense(matrix: Any) -> np.ndarray:
@@ -70,7 +75,11 @@ def write_mtx(result: Result, folder: Path) -> list[Path]:
         mmwrite(path, matrix, symmetry=kind, precision=17)
         written.append(path)
     told = folder / "reduced.json"
-    about = {"components": model.interface.components, "units": "SI", "contact": "x = B q, row pair * n_component + component"}
+    about = {
+        "components": model.interface.components,
+        "units": "SI",
+        "contact": "x = B q, row pair * n_component + component",
+    }
     told.write_text(json.dumps(about, indent=2), encoding="utf-8")
     return [*written, told]
 

@@ -11,7 +11,12 @@ from tribodyn.workflows.export.vtk import part_grid
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import shown_states
 
-KIND = {"triquadratic_hexahedron": "hexahedron27", "quadratic_tetra": "tetra10", "hexahedron": "hexahedron", "tetra": "tetra"}
+KIND = {
+    "triquadratic_hexahedron": "hexahedron27",
+    "quadratic_tetra": "tetra10",
+    "hexahedron": "hexahedron",
+    "tetra": "tetra",
+}
 WITH_FIELDS = (".xdmf", ".vtu", ".vtk", ".msh", ".exo", ".e", ".med")
 MESH_ONLY = (".bdf", ".nas", ".inp", ".unv", ".mesh", ".cgns")
 

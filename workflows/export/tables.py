@@ -16,7 +16,7 @@ Table = Mapping[str, np.ndarray]
 def tables(result: Result) -> dict[str, Table]:
     """The tables that a result has data for, by name; columns of a table have one length."""
     found: dict[str, Table] = {}
-    if result.frf is not None:
+    if result.response is not None:
         found["response"] = response(result)
     if result.references is not None:
         r = result.references
@@ -49,7 +49,7 @@ def tables(result: Result) -> dict[str, Table]:
 
 def response(result: Result) -> Table:
     """The response curve point by point: amplitude and Fourier coefficients of every output."""
-    frf = result.frf
+    frf = result.response
     assert frf is not None
     columns: dict[str, np.ndarray] = {"frequency_Hz": frf.frequency}
     if frf.parameter_name != "frequency":
@@ -113,7 +113,7 @@ def wear(result: Result) -> Table:
         "solves": history.solves,
         "step_error": history.step_error,
     }
-    names = [] if result.frf is None else list(result.frf.output_names)
+    names = [] if result.response is None else list(result.response.output_names)
     for position, name in enumerate(names[: history.response.shape[1]]):
         for k, term in enumerate(terms(result.harmonics)):
             columns[f"{name}_{term}_m"] = history.response[:, position, k]

@@ -6,6 +6,7 @@ Point coordinates are those of the worn part at rest, not exaggerated; displacem
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -26,14 +27,18 @@ def write_vtk(result: Result, folder: Path) -> list[Path]:
     Raises  ValueError where the result has neither faces of its contact nor a mesh
     """
     if result.patch is None or (not len(result.patch.faces) and result.part is None):
-        raise ValueError("vtk: the contact of this result has no faces and its part no mesh; nothing can be drawn of it")
+        raise ValueError(
+            "vtk: the contact of this result has no faces and its part no mesh; nothing can be drawn of it"
+        )
     written: list[Path] = []
     if result.wear is not None and len(result.wear.cycles):
         states = [state_of(result, row) for row in range(len(result.wear.cycles))]
         times = [state.cycles for state in states]
         for name, make in (("part", part_grid), ("contact", contact_surface)):
             if _has(result, name):
-                written.append(_series(folder, f"{name}_wear", times, [lambda s=s, m=make: m(result, s) for s in states]))
+                written.append(
+                    _series(folder, f"{name}_wear", times, [partial(make, result, state) for state in states])
+                )
     for state in shown_states(result):
         written += _cycle(result, state, folder)
     return written
@@ -55,7 +60,9 @@ def _cycle(result: Result, state: State, folder: Path) -> list[Path]:
             grid.point_data["displacement"] = moved[i]
             return grid
 
-        written.append(_series(folder, f"part_cycle_{state.number}", times, [lambda i=i: moving(i) for i in range(INSTANTS)]))
+        written.append(
+            _series(folder, f"part_cycle_{state.number}", times, [partial(moving, i) for i in range(INSTANTS)])
+        )
     loops = result.loops
     if loops is not None and state.number in loops.row.tolist() and _has(result, "contact"):
         at = loops.row.tolist().index(state.number)
@@ -70,7 +77,7 @@ def _cycle(result: Result, state: State, folder: Path) -> list[Path]:
             return surface
 
         if samples % INSTANTS == 0:
-            names = [lambda i=i: touching(i) for i in range(INSTANTS)]
+            names = [partial(touching, i) for i in range(INSTANTS)]
             written.append(_series(folder, f"contact_cycle_{state.number}", times, names))
     return written
 
@@ -138,7 +145,11 @@ def _series(folder: Path, name: str, times: Sequence[float], make: Sequence[Call
     """Write the data sets of a series and the .pvd that lists them with their times."""
     place = folder / name
     place.mkdir(parents=True, exist_ok=True)
-    lines = ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">', "<Collection>"]
+    lines = [
+        '<?xml version="1.0"?>',
+        '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">',
+        "<Collection>",
+    ]
     for i, (time, data) in enumerate(zip(times, make, strict=True)):
         found = data()
         path = place / f"{name}_{i:04d}{'.vtp' if type(found).__name__ == 'PolyData' else '.vtu'}"

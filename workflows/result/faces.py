@@ -19,7 +19,7 @@ class Face:
     nodes : (n_pair,) node of the mesh at each pair
     outward : (n_pair, 3) unit normals out of the body
     share : of the total wear depth that is worn off this side
-    between : (n_between, 2 or more) node, then the pairs that it lies in the middle of, where pairs stand at corners only
+    between : a node, and the pairs that it lies in the middle of, where pairs stand at corners only
     """
 
     nodes: np.ndarray

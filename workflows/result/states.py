@@ -1,4 +1,4 @@
-"""States of the contact that pictures, reports and exports show: along wear, at the peaks of a response, over a cycle."""
+"""States of the contact that pictures, reports and exports show: along wear, at response peaks, over a cycle."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ def state_of(result: Result, number: int) -> State:
             wear.normal_force[number] / patch.area,
             field,
         )
-    assert result.frf is not None
-    omega = float(result.frf.omega[number])
+    assert result.response is not None
+    omega = float(result.response.omega[number])
     status = pressure = None
     if result.loops is not None and number in result.loops.row.tolist():
         at = result.loops.row.tolist().index(number)
@@ -74,7 +74,7 @@ def state_of(result: Result, number: int) -> State:
 
 
 def peaks(frf: Branch, count: int = PEAKS) -> np.ndarray:
-    """Points of the highest local maxima of a curve's first output, in the order of frequency; the highest point if none."""
+    """Points of the highest local maxima of a curve's first output, by frequency; else the highest point."""
     height = np.where([o == CONVERGED for o in frf.outcome], frf.amplitude(frf.output_names[0]), -1.0)
     inner = np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:]) & (height[1:-1] > 0)) + 1
     best = inner[np.argsort(-height[inner])][:count] if len(inner) else np.array([int(np.argmax(height))])
@@ -93,7 +93,7 @@ def friction_of(result: Result) -> float | None:
 def instant_status(result: Result, at: int) -> np.ndarray:
     """(n_pair, n_sample) whether each pair sticks, slips or is separated at the instants of a kept loop.
 
-    A closed pair slips where its tangential force is at mu N; where mu is not one number, a closed pair counts as sticking
+    A closed pair slips where its tangential force is at mu N; without one mu it counts as sticking
     """
     loops, patch = result.loops, result.patch
     assert loops is not None
