@@ -117,7 +117,7 @@ def part_grid(result: Result, state: State) -> Any:
 
 
 def contact_surface(result: Result, state: State) -> Any:
-    """Body 1's face of the contact as a pyvista surface: fields of the pairs at its points, their means on its faces."""
+    """Body 1's face of the contact as a pyvista surface: fields at its pairs and their means on its faces."""
     import pyvista as pv
 
     patch = result.patch
