@@ -26,6 +26,32 @@ class CycleNotPeriodic(RuntimeError):
     """The memory of a contact law did not repeat after MAX_CYCLES cycles."""
 
 
+def cycle(
+    law: ModuleType,
+    x: np.ndarray,
+    parameters: ContactParameters,
+    basis: HarmonicBasis,
+    memory: np.ndarray | None = None,
+    jacobian: bool = True,
+) -> ContactCycle:
+    """Periodic contact cycle of all pairs, by the law's own closed form where it has one, else by marching.
+
+    x : (n_pair, n_component, n_coeff) relative displacement [m]
+    memory : (n_pair, n_state) memory at the start of the load path, zeros if None
+    Raises  ValueError where the basis asks for located transitions and the law does not locate them
+    """
+    if memory is None:
+        memory = np.zeros((parameters.n_pair, law.n_state(parameters.components)))
+    if basis.transitions == "located":
+        if not hasattr(law, "located"):
+            name = law.__name__.rsplit(".", 1)[-1]
+            raise ValueError(f"contact law '{name}' does not locate its transitions: take transitions = 'sampled'")
+        return law.located(x, parameters, memory, basis, jacobian)
+    if hasattr(law, "cycle"):
+        return law.cycle(x, parameters, memory, basis, jacobian)
+    return march(law, x, parameters, memory, basis, jacobian)
+
+
 def march(
     law: ModuleType,
     x: np.ndarray,

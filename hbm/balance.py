@@ -8,17 +8,18 @@ Source  design of tribodyn; x_lin and G in hbm.compliance; f_c from a contact la
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from tribodyn.hbm import law as contact_law
 from tribodyn.hbm.compliance import CompliancePoint, ContactCompliance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Contact, Joint
 from tribodyn.hbm.krylov import gmres
-from tribodyn.hbm.law import ContactCycle, ContactParameters
+from tribodyn.hbm.law import STICKS, ContactCycle
 from tribodyn.reduction.model import ReducedModel
 
 
@@ -44,67 +45,75 @@ class State:
         return self.x.reshape(-1, self.x.shape[2])
 
 
+@dataclass(frozen=True, eq=False)
 class HarmonicBalance:
-    """The nonlinear problem of one scene: reduced model, contact law, harmonics, excitation.
+    """The nonlinear problem of one scene: reduced model, joints, harmonics, excitation. Made by `of`.
 
     model : reduced model whose contact map orders its rows pair by pair, component by component
-    law : name of a contact law; parameters : of every pair; omega_max : largest frequency to come [rad/s]
-    memory : (n_pair, n_state) slider positions at the start of the load path [m], zeros by default: the contact is
-        closed without shear, and a pair that never slips keeps the shear that the loads put on it
+    contact : its joints, each with its contact law and parameters; omega_max : largest frequency to come [rad/s]
+    memory : (n_pair, n_state) slider positions at the start of the load path [m]
+    compliance : the linear side, which problems that differ in contact or load share
+    load_factor : on the harmonics >= 1 of the excitation
     """
 
-    def __init__(
-        self,
+    model: ReducedModel
+    contact: Contact
+    basis: HarmonicBasis
+    excitation: Excitation
+    omega_max: float
+    memory: np.ndarray
+    compliance: ContactCompliance
+    load_factor: float = 1.0
+
+    @classmethod
+    def of(
+        cls,
         model: ReducedModel,
-        law: str,
-        parameters: ContactParameters,
+        joints: Joint | Sequence[Joint],
         basis: HarmonicBasis,
         excitation: Excitation,
         omega_max: float,
         memory: np.ndarray | None = None,
-    ):
-        self.law = contact_law.load(law)
-        contact_law.check_components(self.law, parameters.components)
+    ) -> HarmonicBalance:
+        """The balance of a model with one or several joints; their springs become the stuck reference springs.
+
+        memory : zeros by default: the contact is closed without shear, and a pair that never slips keeps the shear that
+            the loads put on it
+        Raises  ValueError where joints, loads or frequency do not fit the model
+        """
         if not 0 < omega_max < np.inf:
             raise ValueError(f"the highest frequency is {omega_max} rad/s: give a finite one above zero")
-        self.law_name = law
-        self.model = model
-        self.parameters = parameters
-        self.basis = basis
-        self.excitation = excitation
-        self.omega_max = omega_max
+        contact = Contact.of(model, joints)
         if memory is None:
-            memory = np.zeros((parameters.n_pair, self.law.n_state(parameters.components)))
-        self.memory = memory
-        self.load_factor = 1.0
-        self.compliance = ContactCompliance(model, parameters.stiffness, basis, excitation, omega_max)
-        self._point: CompliancePoint | None = None
+            memory = np.zeros((contact.n_pair, contact.n_state))
+        compliance = ContactCompliance(model, contact.stiffness, basis, excitation, omega_max)
+        return cls(model, contact, basis, excitation, omega_max, memory, compliance)
 
     @property
     def n_unknown(self) -> int:
         """Number of unknowns: pairs x components x harmonic coefficients."""
-        return self.parameters.stiffness.size * self.basis.n_coeff
+        return self.contact.stiffness.size * self.basis.n_coeff
 
     def with_gap(self, gap: np.ndarray) -> HarmonicBalance:
         """The same problem with another gap (n_pair,) [m], as wear makes it; everything linear is shared."""
-        return self._changed(parameters=replace(self.parameters, gap=np.asarray(gap, float)))
+        return replace(self, contact=self.contact.with_gap(np.asarray(gap, float)))
 
-    def with_parameters(self, parameters: ContactParameters) -> HarmonicBalance:
+    def with_contact(self, contact: Contact) -> HarmonicBalance:
         """The same problem with other contact parameters; the stuck reference springs stay those of the first."""
-        return self._changed(parameters=parameters)
+        return replace(self, contact=contact)
 
     def with_memory(self, memory: np.ndarray) -> HarmonicBalance:
         """The same problem from another start of the load path."""
-        return self._changed(memory=memory)
+        return replace(self, memory=memory)
 
     def with_load(self, factor: float) -> HarmonicBalance:
         """The same problem with the harmonics >= 1 of the excitation times a factor."""
-        return self._changed(load_factor=factor)
+        return replace(self, load_factor=factor)
 
     def with_samples(self, n_samples: int, located: bool) -> HarmonicBalance:
         """The same problem with other time samples, transitions located or not; everything linear is shared."""
         transitions = "located" if located else "sampled"
-        return self._changed(basis=replace(self.basis, n_samples=n_samples, transitions=transitions))
+        return replace(self, basis=replace(self.basis, n_samples=n_samples, transitions=transitions))
 
     def with_harmonics(self, harmonics: tuple[int, ...]) -> HarmonicBalance:
         """The same problem with fewer of its harmonics; raises ValueError for unknown ones and ones a load needs."""
@@ -113,19 +122,11 @@ class HarmonicBalance:
             raise ValueError(f"harmonics {lacking} are not among those of the balance, {self.basis.harmonics}")
         basis = replace(self.basis, harmonics=tuple(harmonics))
         self.excitation.check(basis, {name: None for _, name in self.excitation.loads})
-        return self._changed(basis=basis, compliance=self.compliance.restricted(basis), _point=None)
-
-    def _changed(self, **changes: object) -> HarmonicBalance:
-        other = object.__new__(HarmonicBalance)
-        other.__dict__.update(self.__dict__)
-        other.__dict__.update(changes)
-        return other
+        return replace(self, basis=basis, compliance=self.compliance.restricted(basis))
 
     def at(self, omega: float) -> CompliancePoint:
-        """The linear side at one frequency, the last one kept."""
-        if self._point is None or self._point.omega != omega:
-            self._point = self.compliance.at(omega)
-        return self._point
+        """The linear side at one frequency."""
+        return self.compliance.at(omega)
 
     def loaded(self, coefficients: np.ndarray) -> np.ndarray:
         """Coefficients (..., n_coeff) that are linear in the loads, their vibrating part times the load factor."""
@@ -140,11 +141,11 @@ class HarmonicBalance:
     def stuck(self, omega: float) -> np.ndarray:
         """The same as a first guess x (n_pair, n_component, n_coeff) [m]."""
         x = self.x_lin(omega)
-        return x.reshape(self.parameters.n_pair, -1, x.shape[-1])
+        return x.reshape(self.contact.n_pair, -1, x.shape[-1])
 
     def evaluate(self, omega: float, x: np.ndarray, jacobian: bool = True) -> State:
         """The balance at x (n_pair, n_component, n_coeff)."""
-        cycle = contact_law.cycle(self.law, x, self.parameters, self.basis, self.memory, jacobian)
+        cycle = self.contact.cycle(x, self.basis, self.memory, jacobian)
         flat = x.reshape(-1, x.shape[2])
         g = self.compliance.k[:, None] * flat - cycle.force.reshape(flat.shape)
         return State(omega, x, cycle, g, flat - self.x_lin(omega) - self.at(omega).apply(g))
@@ -168,7 +169,7 @@ class HarmonicBalance:
         if not self.basis.has_static:
             return np.zeros_like(state.x)
         n_coeff = self.basis.n_coeff
-        column = self.parameters.components.index("n") * n_coeff
+        column = self.contact.components.index("n") * n_coeff
         jac = state.cycle.jacobian
         assert jac is not None
         g_slope = (jac[:, :, column] * opening[:, None]).reshape(-1, n_coeff)
@@ -186,16 +187,27 @@ class HarmonicBalance:
         The normal spring is elastic: what work its sampled force does when a pair lifts is an error of sampling. A pair
         that sticks throughout is elastic too: what is left of its work is rounding, and would be taken for slow wear.
         """
-        t = self.parameters.tangential
+        t = self.contact.tangential
         work = self.basis.work_per_cycle(state.cycle.force[:, t], state.x[:, t]).sum(axis=1)
-        return np.where(state.cycle.status == contact_law.STICKS, 0.0, work)
+        return np.where(state.cycle.status == STICKS, 0.0, work)
 
     def preload(self, state: State) -> float:
         """Static normal force of the whole contact [N]; zero where the law has no normal component."""
-        components = self.parameters.components
+        components = self.contact.components
         if "n" not in components or not self.basis.has_static:
             return 0.0
         return float(state.cycle.force[:, components.index("n"), 0].sum())
+
+    def preload_by_joint(self, state: State) -> dict[str, float]:
+        """Static normal force of every joint [N]; zero where its law has no normal component."""
+        if "n" not in self.contact.components or not self.basis.has_static:
+            return {joint.name: 0.0 for joint in self.contact.joints}
+        normal = state.cycle.force[:, self.contact.components.index("n"), 0]
+        return {name: float(force.sum()) for name, force in self.contact.by_joint(normal).items()}
+
+    def history(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """Displacement [m] and contact force [N] over one period, both (n_pair, n_component, n_samples)."""
+        return self.contact.history(state.x, self.basis, self.memory)
 
 
 class Linearisation:

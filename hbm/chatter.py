@@ -54,10 +54,10 @@ def chatter(balance: HarmonicBalance, state: State) -> Chatter:
 
     Raises  ValueError where the law has no normal component
     """
-    components = balance.parameters.components
+    components = balance.contact.components
     if "n" not in components:
         raise ValueError("chattering needs a contact law with a normal component: take components with n")
-    basis, gap = balance.basis, balance.parameters.gap
+    basis, gap = balance.basis, balance.contact.gap
     approach = state.x[:, components.index("n")]
     touching, opening, closing, speed = [], [], [], []
     for coefficients, level in zip(approach, gap, strict=True):

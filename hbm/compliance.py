@@ -16,6 +16,7 @@ from tribodyn.hbm.expansion import Expansion
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.model import ReducedModel
 
+POINTS_KEPT = 4  # frequencies at hand, for the duties of a mission that are solved in turn
 COARSE = 0.1  # share of the contact flexibility from which on a mode counts in the preconditioner
 
 
@@ -57,6 +58,7 @@ class ContactCompliance:
         self.error = max(e.error for e, _ in self.groups)
         self.shared_real = len(self.groups) == 1 and not np.iscomplexobj(self.groups[0][0].w0)
         self.coarse = self._coarse_modes()
+        self._points: dict[float, CompliancePoint] = {}
         self._active: tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray]]] | None = None
 
     def restricted(self, basis: HarmonicBasis) -> ContactCompliance:
@@ -65,7 +67,7 @@ class ContactCompliance:
         other = object.__new__(ContactCompliance)
         other.__dict__.update(self.__dict__)
         other.basis = basis
-        other._active = None
+        other._active, other._points = None, {}
         other._load = self._load[:, [old.index(h) for h in basis.harmonics]]
         other.base = None if self.base is None else self.basis.transfer(self.base, basis)
         kept = [(e, [basis.harmonics.index(old[p]) for p in ps if old[p] in basis.harmonics]) for e, ps in self.groups]
@@ -97,8 +99,12 @@ class ContactCompliance:
         return self._active[1]
 
     def at(self, omega: float) -> CompliancePoint:
-        """The compliance at one excitation frequency [rad/s]."""
-        return CompliancePoint(self, omega)
+        """The compliance at one excitation frequency [rad/s]; the last POINTS_KEPT ones are kept."""
+        point = self._points.pop(omega, None) or CompliancePoint(self, omega)
+        self._points[omega] = point
+        if len(self._points) > POINTS_KEPT:
+            del self._points[next(iter(self._points))]
+        return point
 
     def port_force(self, g: np.ndarray | None) -> np.ndarray:
         """(n_port, n_harmonic) complex port forces: g [N] at the contacts alone, or the excitation where g is None."""

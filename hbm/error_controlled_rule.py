@@ -121,11 +121,11 @@ def _step(problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Se
         else:
             error = _error(problem, tolerance, state, stride, first, second)
         if error <= 1.0:
-            preload = problem.balance.preload(second.points[0].state)
+            preload = problem.preload(second.points[0].state)
             if preload >= LANDING[0] * target:
                 break
             longest = stride
-            stride *= _share_to(target, problem.balance.preload(state.points[0].state), preload)
+            stride *= _share_to(target, problem.preload(state.points[0].state), preload)
         else:
             stride = min(stride * _growth(error), 0.5 * longest if second.failure else np.inf)
         if stride < (leap if second.failure else smallest):
@@ -165,7 +165,7 @@ def _leap(
 
 def _event(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) -> float:
     """The next preload at which a row is wanted [N]: where life is stated to end, and where the run is to end."""
-    first, now = first_preload(problem, rows, state), problem.balance.preload(state.points[0].state)
+    first, now = first_preload(problem, rows, state), problem.preload(state.points[0].state)
     shares = [share for share in (LIFE_SHARE, problem.lost_below) if share > 0]
     return max((share * first for share in shares if share * first < now), default=0.0)
 
@@ -249,13 +249,18 @@ def _stage(
 
 def _gain(problem: WearProblem, state: WearState) -> np.ndarray:
     """(n_pair,) wear depth per friction work [m/J]; a pair at rest is taken to wear as the working ones on average."""
-    works = state.work > 0
-    if np.any(state.rate[~works] > 0):
-        raise ValueError(f'wear law "{problem.law}" wears pairs without friction work: take the thesis\'s rule')
-    own = np.divide(problem.spread, problem.area)
-    known = works & (own > 0)
-    factor = np.mean(state.rate[known] / (state.work[known] * own[known])) if known.any() else 1.0
-    return np.divide(state.rate, state.work, out=factor * own, where=works)
+    gain, area = np.zeros_like(state.rate), problem.area
+    for name, wear in problem.wearing.items():
+        pairs = problem.balance.contact.joint(name).rows
+        rate, work = state.rate[pairs], state.work[pairs]
+        works = work > 0
+        if np.any(rate[~works] > 0):
+            raise ValueError(f'wear law "{wear.law}" wears pairs without friction work: take the thesis\'s rule')
+        own = np.divide(problem.coefficient[pairs], area[pairs])
+        known = works & (own > 0)
+        factor = np.mean(rate[known] / (work[known] * own[known])) if known.any() else 1.0
+        gain[pairs] = np.divide(rate, work, out=factor * own, where=works)
+    return gain
 
 
 class _Search:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from tribodyn.hbm import law as contact_law
 from tribodyn.hbm import newton, wear_law
-from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.law import SEPARATES
 from tribodyn.hbm.operating_point import OperatingPoint, Site
 from tribodyn.hbm.wear_history import WearRow
+from tribodyn.hbm.wear_law import JointWear
 
 LOST = "contact lost at every pair"
 LOST_AT_REST = "preload at rest fell below"  # the beginning of its sentence
@@ -31,7 +33,8 @@ class WearProblem:
     """What wears, where the cycles are taken, and by which law.
 
     balance : the unworn problem; mission : its duties, whose shares sum to one
-    law : name of a wear law; coefficient : (n_pair,) or scalar, in the unit the law states; area : (n_pair,) [m2]
+    wear : how the joints wear, by name; a joint that is not there does not wear. One alone serves all joints
+    area : (n_pair,) [m2], of all joints
     lost_below : contact counts as lost when the preload falls below this share of its first value; the last touch
         of a vibrating contact wears ever more slowly, so that the time until it ends has no limit (see README)
     lost_below_at_rest : the run ends when the preload without the harmonic loads falls to this share of its first
@@ -40,36 +43,60 @@ class WearProblem:
 
     balance: HarmonicBalance
     mission: tuple[Duty, ...]
-    law: str
-    coefficient: np.ndarray | float
+    wear: JointWear | Mapping[str, JointWear]
     area: np.ndarray
     lost_below: float = 0.0
     lost_below_at_rest: float | None = None
-    spread: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
         shares = [duty.share for duty in self.mission]
         if not self.mission or min(shares) < 0 or abs(sum(shares) - 1) > 1e-9:
             raise ValueError(f"the shares of the mission's duties must be >= 0 and sum to 1, not {shares}")
-        coefficient = np.array(np.broadcast_to(np.asarray(self.coefficient, float), self.area.shape))
-        if not np.all(np.isfinite(coefficient)) or np.any(coefficient < 0):
-            raise ValueError("the wear coefficient must be finite and >= 0 at every pair")
+        if not self.wearing:
+            raise ValueError("no joint wears: give at least one of them a wear law")
         if self.lost_below_at_rest is not None and (
-            "n" not in self.balance.parameters.components or not self.balance.basis.has_static
+            "n" not in self.balance.contact.components or not self.balance.basis.has_static
         ):
             raise ValueError("the preload at rest needs a contact with component n and harmonic 0 among those kept")
-        object.__setattr__(self, "spread", coefficient)
+
+    @cached_property
+    def wearing(self) -> dict[str, JointWear]:
+        """The joints that wear."""
+        joints = self.balance.contact.joints
+        if isinstance(self.wear, JointWear):
+            return {joint.name: self.wear for joint in joints}
+        return {self.balance.contact.joint(name).name: wear for name, wear in self.wear.items()}
+
+    @cached_property
+    def coefficient(self) -> np.ndarray:
+        """(n_pair,) wear coefficient, each in the unit of its joint's law; zero where a joint does not wear."""
+        spread = np.zeros_like(self.area)
+        for name, wear in self.wearing.items():
+            spread[self.balance.contact.joint(name).rows] = wear.coefficient
+        return spread
+
+    @cached_property
+    def pairs(self) -> np.ndarray:
+        """Indices of the pairs of the joints that wear."""
+        return np.sort(np.concatenate([self.balance.contact.joint(name).rows for name in self.wearing]))
+
+    def preload(self, state: State) -> float:
+        """Static normal force of the joints that wear [N]."""
+        if len(self.wearing) == len(self.balance.contact.joints):
+            return self.balance.preload(state)
+        preload = self.balance.preload_by_joint(state)
+        return float(sum(preload[name] for name in self.wearing))
 
     def at_depth(self, depth: np.ndarray) -> HarmonicBalance:
         """The balance with the gap that a wear depth (n_pair,) [m] has opened."""
-        return self.balance.with_gap(self.balance.parameters.gap + depth)
+        return self.balance.with_gap(self.balance.contact.gap + depth)
 
 
 @dataclass(frozen=True)
 class WearState:
     """A worn contact with its solved duties.
 
-    depth : (n_pair,) [m]; cycles : passed before; points : one per duty
+    depth : (n_pair,) [m]; cycles : passed before; points : one per duty; pairs : of the joints that wear
     rate : (n_pair,) wear depth per cycle [m], work : (n_pair,) friction work per cycle [J]; averages over the mission
     preload_at_rest : [N], nan where it was not asked for; failure_at_rest : why it was not found
     """
@@ -80,6 +107,7 @@ class WearState:
     rate: np.ndarray
     work: np.ndarray
     solves: int
+    pairs: np.ndarray
     preload_at_rest: float = float("nan")
     failure_at_rest: str = ""
 
@@ -93,8 +121,8 @@ class WearState:
 
     @property
     def separated(self) -> bool:
-        """Whether no pair touches at any moment of any duty."""
-        return all(bool(np.all(point.state.cycle.status == contact_law.SEPARATES)) for point in self.points)
+        """Whether no pair that can wear touches at any moment of any duty."""
+        return all(bool(np.all(point.state.cycle.status[self.pairs] == SEPARATES)) for point in self.points)
 
 
 def assess(problem: WearProblem, depth: np.ndarray, cycles: float, before: WearState | None) -> WearState:
@@ -117,10 +145,13 @@ def worn_state(
     rate, work = np.zeros_like(depth), np.zeros_like(depth)
     for duty, point in zip(problem.mission, points, strict=True):
         balance = problem.at_depth(depth).with_load(duty.load)
-        exposure = wear_law.Exposure(balance, point.state, problem.area, problem.spread, depth, cycles)
-        rate += duty.share * wear_law.depth_rate(problem.law, exposure)
-        work += duty.share * exposure.energy
-    return WearState(depth, cycles, tuple(points), rate, work, solves)
+        for name, wear in problem.wearing.items():
+            pairs = balance.contact.joint(name).rows
+            of_joint = (problem.area[pairs], problem.coefficient[pairs], depth[pairs])
+            exposure = wear_law.Exposure(balance, point.state, *of_joint, cycles, name)
+            rate[pairs] += duty.share * wear_law.depth_rate(wear.law, exposure)
+            work[pairs] += duty.share * exposure.energy
+    return WearState(depth, cycles, tuple(points), rate, work, solves, problem.pairs)
 
 
 def _neighbour(
@@ -148,7 +179,7 @@ def _neighbour(
 
 def _carry(before: HarmonicBalance, omega: float, x: np.ndarray, opening: np.ndarray) -> tuple[np.ndarray, int]:
     """Follow x at fixed frequency while the gaps open, in steps that halve where Newton fails; x and solves spent."""
-    gap, done, stride, solves = before.parameters.gap, 0.0, 0.5, 0
+    gap, done, stride, solves = before.contact.gap, 0.0, 0.5, 0
     while done < 1.0 and stride > 1e-3:
         reach = min(1.0, done + stride)
         here, there = before.with_gap(gap + done * opening), before.with_gap(gap + reach * opening)
@@ -176,7 +207,7 @@ def reason_to_stop(
         return f"{LOST_AT_REST} {share:.3g} of its first value"
     if state.separated:
         return LOST
-    preload = problem.balance.preload(state.points[0].state)
+    preload = problem.preload(state.points[0].state)
     if preload < problem.lost_below * first_preload:
         return f"preload fell below {problem.lost_below:.3g} of its first value"
     if state.rate.max() <= 0.0:
@@ -196,7 +227,8 @@ def row_of(
     """The history row of a state, with what its step wears [m] and dissipates [J]."""
     balance = problem.at_depth(state.depth).with_load(problem.mission[0].load)
     taken = (cycles_in_step, worn, work, state.solves, step_error, plan, state.preload_at_rest)
-    return WearRow.of(balance, state.points, state.depth, state.cycles, *taken)
+    preload = problem.preload(state.points[0].state)
+    return WearRow.of(balance, state.points, state.depth, state.cycles, preload, *taken)
 
 
 def state_of(problem: WearProblem, row: WearRow) -> WearState:
@@ -213,7 +245,7 @@ def state_of(problem: WearProblem, row: WearRow) -> WearState:
 
 def first_preload(problem: WearProblem, rows: Sequence[WearRow], state: WearState) -> float:
     """Preload of the unworn contact [N]."""
-    return rows[0].preload if rows else problem.balance.preload(state.points[0].state)
+    return rows[0].preload if rows else problem.preload(state.points[0].state)
 
 
 def first_at_rest(rows: Sequence[WearRow], state: WearState) -> float:

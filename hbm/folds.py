@@ -257,7 +257,7 @@ class _Surface:
     def _null(self, response: Parameter, guess: Direction, metric: Metric) -> Direction:
         """Tangent of the response curve at a guess, with the vibration itself as the border."""
         balance = response.make(guess.p)
-        state = balance.evaluate(guess.p, guess.x.reshape(balance.parameters.n_pair, -1, guess.x.shape[-1]))
+        state = balance.evaluate(guess.p, guess.x.reshape(balance.contact.n_pair, -1, guess.x.shape[-1]))
         border = metric.unit(Direction(np.where(balance.basis.order > 0, guess.x, 0.0), 0.0))
         try:
             return bordered.tangent(response, guess.p, state, border, metric, self._newton, TANGENT)
@@ -279,7 +279,7 @@ class _Surface:
         def scalar(v: float, place: Direction) -> float:
             response = self._response(v)
             balance = response.make(v)
-            state = balance.evaluate(place.p, place.x.reshape(balance.parameters.n_pair, -1, place.x.shape[-1]))
+            state = balance.evaluate(place.p, place.x.reshape(balance.contact.n_pair, -1, place.x.shape[-1]))
             return bordered.tangent(response, place.p, state, along, metric, self._newton, TANGENT).p / metric.width
 
         reach = 1.0 / max(metric.norm(across), 1.0 / self._span)  # change of the parameter that counts as one

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as sla
 
-from tribodyn.hbm import law as contact_law
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.krylov import gmres
@@ -124,7 +123,7 @@ class FreeVibration:
         zeta = float(coordinates[-2])
         flat = coordinates[:-3].reshape(self._shape) * self._units(a)
         x = flat.reshape(self.rest.shape)
-        cycle = contact_law.cycle(self.balance.law, x, self.balance.parameters, self.basis, self.balance.memory)
+        cycle = self.balance.contact.cycle(x, self.basis, self.balance.memory)
         g = self.k[:, None] * flat - cycle.force.reshape(flat.shape)
         factors = []
         for h in self.basis.harmonics:

@@ -136,10 +136,9 @@ def widened(balance: HarmonicBalance, highest: int) -> HarmonicBalance:
     excitation = balance.excitation
     if excitation.base is not None:
         excitation = replace(excitation, base=balance.basis.transfer(excitation.base, basis))
-    wide = HarmonicBalance(
+    wide = HarmonicBalance.of(
         balance.model,
-        balance.law_name,
-        balance.parameters,
+        balance.contact.joints,
         basis,
         excitation,
         balance.omega_max,

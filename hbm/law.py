@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from functools import cache
 from types import ModuleType
 
 import numpy as np
 
 from tribodyn.hbm import contact as hbm_contact
-from tribodyn.hbm.harmonics import HarmonicBasis
 
 STICKS, SLIPS, SEPARATES = 1, 2, 4
 
@@ -74,6 +74,11 @@ class ContactParameters:
         """Number of node pairs."""
         return len(self.stiffness)
 
+    def taken(self, pairs: np.ndarray) -> ContactParameters:
+        """The parameters of some pairs, by their indices."""
+        own = {f.name: getattr(self, f.name)[pairs] for f in fields(self) if f.name != "components"}
+        return replace(self, **own)
+
     @property
     def tangential(self) -> list[int]:
         """Positions of the tangential components, the ones in which friction works."""
@@ -109,6 +114,7 @@ def names() -> list[str]:
     return sorted(m.name for m in pkgutil.iter_modules(hbm_contact.__path__) if not m.name.startswith("_"))
 
 
+@cache
 def load(name: str) -> ModuleType:
     """The law module of this name; raises ValueError with the known names."""
     if name not in names():
@@ -121,31 +127,3 @@ def check_components(law: ModuleType, components: tuple[str, ...]) -> None:
     if components not in law.COMPONENTS:
         known = " or ".join("(" + ", ".join(c) + ")" for c in law.COMPONENTS)
         raise ValueError(f"contact law '{law.__name__.rsplit('.', 1)[-1]}' has components {known}, not {components}")
-
-
-def cycle(
-    law: ModuleType,
-    x: np.ndarray,
-    parameters: ContactParameters,
-    basis: HarmonicBasis,
-    memory: np.ndarray | None = None,
-    jacobian: bool = True,
-) -> ContactCycle:
-    """Periodic contact cycle of all pairs, by the law's own closed form where it has one, else by marching.
-
-    x : (n_pair, n_component, n_coeff) relative displacement [m]
-    memory : (n_pair, n_state) memory at the start of the load path, zeros if None
-    Raises  ValueError where the basis asks for located transitions and the law does not locate them
-    """
-    from tribodyn.hbm import aft
-
-    if memory is None:
-        memory = np.zeros((parameters.n_pair, law.n_state(parameters.components)))
-    if basis.transitions == "located":
-        if not hasattr(law, "located"):
-            name = law.__name__.rsplit(".", 1)[-1]
-            raise ValueError(f"contact law '{name}' does not locate its transitions: take transitions = 'sampled'")
-        return law.located(x, parameters, memory, basis, jacobian)
-    if hasattr(law, "cycle"):
-        return law.cycle(x, parameters, memory, basis, jacobian)
-    return aft.march(law, x, parameters, memory, basis, jacobian)

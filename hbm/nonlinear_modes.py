@@ -156,7 +156,7 @@ def _newton(problem: FreeVibration, point: Point, normal: np.ndarray, options: N
 def _result(problem: FreeVibration, solved: list[_Solved], end: str) -> Backbone:
     points = [p for p, _, _ in solved]
     basis = problem.basis
-    t = problem.balance.parameters.tangential
+    t = problem.balance.contact.tangential
     work = [float(basis.work_per_cycle(p.cycle.force[:, t], p.x[:, t]).sum()) for p in points]
     return Backbone(
         amplitude=np.array([p.a for p in points]) * problem.per_amplitude,

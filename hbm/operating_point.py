@@ -105,7 +105,7 @@ class AtPeak:
         branch = adaptive.follow(balance, self.start, self.stop, scan)
         height = branch.amplitude(self.output)
         best = int(np.argmax(np.where([o == CONVERGED for o in branch.outcome], height, -1.0)))
-        x = branch.contact[best].reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
+        x = branch.contact[best].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
         near = branch.omega[max(best - 1, 0) : best + 2]
         width = float(np.ptp(near)) / max(len(near) - 1, 1)
         found = self._refine(balance, branch.omega[best], x, 0.5 * width)

@@ -63,13 +63,12 @@ def of(problem: HarmonicBalance | Parameter) -> Parameter:
 
 def load(balance: HarmonicBalance, omega: float) -> Parameter:
     """Factor on the harmonics >= 1 of the excitation, at one frequency [rad/s]."""
-    _keep(balance, omega)
     return Parameter(LOAD, balance.with_load, omega)
 
 
 def gap(balance: HarmonicBalance, omega: float) -> Parameter:
     """Opening added to the gap of every pair alike [m], at one frequency [rad/s]."""
-    initial = balance.parameters.gap
+    initial = balance.contact.gap
     scale = _length(balance, omega)
     return Parameter("gap offset", lambda value: balance.with_gap(initial + value), omega, scale, "m")
 
@@ -83,36 +82,31 @@ def wear(balance: HarmonicBalance, omega: float, depth: np.ndarray) -> Parameter
     deepest = float(np.abs(depth).max(initial=0.0))
     if deepest == 0.0:
         raise ValueError("the wear depth to continue in is zero at every pair: give the depth of a worn contact")
-    initial = balance.parameters.gap
+    initial = balance.contact.gap
     scale = _length(balance, omega) / deepest
     return Parameter("wear fraction", lambda value: balance.with_gap(initial + value * depth), omega, scale)
 
 
 def stiffness(balance: HarmonicBalance, omega: float) -> Parameter:
     """Factor on all contact springs, at one frequency [rad/s]."""
-    _keep(balance, omega)
-    k = balance.parameters.stiffness
+    contact = balance.contact
     return Parameter(
         "stiffness factor",
-        lambda value: balance.with_parameters(replace(balance.parameters, stiffness=value * k)),
+        lambda value: balance.with_contact(
+            contact.with_parameters(lambda p: replace(p, stiffness=value * p.stiffness))
+        ),
         omega,
     )
 
 
 def friction(balance: HarmonicBalance, omega: float) -> Parameter:
     """Factor on all friction coefficients, at one frequency [rad/s]."""
-    _keep(balance, omega)
-    mu = balance.parameters.friction
+    contact = balance.contact
     return Parameter(
         "friction factor",
-        lambda value: balance.with_parameters(replace(balance.parameters, friction=value * mu)),
+        lambda value: balance.with_contact(contact.with_parameters(lambda p: replace(p, friction=value * p.friction))),
         omega,
     )
-
-
-def _keep(balance: HarmonicBalance, omega: float) -> None:
-    """Have the linear side at hand before copies of the balance are made, so that all of them share it."""
-    balance.at(omega)
 
 
 def _length(balance: HarmonicBalance, omega: float) -> float:

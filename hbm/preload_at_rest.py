@@ -41,5 +41,5 @@ class PreloadAtRest:
         if self._before.failure:
             failure = self._before.failure.replace("solve failed", "solve failed at rest", 1)
             return replace(state, failure_at_rest=failure, preload_at_rest=float(np.nan), solves=solves)
-        preload = problem.balance.preload(self._before.points[0].state)
+        preload = problem.preload(self._before.points[0].state)
         return replace(state, preload_at_rest=preload, solves=solves)

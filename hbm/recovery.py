@@ -17,7 +17,7 @@ def coordinates(
     structure held by its contact alone is no exception
     """
     basis, excitation = balance.basis, balance.excitation
-    k = balance.parameters.stiffness.ravel()
+    k = balance.contact.stiffness.ravel()
     moved = displacement if excitation.base is None else displacement + balance.loaded(excitation.base)
     g = basis.to_complex(k[:, None] * moved - force)
     found = []

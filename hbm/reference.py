@@ -13,7 +13,6 @@ from time import perf_counter
 import numpy as np
 from scipy.sparse import csr_matrix, kron
 
-from tribodyn.hbm import law as contact_law
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.law import ContactCycle
@@ -107,8 +106,8 @@ class DenseBalance:
         """
         p = self.problem
         clock = perf_counter()
-        x = (self._spread @ q).reshape(p.parameters.n_pair, -1, p.basis.n_coeff)
-        cycle = contact_law.cycle(p.law, x, p.parameters, p.basis, p.memory)
+        x = (self._spread @ q).reshape(p.contact.n_pair, -1, p.basis.n_coeff)
+        cycle = p.contact.cycle(x, p.basis, p.memory)
         tick = perf_counter()
         residual = linear @ q - self.force.ravel() + self._spread.T @ cycle.force.ravel()
         self.profile.contact += tick - clock
@@ -129,7 +128,7 @@ class DenseBalance:
 
     def coordinates_of(self, omega: float, x: np.ndarray) -> np.ndarray:
         """Reduced coordinates (n, n_coeff) in balance with the contact forces at x, to start or to check from."""
-        cycle = contact_law.cycle(self.problem.law, x, self.problem.parameters, self.problem.basis, self.problem.memory)
+        cycle = self.problem.contact.cycle(x, self.problem.basis, self.problem.memory)
         force = self.force.ravel() - self._spread.T @ cycle.force.ravel()
         return np.linalg.solve(self.dynamic_stiffness(omega), force).reshape(-1, self.problem.basis.n_coeff)
 

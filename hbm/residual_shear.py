@@ -114,9 +114,10 @@ def response_bounds(
 def stuck(balance: HarmonicBalance, state: State) -> np.ndarray:
     """(n_pair, n_tangential) whether a direction sticks all the time: its vibrating force is that of its spring."""
     t = _check(balance)
-    linear = balance.parameters.stiffness[:, t, None] * state.x[:, t, 1:]
+    linear = balance.contact.stiffness[:, t, None] * state.x[:, t, 1:]
     error = np.abs(state.cycle.force[:, t, 1:] - linear).max(axis=2)
-    return error <= LINEAR * np.abs(balance.parameters.stiffness[:, t, None] * state.x[:, t]).max()
+    held = error <= LINEAR * np.abs(balance.contact.stiffness[:, t, None] * state.x[:, t]).max()
+    return held & balance.contact.sees[:, t]
 
 
 def amplitude_slope(balance: HarmonicBalance, state: State, output: str, tolerance: float = 1e-6) -> np.ndarray:
@@ -148,15 +149,19 @@ def _with_sliders_held(balance: HarmonicBalance, state: State) -> State:
     for pair, c in np.argwhere(stuck(balance, state)):
         block = slice(tangential[c] * m, (tangential[c] + 1) * m)
         jac[pair, block] = 0.0
-        jac[pair, block, block] = balance.parameters.stiffness[pair, tangential[c]] * np.eye(m)
+        jac[pair, block, block] = balance.contact.stiffness[pair, tangential[c]] * np.eye(m)
     return replace(state, cycle=replace(state.cycle, jacobian=jac))
 
 
 def _check(balance: HarmonicBalance) -> list[int]:
     """Positions of the components whose sliders are the memory of the law."""
-    tangential = balance.parameters.tangential
-    if balance.law.n_state(balance.parameters.components) != len(tangential) or not tangential:
-        raise ValueError(f"contact law '{balance.law_name}' keeps no slider: there is no residual shear to bound")
+    tangential = balance.contact.tangential
+    for joint in balance.contact.joints:
+        own = joint.parameters.tangential
+        if joint.n_state != len(own) or not tangential:
+            raise ValueError(f"contact law '{joint.law}' keeps no slider: there is no residual shear to bound")
+        if [balance.contact.columns(joint)[c] for c in own] != tangential[: len(own)]:
+            raise ValueError(f"joint '{joint.name}' sees {joint.parameters.components}: give it t1 to bound its shear")
     if not balance.basis.has_static:
         raise ValueError("residual shear is a static force: keep harmonic 0 to bound the response")
     return tangential
@@ -164,12 +169,12 @@ def _check(balance: HarmonicBalance) -> list[int]:
 
 def _reach(balance: HarmonicBalance, state: State, tangential: list[int]) -> np.ndarray:
     """(n_pair, n_tangential) travel of a slider from one end of its range to the other, at most [m]."""
-    p = balance.parameters
-    load = p.normal_load
-    if "n" in p.components:
-        load = np.abs(state.cycle.force[:, -1]).sum(axis=1)
-    k = p.stiffness[:, tangential]
-    limit = (p.friction * load)[:, None]
+    contact = balance.contact
+    load = contact.gathered(lambda p: p.normal_load)
+    if "n" in contact.components:
+        load = np.maximum(load, np.abs(state.cycle.force[:, -1]).sum(axis=1))
+    k = contact.stiffness[:, tangential]
+    limit = (contact.gathered(lambda p: p.friction) * load)[:, None]
     return np.divide(2 * limit, k, out=np.zeros_like(k), where=k > 0) + np.abs(state.x[:, tangential]).sum(axis=2)
 
 

@@ -21,7 +21,6 @@ from itertools import pairwise
 import numpy as np
 
 from tribodyn.hbm import floquet, parameter
-from tribodyn.hbm import law as contact_law
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.branch import CONVERGED, Branch
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -134,7 +133,7 @@ def mark(
             found.append(None)
             continue
         balance, omega = path.place(value)
-        state = balance.evaluate(omega, flat.reshape(balance.parameters.n_pair, -1, flat.shape[1]))
+        state = balance.evaluate(omega, flat.reshape(balance.contact.n_pair, -1, flat.shape[1]))
         found.append(stability(balance, state, method, n_modes))
     changes = []
     for i, (before, after) in enumerate(pairwise(found)):
@@ -197,7 +196,7 @@ def _departure_slope(balance: HarmonicBalance, state: State, basis: HarmonicBasi
         if h <= basis.harmonics[-1]:
             x[:, :, 0 if h == 0 else 2 * h - 1 + seen.get(h, 0)] = state.x[:, :, i]
             seen[h] = 1
-    jac = contact_law.cycle(balance.law, x, balance.parameters, basis, balance.memory).jacobian
+    jac = balance.contact.cycle(x, basis, balance.memory).jacobian
     assert jac is not None
     slope = -jac.reshape(n_pair, c, basis.n_coeff, c, basis.n_coeff)
     k = balance.compliance.k.reshape(n_pair, c)

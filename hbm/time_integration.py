@@ -127,7 +127,7 @@ class TimeStepper:
             raise ValueError(
                 "time integration needs a positive definite mass matrix: give every coordinate some mass"
             ) from None
-        self.n_pair, self.c = balance.parameters.stiffness.shape
+        self.n_pair, self.c = balance.contact.stiffness.shape
         self.U = np.ascontiguousarray(np.asarray(model.interface.B) @ phi)
         names = balance.compliance.output_names
         self.O = np.array([system.outputs[name] @ phi for name in names]).reshape(len(names), len(phi))
@@ -147,8 +147,9 @@ class TimeStepper:
         self.inverse = 1 / np.diag(effective)[None] if self.diagonal else np.ascontiguousarray(np.linalg.inv(effective))
         through = self.inverse[0][:, None] * self.U.T if self.diagonal else self.inverse @ self.U.T
         self.compliance = np.ascontiguousarray((1 - af) * beta * self.h**2 * (self.U @ through))
-        self.law = time_step.pointer(balance.law.step)
-        self.packed = balance.parameters.packed()
+        joint = balance.contact.only("time integration")
+        self.law = time_step.pointer(joint.module.step)
+        self.packed = joint.parameters.packed()
         self._load_coefficients = balance.loaded(self._modal_load(phi))
         samples = self._samples(self._load_coefficients)  # (n, n_step), at t_1 .. t_n_step
         self.load = np.ascontiguousarray(((1 - af) * samples + af * np.roll(samples, 1, axis=1)).T)
@@ -266,7 +267,7 @@ class _StateVector:
         rate = np.sqrt(np.maximum(stepper.lam, 0.0) + stepper.omega**2)
         self._stepper = stepper
         self._shape = stepper.balance.memory.shape
-        spring = np.sqrt(stepper.balance.parameters.stiffness[:, : self._shape[1]]).ravel()
+        spring = np.sqrt(stepper.balance.contact.stiffness[:, : self._shape[1]]).ravel()
         spring[spring == 0] = 1.0
         self._weight = np.concatenate([rate, np.ones_like(rate), 1 / rate, spring])
 
@@ -332,10 +333,10 @@ def _to_periodic(stepper: TimeStepper, motion: Motion, options: Options, with_sl
 
 
 def _result(stepper: TimeStepper, record: Record, drift: float, periods: int, outcome: str) -> PeriodicMotion:
-    components = stepper.balance.parameters.components
+    components = stepper.balance.contact.components
     before = np.roll(record.xs, 1, axis=0), np.roll(record.fs, 1, axis=0)
     work = 0.5 * ((record.fs + before[1]) * (record.xs - before[0])).sum(axis=0)
-    work = work[:, stepper.balance.parameters.tangential].sum(axis=1)
+    work = work[:, stepper.balance.contact.tangential].sum(axis=1)
     preload = float(record.fs[:, :, components.index("n")].mean(axis=0).sum()) if "n" in components else 0.0
     return PeriodicMotion(
         omega=stepper.omega,

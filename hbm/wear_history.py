@@ -55,6 +55,7 @@ class WearRow:
         points: Sequence[OperatingPoint],
         depth: np.ndarray,
         cycles: float,
+        preload: float,
         cycles_in_step: float,
         worn: np.ndarray,
         work: np.ndarray,
@@ -68,15 +69,15 @@ class WearRow:
         state = point.state
         shape = (-1, state.x.shape[2])
         normal = np.zeros(len(depth))
-        if "n" in balance.parameters.components and balance.basis.has_static:
-            normal = state.cycle.force[:, balance.parameters.components.index("n"), 0]
+        if "n" in balance.contact.components and balance.basis.has_static:
+            normal = state.cycle.force[:, balance.contact.components.index("n"), 0]
         return cls(
             cycles=cycles,
             cycles_in_step=cycles_in_step,
             depth=depth,
             worn=worn,
             energy=np.maximum(balance.energy(state), 0.0),
-            preload=balance.preload(state),
+            preload=preload,
             normal_force=normal,
             status=state.cycle.status,
             omega=state.omega,
@@ -102,7 +103,7 @@ class WearHistory:
     depth : (n_row, n_pair) total wear depth of the pair, both surfaces together [m]
     worn : (n_row, n_pair) depth that is worn from this row to the next [m]
     energy : (n_row, n_pair) dissipated energy per cycle [J]
-    preload : (n_row,) static normal force of the whole contact [N]
+    preload : (n_row,) static normal force of all joints that wear [N]
     normal_force : (n_row, n_pair) mean normal force over the cycle [N]
     status : (n_row, n_pair) bits over one cycle: 1 sticks, 2 slips, 4 separates
     omega : (n_row,) frequency of the cycle [rad/s]

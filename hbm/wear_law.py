@@ -17,17 +17,35 @@ from types import ModuleType
 
 import numpy as np
 
-from tribodyn.hbm import aft
 from tribodyn.hbm import wear as hbm_wear
 from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.joint import Joint
+
+
+@dataclass(frozen=True)
+class JointWear:
+    """How a joint wears.
+
+    law : name of a wear law, or path of its file; coefficient : scalar or one a pair, in the unit the law states
+    """
+
+    law: str
+    coefficient: np.ndarray | float
+
+    def __post_init__(self) -> None:
+        coefficient = np.asarray(self.coefficient, float)
+        if not np.all(np.isfinite(coefficient)) or np.any(coefficient < 0):
+            raise ValueError("the wear coefficient must be finite and >= 0 at every pair")
 
 
 @dataclass(frozen=True)
 class Exposure:
     """One vibration cycle as a wear law sees it.
 
+    The law serves one joint; n_pair counts the pairs of that joint.
     area : (n_pair,) tributary area [m2]; coefficient : (n_pair,) wear coefficient of the law
     depth : (n_pair,) wear depth so far [m]; cycles : vibration cycles so far
+    on : name of the joint, the first one by default
     """
 
     balance: HarmonicBalance
@@ -36,21 +54,43 @@ class Exposure:
     coefficient: np.ndarray
     depth: np.ndarray
     cycles: float
+    on: str = ""
+
+    @property
+    def joint(self) -> Joint:
+        """The joint that wears."""
+        contact = self.balance.contact
+        return contact.joint(self.on) if self.on else contact.joints[0]
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """The components that the joint's contact law sees, in the order t1, t2, n."""
+        return self.joint.parameters.components
 
     @cached_property
     def energy(self) -> np.ndarray:
         """(n_pair,) friction work over the cycle, both tangential directions [J]; rounding below zero is cut off."""
-        return np.maximum(self.balance.energy(self.state), 0.0)
+        return np.maximum(self.balance.energy(self.state)[self.joint.rows], 0.0)
+
+    @property
+    def status(self) -> np.ndarray:
+        """(n_pair,) bits of what happened in the cycle, see `hbm.law`."""
+        return self.state.cycle.status[self.joint.rows]
+
+    @cached_property
+    def history(self) -> tuple[np.ndarray, np.ndarray]:
+        """Displacement [m] and contact force [N] over the cycle, both (n_pair, n_component, n_samples)."""
+        balance = self.balance
+        return balance.contact.history_of(self.joint, self.state.x, balance.basis, balance.memory)
 
     @cached_property
     def normal_force_times_slip(self) -> np.ndarray:
         """(n_pair,) integral of N |ds| over the cycle, s the slip path in the contact plane [J]."""
-        parameters, basis = self.balance.parameters, self.balance.basis
-        if "n" not in parameters.components:
+        if "n" not in self.components:
             raise ValueError("a wear law that needs the normal force cannot serve a contact without a normal component")
-        x, f = aft.history(self.balance.law, self.state.x, parameters, basis, self.balance.memory)
-        t = parameters.components.index("n")
-        k = parameters.stiffness[:, :t, None]
+        x, f = self.history
+        t = self.components.index("n")
+        k = self.joint.parameters.stiffness[:, :t, None]
         slider = x[:, :t] - np.divide(f[:, :t], k, out=np.zeros_like(f[:, :t]), where=k > 0)
         step = np.linalg.norm(np.roll(slider, -1, axis=2) - slider, axis=1)
         # geometric mean: a slider that moved while the pair was apart carried no load on the way

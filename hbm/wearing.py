@@ -12,14 +12,13 @@ Source  ours
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from tribodyn.hbm import law as contact_law
 from tribodyn.hbm.balance import HarmonicBalance, Linearisation, State
 from tribodyn.hbm.compliance import CompliancePoint
-from tribodyn.hbm.law import ContactCycle, ContactParameters
+from tribodyn.hbm.law import ContactCycle
 
 MAX_ITERATIONS = 80
 ROUNDING = 4e-16
@@ -111,10 +110,10 @@ class WearingBalance:
         self.balances, self.shares, self.base, self.cycles, self.gain = balances, shares, base, cycles, gain
         self._guess = np.maximum(guess, base)
         first = balances[0]
-        self._n_component = len(first.parameters.components)
+        self._n_component = len(first.contact.components)
         spread = first.compliance.k.reshape(-1, 1, self._n_component)
         self.compliance = _Springs(np.repeat(spread, len(balances), axis=1).ravel())
-        self._normal = first.parameters.components.index("n") if "n" in first.parameters.components else None
+        self._normal = first.contact.components.index("n") if "n" in first.contact.components else None
 
     def at(self, omegas: tuple[float, ...]) -> _Points:
         """The linear sides at the duties' frequencies [rad/s]."""
@@ -146,7 +145,7 @@ class WearingBalance:
         omegas: tuple[float, ...] = state.omega  # type: ignore[assignment]
         spread = []
         for balance, omega, part, move in zip(self.balances, omegas, self.parts(state.x), moves, strict=True):
-            there = balance.with_gap(balance.parameters.gap + state.depth)
+            there = balance.with_gap(balance.contact.gap + state.depth)
             spread.append(move * there.frequency_slope(there.evaluate(omega, part))[0])
         moved, _, _ = self.linearise(state).solve(-self.at(omegas).join(spread), 1e-4)
         return moved.reshape(state.x.shape)
@@ -164,7 +163,7 @@ class WearingBalance:
         along = np.zeros((n_pair, n_duty * width))
         column = np.zeros((n_pair, n_duty * width))
         bend, gain = np.ones(n_pair), self.cycles * self.gain
-        t = first.parameters.tangential
+        t = first.contact.tangential
         for i, (share, sample, part) in enumerate(zip(self.shares, samples, parts, strict=True)):
             rows = slice(i * width, (i + 1) * width)
             jac = sample.cycle.jacobian
@@ -218,9 +217,9 @@ class WearingBalance:
         made = []
         for share, balance, part in zip(self.shares, self.balances, parts, strict=True):
             x = part[pairs]
-            parameters = _of(balance.parameters, pairs, balance.parameters.gap[pairs] + depth[pairs])
-            cycle = contact_law.cycle(balance.law, x, parameters, balance.basis, balance.memory[pairs])
-            t = parameters.tangential
+            contact = balance.contact.taken(pairs).with_gap(balance.contact.gap[pairs] + depth[pairs])
+            cycle = contact.cycle(x, balance.basis, balance.memory[pairs])
+            t = contact.tangential
             assert cycle.jacobian is not None
             if self._normal is None or not balance.basis.has_static:
                 column = np.zeros((len(pairs), cycle.jacobian.shape[1]))
@@ -258,15 +257,3 @@ class _Sample:
         ):
             mine[pairs] = new
         return self
-
-
-def _of(parameters: ContactParameters, pairs: np.ndarray, gap: np.ndarray) -> ContactParameters:
-    """The parameters of some pairs, with another gap."""
-    return replace(
-        parameters,
-        stiffness=parameters.stiffness[pairs],
-        friction=parameters.friction[pairs],
-        gap=gap,
-        normal_load=parameters.normal_load[pairs],
-        cubic=parameters.cubic[pairs],
-    )

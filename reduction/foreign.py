@@ -8,16 +8,16 @@
     parameters = ContactParameters.of(contact.components, springs, friction=0.4)
     excitation = Excitation.of({"press": 50.0}, {1: {"shaker": 20.0}})
     basis = HarmonicBasis((0, 1, 2, 3), transitions="located")
-    balance = HarmonicBalance(model, "jenkins", parameters, basis, excitation, omega_max=900.0)
+    balance = HarmonicBalance.of(model, Joint("contact", "jenkins", parameters), basis, excitation, omega_max=900.0)
     response = natural.follow(balance, 200.0, 800.0, natural.Options(n_points=60))
     print(response.frequency, response.amplitude("tip"))
-    wear = WearProblem(balance, (Duty(AtPeak("tip", 200.0, 800.0)),), "energy", 2e-15, contact.area)
+    wear = WearProblem(balance, (Duty(AtPeak("tip", 200.0, 800.0)),), JointWear("energy", 2e-15), contact.area)
     history = thesis_rule.evolve(wear, 1e-6, max_steps=5)
     print(history.cycles, history.depth.max(axis=1))
 
-with `ContactParameters` from hbm.law, `HarmonicBalance` from hbm.balance, `HarmonicBasis` from hbm.harmonics,
+with `ContactParameters` from hbm.law, `Joint` from hbm.joint, `HarmonicBalance` from hbm.balance, `HarmonicBasis` from hbm.harmonics,
 `Excitation` from hbm.excitation, `natural` from hbm.continuation, `AtPeak` from hbm.operating_point, `Duty` and
-`WearProblem` from hbm.evolution and `thesis_rule` from hbm. A scene with [model] does the same without Python.
+`WearProblem` from hbm.evolution, `JointWear` from hbm.wear_law and `thesis_rule` from hbm. A scene with [model] does the same without Python.
 
 Units are SI after `scale`. A DOF is a number from 0, or (node, component) where the file carries labels (Abaqus text,
 ANSYS with its mapping file); the component is 1 to 6 or a name such as "UX" or "z".

@@ -193,7 +193,7 @@ class Stepper:
     def _legs(self, ahead: Direction) -> list[Direction]:
         """Directions in which the curve may go on, from the derivative at a place that need not lie on the curve."""
         balance, omega = self._path.place(ahead.p)
-        state = balance.evaluate(omega, ahead.x.reshape(balance.parameters.n_pair, -1, ahead.x.shape[-1]))
+        state = balance.evaluate(omega, ahead.x.reshape(balance.contact.n_pair, -1, ahead.x.shape[-1]))
         o = self._options.newton
         try:
             leg = bordered.tangent(self._path, ahead.p, state, self._here.tangent, self._metric, o, STEP_TANGENT)

@@ -156,7 +156,7 @@ class _Walk:
         """Solve at the bound that the curve crosses."""
         balance, omega = self._path.place(bound)
         flat = part.guess_at(bound)
-        guess = flat.reshape(balance.parameters.n_pair, -1, flat.shape[-1])
+        guess = flat.reshape(balance.contact.n_pair, -1, flat.shape[-1])
         last = newton.solve(balance, omega, guess, self._options.newton)
         self._builder.add(bound, last)
         if not last.converged:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from tribodyn.hbm import aft
 from tribodyn.hbm.law import SEPARATES
 from tribodyn.hbm.wear_law import Exposure
 
@@ -23,13 +22,11 @@ def depth_rate(exposure: Exposure) -> np.ndarray:
 
 def impact_work(exposure: Exposure) -> np.ndarray:
     """(n_pair,) work of the normal force on closing pairs over one cycle, 0 where a pair never opens [J]."""
-    balance, state = exposure.balance, exposure.state
-    components = balance.parameters.components
-    if "n" not in components:
+    if "n" not in exposure.components:
         raise ValueError("the wear law impact needs a contact law with a normal component: take components with n")
-    n = components.index("n")
-    x, force = aft.history(balance.law, state.x, balance.parameters, balance.basis, balance.memory)
-    return np.where(state.cycle.status & SEPARATES, loading_work(force[:, n], x[:, n]), 0.0)
+    n = exposure.components.index("n")
+    x, force = exposure.history
+    return np.where(exposure.status & SEPARATES, loading_work(force[:, n], x[:, n]), 0.0)
 
 
 def loading_work(force: np.ndarray, displacement: np.ndarray) -> np.ndarray:

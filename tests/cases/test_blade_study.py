@@ -99,7 +99,7 @@ def test_blades_alike_are_a_travelling_wave():
     exact = newton.NewtonOptions(tolerance=1e-11)
     mine, theirs = (newton.solve_from_rest(balance, 2 * np.pi * 1000, exact) for balance in (one, wheel))
     assert mine.outcome == theirs.outcome == CONVERGED
-    pairs = one.parameters.n_pair
+    pairs = one.contact.n_pair
     for n in range(8):
         expected = waves.at_sector(one.basis, mine.state.x, 2, 8, n)
         found = theirs.state.x[n * pairs : (n + 1) * pairs]

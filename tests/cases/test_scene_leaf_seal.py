@@ -42,7 +42,7 @@ def built(folder, *overrides):
 
 def dense_response(balance, omega):
     """Outputs (n_output, 3) of the stuck leaf by one dense solve per harmonic, nothing shared with the balance."""
-    model, k = balance.model, balance.parameters.stiffness.ravel()
+    model, k = balance.model, balance.contact.stiffness.ravel()
     system, B = model.system, model.interface.B
     outputs = np.array([system.outputs[name] for name in balance.compliance.output_names])
     amplitudes = []
@@ -57,8 +57,8 @@ def dense_response(balance, omega):
 
 def test_exactly_one_unknown_for_each_pair_and_coefficient(leaf):
     balance = leaf.balance
-    assert balance.parameters.components == ("n",)
-    assert balance.parameters.n_pair == 126
+    assert balance.contact.components == ("n",)
+    assert balance.contact.n_pair == 126
     assert {face: pairs.stop - pairs.start for face, pairs in leaf.part.pairs.items()} == {
         "upper_contact": 63,
         "lower_contact": 63,

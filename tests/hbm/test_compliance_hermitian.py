@@ -8,6 +8,7 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.reduction.model import ReducedModel
 
@@ -53,7 +54,7 @@ def balance():
     model = ReducedModel(systems[1][0], interface, per_harmonic=lambda h: systems[SYSTEM_OF[h]])
     parameters = ContactParameters.of(interface.components, np.full((N_PAIR, 3), 3e3), friction=0.4)
     load = Excitation.of({"rest": 2e3}, {1: {"shaker": 900 - 300j}, 3: {"shaker": 200j}})
-    return HarmonicBalance(model, "jenkins", parameters, HarmonicBasis(HARMONICS, 64), load, OMEGA)
+    return HarmonicBalance.of(model, Joint("contact", "jenkins", parameters), HarmonicBasis(HARMONICS, 64), load, OMEGA)
 
 
 def direct(balance, omega, force, loads):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tribodyn.hbm import aft
 from tribodyn.hbm import law as contact_law
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS, ContactParameters
@@ -25,7 +26,7 @@ def test_jenkins_describing_function(amplitude, way, n_samples, tolerance):
     basis = HarmonicBasis((0, 1), n_samples, way)
     x = np.array([[[0.0, amplitude, 0.0]]])
     constant = contact_law.load("jenkins_constant")
-    cycle = contact_law.cycle(
+    cycle = aft.cycle(
         constant, x, ContactParameters.of(("t1",), [[kt]], friction=mu, normal_load=load), basis
     )
     assert cycle.force[0, 0] == pytest.approx([0.0, *exact], abs=tolerance * amplitude * kt)
@@ -34,7 +35,7 @@ def test_jenkins_describing_function(amplitude, way, n_samples, tolerance):
     )
     variable = contact_law.load("jenkins")
     x = np.concatenate([x, [[[load, 0.0, 0.0]]]], axis=1)
-    cycle = contact_law.cycle(variable, x, ContactParameters.of(("t1", "n"), [[kt, 1.0]], friction=mu), basis)
+    cycle = aft.cycle(variable, x, ContactParameters.of(("t1", "n"), [[kt, 1.0]], friction=mu), basis)
     assert cycle.force[0, 0] == pytest.approx([0.0, *exact], abs=tolerance * amplitude * kt)
     assert cycle.status[0] == (STICKS if amplitude < 1 else STICKS | SLIPS)
 
@@ -44,7 +45,7 @@ def test_mean_shear_of_a_slipping_element_vanishes_and_of_a_stuck_one_is_that_of
     parameters = ContactParameters.of(("t1",), [[2.0], [2.0]], friction=0.4, normal_load=5.0)  # slips beyond 1 m
     basis = HarmonicBasis((0, 1), 64, "located")
     x = np.array([[[0.9, 0.3, 0.0]], [[0.9, 1.3, 0.0]]])
-    force = contact_law.cycle(law, x, parameters, basis).force
+    force = aft.cycle(law, x, parameters, basis).force
     assert force[0, 0] == pytest.approx([2.0 * (1.0 - 0.3), 0.6, 0.0])  # the peak of the path touched the limit
     assert force[1, 0, 0] == pytest.approx(0.0, abs=1e-14)
 
@@ -66,7 +67,7 @@ def test_planar_coulomb_on_a_circle(n_samples, ratio):
     x = np.array([[[0.0, amplitude, 0.0], [0.0, 0.0, amplitude], [load, 0.0, 0.0]]])
     law = contact_law.load("coulomb_planar")
     parameters = ContactParameters.of(("t1", "t2", "n"), [[kt, kt, 1.0]], friction=mu)
-    cycle = contact_law.cycle(law, x, parameters, basis)
+    cycle = aft.cycle(law, x, parameters, basis)
     exact = limit * np.array([[0.0, np.sin(alpha), -np.cos(alpha)], [0.0, np.cos(alpha), np.sin(alpha)]])
     # sin(t - alpha) = sin t cos alpha - cos t sin alpha
     bound = limit * (2 * np.pi / n_samples) * (1 + 2 / np.sqrt(ratio - 1))
@@ -84,7 +85,7 @@ def test_planar_coulomb_on_a_circle_converges_with_the_samples():
         basis = HarmonicBasis((0, 1), n_samples)
         x = np.array([[[0.0, 1.5, 0.0], [0.0, 0.0, 1.5], [5.0, 0.0, 0.0]]])
         parameters = ContactParameters.of(("t1", "t2", "n"), [[2.0, 2.0, 1.0]], friction=0.4)
-        force = contact_law.cycle(contact_law.load("coulomb_planar"), x, parameters, basis).force[0, 0]
+        force = aft.cycle(contact_law.load("coulomb_planar"), x, parameters, basis).force[0, 0]
         alpha = np.arcsin(1 / 1.5)
         errors.append(np.linalg.norm(force - 2.0 * np.array([0, np.sin(alpha), -np.cos(alpha)])))
     order = np.log2(np.array(errors[:-1]) / errors[1:])
@@ -104,13 +105,13 @@ def test_planar_coulomb_along_a_line_is_a_jenkins_element():
     x[:, 0], x[:, 1] = np.cos(angle)[:, None] * motion, np.sin(angle)[:, None] * motion
     planar = ContactParameters.of(("t1", "t2", "n"), np.ones((20, 3)), friction=0.5)
     line = ContactParameters.of(("t1", "n"), np.ones((20, 2)), friction=0.5)
-    force = contact_law.cycle(contact_law.load("coulomb_planar"), x, planar, basis).force
-    along = contact_law.cycle(contact_law.load("jenkins"), np.stack([motion, x[:, 2]], axis=1), line, basis).force
+    force = aft.cycle(contact_law.load("coulomb_planar"), x, planar, basis).force
+    along = aft.cycle(contact_law.load("jenkins"), np.stack([motion, x[:, 2]], axis=1), line, basis).force
     np.testing.assert_allclose(force[:, 0], np.cos(angle)[:, None] * along[:, 0], atol=1e-12)
     np.testing.assert_allclose(force[:, 1], np.sin(angle)[:, None] * along[:, 0], atol=1e-12)
     x[:, 0], x[:, 1] = motion, 0.0
     unequal = ContactParameters.of(("t1", "t2", "n"), np.tile([1.0, 50.0, 1.0], (20, 1)), friction=0.5)
-    force = contact_law.cycle(contact_law.load("coulomb_planar"), x, unequal, basis).force
+    force = aft.cycle(contact_law.load("coulomb_planar"), x, unequal, basis).force
     np.testing.assert_allclose(force[:, 0], along[:, 0], atol=1e-12)
     np.testing.assert_allclose(force[:, 1], 0.0, atol=1e-14)
 
@@ -147,7 +148,7 @@ def test_unilateral_half_sine(way, n_samples, tolerance):
     exact[0], exact[2] = 1 / np.pi, 0.5
     for m in (1, 2, 3):
         exact[4 * m - 1] = -2 / np.pi / (4 * m**2 - 1)
-    cycle = contact_law.cycle(contact_law.load("unilateral"), x, ContactParameters.of(("n",), [[k]]), basis)
+    cycle = aft.cycle(contact_law.load("unilateral"), x, ContactParameters.of(("n",), [[k]]), basis)
     np.testing.assert_allclose(cycle.force[0, 0], k * amplitude * exact, atol=3 * k * tolerance)
     assert cycle.status[0] == STICKS | SEPARATES
 
@@ -158,7 +159,7 @@ def test_unilateral_static_part_with_a_gap(gap):
     k, amplitude = 3.0, 0.7
     basis = HarmonicBasis((0, 1), 8, "located")
     x = np.array([[[0.0, amplitude, 0.0]]])
-    cycle = contact_law.cycle(contact_law.load("unilateral"), x, ContactParameters.of(("n",), [[k]], gap=gap), basis)
+    cycle = aft.cycle(contact_law.load("unilateral"), x, ContactParameters.of(("n",), [[k]], gap=gap), basis)
     c = np.arccos(gap / amplitude)
     assert cycle.force[0, 0, 0] == pytest.approx(k * (amplitude * np.sin(c) - gap * c) / np.pi, abs=1e-15)
     assert cycle.force[0, 0, 1] == pytest.approx(k * amplitude * (c - np.sin(c) * np.cos(c)) / np.pi, abs=1e-15)
@@ -170,5 +171,5 @@ def test_cubic_spring_gives_the_duffing_amplitudes():
     x = np.zeros((1, 1, 7))
     x[0, 0, 1] = 1.3
     parameters = ContactParameters.of(("t1",), [[2.0]], cubic=0.7)
-    force = contact_law.cycle(contact_law.load("cubic_spring"), x, parameters, basis).force[0, 0]
+    force = aft.cycle(contact_law.load("cubic_spring"), x, parameters, basis).force[0, 0]
     assert force == pytest.approx([0, 2.6 + 0.75 * 0.7 * 1.3**3, 0, 0, 0, 0.25 * 0.7 * 1.3**3, 0], abs=1e-14)

@@ -12,6 +12,7 @@ from tribodyn.hbm import law as contact_law
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.recovery import coordinates
 from tribodyn.reduction.model import ReducedModel
@@ -77,10 +78,10 @@ def test_jacobian_of_the_cycle_equals_differences(name, components, harmonics):
         direction = np.random.default_rng(4).normal(size=x.shape) * np.abs(x).max(axis=(1, 2), keepdims=True)
 
         def force(e, x=x, parameters=parameters, basis=basis, memory=memory, direction=direction):
-            return contact_law.cycle(law, x + e * direction, parameters, basis, memory, jacobian=False).force
+            return aft.cycle(law, x + e * direction, parameters, basis, memory, jacobian=False).force
 
         coarse, fine = ((force(e) - force(-e)) / (2 * e) for e in (2e-6, 1e-6))
-        slope = contact_law.cycle(law, x, parameters, basis, memory).jacobian
+        slope = aft.cycle(law, x, parameters, basis, memory).jacobian
         exact = (slope @ direction.reshape(80, -1, 1)).reshape(x.shape)
         scale = 1e-30 + np.abs(exact).max(axis=(1, 2))
         smooth = np.abs(coarse - fine).max(axis=(1, 2)) < 1e-5 * scale  # no transition passes a sample within the step
@@ -129,7 +130,7 @@ def test_no_law_makes_energy(name, components):
     for way in cycles(name, components):
         basis = HarmonicBasis((0, 1, 2, 3), 256, way)
         x, parameters, memory = draw(law, components, basis, 300, seed=7)
-        cycle = contact_law.cycle(law, x, parameters, basis, memory)
+        cycle = aft.cycle(law, x, parameters, basis, memory)
         scale = np.abs(cycle.force).max() * np.abs(x).max()
         work = basis.work_per_cycle(cycle.force, x)
         opens = (cycle.status & SEPARATES) > 0 if way == "sampled" else np.zeros(300, bool)
@@ -150,7 +151,7 @@ def test_stick_limit_is_the_linear_spring(name, components):
         if "n" in components:
             x[:, -1, 0] = np.abs(x[:, -1, 1:]).sum(axis=1) + 1
         parameters = ContactParameters.of(components, drawn.stiffness, friction=1e6, normal_load=1.0)
-        cycle = contact_law.cycle(law, x, parameters, basis)
+        cycle = aft.cycle(law, x, parameters, basis)
         linear = drawn.stiffness[:, :, None] * x
         stiffness = np.stack([np.diag(np.repeat(k, basis.n_coeff)) for k in drawn.stiffness])
         tolerance = 0.0 if way == "located" else 1e-14
@@ -173,7 +174,7 @@ def test_full_slip_limit_of_energy(name, components):
         k = np.full((1, len(components)), kt)
         k[0, -1] = 1.0 if "n" in components else kt
         parameters = ContactParameters.of(components, k, friction=mu, normal_load=load)
-        cycle = contact_law.cycle(law, x, parameters, basis)
+        cycle = aft.cycle(law, x, parameters, basis)
         energy = basis.work_per_cycle(cycle.force, x)[0, 0]
         exact = 4 * mu * load * (amplitude - mu * load / kt)
         assert energy == pytest.approx(exact, rel=1e-12 if way == "located" else 2e-6)
@@ -188,8 +189,8 @@ def test_time_origin_does_not_matter(name, components):
         basis = HarmonicBasis((0, 1, 2, 3), 60, way)
         x, parameters, _ = draw(law, components, basis, 100, seed=9)
         angle = 2 * np.pi * 7 / 60 if way == "sampled" else 1.234
-        first = contact_law.cycle(law, x, parameters, basis)
-        second = contact_law.cycle(law, basis.shift(x, angle), parameters, basis)
+        first = aft.cycle(law, x, parameters, basis)
+        second = aft.cycle(law, basis.shift(x, angle), parameters, basis)
         keep = (first.status & SLIPS) > 0 if name == "coulomb_planar" else np.ones(100, bool)
         assert keep.sum() > 30
         scale = np.abs(first.force).max()
@@ -206,12 +207,12 @@ def test_mirror_image_of_the_plane(name, components):
     for way in cycles(name, components):
         basis = HarmonicBasis((0, 1, 2, 3), 64, way)
         x, parameters, memory = draw(law, components, basis, 100, seed=10)
-        first = contact_law.cycle(law, x, parameters, basis, memory)
+        first = aft.cycle(law, x, parameters, basis, memory)
         for c in range(len(components)) if name == "cubic_spring" else tangential(components):
             flip = np.ones(len(components))
             flip[c] = -1.0
             mirrored = memory * flip[: memory.shape[1]]
-            second = contact_law.cycle(law, x * flip[:, None], parameters, basis, mirrored)
+            second = aft.cycle(law, x * flip[:, None], parameters, basis, mirrored)
             np.testing.assert_allclose(second.force, first.force * flip[:, None], atol=1e-12)
 
 
@@ -235,7 +236,7 @@ def test_action_is_reaction(name, components):
     )
     basis = HarmonicBasis((0, 1, 2, 3), 64)
     excitation = Excitation.of({"press": 0.5}, {1: {"shake": 1.0}})
-    balance = HarmonicBalance(model, name, parameters, basis, excitation, 2.0)
+    balance = HarmonicBalance.of(model, Joint("contact", name, parameters), basis, excitation, 2.0)
     solution = newton.solve_from_rest(balance, 0.8)
     assert solution.converged
     state = solution.state
@@ -270,8 +271,8 @@ def test_units_of_length_and_force_do_not_matter(name, components, length, unit_
             normal_load=p.normal_load * unit_force,
             cubic=p.cubic * unit_force / length**3,
         )
-        first = contact_law.cycle(law, x, p, basis, memory)
-        second = contact_law.cycle(law, x * length, scaled, basis, memory * length)
+        first = aft.cycle(law, x, p, basis, memory)
+        second = aft.cycle(law, x * length, scaled, basis, memory * length)
         np.testing.assert_allclose(second.force / unit_force, first.force, atol=1e-11)
         error = np.abs(second.jacobian * length / unit_force - first.jacobian).max(axis=(1, 2))
         assert np.quantile(error, 0.97) < 1e-9
@@ -288,8 +289,8 @@ def test_memory_repeats(name, components):
     settled, _ = aft.settle(law, samples, parameters.packed(), memory, basis.synthesis[:, :0])
     again, _ = aft.settle(law, samples, parameters.packed(), settled, basis.synthesis[:, :0])
     np.testing.assert_allclose(again, settled, atol=1e-12)
-    first = contact_law.cycle(law, x, parameters, basis, memory)
-    second = contact_law.cycle(law, x, parameters, basis, settled)
+    first = aft.cycle(law, x, parameters, basis, memory)
+    second = aft.cycle(law, x, parameters, basis, settled)
     np.testing.assert_allclose(second.force, first.force, atol=1e-11)
 
 
@@ -303,7 +304,7 @@ def test_extreme_parameters_give_finite_forces(name, components):
             stiffness = np.full_like(p.stiffness, k)
             extreme = ContactParameters.of(components, stiffness, friction=mu, gap=p.gap, normal_load=1e6)
             for motion in (x, 0 * x, 1e-12 * x, 1e6 * x):
-                cycle = contact_law.cycle(law, motion, extreme, basis, memory)
+                cycle = aft.cycle(law, motion, extreme, basis, memory)
                 assert np.isfinite(cycle.force).all()
                 assert np.isfinite(cycle.jacobian).all()
 
@@ -316,7 +317,7 @@ def test_law_without_located_transitions_refuses():
         law = contact_law.load(name)
         x, parameters, memory = draw(law, components, basis, 2, seed=0)
         with pytest.raises(ValueError, match=f"'{name}' does not locate its transitions: take transitions = 'sampled'"):
-            contact_law.cycle(law, x, parameters, basis, memory)
+            aft.cycle(law, x, parameters, basis, memory)
     with pytest.raises(ValueError, match="transitions must be"):
         HarmonicBasis((0, 1), 16, "exact")
 

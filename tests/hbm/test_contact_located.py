@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from tests.helpers.contact_draws import HARMONICS, LOCATED, draw
 from tests.helpers.random_problems import cases
+from tribodyn.hbm import aft, located
 from tribodyn.hbm import law as contact_law
-from tribodyn.hbm import located
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS, ContactParameters
 
@@ -46,7 +46,7 @@ def test_against_a_fine_integration(name, components, harmonics):
     law = contact_law.load(name)
     basis = HarmonicBasis(harmonics, 12, "located")
     x, p, memory = draw(law, components, basis, 6, seed=21)
-    force = contact_law.cycle(law, x, p, basis, memory).force
+    force = aft.cycle(law, x, p, basis, memory).force
     for i in range(6):
 
         def load(angle, i=i):
@@ -86,13 +86,13 @@ def test_what_locating_buys(name, components, swing, order):
         normal *= swing / np.hypot(normal[:, 1::2], normal[:, 2::2]).sum(axis=1)[:, None]
         normal[:, 0] = 1
     p = ContactParameters.of(components, np.ones((200, len(components))), friction=0.5, normal_load=1.0)
-    exact = contact_law.cycle(law, x, p, WITH_STATIC)
+    exact = aft.cycle(law, x, p, WITH_STATIC)
     samples = 8 * 2 ** np.arange(10)
     error = []
     for n_samples in samples:
-        sampled = contact_law.cycle(law, x, p, HarmonicBasis((0, 1, 2, 3), int(n_samples)))
+        sampled = aft.cycle(law, x, p, HarmonicBasis((0, 1, 2, 3), int(n_samples)))
         error.append(np.sqrt(np.mean((sampled.force - exact.force) ** 2)))
-        same = contact_law.cycle(law, x, p, HarmonicBasis((0, 1, 2, 3), int(n_samples), "located"))
+        same = aft.cycle(law, x, p, HarmonicBasis((0, 1, 2, 3), int(n_samples), "located"))
         np.testing.assert_array_equal(same.force, exact.force)
     slope = -np.polyfit(np.log2(samples[2:]), np.log2(error[2:]), 1)[0]
     assert slope == pytest.approx(order, abs=0.12)
@@ -109,9 +109,9 @@ def test_jacobian_through_every_kind_of_transition(name, components):
         direction = np.random.default_rng(1).normal(size=x.shape)
         e = 1e-6
         plus, minus = (
-            contact_law.cycle(law, x + s * e * direction, p, basis, memory, jacobian=False).force for s in (1, -1)
+            aft.cycle(law, x + s * e * direction, p, basis, memory, jacobian=False).force for s in (1, -1)
         )
-        slope = contact_law.cycle(law, x, p, basis, memory).jacobian @ direction.reshape(100, -1, 1)
+        slope = aft.cycle(law, x, p, basis, memory).jacobian @ direction.reshape(100, -1, 1)
         error = np.abs((plus - minus) / (2 * e) - slope.reshape(x.shape)).max(axis=(1, 2))
         assert error.max() < 1e-3  # differences across an event that appears or vanishes
         assert np.quantile(error, 0.97) < 1e-6
@@ -121,7 +121,7 @@ def test_dissipation_is_never_negative():
     for name, components in LOCATED:
         law = contact_law.load(name)
         x, p, memory = draw(law, components, WITH_STATIC, 500, seed=23)
-        work = WITH_STATIC.work_per_cycle(contact_law.cycle(law, x, p, WITH_STATIC, memory).force, x)
+        work = WITH_STATIC.work_per_cycle(aft.cycle(law, x, p, WITH_STATIC, memory).force, x)
         scale = np.abs(x).max()
         assert work.min() > -1e-14 * scale
         if "n" in components:  # the normal spring gives back what it takes
@@ -136,8 +136,8 @@ def test_several_events_within_one_sample_interval():
     x[0, 0] = [0.0, 0.3, 0.1, 0.8, 0.4]
     x[0, 1] = [0.1, 0.2, 0.0, 0.0, 1.0]
     p = ContactParameters.of(("t1", "n"), [[1.0, 1.0]], friction=0.4)
-    cycle = contact_law.cycle(law, x, p, basis)
-    fine = contact_law.cycle(law, x, p, HarmonicBasis((0, 1, 15), 2**18))
+    cycle = aft.cycle(law, x, p, basis)
+    fine = aft.cycle(law, x, p, HarmonicBasis((0, 1, 15), 2**18))
     np.testing.assert_allclose(cycle.force, fine.force, atol=2e-5)
     assert cycle.status[0] == STICKS | SLIPS | SEPARATES
 
@@ -151,8 +151,8 @@ def test_grazing_contact(touch):
     x[0, 1, :2] = 1.0 + touch, 1.0
     x[1, 1, :2] = -1.0 + touch, 1.0
     p = ContactParameters.of(("t1", "n"), [[1.0, 1.0]] * 2, friction=0.5)
-    cycle = contact_law.cycle(law, x, p, WITH_STATIC)
-    near = contact_law.cycle(law, x + [[[1e-7], [0.0]]] * (WITH_STATIC.order == 0), p, WITH_STATIC)
+    cycle = aft.cycle(law, x, p, WITH_STATIC)
+    near = aft.cycle(law, x + [[[1e-7], [0.0]]] * (WITH_STATIC.order == 0), p, WITH_STATIC)
     assert np.isfinite(cycle.force).all()
     assert np.isfinite(cycle.jacobian).all()
     np.testing.assert_allclose(near.force, cycle.force, atol=2e-7)
@@ -167,7 +167,7 @@ def test_always_separated_costs_and_gives_nothing():
     x[0, :, 1:] = 0.1
     x[0, 2, 0] = -1.0
     p = ContactParameters.of(("t1", "t2", "n"), [[1.0, 1.0, 1.0]], friction=0.5)
-    cycle = contact_law.cycle(law, x, p, WITH_STATIC, memory=np.array([[3.0, -1.0]]))
+    cycle = aft.cycle(law, x, p, WITH_STATIC, memory=np.array([[3.0, -1.0]]))
     assert not cycle.force.any()
     assert not cycle.jacobian.any()
     assert cycle.status[0] == SEPARATES
@@ -179,7 +179,7 @@ def test_always_stuck_is_linear_to_the_last_digit():
     x = 0.01 * rng.normal(size=(50, 3, 7))
     x[:, 2, 0] = 1.0
     p = ContactParameters.of(("t1", "t2", "n"), rng.uniform(1, 2, (50, 3)), friction=0.5)
-    cycle = contact_law.cycle(law, x, p, WITH_STATIC)
+    cycle = aft.cycle(law, x, p, WITH_STATIC)
     np.testing.assert_array_equal(cycle.force, p.stiffness[:, :, None] * x)
     k = np.stack([np.diag(np.repeat(row, 7)) for row in p.stiffness])
     np.testing.assert_array_equal(cycle.jacobian, k)
@@ -195,7 +195,7 @@ def test_stuck_on_the_rim_keeps_the_shear_of_the_extreme_load_path():
     angle = np.linspace(0, 2 * np.pi, 100_001)
     room = (0.6 * (1 + 0.1 * np.cos(2 * angle)) - 2.0 * 0.2 * np.cos(angle)).min()
     for side in (1, -1):
-        cycle = contact_law.cycle(law, x, p, WITH_STATIC, memory=np.array([[-side * 1e6]]))
+        cycle = aft.cycle(law, x, p, WITH_STATIC, memory=np.array([[-side * 1e6]]))
         assert cycle.force[0, 0, 0] == pytest.approx(side * room, abs=1e-9)
         assert cycle.force[0, 0, 1:] == pytest.approx(2.0 * x[0, 0, 1:], abs=0)
 
@@ -206,7 +206,7 @@ def test_tiny_preload(load):
     x = np.zeros((1, 2, 7))
     x[0, 0, 1:] = np.random.default_rng(6).normal(size=6)
     x[0, 1, 0] = load
-    cycle = contact_law.cycle(law, x, ContactParameters.of(("t1", "n"), [[1.0, 1.0]], friction=0.5), WITH_STATIC)
+    cycle = aft.cycle(law, x, ContactParameters.of(("t1", "n"), [[1.0, 1.0]], friction=0.5), WITH_STATIC)
     assert np.abs(cycle.force[0, 0]).max() <= 4 / np.pi * 0.5 * load + 1e-15
     assert cycle.force[0, 1, 0] == load
     assert np.isfinite(cycle.jacobian).all()
@@ -223,7 +223,7 @@ def test_friction_proportional_to_the_motion():
         x[0, 1, 0] = 1 - lift
         x[0, 0] = 0.5 * x[0, 1]
         p = ContactParameters.of(("t1", "n"), [[1.0, 1.0]], friction=0.5)
-        cycle = contact_law.cycle(law, x, p, WITH_STATIC)
+        cycle = aft.cycle(law, x, p, WITH_STATIC)
         assert np.isfinite(cycle.jacobian).all()
         np.testing.assert_allclose(cycle.force[0, 0], 0.5 * cycle.force[0, 1], atol=1e-14)
 
@@ -253,9 +253,9 @@ def test_without_numba_the_kernels_give_the_same(monkeypatch):
     """The compiled kernels and their Python source agree (one cycle with all kinds of segment)."""
     law = contact_law.load("jenkins")
     x, p, memory = draw(law, ("t1", "n"), WITH_STATIC, 4, seed=24)
-    compiled = contact_law.cycle(law, x, p, WITH_STATIC, memory)
+    compiled = aft.cycle(law, x, p, WITH_STATIC, memory)
     for kernel in [n for n in vars(located) if hasattr(getattr(located, n), "py_func")]:
         monkeypatch.setattr(located, kernel, getattr(located, kernel).py_func)
-    plain = contact_law.cycle(law, x, p, WITH_STATIC, memory)
+    plain = aft.cycle(law, x, p, WITH_STATIC, memory)
     np.testing.assert_allclose(plain.force, compiled.force, atol=1e-14)
     np.testing.assert_allclose(plain.jacobian, compiled.jacobian, atol=1e-13)

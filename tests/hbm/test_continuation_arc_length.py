@@ -18,6 +18,7 @@ from tribodyn.hbm.continuation import arc_length, natural
 from tribodyn.hbm.continuation.arc_length import Options
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.hbm.parameter import Parameter
 
@@ -27,7 +28,9 @@ def pressed_slab(harmonics: tuple[int, ...] = (0, 1, 2), rock: float = 2.0, how:
     model = slab(2, 2, ratio=0.01)
     parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(4e6, 6e6), friction=0.3)
     excitation = Excitation.of({"press": 60.0}, {1: {"rock": rock, "shake": rock / 3}})
-    return HarmonicBalance(model, "jenkins", parameters, HarmonicBasis(harmonics, 128, how), excitation, 8000.0)
+    return HarmonicBalance.of(
+        model, Joint("contact", "jenkins", parameters), HarmonicBasis(harmonics, 128, how), excitation, 8000.0
+    )
 
 
 def test_duffing_has_both_folds_where_its_discriminant_vanishes():
@@ -171,7 +174,7 @@ def test_derivative_with_respect_to_a_parameter(make):
     parameters = ContactParameters.of(("t1", "t2", "n"), k, friction=0.3)
     excitation = Excitation.of({"static": 1500.0}, {1: {"shaker": 2500.0}})
     basis = HarmonicBasis((0, 1, 2), 64, "located")
-    balance = HarmonicBalance(structure, "jenkins", parameters, basis, excitation, 2000.0)
+    balance = HarmonicBalance.of(structure, Joint("contact", "jenkins", parameters), basis, excitation, 2000.0)
     omega = 450.0
     base = newton.solve_from_rest(balance, omega)
     assert base.converged

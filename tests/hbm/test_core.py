@@ -27,7 +27,7 @@ def model() -> ReducedModel:
 
 def test_compliance_and_its_slope_equal_direct_solves(model: ReducedModel) -> None:
     balance = balance_of(model)
-    compliance = ContactCompliance(model, balance.parameters.stiffness, balance.basis, balance.excitation, 1500.0)
+    compliance = ContactCompliance(model, balance.contact.stiffness, balance.basis, balance.excitation, 1500.0)
     g = np.random.default_rng(0).normal(size=(3 * N_PAIR, balance.basis.n_coeff))
     system, b = model.at_harmonic(1)
     stuck = system.stiffness + b.T @ (compliance.k[:, None] * b)

@@ -92,8 +92,8 @@ def test_fewer_harmonics_share_the_linear_side():
     balance, omega = pairs()
     wide = widened(balance, 4)
     narrow = wide.with_harmonics((0, 1, 3))
-    made = HarmonicBalance(
-        balance.model, "jenkins", balance.parameters, narrow.basis, balance.excitation, balance.omega_max
+    made = HarmonicBalance.of(
+        balance.model, balance.contact.joints, narrow.basis, balance.excitation, balance.omega_max
     )
     a, b = newton.solve_from_rest(narrow, omega[0]), newton.solve_from_rest(made, omega[0])
     np.testing.assert_allclose(a.state.x, b.state.x, atol=1e-7 * np.abs(b.state.x).max())

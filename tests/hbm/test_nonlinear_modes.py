@@ -14,6 +14,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.hbm.nonlinear_modes import Options, backbone
 from tribodyn.reduction.model import ReducedModel
@@ -26,8 +27,12 @@ LIMIT = MU * PRESS * KN / (KN + STIFFNESS)
 def jenkins(n_samples: int = 8192) -> HarmonicBalance:
     parameters = ContactParameters.of(("t1", "n"), [[KT, KN]], friction=MU)
     excitation = Excitation.of({"normal": PRESS})
-    return HarmonicBalance(
-        oscillator(MASS, STIFFNESS, RATIO), "jenkins", parameters, HarmonicBasis((0, 1), n_samples), excitation, 1000.0
+    return HarmonicBalance.of(
+        oscillator(MASS, STIFFNESS, RATIO),
+        Joint("contact", "jenkins", parameters),
+        HarmonicBasis((0, 1), n_samples),
+        excitation,
+        1000.0,
     )
 
 
@@ -53,8 +58,8 @@ def test_frequency_and_damping_of_a_jenkins_element_are_the_closed_form():
 def duffing(harmonics: tuple[int, ...], ratio: float) -> HarmonicBalance:
     parameters = ContactParameters.of(("n",), [[KT]], cubic=2e9)
     basis = HarmonicBasis(harmonics, 256)
-    return HarmonicBalance(
-        oscillator(MASS, STIFFNESS, ratio, "n"), "cubic_spring", parameters, basis, Excitation(), 1e4
+    return HarmonicBalance.of(
+        oscillator(MASS, STIFFNESS, ratio, "n"), Joint("contact", "cubic_spring", parameters), basis, Excitation(), 1e4
     )
 
 
@@ -86,14 +91,16 @@ def structure(ratio: float, friction: float = 0.3) -> HarmonicBalance:
     parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(3e6, 5e6), friction=friction)
     basis = HarmonicBasis((0, 1, 2, 3), 512, "located")  # the normal spring then does no work, not even by sampling
     excitation = Excitation.of({"static": 30.0})
-    return HarmonicBalance(model, "jenkins", parameters, basis, excitation, 600.0).with_gap(np.full(3, -5e-5))
+    return HarmonicBalance.of(
+        model, Joint("contact", "jenkins", parameters), basis, excitation, 600.0).with_gap(np.full(3, -5e-5)
+    )
 
 
 def test_small_amplitude_is_the_linear_mode_and_the_backbone_goes_on():
     balance = structure(ratio=0.01)
     found = backbone(balance, 1e-9, 3e-5, mode=1, options=Options(n_points=25))
     system, b = balance.model.system, np.asarray(balance.model.interface.B)
-    stuck = system.stiffness + b.T @ (balance.parameters.stiffness.ravel()[:, None] * b)
+    stuck = system.stiffness + b.T @ (balance.contact.stiffness.ravel()[:, None] * b)
     lam, phi = sla.eigh(stuck, system.mass)
     assert found.reference_omega == pytest.approx(np.sqrt(lam[1]), rel=1e-10)
     assert found.omega[0] == pytest.approx(np.sqrt(lam[1]), rel=1e-4)  # light damping couples modes at second order
@@ -110,7 +117,7 @@ def test_damping_is_the_energy_lost_and_a_force_along_the_added_term_holds_the_m
     i = -1
     omega, zeta = found.omega[i], found.damping[i]
     system, basis = balance.model.system, balance.basis
-    k = balance.parameters.stiffness.ravel()
+    k = balance.contact.stiffness.ravel()
     b = np.asarray(balance.model.interface.B)
     x = found.contact[i].reshape(3, 3, -1)
     state = balance.evaluate(omega, x)
@@ -132,7 +139,9 @@ def test_damping_is_the_energy_lost_and_a_force_along_the_added_term_holds_the_m
     forced_model = ReducedModel(
         type(system)(system.mass, system.stiffness, None, load_vectors, system.outputs), balance.model.interface
     )
-    forced = HarmonicBalance(forced_model, "jenkins", balance.parameters, basis, Excitation(loads), 600.0)
+    forced = HarmonicBalance.of(
+        forced_model, balance.contact.joints, basis, Excitation(loads), 600.0
+    )
     forced_state = forced.evaluate(omega, x)
     assert newton.relative_residual(forced_state, forced.x_lin(omega)) < 1e-6
 

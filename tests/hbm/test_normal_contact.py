@@ -12,6 +12,7 @@ from tribodyn.hbm.chatter import chatter, sign_changes
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.expansion import SingularStuckSystem
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import SEPARATES, STICKS, ContactParameters
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.wear.impact import impact_work, loading_work
@@ -28,7 +29,9 @@ def balance_of(
 ) -> HarmonicBalance:
     n = model.interface.n_pair
     parameters = ContactParameters.of(("n",), np.full((n, 1), stiffness / n), gap=gap)
-    return HarmonicBalance(model, "unilateral", parameters, HarmonicBasis(harmonics, samples), excitation, 2 * OMEGA)
+    return HarmonicBalance.of(
+        model, Joint("contact", "unilateral", parameters), HarmonicBasis(harmonics, samples), excitation, 2 * OMEGA
+    )
 
 
 def shaken(shake: complex = 0.3, **options) -> HarmonicBalance:
@@ -69,7 +72,7 @@ def test_rigid_modes_of_the_free_part_are_solved_without_any_help():
 def _coordinates(balance, state):
     """Coordinates of the model of a state, over the stuck system."""
     basis, system, B = balance.basis, balance.model.system, balance.model.interface.B
-    k = balance.parameters.stiffness.ravel()
+    k = balance.contact.stiffness.ravel()
     base = 0.0 if balance.excitation.base is None else balance.excitation.base
     pull = basis.to_complex(k[:, None] * (state.flat + base) - state.cycle.force.reshape(len(k), -1))
     columns = []
@@ -194,7 +197,7 @@ def test_impact_work_is_that_of_the_deepest_compression():
     x[0, 0] = [1.0, 0.5, 0.0]
     x[1, 0] = [-1.0, 0.5, 0.0]
     x[2, 0] = [0.5, 0.0, 1.0]
-    k = balance.parameters.stiffness[0, 0]
+    k = balance.contact.stiffness[0, 0]
     exposure = Exposure(balance, balance.evaluate(OMEGA, x), np.full(9, 2e-4), np.full(9, 3e-12), np.zeros(9), 0.0)
     np.testing.assert_allclose(impact_work(exposure)[:3], [0.0, 0.0, k * 1.5**2 / 2], rtol=1e-5)
     angle = 2 * np.pi * np.arange(400) / 400

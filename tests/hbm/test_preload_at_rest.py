@@ -28,7 +28,7 @@ def problem() -> WearProblem:
 
 def static_preload(problem: WearProblem, depth: np.ndarray) -> float:
     """The same by a general solver for nonlinear equations: springs that open and slip, no harmonics, no balance."""
-    model, parameters = problem.balance.model, problem.balance.parameters
+    model, parameters = problem.balance.model, problem.balance.contact.joints[0].parameters
     B, flexibility = np.asarray(model.interface.B), np.linalg.inv(model.system.stiffness)
     free = B @ flexibility @ (100.0 * model.system.loads["press"])
     C = B @ flexibility @ B.T
@@ -78,6 +78,6 @@ def test_a_resumed_run_ends_at_the_same_row(problem: WearProblem, rule: str) -> 
 def test_a_contact_without_static_normal_force_has_no_preload_at_rest(problem: WearProblem) -> None:
     one = problem.balance
     shaken = Excitation.of({}, {1: {"shake": 60.0}})
-    unpressed = HarmonicBalance(one.model, "jenkins", one.parameters, HarmonicBasis((1,), 64), shaken, 1500.0)
+    unpressed = HarmonicBalance.of(one.model, one.contact.joints, HarmonicBasis((1,), 64), shaken, 1500.0)
     with pytest.raises(ValueError, match="component n and harmonic 0"):
         wear_problem(balance=unpressed, lost_below_at_rest=0.5)

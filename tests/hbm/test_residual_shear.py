@@ -5,11 +5,12 @@ import pytest
 
 from tests.helpers.verification_models import interface, random_structure
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.hbm import aft, newton
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.branch import amplitude
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.residual_shear import amplitude_slope, response_bounds
@@ -22,10 +23,9 @@ def stuck_oscillator(transitions):
     """m = 1, k = 3, c = 0.2 on a Jenkins element k_t = 2, mu N = 1.5 that sticks; static load 0.4, harmonic 0.5."""
     one = np.eye(1)
     system = SecondOrderSystem(one, 3 * one, 0.2 * one, {"force": np.ones(1)}, {"mass": np.ones(1)})
-    return HarmonicBalance(
+    return HarmonicBalance.of(
         ReducedModel(system, interface(one, ("t1",))),
-        "jenkins_constant",
-        ContactParameters.of(("t1",), [[2.0]], friction=0.5, normal_load=3.0),
+        Joint("contact", "jenkins_constant", ContactParameters.of(("t1",), [[2.0]], friction=0.5, normal_load=3.0)),
         HarmonicBasis((0, 1), 4096, transitions),
         Excitation.of({"force": 0.4}, {1: {"force": 0.5}}),
         10.0,
@@ -51,9 +51,8 @@ def mixed_contact(law="jenkins", transitions="located"):
     """Four pairs on a random structure: some stick, some slip, and static shear is coupled with the normal loads."""
     parameters = ContactParameters.of(("t1", "t2", "n"), np.full((4, 3), 3e6), friction=0.5)
     excitation = Excitation.of({"static": 4000}, {1: {"shaker": 400}})
-    return HarmonicBalance(
-        random_structure(4, seed=2), law, parameters, HarmonicBasis((0, 1, 2, 3), 64, transitions), excitation, 2500.0
-    )
+    joint, basis = Joint("contact", law, parameters), HarmonicBasis((0, 1, 2, 3), 64, transitions)
+    return HarmonicBalance.of(random_structure(4, seed=2), joint, basis, excitation, 2500.0)
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +71,7 @@ def test_stuck_pairs_end_on_the_rim_of_the_friction_cone(mixed):
     for sign, solution, is_stuck in zip((-1, 1), bounds.solutions[1:], bounds.stuck[1:], strict=True):
         fine = HarmonicBasis(balance.basis.harmonics, 4096)
         far = -sign * bounds.direction * 1e3
-        _, force = aft.history(balance.law, solution.state.x, balance.parameters, fine, far)
+        _, force = balance.contact.history(solution.state.x, fine, far)
         room = 0.5 * force[:, 2:] - np.abs(force[:, :2])
         assert room.min() > -1e-9
         assert np.all(room.min(axis=2)[is_stuck] < 1e-4 * np.abs(force).max())
@@ -103,7 +102,7 @@ def test_the_unloaded_start_and_any_other_lie_between_the_extremes(mixed):
 def test_amplitude_slope_equals_differences(mixed):
     balance, omega, bounds = mixed
     state, free = bounds.solutions[0].state, bounds.stuck[0]
-    k = balance.parameters.stiffness[:, :2]
+    k = balance.contact.stiffness[:, :2]
     tight = NewtonOptions(tolerance=1e-13)
     inside = np.where(free, state.x[:, :2, 0] - 0.99 * state.cycle.force[:, :2, 0] / k, 0.0)
     for _ in range(3):  # a slider that was pushed is moved on a little: off the rim
@@ -137,14 +136,16 @@ def test_refusals():
     model = ReducedModel(system, interface(one, ("n",)))
     basis = HarmonicBasis((0, 1), 16)
     parameters = ContactParameters.of(("n",), [[1.0]])
-    balance = HarmonicBalance(model, "unilateral", parameters, basis, Excitation.of({"force": 1.0}), 2.0)
+    balance = HarmonicBalance.of(
+        model, Joint("contact", "unilateral", parameters), basis, Excitation.of({"force": 1.0}), 2.0
+    )
     with pytest.raises(ValueError, match="'unilateral' keeps no slider"):
         response_bounds(balance, 1.0)
     model = ReducedModel(system, interface(one, ("t1",)))
     parameters = ContactParameters.of(("t1",), [[1.0]], friction=0.5, normal_load=1.0)
     basis = HarmonicBasis((1,), 16)
-    balance = HarmonicBalance(
-        model, "jenkins_constant", parameters, basis, Excitation.of(harmonic={1: {"force": 1.0}}), 2.0
+    balance = HarmonicBalance.of(
+        model, Joint("contact", "jenkins_constant", parameters), basis, Excitation.of(harmonic={1: {"force": 1.0}}), 2.0
     )
     with pytest.raises(ValueError, match="keep harmonic 0"):
         response_bounds(balance, 1.0)

@@ -13,6 +13,7 @@ from tribodyn.hbm import newton, time_integration
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.stability import stability
@@ -36,7 +37,9 @@ def scaled(length: float, force: float, shaker: float = 25.0) -> HarmonicBalance
     )
     excitation = Excitation.of({"static": 30.0 * force}, {1: {"shaker": shaker * force}})
     basis = HarmonicBasis((0, 1, 2, 3), 256)
-    return HarmonicBalance(replace(model, system=system), "jenkins", parameters, basis, excitation, 1.2 * OMEGA)
+    return HarmonicBalance.of(
+        replace(model, system=system), Joint("contact", "jenkins", parameters), basis, excitation, 1.2 * OMEGA
+    )
 
 
 def solved(balance: HarmonicBalance) -> Solution:

@@ -12,6 +12,7 @@ from tribodyn.hbm.continuation import arc_length
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.floquet import monodromy
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.hbm.stability import Stability, mark, stability
 from tribodyn.hbm.time_integration import Options, TimeStepper
@@ -25,7 +26,7 @@ def balance_of(friction: float, static: float, shaker: float, top: int) -> Harmo
     parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(3e6, 5e6), friction=friction)
     excitation = Excitation.of({"static": static}, {1: {"shaker": shaker}})
     basis = HarmonicBasis(tuple(range(top + 1)), 512)
-    return HarmonicBalance(model, "jenkins", parameters, basis, excitation, 1.2 * OMEGA)
+    return HarmonicBalance.of(model, Joint("contact", "jenkins", parameters), basis, excitation, 1.2 * OMEGA)
 
 
 @pytest.mark.parametrize(("method", "smallest", "error"), [("hill", 0.0, 1e-9), ("floquet", 0.5, 0.02)])
@@ -35,7 +36,7 @@ def test_exponents_of_a_stuck_contact_are_eigenvalues(method, smallest, error):
     solution = newton.solve_from_rest(balance, OMEGA)
     assert np.all(solution.state.cycle.status == 1)
     system, b = balance.model.system, np.asarray(balance.model.interface.B)
-    stiffness = system.stiffness + b.T @ (balance.parameters.stiffness.ravel()[:, None] * b)
+    stiffness = system.stiffness + b.T @ (balance.contact.stiffness.ravel()[:, None] * b)
     n = len(stiffness)
     inverse = np.linalg.inv(system.mass)
     first_order = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiffness, -inverse @ system.damping]])
@@ -103,7 +104,9 @@ def lifting_mass() -> HarmonicBalance:
     parameters = ContactParameters.of(("n",), [[4e4]])
     excitation = Excitation.of({"normal": 50.0}, {1: {"normal": 3.0}})
     basis = HarmonicBasis((0, 1, 2, 3, 4, 5), 256, "located")
-    return HarmonicBalance(oscillator(1.0, 1e4, 0.01, "n"), "unilateral", parameters, basis, excitation, 300.0)
+    return HarmonicBalance.of(
+        oscillator(1.0, 1e4, 0.01, "n"), Joint("contact", "unilateral", parameters), basis, excitation, 300.0
+    )
 
 
 def test_folds_of_a_lifting_mass_are_marked_where_the_branch_turns():
@@ -142,12 +145,16 @@ def test_names_and_refusals():
     model = oscillator(1.0, 1e4, 0.01)
     parameters = ContactParameters.of(("t1", "n"), [[1e4, 1e4]])
     excitation = Excitation.of({"normal": 1.0}, {1: {"force": 1.0}})
-    balance = HarmonicBalance(model, "jenkins", parameters, HarmonicBasis((0, 1), 32), excitation, 200.0)
+    balance = HarmonicBalance.of(
+        model, Joint("contact", "jenkins", parameters), HarmonicBasis((0, 1), 32), excitation, 200.0
+    )
     state = newton.solve_from_rest(balance, 100.0).state
     with pytest.raises(ValueError, match="no stability method"):
         stability(balance, state, "guess")
     cyclic = ReducedModel(model.system, model.interface, per_harmonic=lambda h: (model.system, np.eye(2)))
-    other = HarmonicBalance(cyclic, "jenkins", parameters, HarmonicBasis((0, 1), 32), excitation, 200.0)
+    other = HarmonicBalance.of(
+        cyclic, Joint("contact", "jenkins", parameters), HarmonicBasis((0, 1), 32), excitation, 200.0
+    )
     with pytest.raises(ValueError, match="one system for all harmonics"):
         stability(other, state)
     assert Stability(10.0, np.array([1.0 + 3j]), "hill").crossing == "Neimark-Sacker"

@@ -11,6 +11,7 @@ from tribodyn.hbm import newton, time_integration
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.hbm.time_integration import Options
 from tribodyn.reduction.model import ReducedModel
@@ -23,13 +24,13 @@ def random_balance(friction: float, shaker: float = 60.0, ratio: float = 0.01, s
     parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(3e6, 5e6), friction=friction)
     excitation = Excitation.of({"static": 30.0}, {1: {"shaker": shaker}, 2: {"shaker": second}})
     basis = HarmonicBasis(tuple(range(6)), 512)
-    return HarmonicBalance(model, "jenkins", parameters, basis, excitation, 1.2 * OMEGA)
+    return HarmonicBalance.of(model, Joint("contact", "jenkins", parameters), basis, excitation, 1.2 * OMEGA)
 
 
 def test_transient_of_lifting_contacts_is_that_of_a_general_integrator():
     balance = random_balance(friction=0.0)
     system, b = balance.model.system, np.asarray(balance.model.interface.B)
-    kn = balance.parameters.stiffness[:, 2]
+    kn = balance.contact.stiffness[:, 2]
     n = system.n_dof
     inverse = np.linalg.inv(system.mass)
 
@@ -68,7 +69,9 @@ def test_friction_is_that_of_a_general_integrator():
     model = oscillator(mass, stiffness, 0.02)
     parameters = ContactParameters.of(("t1", "n"), [[kt, kn]], friction=mu)
     excitation = Excitation.of({"normal": press}, {1: {"force": 25.0, "normal": 8.0j}})
-    balance = HarmonicBalance(model, "jenkins", parameters, HarmonicBasis((0, 1, 2, 3), 256), excitation, OMEGA)
+    balance = HarmonicBalance.of(
+        model, Joint("contact", "jenkins", parameters), HarmonicBasis((0, 1, 2, 3), 256), excitation, OMEGA
+    )
     damping = 2 * 0.02 * np.sqrt(mass * stiffness)
 
     def rate(t, y):  # friction as a rate: T' = k_t v, or mu N' while T is at the limit and pushed against it
@@ -104,7 +107,9 @@ def test_order_is_two_for_a_smooth_law(radius):
     parameters = ContactParameters.of(("n",), [[k]], cubic=cubic)
     excitation = Excitation.of({"normal": 10.0}, {1: {"force": 40.0}, 3: {"force": 15.0j}})
     model = oscillator(mass, stiffness, 0.02, "n")
-    balance = HarmonicBalance(model, "cubic_spring", parameters, HarmonicBasis((0, 1, 2, 3), 64), excitation, OMEGA)
+    balance = HarmonicBalance.of(
+        model, Joint("contact", "cubic_spring", parameters), HarmonicBasis((0, 1, 2, 3), 64), excitation, OMEGA
+    )
     damping = 2 * 0.02 * np.sqrt(mass * stiffness)
 
     def rate(t, y):
@@ -173,7 +178,9 @@ def test_full_damping_matrix_and_moving_ground():
     base[:, 1:] = 2e-7 * rng.normal(size=(6, 2))
     parameters = ContactParameters.of(("t1", "t2", "n"), np.full((2, 3), 2e6), friction=1e6)
     excitation = Excitation({(0, "static"): 30.0}, base)
-    balance = HarmonicBalance(model, "jenkins", parameters, HarmonicBasis((0, 1), 64), excitation, 2 * OMEGA)
+    balance = HarmonicBalance.of(
+        model, Joint("contact", "jenkins", parameters), HarmonicBasis((0, 1), 64), excitation, 2 * OMEGA
+    )
     solution = newton.solve_from_rest(balance, OMEGA)
     motion = time_integration.integrate(balance, OMEGA, solution.state, Options(steps=4096))
     assert np.all(motion.status == 1)
@@ -196,7 +203,9 @@ def test_what_has_no_equation_of_motion_is_refused():
     cyclic = ReducedModel(
         model.system, model.interface, per_harmonic=lambda h: (model.system, np.asarray(model.interface.B))
     )
-    balance = HarmonicBalance(cyclic, "jenkins", parameters, HarmonicBasis((0, 1), 32), excitation, 200.0)
+    balance = HarmonicBalance.of(
+        cyclic, Joint("contact", "jenkins", parameters), HarmonicBasis((0, 1), 32), excitation, 200.0
+    )
     with pytest.raises(ValueError, match="one system for all harmonics"):
         time_integration.integrate(balance, 100.0)
     with pytest.raises(ValueError, match="steps per period"):

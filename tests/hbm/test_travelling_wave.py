@@ -11,6 +11,7 @@ from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.continuation import natural
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.recovery import coordinates, full_displacement
 from tribodyn.reduction.cyclic import nodal_diameters, relative_map, travelling_wave
@@ -163,7 +164,9 @@ def test_responses_to_several_engine_orders(sectors):
     load = Excitation.of({}, {1: {"couple": 1.0}})
 
     def problem(model):
-        return HarmonicBalance(model, "jenkins", pressed, HarmonicBasis((0, 1), 32), load, 2 * np.pi * 1100)
+        return HarmonicBalance.of(
+            model, Joint("contact", "jenkins", pressed), HarmonicBasis((0, 1), 32), load, 2 * np.pi * 1100
+        )
 
     orders = (1, 3, 7)
     expected = nodal_diameters(reduced.sector, orders, 1, k)[:, 0]

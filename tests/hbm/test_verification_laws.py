@@ -11,6 +11,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.time_integration import Options
@@ -33,7 +34,9 @@ def mass_on_contact(components: tuple[str, ...]) -> ReducedModel:
 
 def solved(law, components, parameters, excitation, omega, top, transitions="sampled", n_samples=1024):
     basis = HarmonicBasis(tuple(range(top + 1)), n_samples, transitions)
-    balance = HarmonicBalance(mass_on_contact(components), law, parameters, basis, excitation, omega)
+    balance = HarmonicBalance.of(
+        mass_on_contact(components), Joint("contact", law, parameters), basis, excitation, omega
+    )
     solution = newton.solve_from_rest(balance, omega, NewtonOptions(tolerance=1e-10))
     assert solution.converged
     return balance, solution.state
@@ -88,7 +91,9 @@ def test_duffing_oscillator_of_one_harmonic_is_its_closed_form():
     parameters = ContactParameters.of(("t1",), [[3.0e4]], cubic=cubic)
     excitation = Excitation.of(harmonic={1: {"along": amplitude * dynamic}})
     basis = HarmonicBasis((1,), 16)
-    balance = HarmonicBalance(mass_on_contact(("t1",)), "cubic_spring", parameters, basis, excitation, omega)
+    balance = HarmonicBalance.of(
+        mass_on_contact(("t1",)), Joint("contact", "cubic_spring", parameters), basis, excitation, omega
+    )
     start = np.array([[[0.9 * amplitude, 0.0]]])
     solution = newton.solve(balance, omega, start, NewtonOptions(tolerance=1e-13))
     assert solution.converged

@@ -13,6 +13,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import arc_length
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.time_integration import Options
 from tribodyn.hbm.verify import Verification, verify
@@ -28,7 +29,7 @@ def slab_balance(case: tuple[float, float, float], top: int) -> HarmonicBalance:
     parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(20e6, 30e6), friction=0.4)
     excitation = Excitation.of({"press": 100.0}, {1: {"shake": shake, "rock": 1j * rock}})
     basis = HarmonicBasis(tuple(range(top + 1)), 512)
-    return HarmonicBalance(model, "jenkins", parameters, basis, excitation, 2 * np.pi * hertz)
+    return HarmonicBalance.of(model, Joint("contact", "jenkins", parameters), basis, excitation, 2 * np.pi * hertz)
 
 
 def slab_verified(
@@ -115,7 +116,7 @@ def test_coupled_structure_near_resonance_approaches_time_integration(law):
         parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(3e6, 5e6), friction=0.3)
         excitation = Excitation.of({"static": 30.0}, {1: {"shaker": 60.0}})
         basis = HarmonicBasis(tuple(range(top + 1)), 1024)
-        balance = HarmonicBalance(model, law, parameters, basis, excitation, omega)
+        balance = HarmonicBalance.of(model, Joint("contact", law, parameters), basis, excitation, omega)
         solution = newton.solve_from_rest(balance, omega)
         assert solution.converged
         result = verify(balance, solution.state, Options(steps=2048))

@@ -12,6 +12,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.time_integration import Options
@@ -27,7 +28,9 @@ def jenkins(harmonics: tuple[int, ...], n_samples: int, force: complex, omega: f
     parameters = ContactParameters.of(("t1", "n"), [[KT, KN]], friction=MU)
     excitation = Excitation.of({"normal": PRESS}, {1: {"force": force}})
     basis = HarmonicBasis(harmonics, n_samples)
-    return HarmonicBalance(oscillator(MASS, STIFFNESS, RATIO), "jenkins", parameters, basis, excitation, 2 * omega)
+    return HarmonicBalance.of(
+        oscillator(MASS, STIFFNESS, RATIO), Joint("contact", "jenkins", parameters), basis, excitation, 2 * omega
+    )
 
 
 def closed_form_force(x: float) -> complex:
@@ -81,8 +84,8 @@ def test_law_with_constant_normal_load_is_the_closed_form_to_rounding_where_its_
     parameters = ContactParameters.of(("t1",), [[KT]], friction=MU, normal_load=NORMAL_FORCE)
     model = oscillator(MASS, STIFFNESS, RATIO, "n")
     basis = HarmonicBasis((1,), 16, "located")
-    balance = HarmonicBalance(
-        model, "jenkins_constant", parameters, basis, Excitation.of({}, {1: {"force": force}}), omega
+    balance = HarmonicBalance.of(
+        model, Joint("contact", "jenkins_constant", parameters), basis, Excitation.of({}, {1: {"force": force}}), omega
     )
     solution = newton.solve_from_rest(balance, omega, NewtonOptions(tolerance=1e-12))
     assert solution.converged
@@ -98,7 +101,7 @@ def test_unilateral_contact_with_preload_approaches_time_integration(press):
         parameters = ContactParameters.of(("n",), [[KN / 100]])
         excitation = Excitation.of({"normal": press}, {1: {"normal": 40.0}})
         basis = HarmonicBasis(tuple(range(top + 1)), 2048)
-        balance = HarmonicBalance(model, "unilateral", parameters, basis, excitation, omega)
+        balance = HarmonicBalance.of(model, Joint("contact", "unilateral", parameters), basis, excitation, omega)
         solution = newton.solve_from_rest(balance, omega)
         assert solution.converged
         result = verify(balance, solution.state, Options(steps=2048))

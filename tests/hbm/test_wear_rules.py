@@ -17,6 +17,7 @@ from tribodyn.hbm.law import SEPARATES
 from tribodyn.hbm.operating_point import AtFrequency, AtPeak, BesidePeak, Correction, OperatingPoint
 from tribodyn.hbm.wear_events import events
 from tribodyn.hbm.wear_history import WearHistory, cycles_to_preload
+from tribodyn.hbm.wear_law import JointWear
 from tribodyn.hbm.wearing import WearingBalance
 from tribodyn.workflows.scene import scene_file
 
@@ -61,7 +62,7 @@ def test_wear_inside_the_balance_has_the_derivative_of_finite_differences(proble
     x, depth = solution.state.x, wearing.evaluate(omega, solution.state.x).depth
     work = np.zeros(N_PAIR)
     for balance, share, w, part in zip(balances, (0.3, 0.7), omega, wearing.parts(x), strict=True):
-        worn = balance.with_gap(balance.parameters.gap + depth)
+        worn = balance.with_gap(balance.contact.gap + depth)
         state = worn.evaluate(w, part)
         assert newton.relative_residual(state, worn.x_lin(w)) < 1e-8  # every duty is solved at the common depth
         work += share * worn.energy(state)
@@ -106,10 +107,10 @@ def test_a_resumed_run_ends_in_the_same_bits(problem: WearProblem, kind: str) ->
 def test_missions_average_their_duties(problem: WearProblem) -> None:
     site = AtFrequency("tip", 420.0)
     mission = (Duty(site, 0.25), Duty(site, 0.75, load=0.5))
-    mixed = WearProblem(problem.balance, mission, "energy", 1e-9, problem.area)
+    mixed = WearProblem(problem.balance, mission, JointWear("energy", 1e-9), problem.area)
     state = assess(mixed, np.zeros(N_PAIR), 0.0, None)
     full, half = (
-        assess(WearProblem(problem.balance, (Duty(site, 1.0, load),), "energy", 1e-9, problem.area), *start)
+        assess(WearProblem(problem.balance, (Duty(site, 1.0, load),), JointWear("energy", 1e-9), problem.area), *start)
         for load, start in ((1.0, (np.zeros(N_PAIR), 0.0, None)), (0.5, (np.zeros(N_PAIR), 0.0, None)))
     )
     assert state.rate == pytest.approx(0.25 * full.rate + 0.75 * half.rate, rel=1e-6)
@@ -143,7 +144,7 @@ def test_error_controlled_missions_equal_the_finest_thesis_run(problem: WearProb
 
 @pytest.mark.parametrize("law", ["archard"])
 def test_error_controlled_rule_takes_laws_whose_depth_per_work_changes(law: str) -> None:
-    other = wear_problem(law=law, coefficient=4e-10)
+    other = wear_problem(wear=JointWear(law, 4e-10))
     fine = thesis_rule.evolve(other, 5e-7)
     worn = error_controlled_rule.evolve(other, error_controlled_rule.Tolerance(0.02, 2e-4))
     assert life(worn) == pytest.approx(life(fine), rel=0.01)
@@ -151,11 +152,12 @@ def test_error_controlled_rule_takes_laws_whose_depth_per_work_changes(law: str)
 
 def test_a_law_file_of_ones_own_is_taken_by_both_rules() -> None:
     law = str(scene_file.CASES / "beam" / "running_in.py")
-    own = wear_problem(law=law, coefficient=4e-10)
+    own = wear_problem(wear=JointWear(law, 4e-10))
     fine = thesis_rule.evolve(own, 5e-7)
     worn = error_controlled_rule.evolve(own, error_controlled_rule.Tolerance(0.02, 2e-4))
     assert life(worn) == pytest.approx(life(fine), rel=0.015)
-    plain = error_controlled_rule.evolve(wear_problem(coefficient=4e-10), error_controlled_rule.Tolerance(0.02, 2e-4))
+    plain_problem = wear_problem(wear=JointWear("energy", 4e-10))
+    plain = error_controlled_rule.evolve(plain_problem, error_controlled_rule.Tolerance(0.02, 2e-4))
     assert 0.25 * life(plain) < life(worn) < life(plain)  # a fresh face wears four times as fast
 
 
@@ -180,11 +182,11 @@ def test_a_wear_law_that_fails_in_the_run_is_told(tmp_path: Path, body: str, say
     path = tmp_path / "law.py"
     path.write_text(f"def depth_rate(exposure):\n    {body}\n")
     with pytest.raises(ValueError, match=says):
-        thesis_rule.evolve(wear_problem(law=str(path)), 5e-7, max_steps=1)
+        thesis_rule.evolve(wear_problem(wear=JointWear(str(path), 1e-9)), 5e-7, max_steps=1)
 
 
 def test_events_are_where_the_penetration_of_a_pair_changes_its_sign(problem: WearProblem, fine: WearHistory) -> None:
-    gap, basis = problem.balance.parameters.gap, HarmonicBasis((0, 1), 1024)
+    gap, basis = problem.balance.contact.gap, HarmonicBasis((0, 1), 1024)
     found = events(fine, ("t1", "t2", "n"), gap, basis)
     assert found is not None
     # by the status that the contact law itself reported, to one row
@@ -222,17 +224,17 @@ def test_a_branch_that_has_ended_is_looked_for_afresh(problem: WearProblem) -> N
 
 def test_error_controlled_steps_get_over_the_end_of_a_branch(problem: WearProblem) -> None:
     """The branch ends where the deepest pair is at 1e-5 m; the next one is found from 2e-6 m further on."""
-    end, gap, tolerance = 1e-5, problem.balance.parameters.gap, error_controlled_rule.Tolerance(0.05, 2e-4)
+    end, gap, tolerance = 1e-5, problem.balance.contact.gap, error_controlled_rule.Tolerance(0.05, 2e-4)
     over = []
 
     class Ending(AtFrequency):
         def first(self, balance: HarmonicBalance) -> OperatingPoint:
-            if (balance.parameters.gap - gap).max() > end + 2e-6:
+            if (balance.contact.gap - gap).max() > end + 2e-6:
                 over.append(True)
             return super().first(balance)
 
         def correct(self, balance: HarmonicBalance, state: State) -> Correction:
-            ended = not over and (balance.parameters.gap - gap).max() > end
+            ended = not over and (balance.contact.gap - gap).max() > end
             return Correction(state.omega if ended else 0.0, np.zeros_like(state.x), 0)
 
     worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Ending("tip", 420.0)),)), tolerance)
@@ -250,12 +252,12 @@ def test_error_controlled_steps_get_over_the_end_of_a_branch(problem: WearProble
 
 def test_a_step_behind_which_no_solution_is_found_is_followed_by_a_longer_one(problem: WearProblem) -> None:
     """The branch ends where the deepest pair is at 1e-5 m; less than 5e-6 m further on nothing is found by any way."""
-    end, gap, tolerance = 1e-5, problem.balance.parameters.gap, error_controlled_rule.Tolerance(0.05, 2e-4)
+    end, gap, tolerance = 1e-5, problem.balance.contact.gap, error_controlled_rule.Tolerance(0.05, 2e-4)
     missed, over = [], []
 
     class Blind(AtFrequency):
         def first(self, balance: HarmonicBalance) -> OperatingPoint:
-            found, deepest = super().first(balance), (balance.parameters.gap - gap).max()
+            found, deepest = super().first(balance), (balance.contact.gap - gap).max()
             if end < deepest < end + 5e-6:
                 missed.append(deepest)
                 return replace(found, solution=replace(found.solution, outcome="nothing here"))
@@ -264,7 +266,7 @@ def test_a_step_behind_which_no_solution_is_found_is_followed_by_a_longer_one(pr
             return found
 
         def correct(self, balance: HarmonicBalance, state: State) -> Correction:
-            ended = not over and (balance.parameters.gap - gap).max() > end
+            ended = not over and (balance.contact.gap - gap).max() > end
             return Correction(state.omega if ended else 0.0, np.zeros_like(state.x), 0)
 
     worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Blind("tip", 420.0)),)), tolerance)

@@ -9,6 +9,7 @@ from tests.helpers.verification_models import oscillator, random_structure
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 
 
@@ -23,7 +24,9 @@ class Duffing:
         model = oscillator(1.0, 0.5, self.zeta * np.sqrt(2.0), "n")
         parameters = ContactParameters.of(("n",), [[0.5]], cubic=self.cubic / length**2)
         excitation = Excitation.of(harmonic={1: {"force": self.force * length}})
-        return HarmonicBalance(model, "cubic_spring", parameters, HarmonicBasis(harmonics, n_samples), excitation, 5.0)
+        return HarmonicBalance.of(
+            model, Joint("contact", "cubic_spring", parameters), HarmonicBasis(harmonics, n_samples), excitation, 5.0
+        )
 
     def defect(self, omega: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
         """Relative defect of the one-harmonic amplitude equation."""
@@ -58,8 +61,8 @@ class Lifting:
         parameters = ContactParameters.of(("n",), [[self.kn]])
         excitation = Excitation.of({"normal": self.press}, {1: {"force": self.force}})
         basis = HarmonicBasis(harmonics, n_samples, how)
-        return HarmonicBalance(
-            oscillator(1.0, 1.0, self.zeta, "n"), "unilateral", parameters, basis, excitation, 10.0
+        return HarmonicBalance.of(
+            oscillator(1.0, 1.0, self.zeta, "n"), Joint("contact", "unilateral", parameters), basis, excitation, 10.0
         )
 
     def _contact(self, mean: float, amplitude: float) -> tuple[float, float]:
@@ -88,7 +91,9 @@ def rubbing_mass(harmonics: tuple[int, ...] = (0, 1), n_samples: int = 128, how:
     parameters = ContactParameters.of(("t1", "n"), [[3.0, 5.0]], friction=0.5)
     excitation = Excitation.of({"normal": 1.0}, {1: {"force": 0.3}})
     basis = HarmonicBasis(harmonics, n_samples, how)
-    return HarmonicBalance(oscillator(1.0, 1.0, 0.01), "jenkins", parameters, basis, excitation, 5.0)
+    return HarmonicBalance.of(
+        oscillator(1.0, 1.0, 0.01), Joint("contact", "jenkins", parameters), basis, excitation, 5.0
+    )
 
 
 def rubbing_pairs(harmonics: tuple[int, ...] = (0, 1), n_samples: int = 64) -> HarmonicBalance:
@@ -96,4 +101,6 @@ def rubbing_pairs(harmonics: tuple[int, ...] = (0, 1), n_samples: int = 64) -> H
     parameters = ContactParameters.of(("t1", "t2", "n"), np.full((4, 3), 5e6), friction=0.4)
     excitation = Excitation.of({"static": 2000.0}, {1: {"shaker": 1500.0}})
     basis = HarmonicBasis(harmonics, n_samples)
-    return HarmonicBalance(random_structure(4, seed=2), "jenkins", parameters, basis, excitation, 2000.0)
+    return HarmonicBalance.of(
+        random_structure(4, seed=2), Joint("contact", "jenkins", parameters), basis, excitation, 2000.0
+    )

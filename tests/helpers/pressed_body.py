@@ -13,8 +13,10 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.evolution import Duty, WearProblem
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.hbm.operating_point import AtFrequency
+from tribodyn.hbm.wear_law import JointWear
 from tribodyn.reduction.model import ReducedModel
 
 N_PAIR = 4
@@ -42,7 +44,7 @@ def balance_of(model: ReducedModel, harmonics: tuple[int, ...] = (0, 1, 2, 3), s
     parameters = ContactParameters.of(("t1", "t2", "n"), stiffness, friction=0.4)
     basis = HarmonicBasis(harmonics, 64, "located")
     excitation = Excitation.of({"press": 100.0}, {1: {"shake": shake}})
-    return HarmonicBalance(model, "jenkins", parameters, basis, excitation, 1500.0)
+    return HarmonicBalance.of(model, Joint("contact", "jenkins", parameters), basis, excitation, 1500.0)
 
 
 def wear_problem(**changes: object) -> WearProblem:
@@ -50,8 +52,7 @@ def wear_problem(**changes: object) -> WearProblem:
     given: dict = {
         "balance": balance_of(pressed_body(), (0, 1)),
         "mission": (Duty(AtFrequency("tip", 420.0)),),
-        "law": "energy",
-        "coefficient": 1e-9,
+        "wear": JointWear("energy", 1e-9),
         "area": np.full(N_PAIR, 1e-4),
         "lost_below": 0.01,
     }

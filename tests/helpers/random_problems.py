@@ -23,6 +23,7 @@ from tribodyn.hbm import law as contact_law
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.reduction.model import ReducedModel
 
@@ -155,7 +156,9 @@ def problem_of(d: Drawn) -> HarmonicBalance:
     if d.memory:
         memory = 10**d.gap * rng.normal(size=(d.n_pair, law.n_state(d.components)))
     omega = frequency_of(d, mass, stiffness, spread)
-    return HarmonicBalance(model, d.law, parameters, basis, Excitation(loads, base), omega * 1.5, memory)
+    return HarmonicBalance.of(
+        model, Joint("contact", d.law, parameters), basis, Excitation(loads, base), omega * 1.5, memory
+    )
 
 
 def frequency_of(d: Drawn, mass: np.ndarray, stiffness: np.ndarray, springs: np.ndarray) -> float:
@@ -177,10 +180,11 @@ def contact_forces(balance: HarmonicBalance, x: np.ndarray) -> np.ndarray:
     The memory is the one at which a march from the start of the load path repeats. Nothing is shared with the solver
     but the law's step. Returns nan where the memory does not repeat within LONGEST cycles
     """
-    basis, law, p = balance.basis, balance.law, balance.parameters.packed()
+    joint, basis = balance.contact.joints[0], balance.basis
+    law, p = joint.module, joint.parameters.packed()
     n_pair, n_comp, _ = x.shape
     if basis.transitions == "located":
-        return law.located(x, balance.parameters, balance.memory, basis, False).force.reshape(n_pair * n_comp, -1)
+        return law.located(x, joint.parameters, balance.memory, basis, False).force.reshape(n_pair * n_comp, -1)
     angle = 2 * np.pi * np.arange(basis.n_samples) / basis.n_samples
     columns = [np.ones_like(angle)] if 0 in basis.harmonics else []
     for h in basis.harmonics:
@@ -212,7 +216,7 @@ def displacement_under(balance: HarmonicBalance, omega: float, x: np.ndarray, fo
     One complex solve for each harmonic of the whole system, with the contact springs on both sides.
     """
     system, b = balance.model.system, np.asarray(balance.model.interface.B)
-    basis, k = balance.basis, balance.parameters.stiffness.ravel()
+    basis, k = balance.basis, balance.contact.stiffness.ravel()
     damping = np.zeros_like(system.mass) if system.damping is None else system.damping
     flat = x.reshape(len(k), -1)
     base = np.zeros_like(flat) if balance.excitation.base is None else balance.excitation.base
@@ -232,7 +236,7 @@ def condition(balance: HarmonicBalance, omega: float) -> float:
     """Largest condition number of the stuck dynamic stiffness of any harmonic, unit stiffness in every coordinate."""
     system, b = balance.model.system, np.asarray(balance.model.interface.B)
     damping = np.zeros_like(system.mass) if system.damping is None else system.damping
-    stuck = system.stiffness + b.T @ (balance.parameters.stiffness.reshape(-1, 1) * b)
+    stuck = system.stiffness + b.T @ (balance.contact.stiffness.reshape(-1, 1) * b)
     scale = 1 / np.sqrt(np.diag(stuck))
     matrices = [stuck + 1j * h * omega * damping - (h * omega) ** 2 * system.mass for h in balance.basis.harmonics]
     return max(float(np.linalg.cond(scale[:, None] * matrix * scale)) for matrix in matrices)

@@ -13,6 +13,7 @@ from tribodyn.hbm import travelling_wave as waves
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.reduction.cyclic import reduce_sector, travelling_wave, wheel_model
 from tribodyn.reduction.damping import modal_damping
@@ -91,6 +92,6 @@ def wave_and_wheel(reduced, engine_order, harmonics=(0, 1, 2, 3), damping=0.01, 
 
     def balance(model, copies, loads):
         contact = ContactParameters.of(model.interface.components, np.tile(k, (copies, 1)), friction=0.3)
-        return HarmonicBalance(model, "jenkins", contact, basis, loads, highest)
+        return HarmonicBalance.of(model, Joint("contact", "jenkins", contact), basis, loads, highest)
 
     return balance(one, 1, load), balance(wheel, N, waves.on_wheel(load, engine_order, N))

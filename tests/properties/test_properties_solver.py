@@ -37,6 +37,7 @@ from tribodyn.hbm.expansion import SingularStuckSystem, UndampedResonance
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.operating_point import AtFrequency
 from tribodyn.hbm.wear_history import WearHistory
+from tribodyn.hbm.wear_law import JointWear
 
 DECLARED = (SingularStuckSystem, UndampedResonance, CycleNotPeriodic)
 TOLERANCE = NewtonOptions().tolerance
@@ -52,7 +53,7 @@ def check(balance: HarmonicBalance, state: State) -> None:
     """A state that counts as converged is finite, balanced, and takes energy from the vibration."""
     for values in (state.x, state.cycle.force, state.residual, balance.outputs(state)):
         assert np.isfinite(values).all()
-    base, parameters = balance.excitation.base, balance.parameters
+    base, parameters = balance.excitation.base, balance.contact
     offsets = [parameters.gap, balance.memory, np.zeros(1) if base is None else base]
     tiny = 1e-14 * max(float(np.abs(offset).max(initial=0.0)) for offset in offsets)  # their rounding
     force = contact_forces(balance, state.x)
@@ -66,7 +67,7 @@ def check(balance: HarmonicBalance, state: State) -> None:
     travelled = np.maximum(basis.order, 1) * state.x  # harmonic h goes to and fro h times in a cycle
     forces, travels = (np.linalg.norm(values[:, along], axis=2) for values in (state.cycle.force, travelled))
     scale = np.pi * ((forces + tiny * parameters.stiffness[:, along]) * (travels + tiny)).sum(axis=1)
-    factor, order = SAMPLING.get(balance.law_name, UNCOUPLED)
+    factor, order = SAMPLING.get(balance.contact.joints[0].law, UNCOUPLED)
     coarse = 0.0 if basis.transitions == "located" else factor * (basis.harmonics[-1] / basis.n_samples) ** order
     assert (balance.energy(state) >= -(1e-10 + coarse) * scale).all()
 
@@ -126,7 +127,7 @@ def test_branches_hold_what_they_say(d: Drawn, method: str, reach: float) -> Non
     assert branch.end
     assert np.isfinite(branch.response).all()
     for i in np.flatnonzero([outcome == CONVERGED for outcome in branch.outcome])[::3]:
-        x = branch.contact[i].reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
+        x = branch.contact[i].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
         check(balance, balance.evaluate(branch.omega[i], x))
 
 
@@ -145,7 +146,7 @@ def test_wear_only_grows(d: Drawn, law: str, rule: str, share: float) -> None:
         if not first.converged:
             return
         site = AtFrequency("tip", omega_of(balance))
-        problem = WearProblem(balance, (Duty(site),), law, coefficient, area)
+        problem = WearProblem(balance, (Duty(site),), JointWear(law, coefficient), area)
         depth = share * max(np.abs(first.state.x[:, -1, 0]).max(), 1e-12)
         if rule == "thesis":
             history = thesis_rule.evolve(problem, depth, max_steps=3)

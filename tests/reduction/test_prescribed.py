@@ -11,6 +11,7 @@ from tribodyn.hbm import law, newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.reduction.damping import modal_damping
 from tribodyn.reduction.model import ReducedModel
@@ -70,7 +71,9 @@ def problem(model: ReducedModel, height: float, force: float, gap=(0.0, 1e-5, -1
         COMPONENTS, np.full((N_PAIR, 3), 3e5), friction=0.4, gap=np.asarray(gap, float)
     )
     excitation = Excitation.of({"height": height}, {1: {"shaker": force}})
-    return HarmonicBalance(model, "jenkins", parameters, HarmonicBasis(kept, 128), excitation, 2 * OMEGA)
+    return HarmonicBalance.of(
+        model, Joint("contact", "jenkins", parameters), HarmonicBasis(kept, 128), excitation, 2 * OMEGA
+    )
 
 
 def thesis(model: ReducedModel, balance: HarmonicBalance, height: float, force: float, start: np.ndarray):
@@ -113,7 +116,7 @@ def thesis(model: ReducedModel, balance: HarmonicBalance, height: float, force: 
     unknown = np.concatenate([np.zeros(len(k)), start[u, 0], start[:, 1:].T.ravel()])
     for _ in range(40):
         X = coordinates(unknown)
-        cycle = law.cycle(balance.law, (B @ X).reshape(N_PAIR, 3, m), balance.parameters, balance.basis, balance.memory)
+        cycle = balance.contact.cycle((B @ X).reshape(N_PAIR, 3, m), balance.basis, balance.memory)
         residual = A @ unknown - rhs + spread @ cycle.force.ravel()
         if np.linalg.norm(residual) < 1e-9 * np.linalg.norm(rhs):
             break

@@ -19,6 +19,7 @@ from tests.workflows.test_matrices import SCENE
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.workflows.result import summary
 from tribodyn.workflows.run import pipeline
@@ -167,14 +168,15 @@ def test_contact_without_friction_state_or_derivative_allocates_neither() -> Non
     model = random_structure(3)
     parameters = ContactParameters.of(("t1", "t2", "n"), np.full((3, 3), 1e6), friction=0.3)
     excitation = Excitation.of({"static": 10.0}, {1: {"shaker": 1.0}})
-    balance = HarmonicBalance(model, "jenkins", parameters, HarmonicBasis((0, 1), 64), excitation, 3e3)
+    balance = HarmonicBalance.of(
+        model, Joint("contact", "jenkins", parameters), HarmonicBasis((0, 1), 64), excitation, 3e3
+    )
     x = balance.stuck(1e3)
     state = balance.evaluate(1e3, x, jacobian=False)
     assert state.cycle.jacobian is None
     # all that is stuck stays out of the linear system: nothing is solved for, nothing is multiplied
-    linear = balance.with_parameters(
-        ContactParameters.of(("t1", "t2", "n"), np.full((3, 3), 1e6), friction=1e6, gap=-1.0)
-    )
+    pressed = ContactParameters.of(("t1", "t2", "n"), np.full((3, 3), 1e6), friction=1e6, gap=-1.0)
+    linear = balance.with_contact(balance.contact.with_parameters(lambda _: pressed))
     stuck = linear.linearise(linear.evaluate(1e3, x))
     assert len(stuck.active) == len(stuck.rows) == 0
     rhs = np.ones((9, 3))

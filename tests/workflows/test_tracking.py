@@ -95,13 +95,14 @@ def test_peaks_are_those_of_the_problem_made_anew(
     assert len(found["value"]) == 3
     file = read("beam", SMALL)
     balance = pipeline.build(file, tmp_path, Progress()).balance
-    last, parameters = found["value"][-1], balance.parameters
+    last = found["value"][-1]
     if against == "load":
         balance = balance.with_load(last)
     elif against == "gap":
-        balance = balance.with_gap(parameters.gap + last)
+        balance = balance.with_gap(balance.contact.gap + last)
     else:
-        balance = balance.with_parameters(replace(parameters, stiffness=last * parameters.stiffness))
+        stiffer = balance.contact.with_parameters(lambda p: replace(p, stiffness=last * p.stiffness))
+        balance = balance.with_contact(stiffer)
     peak = pipeline.peak_of(file.scene).first(balance)
     assert found["frequency_hz"][-1] == pytest.approx(peak.state.omega / (2 * np.pi), rel=1e-5)
     assert found["amplitude_m"][-1] == pytest.approx(peak.amplitude, rel=1e-5)

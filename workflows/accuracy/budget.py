@@ -94,7 +94,7 @@ def _of_response(balance: HarmonicBalance, result: Result) -> Iterator[Entry]:
     height = np.where(good, frf.amplitude(frf.output_names[0]), -1.0)
     best = int(np.argmax(height))
     omega = float(frf.omega[best])
-    x = frf.contact[best].reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
+    x = frf.contact[best].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
     state = balance.evaluate(omega, x)
     yield Entry("newton, krylov", "response at the peak", _newton_error(balance, state), "estimate: one more step")
     yield Entry("samples", "response at the peak", sampling_error(balance, omega, x), "estimate: located, finer")

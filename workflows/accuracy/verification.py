@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
-from tribodyn.hbm import aft, newton, stability
+from tribodyn.hbm import newton, stability
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.branch import CONVERGED, amplitude
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -180,7 +180,7 @@ def _start(
         assert result.wear is not None
         worn: WearRow = result.wear.rows()[row]
         load = pipeline.mission(scene)[0].load if scene.wear is not None else 1.0
-        balance = unworn.with_gap(unworn.parameters.gap + worn.depth).with_load(load)
+        balance = unworn.with_gap(unworn.contact.gap + worn.depth).with_load(load)
         return balance, worn.omega, _carried(worn.displacement, basis, balance)
     frf = result.response
     good = [] if frf is None else [i for i, outcome in enumerate(frf.outcome) if outcome == CONVERGED]
@@ -193,7 +193,7 @@ def _start(
 
 def _carried(flat: np.ndarray, basis: HarmonicBasis, balance: HarmonicBalance) -> np.ndarray:
     """A solution (n_contact, n_coeff) on the harmonics of a balance, as x (n_pair, n_component, n_coeff)."""
-    return basis.transfer(flat, balance.basis).reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
+    return basis.transfer(flat, balance.basis).reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
 
 
 def _walk(
@@ -225,7 +225,7 @@ def picture(comparison: Comparison) -> Figure:
         left.legend(loc="best", fontsize=9)
         pair = int(np.argmax(np.abs(motion.energy)))
         component = int(np.argmax(np.abs(_loop_areas(motion.force[pair], motion.x[pair]))))
-        x, force = aft.history(balance.law, state.x, balance.parameters, balance.basis, balance.memory)
+        x, force = balance.history(state)
         unit, scale = length_unit(np.ptp(motion.x[pair, component]))
         unit_f, scale_f = force_unit(np.abs(motion.force[pair, component]).max())
         middle = motion.x[pair, component].mean()
@@ -235,7 +235,7 @@ def picture(comparison: Comparison) -> Figure:
         ):
             closed = [np.append(v[pair, component], v[pair, component, 0]) for v in (a, b)]
             right.plot(scale * (closed[0] - middle), scale_f * closed[1], **style)
-        direction = balance.parameters.components[component]
+        direction = balance.contact.components[component]
         right.set(xlabel=f"{direction} / {unit}", ylabel=f"force / {unit_f}", title=f"Pair {pair}")
     return figure
 

@@ -92,7 +92,7 @@ def _problem() -> Callable[[str], HarmonicBalance]:
     def of(harmonics: str) -> HarmonicBalance:
         basis = HarmonicBasis(tuple(range(int(harmonics[2:]) + 1)), SAMPLES)
         b = unworn
-        return HarmonicBalance(reduced, b.law_name, b.parameters, basis, b.excitation, b.omega_max)
+        return HarmonicBalance.of(reduced, b.contact.joints, basis, b.excitation, b.omega_max)
 
     return of
 
@@ -158,7 +158,7 @@ def _refined(
     found = []
     for omega in wanted:
         nearest = int(np.argmin(np.abs(omegas - omega)))
-        x = contact[nearest].reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
+        x = contact[nearest].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
         found.append(dense.coordinates_of(omega, newton.solve(balance, omega, x).state.x))
     return found
 

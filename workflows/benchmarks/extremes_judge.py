@@ -95,7 +95,7 @@ def _gain(balance: HarmonicBalance, state: State, energy: np.ndarray) -> float:
 
     Sampled transitions are late by up to a sample, and the work is wrong by the square of it.
     """
-    tangential, basis = balance.parameters.tangential, balance.basis
+    tangential, basis = balance.contact.tangential, balance.basis
     travelled = np.maximum(basis.order, 1) * state.x  # harmonic h goes to and fro h times in a cycle
     force, travel = (np.linalg.norm(v[:, tangential], axis=2) for v in (state.cycle.force, travelled))
     coarse = 0.0 if basis.transitions == "located" else WORK_BY_SAMPLING * (basis.harmonics[-1] / basis.n_samples) ** 2
@@ -135,7 +135,7 @@ def _condition(balance: HarmonicBalance, omega: float) -> float:
     """Largest condition number of the stuck dynamic stiffness of any harmonic, unit stiffness in every coordinate."""
     system, b = balance.model.at_harmonic(balance.basis.harmonics[-1])
     damping = np.zeros_like(system.mass) if system.damping is None else system.damping
-    stuck = system.stiffness + b.T @ (balance.parameters.stiffness.reshape(-1, 1) * b)
+    stuck = system.stiffness + b.T @ (balance.contact.stiffness.reshape(-1, 1) * b)
     scale = 1 / np.sqrt(np.diag(stuck))
     matrices = [stuck + 1j * h * omega * damping - (h * omega) ** 2 * system.mass for h in balance.basis.harmonics]
     return max(float(np.linalg.cond(scale[:, None] * matrix * scale)) for matrix in matrices)
@@ -181,8 +181,8 @@ class _Dense:
         system, b = balance.model.at_harmonic(balance.basis.harmonics[-1])
         if np.all(status == SEPARATES):
             stiffness, name = np.asarray(system.stiffness), "the structure without contact"
-        elif np.all(status == STICKS) and not balance.parameters.gap.any():
-            k = balance.parameters.stiffness.ravel()
+        elif np.all(status == STICKS) and not balance.contact.gap.any():
+            k = balance.contact.stiffness.ravel()
             stiffness, name = system.stiffness + b.T @ (k[:, None] * b), "the structure stuck"
         else:
             return []

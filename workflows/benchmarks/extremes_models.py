@@ -13,6 +13,7 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.reduction.damping import modal_damping
 from tribodyn.reduction.model import ReducedModel
@@ -61,7 +62,9 @@ class Body:
         if setting.preload != 0:
             loads[0, "press"] = setting.preload
         model = self.model.with_damping(lambda system, _: modal_damping(system, setting.damping))
-        return HarmonicBalance(model, "jenkins", parameters, basis, Excitation(loads), setting.omega)
+        return HarmonicBalance.of(
+            model, Joint("contact", "jenkins", parameters), basis, Excitation(loads), setting.omega
+        )
 
 
 def beam(n_patch: int) -> Body:

@@ -13,6 +13,7 @@ from tribodyn.hbm.evolution import Duty, WearProblem
 from tribodyn.hbm.operating_point import AtFrequency
 from tribodyn.hbm.step_error import UNKNOWN, step_error
 from tribodyn.hbm.wear_history import LIFE_SHARE, WearHistory
+from tribodyn.hbm.wear_law import JointWear
 from tribodyn.workflows.benchmarks.extremes_judge import REFUSED, WRONG, Verdict
 from tribodyn.workflows.benchmarks.extremes_models import Body
 from tribodyn.workflows.run.references import free_deflection
@@ -42,7 +43,7 @@ def _problem(body: Body, coefficient: float = ORDINARY) -> tuple[WearProblem, fl
     balance = body.balance(body.ordinary)
     duty = Duty(AtFrequency(balance.compliance.output_names[0], body.ordinary.omega))
     area = body.model.interface.area
-    problem = WearProblem(balance, (duty,), "energy", coefficient, area, lost_below=0.9 * LIFE_SHARE)
+    problem = WearProblem(balance, (duty,), JointWear("energy", coefficient), area, lost_below=0.9 * LIFE_SHARE)
     return problem, float(free_deflection(balance).max())
 
 
@@ -75,7 +76,7 @@ def _judged(
     if (worn.worn < 0).any() or (np.diff(worn.depth, axis=0) < 0).any():
         return Verdict(WRONG, "depth falls")
     volume = float(problem.area @ (worn.depth[-1] + worn.worn[-1]))
-    by_work = float(problem.spread @ worn.work.sum(axis=0))
+    by_work = float(problem.coefficient @ worn.work.sum(axis=0))
     if abs(volume - by_work) > 1e-9 * by_work:
         return Verdict(WRONG, f"volume {volume:.6e} m3 for {by_work:.6e} m3 of work")
     if faster == 0:

@@ -65,7 +65,7 @@ def shear_bounds(
     stuck, failed = np.zeros(n), np.zeros(n, int)
     for i in range(n):
         if branch.outcome[i] == CONVERGED:
-            x = branch.contact[i].reshape(balance.parameters.n_pair, -1, branch.contact.shape[2])
+            x = branch.contact[i].reshape(balance.contact.n_pair, -1, branch.contact.shape[2])
             found = residual_shear.response_bounds(balance, branch.omega[i], x, None, newton)
             failed[i] = np.sum(~found.converged)
             if found.converged.any():

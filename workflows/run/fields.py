@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from tribodyn.fem.part import Part
-from tribodyn.hbm import aft
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.recovery import full_displacement
 from tribodyn.hbm.wear_history import WearRow
@@ -43,11 +42,11 @@ def displacement_fields(balance: HarmonicBalance, part: Part, rows: list[WearRow
 
 def hysteresis_loops(balance: HarmonicBalance, rows: list[WearRow], numbers: np.ndarray) -> Loops:
     """Displacement and force of every pair over the cycle at chosen rows of a wear history."""
-    shape = (balance.parameters.n_pair, -1, balance.basis.n_coeff)
+    shape = (balance.contact.n_pair, -1, balance.basis.n_coeff)
     displacement, force = [], []
     for i in numbers:
-        parameters = balance.with_gap(balance.parameters.gap + rows[i].depth).parameters
-        x, f = aft.history(balance.law, rows[i].displacement.reshape(shape), parameters, balance.basis, balance.memory)
+        contact = balance.contact.with_gap(balance.contact.gap + rows[i].depth)
+        x, f = contact.history(rows[i].displacement.reshape(shape), balance.basis, balance.memory)
         displacement.append(x)
         force.append(f)
     return Loops(np.asarray(numbers), np.stack(displacement), np.stack(force))

@@ -29,9 +29,11 @@ from tribodyn.hbm.evolution import Duty, WearProblem
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.operating_point import AtFrequency, AtPeak, BesidePeak
 from tribodyn.hbm.wear_history import WearHistory, WearRow, history, rows_to_go_on
+from tribodyn.hbm.wear_law import JointWear
 from tribodyn.reduction.damping import modal_damping, rayleigh
 from tribodyn.reduction.held import hold
 from tribodyn.reduction.linear import stuck_stiffness
@@ -285,7 +287,8 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
         if not basis.has_static and np.any(np.abs(parameters.gap) > NO_GAP):
             raise ValueError("the contact has gaps, which act in harmonic 0: keep it in harmonics.kept")
         base = ground_motion(scene, part, basis) if isinstance(scene, PartScene) and part is not None else None
-        return HarmonicBalance(reduced, contact.law, parameters, basis, excite(scene, base), response_range(scene)[1])
+        joint = Joint("contact", contact.law, parameters)
+        return HarmonicBalance.of(reduced, joint, basis, excite(scene, base), response_range(scene)[1])
 
     choice = None
     if harmonics.automatic and not chosen:
@@ -405,7 +408,7 @@ def wear_problem(
     assert scene.wear is not None
     law, area = law_of(scene, folder), balance.model.interface.area
     vibrating, resting = (0.0, lost_below) if at_rest else (lost_below, None)
-    return WearProblem(balance, mission(scene), law, scene.wear.coefficient, area, vibrating, resting)
+    return WearProblem(balance, mission(scene), JointWear(law, scene.wear.coefficient), area, vibrating, resting)
 
 
 def evolve(

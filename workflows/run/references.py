@@ -21,7 +21,7 @@ def linear_references(balance: HarmonicBalance, output: str, start: float, stop:
     The free amplitude is nan where the part is loose without its contact.
     """
     omega = np.linspace(start, stop, POINTS)
-    stuck = _amplitudes(balance, balance.parameters.stiffness, output, omega)
+    stuck = _amplitudes(balance, balance.contact.stiffness, output, omega)
     return References(omega, _amplitudes(balance, None, output, omega), stuck)
 
 

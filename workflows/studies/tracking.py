@@ -111,8 +111,8 @@ def _depth(worn: Path | None, balance: HarmonicBalance) -> np.ndarray | None:
     if worn is None:
         return None
     wear = store.load(worn / "result.h5").wear
-    if wear is None or wear.depth.shape[1] != balance.parameters.n_pair:
-        raise ValueError(f"--worn: {worn} holds no worn contact of this scene's {balance.parameters.n_pair} node pairs")
+    if wear is None or wear.depth.shape[1] != balance.contact.n_pair:
+        raise ValueError(f"--worn: {worn} holds no worn contact of this scene's {balance.contact.n_pair} node pairs")
     return wear.depth[-1]
 
 
@@ -156,7 +156,7 @@ def _fold(file: SceneFile, path: Parameter, start: float, stop: float, number: i
         )
     at = sorted(branch.folds, key=lambda i: -branch.omega[i])[number - 1]
     balance = path.make(start)
-    x = branch.contact[at].reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
+    x = branch.contact[at].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
     line = track_fold(path, start, stop, branch.omega[at], x, FoldOptions(max_points=points, newton=newton))
     amplitude = line.amplitude(pipeline.OUTPUT)
     frequency = line.omega / (2 * np.pi)

@@ -82,7 +82,7 @@ def solutions_at(response: LeafResponse, omega: float) -> list[State]:
     for i in np.flatnonzero(beyond[:-1] * beyond[1:] < 0):
         share = beyond[i] / (beyond[i] - beyond[i + 1])
         x = (1 - share) * branch.contact[i] + share * branch.contact[i + 1]
-        solution = newton.solve(balance, omega, x.reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff))
+        solution = newton.solve(balance, omega, x.reshape(balance.contact.n_pair, -1, balance.basis.n_coeff))
         if solution.converged:
             found.append(solution.state)
     return found

@@ -10,7 +10,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch as Swatch
 
-from tribodyn.hbm.aft import history
 from tribodyn.hbm.law import SEPARATES, STICKS
 from tribodyn.workflows.cases.leaf_seal.record import Record
 from tribodyn.workflows.cases.leaf_seal.response import LeafResponse
@@ -133,7 +132,7 @@ def history_figure(response: LeafResponse, points: Sequence[int], names: Sequenc
                 above.plot(
                     angle / (2 * np.pi), outputs[branch.output_names.index(output)], color=color, label=TITLES[output]
                 )
-            _, force = history(balance.law, response.state(point).x, balance.parameters, balance.basis, balance.memory)
+            _, force = balance.history(response.state(point))
             for (label, pair), color in zip(pairs.items(), (BLUE, GREEN, RED), strict=True):
                 below.plot(shares, np.append(force[pair, 0], force[pair, 0, 0]), color=color, label=label)
             above.set_title(name, fontsize=10, fontweight="normal")

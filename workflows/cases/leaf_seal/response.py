@@ -49,7 +49,7 @@ class LeafResponse:
 
     def state(self, point: int) -> State:
         """The solved state of a point of the curve."""
-        x = self.branch.contact[point].reshape(self.balance.parameters.n_pair, -1, self.balance.basis.n_coeff)
+        x = self.branch.contact[point].reshape(self.balance.contact.n_pair, -1, self.balance.basis.n_coeff)
         return self.balance.evaluate(self.branch.omega[point], x)
 
     def status(self) -> np.ndarray:
@@ -90,7 +90,7 @@ class LeafResponse:
 
     def impact_work(self, point: int) -> np.ndarray:
         """(n_pair,) work of impacts per cycle [J]."""
-        n = self.balance.parameters.n_pair
+        n = self.balance.contact.n_pair
         exposure = Exposure(self.balance, self.state(point), np.ones(n), np.ones(n), np.zeros(n), 0.0)
         return impact.impact_work(exposure)
 

@@ -35,14 +35,14 @@ KEPT = "configurations"  # folder of the records
 def sizes(response: LeafResponse) -> str:
     """What is allocated for the contact: one unknown per pair and coefficient, and no memory of friction."""
     balance = response.balance
-    pairs, basis = balance.parameters.n_pair, balance.basis
+    pairs, basis = balance.contact.n_pair, balance.basis
     state = response.state(0)
     assert state.cycle.jacobian is not None
     arrays = (state.x, state.cycle.force, state.cycle.jacobian, state.g, state.residual)
     kilobytes = sum(array.nbytes for array in arrays) / 1024
     return (
         f"{balance.model.system.n_dof} DOFs; {balance.n_unknown} unknowns = {pairs} pairs x "
-        f"{len(balance.parameters.components)} component x {basis.n_coeff} coefficients; "
+        f"{len(balance.contact.components)} component x {basis.n_coeff} coefficients; "
         f"friction memory {balance.memory.size} numbers; contact state with derivative {kilobytes:.0f} kB; "
         f"peak memory of the process {memory.peak() / 1e6:.0f} MB"
     )

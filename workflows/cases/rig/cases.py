@@ -145,7 +145,7 @@ def _stage(rig: Rig, run: RigWear, share: float, tell: Callable[[str], None]) ->
     tell(f"response and time integration after {run.history.cycles[row]:.3g} cycles")
     low, high = pipeline.response_range(rig.scene)
     response = arc_length.follow(balance, low, high, Options(newton=pipeline.newton_options(rig.scene)))
-    x = run.history.displacement[row].reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
+    x = run.history.displacement[row].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
     cycle = cycle_of(balance, balance.evaluate(rig.omega, x), rig.height)
     return Stage(row, cycle, in_time(worn, cycle), response, *loop(rig.model().balance, run.history, row))
 

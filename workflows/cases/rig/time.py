@@ -52,10 +52,9 @@ def held_by_force(rig: Rig, cycle: Cycle) -> HarmonicBalance:
     push[reaction.dofs] = force + reaction.support * reaction.shape * rig.height
     system = replace(plain.system, loads={**plain.system.loads, HOLD: push})
     loads = {key: value for key, value in model.balance.excitation.loads.items() if key != (0, PLATFORM)}
-    return HarmonicBalance(
+    return HarmonicBalance.of(
         replace(plain, system=system),
-        rig.scene.contact.law,
-        model.balance.parameters,
+        model.balance.contact.joints,
         model.balance.basis,
         Excitation({**loads, (0, HOLD): 1.0}),
         pipeline.response_range(rig.scene)[1],

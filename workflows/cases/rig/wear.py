@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tribodyn.hbm import aft
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.evolution import WearState, assess
 from tribodyn.hbm.wear_history import WearHistory
@@ -132,8 +131,8 @@ def loop(balance: HarmonicBalance, history: WearHistory, row: int) -> tuple[np.n
 
     balance : the unworn problem
     """
-    shape = (balance.parameters.n_pair, -1, balance.basis.n_coeff)
-    worn = balance.with_gap(balance.parameters.gap + history.depth[row])
-    x, f = aft.history(worn.law, history.displacement[row].reshape(shape), worn.parameters, worn.basis, worn.memory)
+    shape = (balance.contact.n_pair, -1, balance.basis.n_coeff)
+    worn = balance.with_gap(balance.contact.gap + history.depth[row])
+    x, f = worn.contact.history(history.displacement[row].reshape(shape), worn.basis, worn.memory)
     share = balance.model.interface.area / balance.model.interface.area.sum()
     return np.asarray(share @ x[:, 0]), np.asarray(f[:, 0].sum(axis=0))

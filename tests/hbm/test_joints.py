@@ -1,0 +1,238 @@
+"""Several joints in one balance: a face split in two is the face, two laws are two models, what a joint does not see."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.linalg as sla
+
+from tests.helpers.pressed_body import N_PAIR, balance_of, pressed_body, wear_problem
+from tests.helpers.verification_models import interface
+from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.hbm import error_controlled_rule, newton, stability, thesis_rule
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.evolution import Duty
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
+from tribodyn.hbm.law import ContactParameters
+from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.operating_point import AtFrequency
+from tribodyn.hbm.residual_shear import response_bounds
+from tribodyn.hbm.wear_law import JointWear
+from tribodyn.reduction.model import ReducedModel
+
+OMEGA = 420.0
+TIGHT = NewtonOptions(tolerance=1e-13)
+ALL = ("t1", "t2", "n")
+
+
+def split(balance: HarmonicBalance, parts: list[np.ndarray]) -> HarmonicBalance:
+    """The same balance with its one joint cut into several."""
+    whole = balance.contact.joints[0]
+    joints = [Joint(f"part {i}", whole.law, whole.parameters.taken(p), p) for i, p in enumerate(parts)]
+    return HarmonicBalance.of(balance.model, joints, balance.basis, balance.excitation, balance.omega_max)
+
+
+@pytest.mark.parametrize("located", [False, True])
+def test_a_face_split_into_joints_is_the_face(located: bool) -> None:
+    whole = balance_of(pressed_body()).with_samples(64, located)
+    parts = split(whole, [np.array([2]), np.array([3, 0, 1])])  # the order of a joint's pairs is its own
+    one, many = (newton.solve_from_rest(b, OMEGA, TIGHT) for b in (whole, parts))
+    assert one.converged
+    assert many.converged
+    assert set(np.unique(one.state.cycle.status)) - {1}  # not all stick all the time
+    np.testing.assert_allclose(many.state.x, one.state.x, atol=1e-12 * np.abs(one.state.x).max())
+    force = one.state.cycle.force
+    np.testing.assert_allclose(many.state.cycle.force, force, atol=1e-12 * np.abs(force).max())
+    jacobian = one.state.cycle.jacobian
+    np.testing.assert_allclose(
+        parts.evaluate(OMEGA, one.state.x).cycle.jacobian, jacobian, atol=1e-12 * np.abs(jacobian).max()
+    )
+    np.testing.assert_array_equal(many.state.cycle.status, one.state.cycle.status)
+    np.testing.assert_allclose(parts.energy(many.state), whole.energy(one.state), rtol=1e-10, atol=1e-15)
+    of_whole, of_parts = whole.history(one.state), parts.history(many.state)
+    for a, b in zip(of_whole, of_parts, strict=True):
+        np.testing.assert_allclose(b, a, atol=1e-11 * np.abs(a).max())
+    preload = parts.preload_by_joint(many.state)
+    assert sum(preload.values()) == pytest.approx(whole.preload(one.state), rel=1e-12)
+    energy = parts.contact.by_joint(parts.energy(many.state))
+    assert list(energy) == ["part 0", "part 1"]
+    assert [len(e) for e in energy.values()] == [1, 3]
+
+
+def test_bounds_and_stability_of_a_split_face_are_those_of_the_face() -> None:
+    whole = balance_of(pressed_body(), (0, 1, 2, 3), 20.0)
+    parts = split(whole, [np.arange(2), np.arange(2, N_PAIR)])
+    one, many = (response_bounds(b, OMEGA, options=TIGHT) for b in (whole, parts))
+    assert one.converged.all()
+    np.testing.assert_allclose(many.shear, one.shear, atol=1e-9 * np.abs(one.shear).max())
+    np.testing.assert_array_equal(many.stuck, one.stuck)
+    states = [newton.solve_from_rest(b, OMEGA, TIGHT).state for b in (whole, parts)]
+    first, second = (stability.stability(b, s) for b, s in zip((whole, parts), states, strict=True))
+    np.testing.assert_allclose(np.sort(second.exponents.real), np.sort(first.exponents.real), atol=1e-7 * OMEGA)
+
+
+def body(seed: int, stiff: float) -> SecondOrderSystem:
+    """A body whose first six coordinates are two pairs of t1, t2, n."""
+    rng = np.random.default_rng(seed)
+    n = 18
+    factor = rng.normal(size=(n, n))
+    stiffness = stiff * (factor @ factor.T / n + 0.05 * np.eye(n))
+    mass = np.eye(n)
+    lam, phi = sla.eigh(stiffness, mass)
+    damping = phi @ np.diag(2 * 0.02 * np.sqrt(lam)) @ phi.T
+    press, shake = np.zeros(n), np.zeros(n)
+    press[[2, 5]], shake[[0, 4, 8]] = 0.5, 1.0
+    return SecondOrderSystem(mass, stiffness, damping, {"press": press, "shake": shake}, {"tip": shake})
+
+
+def two_bodies() -> tuple[ReducedModel, ReducedModel, ReducedModel]:
+    """Two bodies that know nothing of each other, alone and as one model with one contact map."""
+    first, second = body(1, 1e6), body(2, 3e6)
+    n = len(first.mass)
+
+    def block(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return np.asarray(sla.block_diag(a, b))
+
+    loads = {f"{name}1": np.append(v, np.zeros(n)) for name, v in first.loads.items()}
+    loads |= {f"{name}2": np.append(np.zeros(n), v) for name, v in second.loads.items()}
+    outputs = {"tip1": loads["shake1"], "tip2": loads["shake2"]}
+    system = SecondOrderSystem(
+        block(first.mass, second.mass),
+        block(first.stiffness, second.stiffness),
+        block(first.damping, second.damping),
+        loads,
+        outputs,
+    )
+    one = np.eye(6, n)
+    return (
+        ReducedModel(first, interface(one, ALL)),
+        ReducedModel(second, interface(one, ALL)),
+        ReducedModel(system, interface(block(one, one), ALL)),
+    )
+
+
+def test_two_laws_in_one_balance_are_two_models_with_one_law_each() -> None:
+    left, right, both = two_bodies()
+    k = np.tile([2e5, 2e5, 3e5], (2, 1))
+    jenkins = Joint("left", "jenkins", ContactParameters.of(ALL, k, friction=0.4), np.arange(2))
+    planar = Joint("right", "coulomb_planar", ContactParameters.of(ALL, 2 * k, friction=0.2), np.arange(2, 4))
+    basis = HarmonicBasis((0, 1, 2, 3), 128)
+
+    def solved(model: ReducedModel, joints: object, numbers: tuple[int, ...]) -> tuple[HarmonicBalance, newton.Solution]:
+        names = [""] if len(numbers) == 1 else [str(i) for i in numbers]
+        static = {f"press{i}": 60.0 for i in names}
+        balance = HarmonicBalance.of(
+            model, joints, basis, Excitation.of(static, {1: {f"shake{i}": 120.0 for i in names}}), 900.0
+        )
+        solution = newton.solve_from_rest(balance, 600.0, TIGHT)
+        assert solution.converged, solution.outcome
+        return balance, solution
+
+    whole, together = solved(both, [jenkins, planar], (1, 2))
+    states = whole.contact.by_joint(together.state.x)
+    slips = []
+    for model, joint, name in ((left, jenkins, "left"), (right, planar, "right")):
+        _, alone = solved(model, replace(joint, pairs=None), (1,))
+        np.testing.assert_allclose(states[name], alone.state.x, atol=1e-11 * np.abs(alone.state.x).max())
+        np.testing.assert_array_equal(
+            whole.contact.by_joint(together.state.cycle.status)[name], alone.state.cycle.status
+        )
+        slips.append(bool(np.any(alone.state.cycle.status & 2)))
+    assert all(slips)
+
+
+def test_a_joint_has_no_spring_and_no_force_where_it_does_not_see() -> None:
+    left, _, both = two_bodies()
+    k = np.tile([2e5, 2e5, 3e5], (2, 1))
+    normal = Joint("pad", "unilateral", ContactParameters.of(("n",), k[:, 2:]), slice(0, 2))
+    other = Joint("wedge", "jenkins", ContactParameters.of(("t2", "n"), k[:, 1:], friction=0.3), slice(2, 4))
+    basis = HarmonicBasis((0, 1, 2), 64, "located")
+    excitation = Excitation.of({"press1": 60.0, "press2": 40.0}, {1: {"shake1": 90.0, "shake2": 90.0}})
+    balance = HarmonicBalance.of(both, [normal, other], basis, excitation, 900.0)
+    np.testing.assert_array_equal(balance.contact.stiffness[:2, :2], 0.0)
+    np.testing.assert_array_equal(balance.contact.stiffness[2:, 0], 0.0)
+    assert balance.memory.shape == (4, 1)  # the pad has no memory, the wedge one slider a pair
+    solution = newton.solve_from_rest(balance, 600.0, TIGHT)
+    assert solution.converged
+    force = solution.state.cycle.force
+    np.testing.assert_array_equal(force[:2, :2], 0.0)
+    np.testing.assert_array_equal(force[2:, 0], 0.0)
+    assert np.all(np.abs(force[:, 2, 0]) > 0)
+    # the pad alone, on a model that has nothing but its normal direction
+    system = left.system
+    seen = ReducedModel(system, interface(np.eye(6, len(system.mass))[[2, 5]], ("n",)))
+    alone = HarmonicBalance.of(
+        seen, replace(normal, pairs=None), basis, Excitation.of({"press": 60.0}, {1: {"shake": 90.0}}), 900.0
+    )
+    same = newton.solve_from_rest(alone, 600.0, TIGHT)
+    np.testing.assert_allclose(solution.state.x[:2, 2:], same.state.x, atol=1e-11 * np.abs(same.state.x).max())
+
+
+def test_joints_share_out_the_pairs() -> None:
+    balance = balance_of(pressed_body())
+    whole = balance.contact.joints[0]
+
+    def made(*joints: Joint) -> None:
+        HarmonicBalance.of(balance.model, joints, balance.basis, balance.excitation, balance.omega_max)
+
+    def part(name: str, *pairs: int) -> Joint:
+        return Joint(name, "jenkins", whole.parameters.taken(np.array(pairs)), np.array(pairs))
+
+    with pytest.raises(ValueError, match="pair 3 of the contact belongs to 0 joints"):
+        made(part("a", 0, 1, 2))
+    with pytest.raises(ValueError, match="pair 1 of the contact belongs to 2 joints"):
+        made(part("a", 0, 1), part("b", 1, 2, 3))
+    with pytest.raises(ValueError, match="different names, got a, a"):
+        made(part("a", 0, 1), part("a", 2, 3))
+    with pytest.raises(ValueError, match="joint 'a' has pairs beyond the 4"):
+        made(replace(part("a", 0, 1), pairs=np.array([0, 9])), part("b", 2, 3))
+    with pytest.raises(ValueError, match="covers 3 pairs and has parameters of 2"):
+        made(replace(part("a", 0, 1), pairs=slice(0, 3)), part("b", 3))
+    with pytest.raises(ValueError, match="at least one joint"):
+        made()
+    with pytest.raises(ValueError, match="'unilateral' has components"):
+        replace(whole, law="unilateral")
+
+
+@pytest.mark.parametrize("rule", ["thesis", "error controlled"])
+def test_joints_wear_by_their_own_laws(rule: str) -> None:
+    whole = wear_problem()
+    cut = split(whole.balance, [np.arange(2), np.arange(2, N_PAIR)])
+
+    def worn(problem: object) -> np.ndarray:
+        if rule == "thesis":
+            return thesis_rule.evolve(problem, 5e-7, max_steps=6).depth[-1]
+        return error_controlled_rule.evolve(problem, error_controlled_rule.Tolerance(0.05, 2e-4), max_steps=4).depth[-1]
+
+    one = worn(whole)
+    assert np.all(one > 0)
+    same = {"part 0": JointWear("energy", 1e-9), "part 1": JointWear("energy", 1e-9)}
+    np.testing.assert_allclose(worn(replace(whole, balance=cut, wear=same)), one, rtol=1e-7)
+    still = worn(replace(whole, balance=cut, wear={"part 1": JointWear("energy", 1e-9)}))
+    np.testing.assert_array_equal(still[:2], 0.0)
+    assert np.all(still[2:] > 0)
+    law_and_law = {"part 0": JointWear("archard", 4e-10), "part 1": JointWear("energy", 1e-9)}
+    other = worn(replace(whole, balance=cut, wear=law_and_law))
+    # in full slip k = mu alpha: with mu = 0.4 Archard's wear of these pairs is that of the energy law
+    np.testing.assert_allclose(other, one, rtol=0.05)
+    with pytest.raises(ValueError, match="no joint 'part 2': there are part 0, part 1"):
+        worn(replace(whole, balance=cut, wear={"part 2": JointWear("energy", 1e-9)}))
+
+
+def test_only_the_preload_of_wearing_joints_counts() -> None:
+    whole = wear_problem(lost_below=0.5)
+    cut = split(whole.balance, [np.arange(2), np.arange(2, N_PAIR)])
+    problem = replace(
+        whole,
+        balance=cut,
+        mission=(Duty(AtFrequency("tip", OMEGA)),),
+        wear={"part 1": JointWear("energy", 1e-9)},
+    )
+    history = thesis_rule.evolve(problem, 2e-5, max_steps=40)
+    state = newton.solve_from_rest(cut, OMEGA).state
+    assert history.preload[0] == pytest.approx(cut.preload_by_joint(state)["part 1"], rel=1e-6)
+    assert history.end.startswith("preload fell below 0.5")
