@@ -15,9 +15,10 @@
     history = thesis_rule.evolve(wear, 1e-6, max_steps=5)
     print(history.cycles, history.depth.max(axis=1))
 
-with `ContactParameters` from hbm.law, `Joint` from hbm.joint, `HarmonicBalance` from hbm.balance, `HarmonicBasis` from hbm.harmonics,
-`Excitation` from hbm.excitation, `natural` from hbm.continuation, `AtPeak` from hbm.operating_point, `Duty` and
-`WearProblem` from hbm.evolution, `JointWear` from hbm.wear_law and `thesis_rule` from hbm. A scene with [model] does the same without Python.
+with `ContactParameters` from hbm.law, `Joint` from hbm.joint, `HarmonicBalance` from hbm.balance, `HarmonicBasis` from
+hbm.harmonics, `Excitation` from hbm.excitation, `natural` from hbm.continuation, `AtPeak` from hbm.operating_point,
+`Duty` and `WearProblem` from hbm.evolution, `JointWear` from hbm.wear_law and `thesis_rule` from hbm. A scene with
+[model] does the same without Python.
 
 Units are SI after `scale`. A DOF is a number from 0, or (node, component) where the file carries labels (Abaqus text,
 ANSYS with its mapping file); the component is 1 to 6 or a name such as "UX" or "z".
