@@ -19,14 +19,16 @@ if TYPE_CHECKING:
     from tribodyn.workflows.api.scenes import build, load, plan, read_scene, run, scene_names
     from tribodyn.workflows.result.result import Result
     from tribodyn.workflows.result.store import ResultError
-    from tribodyn.workflows.run.pipeline import Model, SolveFailed
+    from tribodyn.workflows.run.failure import SolveFailed
+    from tribodyn.workflows.run.modelling import Model
     from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 
 _HOME = {
     "tribodyn.workflows.api.scenes": ("build", "load", "plan", "read_scene", "run", "scene_names"),
     "tribodyn.workflows.result.result": ("Result",),
     "tribodyn.workflows.result.store": ("ResultError",),
-    "tribodyn.workflows.run.pipeline": ("Model", "SolveFailed"),
+    "tribodyn.workflows.run.failure": ("SolveFailed",),
+    "tribodyn.workflows.run.modelling": ("Model",),
     "tribodyn.workflows.scene.scene_file": ("SceneError", "SceneFile"),
     "tribodyn.version": ("__version__",),
 }

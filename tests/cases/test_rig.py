@@ -19,7 +19,7 @@ from tribodyn.workflows.cases.rig.model import Rig
 from tribodyn.workflows.cases.rig.time import held_by_force, in_time
 from tribodyn.workflows.cases.rig.wear import RigWear, wear_down
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.identification import Measured, Parameter, fit
@@ -67,7 +67,7 @@ def test_platform_height_and_mating_height_are_the_same_interference(rig):
 
 
 def test_lost_contact_is_the_open_rig(rig):
-    references = linear_references(rig.model().balance, pipeline.OUTPUT, 2 * np.pi * 240, 2 * np.pi * 450)
+    references = linear_references(rig.model().balance, settings.OUTPUT, 2 * np.pi * 240, 2 * np.pi * 450)
     assert apart(rig, references) < 1e-3
     worn = rig.with_opening(np.full(rig.plain.interface.n_pair, 1e-4)).cycle()
     assert worn.energy == 0.0
@@ -96,7 +96,7 @@ def test_the_force_found_instead_of_the_height_makes_the_same_motion(rig):
 
 def test_frequencies_of_the_joint_model_are_those_of_the_rig(rig, joints):
     """Other masters, the same rig: springs put in after the reduction or before it."""
-    system, stuck = rig.plain.system, pipeline.contact_stiffness(rig.scene, rig.plain)
+    system, stuck = rig.plain.system, modelling.contact_stiffness(rig.scene, rig.plain)
     for K, state in (
         (system.stiffness, False),
         (stuck_stiffness(system.stiffness, rig.plain.interface.B, stuck), True),

@@ -18,7 +18,7 @@ from tribodyn.reduction.cyclic import nodal_diameters
 from tribodyn.workflows.pictures import render, render_wheel
 from tribodyn.workflows.pictures.view import sunk
 from tribodyn.workflows.result import store, summary
-from tribodyn.workflows.run import part_reduction, pipeline, planning
+from tribodyn.workflows.run import modelling, part_reduction, pipeline, planning
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 
@@ -33,7 +33,7 @@ COARSE = (
 
 
 def built(folder, *overrides):
-    return pipeline.build(scene_file.read("blade", (*COARSE, *overrides)), folder, Progress())
+    return modelling.build(scene_file.read("blade", (*COARSE, *overrides)), folder, Progress())
 
 
 @pytest.fixture(scope="module")
@@ -200,14 +200,14 @@ def test_flexible_disk_couples_through_its_seam(folder):
     """With a disk sector under the root the free frequencies depend on the nodal diameter."""
     disk = ("geometry.disk_radius=0.15", 'wheel.seam=["cyclic_right", "cyclic_left"]')
     scene = scene_file.read("blade", (*COARSE, *disk))
-    mesh, nodes = pipeline.make_mesh(scene, folder)
+    mesh, nodes = modelling.make_mesh(scene, folder)
     assert len(named(nodes, "cyclic_left")) > 0
-    part = pipeline.make_part(scene.part_scene, mesh, nodes)
+    part = modelling.make_part(scene.part_scene, mesh, nodes)
     reduced = part_reduction.reduced_sector(scene.part_scene, part)
     free = nodal_diameters(reduced.sector, (0, 5, 10), 1)[:, 0]
     assert np.ptp(free) > 0.1
     spinning = scene_file.read("blade", (*COARSE, *disk, "wheel.speed=6000 rpm")).part_scene
-    spun = part_reduction.reduced_sector(spinning, pipeline.make_part(spinning, mesh, nodes))
+    spun = part_reduction.reduced_sector(spinning, modelling.make_part(spinning, mesh, nodes))
     assert (nodal_diameters(spun.sector, (0, 5, 10), 1)[:, 0] > free).all()
 
 

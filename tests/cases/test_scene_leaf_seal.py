@@ -19,7 +19,7 @@ from tribodyn.workflows.cases.leaf_seal import study as leaf_study
 from tribodyn.workflows.cases.leaf_seal.cases import Case, cases, liner
 from tribodyn.workflows.cases.leaf_seal.response import LINER_NODE, respond
 from tribodyn.workflows.cases.leaf_seal.study import KEPT
-from tribodyn.workflows.run import pipeline, planning
+from tribodyn.workflows.run import modelling, pipeline, planning
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.scene import scene_file
@@ -35,9 +35,9 @@ def leaf():
 def built(folder, *overrides):
     """The model of the scene with changes."""
     file = scene_file.read("leaf_seal", overrides)
-    mesh, node_sets = pipeline.make_mesh(file, folder)
-    part = pipeline.make_part(file.scene, mesh, node_sets)
-    return pipeline.make_model(file.scene, part, pipeline.reduce_part(file.scene, part))
+    mesh, node_sets = modelling.make_mesh(file, folder)
+    part = modelling.make_part(file.scene, mesh, node_sets)
+    return modelling.make_model(file.scene, part, modelling.reduce_part(file.scene, part))
 
 
 def dense_response(balance, omega):

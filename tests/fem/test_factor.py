@@ -29,12 +29,12 @@ factorise(some @ some.T + 10 * sp.eye(300)).solve(np.ones(300))
 
 def digest(folder: Path) -> str:
     """Of the reduced matrices of a small beam."""
-    from tribodyn.workflows.run import pipeline
+    from tribodyn.workflows.run import modelling
     from tribodyn.workflows.run.progress import Progress
     from tribodyn.workflows.scene.scene_file import read
 
     small = ("geometry.n_patch=5", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=4", "wear=")
-    system = pipeline.build(read("beam", small), folder, Progress()).reduced.system
+    system = modelling.build(read("beam", small), folder, Progress()).reduced.system
     both = np.ascontiguousarray(np.concatenate([np.asarray(system.stiffness), np.asarray(system.mass)]))
     return hashlib.sha256(both.tobytes()).hexdigest()
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import h5py
 
 from tribodyn.fem import factor as fem_factor
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 
@@ -33,8 +33,8 @@ def main() -> None:
         return Counted
 
     fem_factor.Pardiso, fem_factor.SuperLU = counted(fem_factor.Pardiso), counted(fem_factor.SuperLU)
-    build = pipeline.build
-    pipeline.build = lambda *arguments: models.append(build(*arguments)) or models[-1]
+    build = modelling.build
+    modelling.build = lambda *arguments: models.append(build(*arguments)) or models[-1]
     with tempfile.TemporaryDirectory() as folder:
         result = pipeline.run(scene_file.read(sys.argv[1], sys.argv[2:]), Path(folder), Progress())
         arrays: dict[str, tuple[int, ...]] = {}

@@ -15,7 +15,7 @@ from tribodyn.reduction.interface_modes import interface_modes
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.prescribed import prescribe
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 
@@ -111,8 +111,8 @@ def test_what_cannot_be_is_refused(full: ReducedModel) -> None:
 
 def peak(tmp_path: Path, *overrides: str) -> tuple[ReducedModel, np.ndarray]:
     file = scene_file.read("beam", (*SMALL, *overrides))
-    model = pipeline.build(file, tmp_path, Progress())
-    site = pipeline.peak_of(file.scene)
+    model = modelling.build(file, tmp_path, Progress())
+    site = settings.peak_of(file.scene)
     assert isinstance(site, AtPeak)
     point: OperatingPoint = site.first(model.balance)
     assert point.solution.converged

@@ -13,7 +13,7 @@ from tests.workflows.test_matrices import folder as folder  # the fixture
 from tribodyn.hbm.harmonic_choice import estimate, widened
 from tribodyn.hbm.stability import mark
 from tribodyn.workflows.result import store
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling, pipeline, settings
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import from_json, read
 
@@ -41,9 +41,9 @@ def test_harmonics_are_chosen_and_told(folder: Path, capsys: pytest.CaptureFixtu
     assert "estimated truncation error" in leave(["show", str(folder)], capsys)[1]
     # the estimate is that of the balance which was solved, at the peak
     file = read(str(folder / "own.toml"), [*QUICK, *overrides])
-    balance = pipeline.build(file, folder, Progress(), kept).balance
+    balance = modelling.build(file, folder, Progress(), kept).balance
     assert balance.basis.harmonics == kept
-    peak = pipeline.peak_of(file.scene).first(balance).state
+    peak = settings.peak_of(file.scene).first(balance).state
     own = estimate(widened(balance, 9), kept, peak.omega, peak.x, split=False).error
     assert own == pytest.approx(float(result.facts["harmonics_error"]), rel=0.3)
     assert from_json(result.provenance["scene"]) == file.scene
@@ -56,7 +56,7 @@ def test_stability_and_bounds_are_marked_kept_and_drawn(folder: Path, capsys: py
     assert marks is not None
     assert bounds is not None
     file = read(str(folder / "own.toml"), [*QUICK, "loads.harmonic.shaker.value=12 N"])
-    again = mark(pipeline.build(file, folder, Progress()).balance, frf)
+    again = mark(modelling.build(file, folder, Progress()).balance, frf)
     assert np.array_equal(marks.stable, again.stable)
     height = frf.amplitude("response")
     assert np.all(bounds.amplitude_low <= height * (1 + 1e-9))

@@ -11,7 +11,8 @@ from tests.cases.test_rig import COARSE as RIG
 from tests.cases.test_scene_blade import COARSE as BLADE
 from tribodyn.workflows.cases.rig.model import Rig
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling
+from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies import fit_file
 from tribodyn.workflows.studies.fit_file import Bench, Known, Task
@@ -75,8 +76,8 @@ def test_the_wear_coefficient_is_found_from_life_and_work():
 def test_mating_height_is_found_from_the_preload_and_the_part_is_made_once(monkeypatch):
     """From the scene's own zero, where a relative step would have no length; against the rig's own preload."""
     made = []
-    original = pipeline.make_mesh
-    monkeypatch.setattr(pipeline, "make_mesh", lambda *args: made.append(1) or original(*args))
+    original = modelling.make_mesh
+    monkeypatch.setattr(modelling, "make_mesh", lambda *args: made.append(1) or original(*args))
     task = Task.model_validate(
         {
             "parameters": {"height": {"keys": ["surfaces.mating_height"], "low": "-5 um", "high": "5 um"}},
@@ -170,7 +171,7 @@ def test_a_life_without_wear_and_a_run_that_stops_early_are_told():
     life = {"life": Known(of="life", left=0.1, value=1e6)}
     with pytest.raises(ValueError, match=r"the scene has no \[wear\]"):
         Bench().predict(scene_file.read("beam", (*BEAM, "wear=")), life)
-    with pytest.raises(pipeline.SolveFailed, match=r"measured.life: the preload did not fall to 0.1 .* stopped"):
+    with pytest.raises(SolveFailed, match=r"measured.life: the preload did not fall to 0.1 .* stopped"):
         Bench().predict(scene_file.read("beam", (*BEAM, "wear.max_steps=1")), life)
 
 

@@ -23,7 +23,7 @@ from tribodyn.hbm.operating_point import AtPeak
 from tribodyn.reduction import foreign as reduction_foreign
 from tribodyn.reduction.foreign import read_matrices, reduced_model
 from tribodyn.workflows.result import store
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import parse, read
 
@@ -137,7 +137,7 @@ def test_the_scene_is_the_same_as_the_documented_python(folder: Path, monkeypatc
 
 
 def test_lists_may_stand_in_the_file_and_be_reduced(folder: Path) -> None:
-    written = pipeline.build(read(str(folder / "own.toml")), folder, Progress()).balance
+    written = modelling.build(read(str(folder / "own.toml")), folder, Progress()).balance
     named = [
         "contact.dofs={variable = 'touching'}",
         "contact.area={variable = 'areas'}",
@@ -147,7 +147,7 @@ def test_lists_may_stand_in_the_file_and_be_reduced(folder: Path) -> None:
         "reduction.modes=8",
     ]
     # every mode kept: Craig-Bampton is exact
-    reduced = pipeline.build(read(str(folder / "own.toml"), named), folder, Progress())
+    reduced = modelling.build(read(str(folder / "own.toml"), named), folder, Progress())
     assert reduced.part is None
     assert reduced.reduced.interface.points[1, 0] == 1e-3
     stuck = [balance.compliance.at(300.0) for balance in (written, reduced.balance)]
@@ -156,10 +156,10 @@ def test_lists_may_stand_in_the_file_and_be_reduced(folder: Path) -> None:
 
 
 def test_damping_is_that_of_the_files_or_of_the_scene(folder: Path) -> None:
-    given = pipeline.build(read(str(folder / "own.toml"), ["model.names.damping=C"]), folder, Progress())
+    given = modelling.build(read(str(folder / "own.toml"), ["model.names.damping=C"]), folder, Progress())
     assert given.reduced.system.damping == pytest.approx(random_structure(2, n_extra=12).system.damping)
     with pytest.raises(ValueError, match=r"hold a damping matrix: leave \[damping\] out"):
-        pipeline.build(read(str(folder / "own.toml"), ["damping.modal=1 %"]), folder, Progress())
+        modelling.build(read(str(folder / "own.toml"), ["damping.modal=1 %"]), folder, Progress())
 
 
 BAD = {
@@ -191,4 +191,4 @@ def test_what_cannot_be_is_one_sentence(case: str, folder: Path, capsys: pytest.
 
 def test_a_scene_of_matrices_has_no_mesh() -> None:
     with pytest.raises(ValueError, match="made of matrices and has no mesh"):
-        pipeline.make_mesh(parse(SCENE, "own.toml"), Path())
+        modelling.make_mesh(parse(SCENE, "own.toml"), Path())

@@ -11,7 +11,7 @@ import pytest
 
 from tests.workflows.test_cli import leave
 from tribodyn.reduction.linear import linear_modes
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import read
 
@@ -22,7 +22,7 @@ SET = [word for override in SMALL for word in ("--set", override)]
 def test_the_backbone_goes_from_the_stuck_to_the_free_mode(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    model = pipeline.build(read("beam", SMALL), tmp_path, Progress())
+    model = modelling.build(read("beam", SMALL), tmp_path, Progress())
     free = linear_modes(model.reduced, n=1)[0][0]
     code, out, err = leave(
         ["backbone", "beam", *SET, "--from", "0.01um", "--to", "10mm", "--out", str(tmp_path), "--json"], capsys

@@ -22,7 +22,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.workflows.result import summary
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 
@@ -63,7 +63,7 @@ def on_a_mesh_file(name: str, overrides: tuple[str, ...], folder: Path) -> list[
     """Overrides that take the scene's mesh from a file instead of its part."""
     geometry = [text for text in overrides if text.startswith("geometry.")]
     file = scene_file.read(name, geometry)
-    pipeline.make_mesh(file, folder)
+    modelling.make_mesh(file, folder)
     given = file.part_scene.geometry
     axes = ", ".join(f"{group} = {json.dumps(letters)}" for group, letters in given.fixed_axes.items())
     turning = "" if given.no_turning is None else f", no_turning = {json.dumps(given.no_turning)}"
@@ -153,7 +153,7 @@ def matrix_scene(folder: Path, *overrides: str) -> scene_file.SceneFile:
 def test_the_static_part_is_there_where_a_static_load_is_and_nowhere_else(tmp_path: Path) -> None:
     file = matrix_scene(tmp_path, "harmonics.kept=[1, 3]")
     with pytest.raises(ValueError, match="load 'press' acts in harmonic 0, which is not kept"):
-        pipeline.build(file, tmp_path, Progress())
+        modelling.build(file, tmp_path, Progress())
     file = matrix_scene(tmp_path, "harmonics.kept=[1, 3]", "loads.static=")
     result = pipeline.run(file, tmp_path, Progress())
     assert result.response is not None

@@ -18,7 +18,7 @@ from tribodyn.workflows.pictures import plots
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.summary import summary
-from tribodyn.workflows.run import checkpoint, fields, pipeline
+from tribodyn.workflows.run import checkpoint, fields, modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import read
 
@@ -90,7 +90,7 @@ def test_loops_enclose_the_energy(finished: Result, tmp_path: Path) -> None:
     wear, loops = finished.wear, finished.loops
     assert wear is not None
     assert loops is not None
-    balance = pipeline.build(read("beam", SMALL), tmp_path, Progress()).balance.with_samples(4096, located=False)
+    balance = modelling.build(read("beam", SMALL), tmp_path, Progress()).balance.with_samples(4096, located=False)
     fine = fields.hysteresis_loops(balance, wear.rows(), loops.row)
     for row, x, force in zip(loops.row, fine.displacement, fine.force, strict=True):
         following = np.roll(x, -1, -1) - np.roll(x, 1, -1)
@@ -225,7 +225,7 @@ def test_an_earlier_result_is_set_aside(finished: Result, tmp_path: Path) -> Non
 
 def test_a_mesh_file_gives_what_its_part_gives(finished: Result, tmp_path: Path) -> None:
     file = read("beam", SMALL)
-    pipeline.make_mesh(file, tmp_path)
+    modelling.make_mesh(file, tmp_path)
     text = file.text
     begin, end = text.index("[geometry]"), text.index("[material]")
     own = tmp_path / "own.toml"

@@ -11,7 +11,7 @@ import pytest
 
 from tests.workflows.test_cli import leave
 from tribodyn.hbm.continuation import arc_length
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling, pipeline, settings
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import read
 
@@ -71,7 +71,7 @@ def test_a_fold_against_the_load_is_that_of_a_branch_traced_anew(
     assert code == 0, err
     found = json.loads(out)
     assert (found["what"], found["against"], found["end"]) == ("fold", "load factor", "reached load factor 1.4")
-    balance = pipeline.build(read(lifting), tmp_path, Progress()).balance
+    balance = modelling.build(read(lifting), tmp_path, Progress()).balance
     for at in (0, -1):
         loaded = balance.with_load(found["value"][at])
         branch = arc_length.follow(loaded, 2 * np.pi * 0.6, 2 * np.pi * 0.1)
@@ -94,7 +94,7 @@ def test_peaks_are_those_of_the_problem_made_anew(
     found = json.loads(out)
     assert len(found["value"]) == 3
     file = read("beam", SMALL)
-    balance = pipeline.build(file, tmp_path, Progress()).balance
+    balance = modelling.build(file, tmp_path, Progress()).balance
     last = found["value"][-1]
     if against == "load":
         balance = balance.with_load(last)
@@ -103,7 +103,7 @@ def test_peaks_are_those_of_the_problem_made_anew(
     else:
         stiffer = balance.contact.with_parameters(lambda p: replace(p, stiffness=last * p.stiffness))
         balance = balance.with_contact(stiffer)
-    peak = pipeline.peak_of(file.scene).first(balance)
+    peak = settings.peak_of(file.scene).first(balance)
     assert found["frequency_hz"][-1] == pytest.approx(peak.state.omega / (2 * np.pi), rel=1e-5)
     assert found["amplitude_m"][-1] == pytest.approx(peak.amplitude, rel=1e-5)
 

@@ -11,10 +11,10 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm.branch import CONVERGED
-from tribodyn.hbm.operating_point import OperatingPoint
+from tribodyn.hbm.operating_point import AtFrequency, OperatingPoint
 from tribodyn.hbm.wear_history import LIFE_SHARE, WearHistory, cycles_to_preload
 from tribodyn.workflows.accuracy.trade_table import QUANTITIES
-from tribodyn.workflows.run import memory, pipeline
+from tribodyn.workflows.run import memory, modelling, pipeline, settings, wear_run
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import free_deflection
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -49,7 +49,7 @@ def measure(file: SceneFile, wears: bool = True, refined: bool = True) -> Measur
     clock = process_time()
     memory.forget_peak()
     with TemporaryDirectory() as folder, threadpool_limits(1):
-        model = pipeline.build(file, Path(folder), Progress())
+        model = modelling.build(file, Path(folder), Progress())
         balance, interface = model.balance, model.reduced.interface
         depth = energy = np.zeros(interface.n_pair)
         outcome = CONVERGED
@@ -77,13 +77,13 @@ def measure(file: SceneFile, wears: bool = True, refined: bool = True) -> Measur
     return Measured(values, flat, interface.area, depth, energy, spent, needed, outcome)
 
 
-def wear(file: SceneFile, model: pipeline.Model, left: float = LIFE_SHARE) -> WearHistory:
+def wear(file: SceneFile, model: modelling.Model, left: float = LIFE_SHARE) -> WearHistory:
     """Wear by the scene's rule until a share `left` of the preload is left."""
     wanted, balance = file.scene.wear, model.balance
     assert wanted is not None
-    problem = pipeline.wear_problem(file.scene, file.folder, balance, left)
-    limit = pipeline.step_limit(file.scene, free_deflection(balance), problem.area)
-    return pipeline.evolve(problem, wanted, limit, wanted.max_steps)
+    problem = wear_run.wear_problem(file.scene, file.folder, balance, left)
+    limit = settings.step_limit(file.scene, free_deflection(balance), problem.area)
+    return wear_run.evolve(problem, wanted, limit, wanted.max_steps)
 
 
 def depth_at(worn: WearHistory, cycles: float) -> np.ndarray:
@@ -91,15 +91,15 @@ def depth_at(worn: WearHistory, cycles: float) -> np.ndarray:
     return np.array([np.interp(cycles, worn.cycles, pair) for pair in worn.depth.T])
 
 
-def _peak(file: SceneFile, model: pipeline.Model, refined: bool) -> OperatingPoint:
+def _peak(file: SceneFile, model: modelling.Model, refined: bool) -> OperatingPoint:
     """The highest point of the response in the scene's range."""
-    balance, site = model.balance, pipeline.peak_of(file.scene)
+    balance, site = model.balance, settings.peak_of(file.scene)
     branch = pipeline.follow_response(file.scene, balance, lambda share, note: None)
     pipeline.check_branch(branch)
-    height = branch.amplitude(pipeline.OUTPUT)
+    height = branch.amplitude(settings.OUTPUT)
     best = int(np.argmax(np.where([outcome == CONVERGED for outcome in branch.outcome], height, -1.0)))
     x = branch.contact[best].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
     omega = float(branch.omega[best])
     if refined:
         return site.next(balance, omega, x)
-    return pipeline.AtFrequency(pipeline.OUTPUT, omega, site.newton).next(balance, omega, x)
+    return AtFrequency(settings.OUTPUT, omega, site.newton).next(balance, omega, x)

@@ -19,7 +19,7 @@ from tribodyn.hbm.evolution import WearProblem
 from tribodyn.hbm.wear_history import LIFE_SHARE, WearHistory, cycles_to_preload
 from tribodyn.workflows.cases.beam.published import WEAR_STEPS
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE, STYLE
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling, wear_run
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import delta_max, free_deflection
 from tribodyn.workflows.scene import scene_file
@@ -100,8 +100,8 @@ def wear_step(scene: str, say: Callable[[str], None], overrides: tuple[str, ...]
 
 def _problem(file: scene_file.SceneFile) -> tuple[WearProblem, float]:
     with TemporaryDirectory() as folder, threadpool_limits(1):
-        model = pipeline.build(file, Path(folder), Progress())
-    problem = pipeline.wear_problem(file.scene, file.folder, model.balance, LIFE_SHARE)
+        model = modelling.build(file, Path(folder), Progress())
+    problem = wear_run.wear_problem(file.scene, file.folder, model.balance, LIFE_SHARE)
     return problem, delta_max(file.scene, free_deflection(model.balance), problem.area)
 
 

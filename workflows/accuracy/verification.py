@@ -24,7 +24,8 @@ from tribodyn.hbm.wear_history import WearRow
 from tribodyn.workflows.pictures.plots import axes_of, force_unit, length_unit
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling, settings
+from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.schema import Scene
@@ -140,7 +141,7 @@ def compare(
     start = time.perf_counter()
     file = rebuilt(result, overrides)
     with TemporaryDirectory() as folder, threadpool_limits(file.scene.solver.threads):
-        unworn = pipeline.build(file, Path(folder), progress, result.harmonics).balance
+        unworn = modelling.build(file, Path(folder), progress, result.harmonics).balance
         balance, omega, x = _start(result, file.scene, unworn, at, row)
         target = omega if at is None else at
         if not 0 < target <= balance.omega_max:
@@ -149,9 +150,9 @@ def compare(
                 f"{balance.omega_max / (2 * np.pi):g} Hz: change response.frequency with --set"
             )
         with progress.stage("harmonic balance"):
-            solution = _walk(balance, omega, target, x, pipeline.newton_options(file.scene))
+            solution = _walk(balance, omega, target, x, settings.newton_options(file.scene))
         if not solution.converged:
-            raise pipeline.SolveFailed(f"no balance at {target / (2 * np.pi):g} Hz: {solution.outcome}")
+            raise SolveFailed(f"no balance at {target / (2 * np.pi):g} Hz: {solution.outcome}")
         steps = steps or max(STEPS, STEPS_PER_HARMONIC * balance.basis.harmonics[-1])
         with progress.stage("time integration"):
             found = verify(balance, solution.state, Options(steps, tolerance=TOLERANCE, max_periods=PERIODS))
@@ -179,7 +180,7 @@ def _start(
             raise ValueError(f"the result has no wear row {row}: it has {f'0 to {held - 1}' if held else 'none'}")
         assert result.wear is not None
         worn: WearRow = result.wear.rows()[row]
-        load = pipeline.mission(scene)[0].load if scene.wear is not None else 1.0
+        load = settings.mission(scene)[0].load if scene.wear is not None else 1.0
         balance = unworn.with_gap(unworn.contact.gap + worn.depth).with_load(load)
         return balance, worn.omega, _carried(worn.displacement, basis, balance)
     frf = result.response

@@ -13,8 +13,8 @@ import tomli_w
 
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.run import checkpoint, pipeline, planning
-from tribodyn.workflows.run.pipeline import Model
+from tribodyn.workflows.run import checkpoint, modelling, pipeline, planning
+from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.progress import CallbackProgress, Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -59,7 +59,7 @@ def plan(source: Source, overrides: Overrides = ()) -> planning.Plan:
 def build(source: Source, overrides: Overrides = (), *, progress: Report = None) -> Model:
     """The nonlinear problem of a scene, reduced and ready to be solved, with the part that it was made from."""
     with TemporaryDirectory() as folder:
-        return pipeline.build(read_scene(source, overrides), Path(folder), reporter(progress))
+        return modelling.build(read_scene(source, overrides), Path(folder), reporter(progress))
 
 
 def run(

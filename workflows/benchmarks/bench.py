@@ -24,7 +24,7 @@ from tribodyn.hbm.continuation import natural
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.reference import DenseBalance
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 
@@ -86,7 +86,7 @@ def _problem() -> Callable[[str], HarmonicBalance]:
     """The beam scene's balance for chosen harmonics; mesh and reduction are made once."""
     file = scene_file.read("beam", ())
     with TemporaryDirectory() as folder, threadpool_limits(1):
-        model = pipeline.build(file, Path(folder), Progress())
+        model = modelling.build(file, Path(folder), Progress())
     reduced, unworn = model.reduced, model.balance
 
     def of(harmonics: str) -> HarmonicBalance:
@@ -98,7 +98,7 @@ def _problem() -> Callable[[str], HarmonicBalance]:
 
 
 def _measure(balance: HarmonicBalance, harmonics: str, threads: int, windows: tuple[int, int]) -> Row:
-    low, high = pipeline.response_range(scene_file.read("beam", ()).scene)
+    low, high = settings.response_range(scene_file.read("beam", ()).scene)
     options = natural.Options(POINTS, newton=NewtonOptions(TOLERANCE))
     natural.follow(balance, high, high * 0.999, replace(options, n_points=2))  # compiles outside the clock
     now = process_time if threads == 1 else perf_counter  # other work on the machine does not count

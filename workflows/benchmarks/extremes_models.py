@@ -17,7 +17,7 @@ from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.reduction.damping import modal_damping
 from tribodyn.reduction.model import ReducedModel
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 
@@ -71,7 +71,7 @@ def beam(n_patch: int) -> Body:
     """The beam scene with n_patch x n_patch contact nodes and its published loads, between free and stuck peak."""
     file = scene_file.read("beam", (f"geometry.n_patch={n_patch}", "damping="))
     with TemporaryDirectory() as folder:
-        model = pipeline.build(file, Path(folder), Progress())
+        model = modelling.build(file, Path(folder), Progress())
     contact, loads = file.scene.contact, model.balance.excitation.loads
     tangential, normal = contact.tangential_stiffness or 0.0, contact.normal_stiffness or 0.0
     ordinary = Setting(

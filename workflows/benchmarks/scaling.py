@@ -22,7 +22,7 @@ from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.continuation import natural
 from tribodyn.workflows.pictures.plots import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
-from tribodyn.workflows.run import memory, pipeline
+from tribodyn.workflows.run import memory, modelling, settings
 from tribodyn.workflows.scene import scene_file
 
 QUICK, FULL = (5, 9, 13), (5, 9, 13, 19, 25, 31)  # nodes along each side of the patch
@@ -69,14 +69,14 @@ def measure(n_patch: int, points: int = POINTS) -> Row:
     scene = file.part_scene
     with threadpool_limits(1), TemporaryDirectory() as folder:
         clock = [time.process_time()]
-        mesh, node_sets = pipeline.make_mesh(file, Path(folder))
-        part = pipeline.make_part(scene, mesh, node_sets)
-        reduced = pipeline.reduce_part(scene, part)
+        mesh, node_sets = modelling.make_mesh(file, Path(folder))
+        part = modelling.make_part(scene, mesh, node_sets)
+        reduced = modelling.reduce_part(scene, part)
         clock.append(time.process_time())
-        balance = pipeline.make_model(scene, part, reduced).balance
+        balance = modelling.make_model(scene, part, reduced).balance
         clock.append(time.process_time())
-        low, high = pipeline.response_range(scene)
-        options = natural.Options(points, newton=pipeline.newton_options(scene))
+        low, high = settings.response_range(scene)
+        options = natural.Options(points, newton=settings.newton_options(scene))
         natural.follow(balance, high, 0.999 * high, natural.Options(2))  # compiles outside the clock
         clock.append(time.process_time())
         branch = natural.follow(balance, high, low, options)

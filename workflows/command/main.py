@@ -68,7 +68,7 @@ def run(
     """
     from tribodyn.workflows.accuracy.accuracy import tuned
     from tribodyn.workflows.api import scenes
-    from tribodyn.workflows.run.pipeline import SolveFailed
+    from tribodyn.workflows.run.failure import SolveFailed
     from tribodyn.workflows.run.progress import console_progress
 
     make_room(out)
@@ -175,7 +175,7 @@ def verify(
     """
     from tribodyn.workflows.accuracy import verification
     from tribodyn.workflows.api import scenes
-    from tribodyn.workflows.run.pipeline import SolveFailed
+    from tribodyn.workflows.run.failure import SolveFailed
     from tribodyn.workflows.run.progress import Progress, console_progress
 
     make_room(out)

@@ -13,7 +13,7 @@ from scipy.io import mmwrite
 
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 
 
@@ -25,7 +25,7 @@ def reduced_model(result: Result) -> ReducedModel:
     from tribodyn.workflows.accuracy.verification import rebuilt
 
     with TemporaryDirectory() as folder:
-        return pipeline.build(rebuilt(result), Path(folder), Progress(), result.harmonics).reduced
+        return modelling.build(rebuilt(result), Path(folder), Progress(), result.harmonics).reduced
 
 
 def arrays(model: ReducedModel, harmonic: int = 1) -> dict[str, np.ndarray]:

@@ -16,7 +16,8 @@ from tribodyn.fem.constraints import free_dofs, named
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.craig_bampton import POINT_LOAD
 from tribodyn.workflows.run import matrix_model
-from tribodyn.workflows.run.pipeline import check_names, clamps, make_mesh
+from tribodyn.workflows.run.modelling import clamps, make_mesh
+from tribodyn.workflows.run.settings import check_names
 from tribodyn.workflows.scene.matrices import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import PartScene, Scene

@@ -26,9 +26,9 @@ from tribodyn.reduction.held import hold
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.workflows.accuracy import measure
-from tribodyn.workflows.run import part_reduction, pipeline
+from tribodyn.workflows.run import modelling, part_reduction, settings
 from tribodyn.workflows.run.contact_surfaces import surface_gap
-from tribodyn.workflows.run.pipeline import SolveFailed
+from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
@@ -210,22 +210,22 @@ class Bench:
     part: Part | None = None
     plain: ReducedModel | None = None
 
-    def model(self, file: SceneFile) -> pipeline.Model:
+    def model(self, file: SceneFile) -> modelling.Model:
         """The nonlinear problem of a scene."""
         scene = file.part_scene
         early = json.dumps(scene.model_dump(mode="json", exclude=LATE), sort_keys=True)
         if self.part is None or self.plain is None or early != self.early:
             with TemporaryDirectory() as folder:
-                mesh, node_sets = pipeline.make_mesh(file, Path(folder))
-            self.part = pipeline.make_part(scene, mesh, node_sets)
+                mesh, node_sets = modelling.make_mesh(file, Path(folder))
+            self.part = modelling.make_part(scene, mesh, node_sets)
             self.plain, self.early = hold(part_reduction.reduce(scene, self.part), self.part.held), early
         plain = self.plain
         if scene.surfaces is not None:
             i = plain.interface
             gap = i.gap + surface_gap(scene.surfaces, self.part.interface, file.folder).gap
             plain = replace(plain, interface=replace(i, gap=gap))
-        reduced = part_reduction.with_prescribed(scene, self.part, pipeline.damped(scene, plain))
-        return pipeline.make_model(scene, self.part, reduced)
+        reduced = part_reduction.with_prescribed(scene, self.part, modelling.damped(scene, plain))
+        return modelling.make_model(scene, self.part, reduced)
 
     def predict(self, file: SceneFile, measured: Mapping[str, Known]) -> np.ndarray:
         """(n_measured,) what the scene says to each number."""
@@ -236,7 +236,7 @@ class Bench:
 class Answers:
     """What one scene says; cycles and wear runs that several numbers share are solved once."""
 
-    def __init__(self, file: SceneFile, model: pipeline.Model):
+    def __init__(self, file: SceneFile, model: modelling.Model):
         self.file, self.model = file, model
         self._points: dict[tuple[Place, float], OperatingPoint] = {}
         self._runs: dict[float, WearHistory] = {}
@@ -265,19 +265,19 @@ class Answers:
         reduced = self.model.reduced
         if mode > reduced.system.n_dof:
             raise ValueError(f"there is no mode {mode}: the model has {reduced.system.n_dof}")
-        springs = pipeline.contact_stiffness(self.file.scene, reduced) if stuck else None
+        springs = modelling.contact_stiffness(self.file.scene, reduced) if stuck else None
         return float(linear_modes(reduced, springs, mode)[0][mode - 1])
 
     def _at_rest(self) -> float:
         still = self.model.balance.with_load(0.0)
-        found = newton.solve_from_rest(still, still.omega_max, pipeline.newton_options(self.file.scene))
+        found = newton.solve_from_rest(still, still.omega_max, settings.newton_options(self.file.scene))
         if not found.converged:
             raise SolveFailed(f"the contact at rest: {found.outcome}")
         return still.preload(found.state)
 
     def _point(self, where: Place, load: float) -> OperatingPoint:
         if (where, load) not in self._points:
-            site = pipeline.site_of(self.file.scene, where)
+            site = settings.site_of(self.file.scene, where)
             point = site.first(self.model.balance.with_load(load))
             if not point.solution.converged:
                 raise SolveFailed(point.solution.outcome)

@@ -15,7 +15,8 @@ from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.nonlinear_modes import Backbone, Options, backbone
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling, settings
+from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 
@@ -24,15 +25,15 @@ def follow(file: SceneFile, start: float, stop: float, mode: int, points: int, p
     """The backbone of a scene's observed displacement from one amplitude to another [m].
 
     mode : number of the mode about the static equilibrium, from 0; points : on an easy way
-    Raises  ValueError for what cannot be; pipeline.SolveFailed where not even the first point is found
+    Raises  ValueError for what cannot be; SolveFailed where not even the first point is found
     """
     with TemporaryDirectory() as folder, threadpool_limits(file.scene.solver.threads):
-        balance = pipeline.build(file, Path(folder), progress).balance
+        balance = modelling.build(file, Path(folder), progress).balance
         with progress.stage("backbone"):
-            options = Options(points, newton=pipeline.newton_options(file.scene))
-            found = backbone(balance, start, stop, mode, pipeline.OUTPUT, options)
+            options = Options(points, newton=settings.newton_options(file.scene))
+            found = backbone(balance, start, stop, mode, settings.OUTPUT, options)
     if CONVERGED not in found.outcome:
-        raise pipeline.SolveFailed(f"the backbone {found.end}")
+        raise SolveFailed(f"the backbone {found.end}")
     return found
 
 

@@ -26,7 +26,8 @@ from tribodyn.hbm.parameter import Parameter
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
 from tribodyn.workflows.result import store
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling, settings
+from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 
@@ -80,7 +81,7 @@ def follow(
 
     against : a key of UNITS; points : values of the peak, or the most that a line of folds may have
     worn : folder of a result whose last depth is one of "wear"
-    Raises  ValueError for what cannot be; pipeline.SolveFailed where not even the first point is found
+    Raises  ValueError for what cannot be; SolveFailed where not even the first point is found
     """
     if start == stop:
         raise ValueError("--from and --to are the same: give two values to go from and to")
@@ -89,7 +90,7 @@ def follow(
     if (against == "wear") != (worn is not None):
         raise ValueError('--worn: give the folder of a worn result with --against "wear", and only there')
     with TemporaryDirectory() as folder, threadpool_limits(file.scene.solver.threads):
-        balance = pipeline.build(file, Path(folder), progress).balance
+        balance = modelling.build(file, Path(folder), progress).balance
         path = _path(balance, against, _depth(worn, balance))
         if fold is None:
             with progress.track("peaks") as advance:
@@ -119,7 +120,7 @@ def _depth(worn: Path | None, balance: HarmonicBalance) -> np.ndarray | None:
 def _peaks(
     file: SceneFile, path: Parameter, start: float, stop: float, points: int, on_point: Callable[[int], None]
 ) -> Track:
-    site = pipeline.peak_of(file.scene)
+    site = settings.peak_of(file.scene)
     found: list[tuple[float, OperatingPoint]] = []
     end = f"reached {path.say(stop)}"
     for done, value in enumerate(np.linspace(start, stop, points), start=1):
@@ -135,7 +136,7 @@ def _peaks(
         found.append((value, point))
         on_point(done)
     if not found:
-        raise pipeline.SolveFailed(f"the peak {end}")
+        raise SolveFailed(f"the peak {end}")
     rows = [(value, point.state.omega / (2 * np.pi), point.amplitude) for value, point in found]
     values, frequency, amplitude = np.array(rows).T
     at_limit = np.flatnonzero(np.min(np.abs(frequency[:, None] / file.scene.response.frequency - 1), axis=1) < LIMIT)
@@ -146,8 +147,8 @@ def _peaks(
 
 
 def _fold(file: SceneFile, path: Parameter, start: float, stop: float, number: int, points: int) -> Track:
-    low, high = pipeline.response_range(file.scene)
-    newton = pipeline.newton_options(file.scene)
+    low, high = settings.response_range(file.scene)
+    newton = settings.newton_options(file.scene)
     branch = arc_length.follow(path.make(start), high, low, arc_length.Options(newton=newton))
     if not 1 <= number <= len(branch.folds):
         raise ValueError(
@@ -158,7 +159,7 @@ def _fold(file: SceneFile, path: Parameter, start: float, stop: float, number: i
     balance = path.make(start)
     x = branch.contact[at].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
     line = track_fold(path, start, stop, branch.omega[at], x, FoldOptions(max_points=points, newton=newton))
-    amplitude = line.amplitude(pipeline.OUTPUT)
+    amplitude = line.amplitude(settings.OUTPUT)
     frequency = line.omega / (2 * np.pi)
     return Track("fold", path.name, path.unit, line.parameter, frequency, amplitude, line.cusps, line.end)
 

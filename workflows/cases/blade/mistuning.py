@@ -25,7 +25,7 @@ from tribodyn.workflows.cases.blade.figures import shades
 from tribodyn.workflows.cases.blade.model import Blade
 from tribodyn.workflows.pictures import plots
 from tribodyn.workflows.pictures.style import INK
-from tribodyn.workflows.run.pipeline import OUTPUT
+from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene import scene_file
 
 FEW_SECTORS = (  # ours: a wheel of eight small blades, coarse

@@ -18,7 +18,8 @@ from tribodyn.hbm.branch import Branch
 from tribodyn.hbm.continuation import adaptive
 from tribodyn.hbm.travelling_wave import on_wheel
 from tribodyn.reduction.cyclic import ReducedSector, nodal_diameters, travelling_wave, wheel_model
-from tribodyn.workflows.run import part_reduction, pipeline
+from tribodyn.workflows.run import modelling, part_reduction
+from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import PartScene
 
@@ -43,7 +44,7 @@ class Blade:
     def springs(self) -> np.ndarray:
         """(n_pair, n_component) stuck, closed contact [N/m]."""
         wave = travelling_wave(self.reduced, 0)
-        return pipeline.contact_stiffness(self.scene, wave)
+        return modelling.contact_stiffness(self.scene, wave)
 
     def diagram(self, diameters: Sequence[int], families: int, stuck: bool, full: bool = False) -> np.ndarray:
         """Frequencies (n_diameter, families) [Hz], of the reduced or of the full sector."""
@@ -54,8 +55,8 @@ class Blade:
         """The balance under a wave; engine order and range of frequencies [Hz] are the scene's unless told."""
         scene = self.asked(engine_order, frequency)
         assert scene.wheel is not None
-        reduced = pipeline.damped(scene, travelling_wave(self.reduced, scene.wheel.engine_order))
-        return pipeline.make_model(scene, self.part, reduced).balance
+        reduced = modelling.damped(scene, travelling_wave(self.reduced, scene.wheel.engine_order))
+        return modelling.make_model(scene, self.part, reduced).balance
 
     def asked(self, engine_order: int | None = None, frequency: tuple[float, float] | None = None) -> PartScene:
         """The scene with another engine order and range of frequencies."""
@@ -77,7 +78,7 @@ class Blade:
         assert wheel is not None
         springs = np.tile(one.contact.stiffness, (n_sectors, 1))
         whole = wheel_model(self.reduced, stiffness)
-        whole = whole.with_damping(partial(pipeline.damping_matrix, self.scene, springs))
+        whole = whole.with_damping(partial(modelling.damping_matrix, self.scene, springs))
         load = on_wheel(one.excitation, wheel.engine_order, n_sectors)
         return HarmonicBalance.of(whole, one.contact.repeated(n_sectors), one.basis, load, one.omega_max)
 
@@ -98,7 +99,7 @@ def follow(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: 
     low, high = (2 * np.pi * hertz for hertz in frequency)
     branch = adaptive.follow(balance, low, high, adaptive.Options(tolerance=tolerance, max_points=MAX_POINTS))
     if not branch.end.startswith("reached"):
-        raise pipeline.SolveFailed(f"the frequency response {branch.end}")
+        raise SolveFailed(f"the frequency response {branch.end}")
     return branch
 
 
@@ -108,13 +109,13 @@ def build(file: SceneFile) -> Blade:
     if scene.wheel is None:
         raise SceneError(f"{file.name} has no [wheel]: this study is for a sector of one")
     with TemporaryDirectory() as folder:
-        mesh, node_sets = pipeline.make_mesh(file, Path(folder))
+        mesh, node_sets = modelling.make_mesh(file, Path(folder))
     return assembled(file, mesh, node_sets)
 
 
 def assembled(file: SceneFile, mesh: Any, node_sets: dict[str, np.ndarray]) -> Blade:
     """Assemble and reduce the sector of a scene with a wheel from its mesh."""
     scene = file.part_scene
-    part = pipeline.make_part(scene, mesh, node_sets)
+    part = modelling.make_part(scene, mesh, node_sets)
     full = part_reduction.sector(scene, part)
     return Blade(file, part, full, part_reduction.reduced_from(scene, full))

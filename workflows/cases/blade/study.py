@@ -25,13 +25,13 @@ from tribodyn.workflows.cases.blade import figures as blade_figures
 from tribodyn.workflows.cases.blade import model as blade_model
 from tribodyn.workflows.cases.blade.model import Blade
 from tribodyn.workflows.result.result import References
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import settings, wear_run
 from tribodyn.workflows.run.description import described
 from tribodyn.workflows.run.references import delta_max, free_deflection, linear_references
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
 
-OUTPUT = pipeline.OUTPUT
+OUTPUT = settings.OUTPUT
 FULL_DIAMETERS = (0, 1, 2, 5, 10, 20)  # that are held against the full sector
 FAMILIES = 4
 PUBLISHED = WEAR_STEPS["blade"]  # table 4.4
@@ -168,7 +168,7 @@ def forces(blade: Blade, extent: Extent) -> dict[float, Curve]:
 def problem_of(blade: Blade) -> tuple[WearProblem, float]:
     """The wear of the scene until every pair is separated, and its delta_max [m]."""
     balance = blade.wave()
-    problem = pipeline.wear_problem(blade.scene, blade.file.folder, balance)
+    problem = wear_run.wear_problem(blade.scene, blade.file.folder, balance)
     return problem, delta_max(blade.scene, free_deflection(balance), problem.area)
 
 

@@ -16,8 +16,8 @@ from tribodyn.workflows.cases.leaf_seal.response import LeafResponse
 from tribodyn.workflows.pictures.maps import draw_field, draw_status
 from tribodyn.workflows.pictures.style import BLUE, GREEN, INK, ORANGE, PRESSURE_MAP, RED, STATUS, STYLE
 from tribodyn.workflows.result.result import Patch
-from tribodyn.workflows.run.pipeline import OUTPUT
 from tribodyn.workflows.run.references import linear_references
+from tribodyn.workflows.run.settings import OUTPUT
 
 TITLES = {"upper_centre": "upper patch, centre", "middle": "centre of the leaf", OUTPUT: "lower corner"}
 MICRO = 1e6

@@ -30,7 +30,7 @@ from tribodyn.geometry import leaf_seal
 from tribodyn.geometry import mesh as mesh_reader
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.held import hold
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.schema import PartScene
 
@@ -163,8 +163,8 @@ def reduced_leaf(scene: PartScene, parameters: leaf_seal.Parameters) -> Leaf:
         path = Path(folder) / "leaf.msh"
         leaf_seal.build(parameters, path)
         mesh, node_sets = mesh_reader.read(path)
-    part = pipeline.make_part(scene.model_copy(update={"springs": {}}), mesh, node_sets)
-    rows, shares = zip(*(spring.elongation(mesh, node_sets) for spring in pipeline.springs(scene)), strict=True)
+    part = modelling.make_part(scene.model_copy(update={"springs": {}}), mesh, node_sets)
+    rows, shares = zip(*(spring.elongation(mesh, node_sets) for spring in modelling.springs(scene)), strict=True)
     seats = [row[:, part.free] for row in rows]
     masters = np.concatenate([seat.nonzero()[1] for seat in seats]).tolist()
     model = hold(

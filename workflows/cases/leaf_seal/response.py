@@ -19,11 +19,12 @@ from tribodyn.hbm.law import SEPARATES, STICKS
 from tribodyn.hbm.stability import BranchStability
 from tribodyn.hbm.wear import impact
 from tribodyn.hbm.wear_law import Exposure
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling, pipeline, settings
+from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.scene.scene_file import SceneFile
 
 LINEAR, APART = 0.85, 1.12  # frequencies of the linear points, over those where separation begins and ends
-LINER_NODE = pipeline.OUTPUT  # the lower corner, which moves most where the leaf chatters
+LINER_NODE = settings.OUTPUT  # the lower corner, which moves most where the leaf chatters
 WEAR_COEFFICIENT = 2e-15  # [m3/J], that of the thesis's friction contacts put to impacts (ours)
 
 
@@ -112,19 +113,19 @@ class LeafResponse:
 def respond(file: SceneFile) -> LeafResponse:
     """Build the model of a configuration and follow its response as far as it goes, see Branch.end.
 
-    Raises  pipeline.SolveFailed where not even the first point of the curve is found
+    Raises  SolveFailed where not even the first point of the curve is found
     """
     start = time.process_time()
     scene = file.part_scene
     with TemporaryDirectory() as folder:
-        mesh, node_sets = pipeline.make_mesh(file, Path(folder))
-    part = pipeline.make_part(scene, mesh, node_sets)
-    balance = pipeline.make_model(scene, part, pipeline.reduce_part(scene, part)).balance
+        mesh, node_sets = modelling.make_mesh(file, Path(folder))
+    part = modelling.make_part(scene, mesh, node_sets)
+    balance = modelling.make_model(scene, part, modelling.reduce_part(scene, part)).balance
     branch = pipeline.follow_response(scene, balance, lambda done, said: None)
     seconds = time.process_time() - start
     if branch.outcome[-1] != CONVERGED:  # only the last point of a branch may be unsolved
         if len(branch.omega) == 1:
-            raise pipeline.SolveFailed(f"the frequency response {branch.end}")
+            raise SolveFailed(f"the frequency response {branch.end}")
         branch = _without_last(branch)
     pins = {name: spring.stiffness for name, spring in scene.springs.items()}
     leaf = scene.geometry.parameters

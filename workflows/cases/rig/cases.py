@@ -24,7 +24,7 @@ from tribodyn.workflows.cases.rig.published import MATING_HEIGHTS, STUCK_COMPLEX
 from tribodyn.workflows.cases.rig.time import InTime, in_time
 from tribodyn.workflows.cases.rig.wear import RigWear, loop, wear_down
 from tribodyn.workflows.result.result import Patch, References
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.scene.scene_file import SceneFile
 
@@ -109,7 +109,7 @@ def compute(file: SceneFile, tell: Callable[[str], None]) -> Study:
         other = wear_down(rig.with_harmonics(READINGS[1]), 0.0, tell)
         stages = tuple(_stage(rig, runs[0], share, tell) for share in STAGES)
         model = rig.model()
-        references = linear_references(model.balance, pipeline.OUTPUT, *pipeline.response_range(scene))
+        references = linear_references(model.balance, settings.OUTPUT, *settings.response_range(scene))
         return Study(
             before, after, _stuck_complex(joints), heights, apart(rig, references), cycles, tight, runs, other, stages,
             references, rig.patch(model.balance), scene.wear.coefficient, scene.contact.friction or 0.0,
@@ -143,8 +143,8 @@ def _stage(rig: Rig, run: RigWear, share: float, tell: Callable[[str], None]) ->
     worn = rig.with_opening(run.history.depth[row])
     balance = worn.model().balance
     tell(f"response and time integration after {run.history.cycles[row]:.3g} cycles")
-    low, high = pipeline.response_range(rig.scene)
-    response = arc_length.follow(balance, low, high, Options(newton=pipeline.newton_options(rig.scene)))
+    low, high = settings.response_range(rig.scene)
+    response = arc_length.follow(balance, low, high, Options(newton=settings.newton_options(rig.scene)))
     x = run.history.displacement[row].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
     cycle = cycle_of(balance, balance.evaluate(rig.omega, x), rig.height)
     return Stage(row, cycle, in_time(worn, cycle), response, *loop(rig.model().balance, run.history, row))

@@ -21,7 +21,7 @@ from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.relative import relative
 from tribodyn.workflows.cases.rig.published import OPEN, STUCK
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import Output
 
@@ -105,8 +105,8 @@ def joints_of(file: SceneFile) -> Joints:
     watched = scene.response.model_copy(update={"others": probes})
     bare = scene.model_copy(update={"springs": {}, "prescribed": {}, "response": watched})
     with TemporaryDirectory() as folder:
-        mesh, node_sets = pipeline.make_mesh(file, Path(folder))
-    part = pipeline.make_part(bare, mesh, node_sets)
+        mesh, node_sets = modelling.make_mesh(file, Path(folder))
+    part = modelling.make_part(bare, mesh, node_sets)
     system, interface, back = relative(part.system, part.interface)
     stretch = {}
     for name, s in scene.springs.items():
@@ -120,4 +120,4 @@ def joints_of(file: SceneFile) -> Joints:
         e = rows @ basis
         units[name] = e.T @ (share[:, None] * e)
     given = {name: spring.stiffness for name, spring in scene.springs.items()}
-    return Joints(model, units, pipeline.contact_stiffness(scene, model), given)
+    return Joints(model, units, modelling.contact_stiffness(scene, model), given)

@@ -14,7 +14,7 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.arc_length import solve_along_load
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.workflows.result.result import Patch
-from tribodyn.workflows.run import part_reduction, pipeline
+from tribodyn.workflows.run import modelling, part_reduction
 from tribodyn.workflows.run.references import free_deflection
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import Damping, PartScene
@@ -67,8 +67,8 @@ class Rig:
         check(file)
         scene = file.part_scene
         with TemporaryDirectory() as folder:
-            mesh, node_sets = pipeline.make_mesh(file, Path(folder))
-        part, _ = pipeline.with_surfaces(scene, pipeline.make_part(scene, mesh, node_sets), file.folder)
+            mesh, node_sets = modelling.make_mesh(file, Path(folder))
+        part, _ = modelling.with_surfaces(scene, modelling.make_part(scene, mesh, node_sets), file.folder)
         return cls(scene, part, part_reduction.reduce(scene, part), file.folder)
 
     @property
@@ -113,10 +113,11 @@ class Rig:
     def _changed(self, **changes: object) -> Rig:
         return replace(self, scene=self.scene.model_copy(update=changes))
 
-    def model(self) -> pipeline.Model:
+    def model(self) -> modelling.Model:
         """The nonlinear problem."""
-        damped = pipeline.damped(self.scene, self.plain)
-        return pipeline.make_model(self.scene, self.part, part_reduction.with_prescribed(self.scene, self.part, damped))
+        damped = modelling.damped(self.scene, self.plain)
+        reduced = part_reduction.with_prescribed(self.scene, self.part, damped)
+        return modelling.make_model(self.scene, self.part, reduced)
 
     def patch(self, balance: HarmonicBalance) -> Patch:
         """The contact patch as pictures need it; `balance` is this rig's problem."""

@@ -17,7 +17,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.time_integration import IntegrationFailed, Options
 from tribodyn.hbm.verify import verify
 from tribodyn.workflows.cases.rig.model import PLATFORM, Cycle, Rig
-from tribodyn.workflows.run import part_reduction, pipeline
+from tribodyn.workflows.run import modelling, part_reduction, settings
 
 HOLD = "hold"  # the load that takes the place of the height
 STEPS, PERIODS, DRIFT = 1024, 200, 1e-5  # per period; periods to settle in; of the state over one period
@@ -46,7 +46,7 @@ def held_by_force(rig: Rig, cycle: Cycle) -> HarmonicBalance:
     """The rig's problem with the static force of a solved cycle at the platform instead of its height."""
     model = rig.model()
     reaction = part_reduction.reaction_of(model.reduced)
-    plain = pipeline.damped(rig.scene, rig.plain)
+    plain = modelling.damped(rig.scene, rig.plain)
     push = np.zeros(plain.system.n_dof)
     force = reaction.force(rig.height, cycle.state.cycle.force[:, :, 0])
     push[reaction.dofs] = force + reaction.support * reaction.shape * rig.height
@@ -57,7 +57,7 @@ def held_by_force(rig: Rig, cycle: Cycle) -> HarmonicBalance:
         model.balance.contact.joints,
         model.balance.basis,
         Excitation({**loads, (0, HOLD): 1.0}),
-        pipeline.response_range(rig.scene)[1],
+        settings.response_range(rig.scene)[1],
     )
 
 
@@ -68,5 +68,5 @@ def in_time(rig: Rig, cycle: Cycle) -> InTime:
         found = verify(held_by_force(rig, cycle), cycle.state, options)
     except IntegrationFailed as failure:
         return InTime(None, None, None, str(failure))
-    amplitude = found.amplitude[pipeline.OUTPUT]
+    amplitude = found.amplitude[settings.OUTPUT]
     return InTime(float(found.motion.energy.sum()), found.motion.preload, amplitude, found.outcome)

@@ -18,7 +18,7 @@ from tribodyn.hbm.evolution import WearState, assess
 from tribodyn.hbm.wear_history import WearHistory
 from tribodyn.hbm.wear_history import history as joined
 from tribodyn.workflows.cases.rig.model import NoSolution, Rig
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import settings, wear_run
 from tribodyn.workflows.run.references import free_deflection
 
 STRIDE = 8  # wear steps between two looks at the preload at rest
@@ -90,15 +90,15 @@ def wear_down(rig: Rig, shift: float, tell: Callable[[str], None]) -> RigWear:
     assert wear is not None
     rig = rig.with_mating_height(shift)
     balance, still = rig.model().balance, rig.with_force(0.0).model().balance
-    problem, quiet = (pipeline.wear_problem(rig.scene, rig.folder, b) for b in (balance, still))
+    problem, quiet = (wear_run.wear_problem(rig.scene, rig.folder, b) for b in (balance, still))
     area = problem.area
-    limit = pipeline.step_limit(rig.scene, free_deflection(balance), area)
+    limit = settings.step_limit(rig.scene, free_deflection(balance), area)
     history: WearHistory | None = None
     rest: list[float] = []
     resting: WearState | None = None
     while True:
         count = min(len(rest) + STRIDE, wear.max_steps)
-        history = pipeline.evolve(problem, wear, limit, count, resume=history)
+        history = wear_run.evolve(problem, wear, limit, count, resume=history)
         if history.end.startswith("solve failed"):
             raise NoSolution(f"mating height {shift * 1e6:+.3g} um, wear step {len(history.cycles)}: {history.end}")
         for depth in history.depth[len(rest) :]:

@@ -1,0 +1,241 @@
+"""From a scene to its nonlinear problem, stage by stage: mesh, part, reduced model, harmonic balance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tribodyn.fem import part as fem_part
+from tribodyn.fem.constraints import Clamp, NoMeanRotation
+from tribodyn.fem.interface import COMPONENTS
+from tribodyn.fem.loads import Centrifugal, Couple, Load, NodalForce, Pressure
+from tribodyn.fem.part import Part
+from tribodyn.fem.springs import Spring
+from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.geometry import mesh as mesh_reader
+from tribodyn.geometry import parts
+from tribodyn.hbm import law
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact_stiffness import rectangular_punch
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonic_choice import HarmonicChoice
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
+from tribodyn.reduction.damping import modal_damping, rayleigh
+from tribodyn.reduction.held import hold
+from tribodyn.reduction.linear import stuck_stiffness
+from tribodyn.reduction.model import ReducedModel
+from tribodyn.workflows.run import curve, matrix_model, part_reduction, settings
+from tribodyn.workflows.run.contact_surfaces import surface_gap
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.matrices import MatrixScene
+from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.schema import CENTRIFUGAL, HIGHEST, PartScene, Scene, StaticLoad
+
+NO_GAP = 1e-12  # [m], rounding of node positions
+TOLERANCE = 0.01  # of the response, where a scene leaves the choice of harmonics
+
+
+@dataclass(frozen=True)
+class Model:
+    """The nonlinear problem of a scene with what it was made from; no part where it came as matrices.
+
+    choice : of harmonics, where the scene leaves it
+    """
+
+    part: Part | None
+    reduced: ReducedModel
+    balance: HarmonicBalance
+    choice: HarmonicChoice | None = None
+
+
+def build(file: SceneFile, folder: Path, progress: Progress, chosen: tuple[int, ...] = ()) -> Model:
+    """The nonlinear problem of a scene, stage by stage; a mesh that is made is kept in `folder`.
+
+    chosen : harmonics of an earlier run, for a scene that leaves the choice
+    """
+    scene = file.scene
+    part = None
+    if isinstance(scene, MatrixScene):
+        with progress.stage("matrices"):
+            reduced = damped(scene, matrix_model.make(scene, file.folder))
+    else:
+        with progress.stage("mesh"):
+            mesh, node_sets = make_mesh(file, folder)
+        with progress.stage("mass and stiffness"):
+            part = make_part(file.part_scene, mesh, node_sets)
+        part, repairs = with_surfaces(file.part_scene, part, file.folder)
+        for sentence in repairs:
+            progress.say(sentence)
+        with progress.stage("reduction"):
+            reduced = reduce_part(file.part_scene, part)
+    with progress.stage("choice of harmonics" if scene.harmonics.automatic and not chosen else "contact compliance"):
+        model = make_model(scene, part, reduced, chosen)
+    if model.choice is not None:
+        progress.say(model.choice.outcome)
+    return model
+
+
+def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]]:
+    """The mesh with its node sets: read from the scene's file, or built from the part and kept in `folder`."""
+    geometry = file.part_scene.geometry
+    if geometry.mesh is not None:
+        return mesh_reader.read(file.folder / geometry.mesh)
+    assert geometry.part is not None
+    part, path = parts.load(geometry.part), folder / "mesh.msh"
+    part.build(part.Parameters(**geometry.parameters), path)
+    return mesh_reader.read(path)
+
+
+def make_part(scene: PartScene, mesh: Any, node_sets: dict[str, np.ndarray]) -> Part:
+    """Mass, stiffness, loads, outputs and contact of the mesh, held where the scene says."""
+    loads = {name: make_load(load) for name, load in {**scene.loads.static, **scene.loads.harmonic}.items()}
+    if scene.wheel is not None and scene.wheel.speed:
+        loads[CENTRIFUGAL] = Centrifugal(scene.wheel.axis)
+    return fem_part.build(
+        mesh,
+        node_sets,
+        part_reduction.material(scene),
+        clamps(scene),
+        part_reduction.contacts(scene, alone=scene.wheel is not None),
+        loads,
+        {
+            name: NodalForce(output.group, output.direction)
+            for name, output in {settings.OUTPUT: scene.response, **scene.response.others}.items()
+        },
+        springs=springs(scene),
+        held=[] if scene.geometry.no_turning is None else [NoMeanRotation(scene.geometry.no_turning)],
+    )
+
+
+def with_surfaces(scene: PartScene, part: Part, folder: Path) -> tuple[Part, tuple[str, ...]]:
+    """The part with the waviness of measured faces in its gap, and a sentence for each repair of a height map."""
+    if scene.surfaces is None:
+        return part, ()
+    measured = surface_gap(scene.surfaces, part.interface, folder)
+    return replace(part, interface=replace(part.interface, gap=part.interface.gap + measured.gap)), measured.repairs
+
+
+def clamps(scene: PartScene) -> list[Clamp]:
+    """What holds the part, whole groups or along some axes."""
+    geometry = scene.geometry
+    return [*(Clamp(group) for group in geometry.fixed), *(Clamp(*item) for item in geometry.fixed_axes.items())]
+
+
+def springs(scene: PartScene) -> list[Spring]:
+    """Joints that give way."""
+    return [Spring(s.group, s.direction, s.stiffness, s.opposite) for s in scene.springs.values()]
+
+
+def make_load(load: StaticLoad) -> Load:
+    """A force at the nodes of a group, a couple of two forces, or a pressure on a face."""
+    if load.direction is None:
+        return Pressure(load.group)
+    if load.opposite is not None:
+        return Couple(load.group, load.opposite, load.direction)
+    return NodalForce(load.group, load.direction)
+
+
+def reduce_part(scene: PartScene, part: Part) -> ReducedModel:
+    """The part on its contact and load nodes and a few modes, damped and held as the scene says."""
+    reduced = damped(scene, hold(part_reduction.reduce(scene, part), part.held))
+    return part_reduction.with_prescribed(scene, part, reduced)
+
+
+def damped(scene: Scene, reduced: ReducedModel) -> ReducedModel:
+    """The model with the scene's damping; raises ValueError where its files hold another one."""
+    if reduced.system.damping is None:
+        return reduced.with_damping(partial(damping_matrix, scene, contact_stiffness(scene, reduced)))
+    if scene.damping.given:
+        raise ValueError("the files of the model hold a damping matrix: leave [damping] out, or the matrix")
+    return reduced
+
+
+def damping_matrix(scene: Scene, springs: np.ndarray, system: SecondOrderSystem, B: np.ndarray) -> np.ndarray | None:
+    """Damping matrix (n, n) [N s/m] of a system with its contact map and springs, None where the scene has none."""
+    damping = scene.damping
+    if damping.modal is not None:
+        if damping.state == "stuck":
+            system = replace(system, stiffness=stuck_stiffness(system.stiffness, B, springs))
+        return modal_damping(system, damping.modal)
+    if damping.mass is not None or damping.stiffness is not None:
+        return rayleigh(system, damping.mass or 0.0, damping.stiffness or 0.0)
+    return None
+
+
+def contact_stiffness(scene: Scene, reduced: ReducedModel) -> np.ndarray:
+    """Contact springs (n_pair, n_component) [N/m]; those of a punch in shear along t1 serve both tangents."""
+    if isinstance(scene, PartScene) and scene.contact.punch is not None:
+        body = (scene.material.young, scene.material.poisson)
+        normal, tangential = rectangular_punch(*scene.contact.punch, *body, *body)
+        return reduced.interface.stiffness(tangential, normal)
+    return reduced.interface.stiffness(scene.contact.tangential_stiffness or 0.0, scene.contact.normal_stiffness or 0.0)
+
+
+def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: tuple[int, ...] = ()) -> Model:
+    """The harmonic balance of the scene; harmonics are those it names, else `chosen`, else chosen here."""
+    contact, harmonics = scene.contact, scene.harmonics
+    parameters = law.ContactParameters.of(
+        contact.components,
+        contact_stiffness(scene, reduced),
+        friction=contact.friction or 0.0,
+        gap=reduced.interface.gap,
+    )
+
+    def balance(kept: tuple[int, ...]) -> HarmonicBalance:
+        basis = HarmonicBasis(kept, harmonics.samples, harmonics.transitions)
+        if not basis.has_static and np.any(np.abs(parameters.gap) > NO_GAP):
+            raise ValueError("the contact has gaps, which act in harmonic 0: keep it in harmonics.kept")
+        base = ground_motion(scene, part, basis) if isinstance(scene, PartScene) and part is not None else None
+        joint = Joint("contact", contact.law, parameters)
+        return HarmonicBalance.of(reduced, joint, basis, excite(scene, base), settings.response_range(scene)[1])
+
+    choice = None
+    if harmonics.automatic and not chosen:
+        first = balance(tuple(sorted({0, 1} | {load.harmonic for load in scene.loads.harmonic.values()})))
+        choice = curve.choose_harmonics(
+            first,
+            settings.peak_of(scene),
+            harmonics.tolerance or TOLERANCE,
+            harmonics.highest or HIGHEST,
+            settings.newton_options(scene),
+        )
+        chosen = choice.harmonics
+    return Model(part, reduced, balance(harmonics.kept or chosen), choice)
+
+
+def excite(scene: Scene, base: np.ndarray | None) -> Excitation:
+    """The loads of the scene, F cos(h w t + phase) as amplitude F exp(i phase), and the motion of the ground."""
+    loads: dict[tuple[int, str], complex] = {(0, name): load.amplitude for name, load in scene.loads.static.items()}
+    if isinstance(scene, PartScene):
+        loads |= {(0, name): given.displacement for name, given in scene.prescribed.items()}
+        if scene.wheel is not None and scene.wheel.speed:
+            loads[0, CENTRIFUGAL] = (2 * np.pi * scene.wheel.speed) ** 2
+    for name, load in scene.loads.harmonic.items():
+        loads[load.harmonic, name] = load.amplitude * np.exp(1j * load.phase)
+    return Excitation(loads, base)
+
+
+def ground_motion(scene: PartScene, part: Part, basis: HarmonicBasis) -> np.ndarray | None:
+    """Motion of the ground (n_pair * n_component, n_coeff) [m] along the contact components, None where it rests.
+
+    Raises  ValueError where a face has no contact or a harmonic is not kept
+    """
+    if not scene.motion:
+        return None
+    i = part.interface
+    amplitudes = np.zeros((i.n_pair, len(i.components), len(basis.harmonics)), complex)
+    for face, motion in scene.motion.items():
+        if face not in part.pairs:
+            raise ValueError(f'motion.{face}: "{face}" is no contact face, the contact has {", ".join(part.pairs)}')
+        rows = i.frames[part.pairs[face]][:, [COMPONENTS.index(c) for c in i.components]]
+        for h, value in ((0, motion.static), (1, motion.harmonic * np.exp(1j * motion.phase))):
+            if value != 0 and h not in basis.harmonics:
+                raise ValueError(f"motion.{face} moves in harmonic {h}: keep it in harmonics.kept")
+            if h in basis.harmonics:
+                amplitudes[part.pairs[face], :, basis.harmonics.index(h)] = value * (rows @ np.array(motion.direction))
+    return basis.to_real(amplitudes).reshape(-1, basis.n_coeff)

@@ -1,0 +1,101 @@
+"""What a scene asks of the solver: frequency range, continuation and Newton options, places, mission, wear step."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tribodyn.hbm import continuation, law, wear_law
+from tribodyn.hbm.evolution import Duty
+from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.operating_point import AtFrequency, AtPeak, BesidePeak
+from tribodyn.workflows.run import references
+from tribodyn.workflows.scene.schema import Scene, unknown_key
+from tribodyn.workflows.scene.wear import Place
+
+OUTPUT = "response"
+
+
+def check_names(scene: Scene, folder: Path) -> None:
+    """Raise ValueError where a scene names a law or a method that does not exist, before anything is built."""
+    law.check_components(law.load(scene.contact.law), scene.contact.components)
+    response_options(scene)
+    if scene.wear is not None:
+        wear_law.load(law_of(scene, folder))
+
+
+def law_of(scene: Scene, folder: Path) -> str:
+    """Name of the wear law of a scene that stands in `folder`, or path of its file."""
+    assert scene.wear is not None
+    name = scene.wear.law
+    return str(folder / name) if name.endswith(".py") else name
+
+
+def response_options(scene: Scene) -> Any:
+    """Options of the scene's continuation method; raises ValueError for one that it does not have."""
+    kind, given = continuation.load(scene.response.method).Options, scene.response.options
+    known = {option.name: option.type for option in fields(kind) if option.name not in ("newton", "guess", "bounds")}
+    for key, value in given.items():
+        if key not in known:
+            raise ValueError(unknown_key(f"response.options.{key}", list(known)))
+        whole = known[key] in (int, "int")
+        if type(value) not in ((int,) if whole else (int, float)):
+            expected = "a whole number" if whole else "a number"
+            raise ValueError(f"response.options.{key}: expected {expected}, got {value!r}")
+    points = {"n_points": scene.response.points} if "n_points" in known else {}
+    return kind(**{**points, "newton": newton_options(scene), **given})
+
+
+def response_range(scene: Scene) -> tuple[float, float]:
+    """Lowest and highest frequency of the response [rad/s]."""
+    low, high = scene.response.frequency
+    return 2 * np.pi * low, 2 * np.pi * high
+
+
+def newton_options(scene: Scene) -> NewtonOptions:
+    """How exactly every balance is solved."""
+    return NewtonOptions(tolerance=scene.solver.tolerance, krylov=scene.solver.krylov)
+
+
+def peak_of(scene: Scene) -> AtPeak:
+    """The resonance peak within the range of the response."""
+    return AtPeak(OUTPUT, *response_range(scene), scene.response.points, newton=newton_options(scene))
+
+
+def mission(scene: Scene) -> tuple[Duty, ...]:
+    """Where the cycles that wear are taken: the scene's one place, or the duties of its mission."""
+    assert scene.wear is not None
+    if not scene.wear.mission:
+        return (Duty(site_of(scene, scene.wear.at)),)
+    return tuple(Duty(site_of(scene, duty.at), duty.share, duty.load) for duty in scene.wear.mission)
+
+
+def site_of(scene: Scene, place: Place) -> AtFrequency | AtPeak | BesidePeak:
+    """A place of the scene's response."""
+    if place.frequency is not None:
+        return AtFrequency(OUTPUT, 2 * np.pi * place.frequency, newton_options(scene))
+    assert place.peak is not None
+    return peak_of(scene) if place.peak == 1.0 else BesidePeak(peak_of(scene), place.peak)
+
+
+def step_limit(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:
+    """Largest depth of one wear step by the thesis's rule, or delta_max that the other rule measures errors by [m].
+
+    approach : (n_pair,) by which the static loads press the faces into each other without contact [m]; area : [m2]
+    Raises  ValueError where delta_max is needed and the scene has none
+    """
+    assert scene.wear is not None
+    step = scene.wear.step
+    if scene.wear.rule == "thesis" and step is not None and step.depth is not None:
+        return step.depth
+    delta_max = references.delta_max(scene, approach, area)
+    if not (np.isfinite(delta_max) and delta_max > 0):
+        raise ValueError(
+            "wear.step: a share of delta_max needs static loads that press the contact of a part held without it; "
+            'give a depth such as "50 um" and rule = "thesis"'
+        )
+    share = step.share if scene.wear.rule == "thesis" and step is not None else None
+    return delta_max if share is None else share * delta_max

@@ -1,0 +1,78 @@
+"""The wear of a run: from the unworn problem until contact is lost, every step kept as soon as it is done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from tribodyn.hbm import error_controlled_rule, thesis_rule
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.evolution import WearProblem
+from tribodyn.hbm.wear_history import WearHistory, WearRow, history, rows_to_go_on
+from tribodyn.hbm.wear_law import JointWear
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.run import settings
+from tribodyn.workflows.run.checkpoint import Keeper
+from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.fields import with_shown
+from tribodyn.workflows.run.modelling import Model
+from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.schema import Scene
+from tribodyn.workflows.scene.wear import Wear
+
+
+def wear_down(
+    file: SceneFile, model: Model, result: Result, keep: Keeper, advance: Callable[[float, str], None]
+) -> Result:
+    """Wear until contact is lost; every step is kept as soon as it is done."""
+    scene = file.scene
+    assert scene.wear is not None
+    assert result.patch is not None
+    patch, wear = result.patch, scene.wear
+    rows = rows_to_go_on(result.wear)
+    to_wear = float(patch.area @ patch.free_deflection)
+
+    def on_row(row: WearRow) -> None:
+        rows.append(row)
+        keep(replace(result, wear=history(rows, "unfinished"), state=f"unfinished: {len(rows)} wear steps are done"))
+        done = float(patch.area @ (row.depth + row.worn)) / to_wear if to_wear > 0 else 0.0
+        advance(done, f"step {len(rows)}, {row.cycles + row.cycles_in_step:.3g} cycles, {row.preload:.4g} N")
+
+    problem = wear_problem(scene, file.folder, model.balance, wear.lost_below, wear.end_at == "at_rest")
+    limit = settings.step_limit(scene, patch.free_deflection, patch.area)
+    worn = evolve(problem, wear, limit, wear.max_steps, on_row, result.wear)
+    result = with_shown(scene, replace(result, wear=worn), model.balance.with_load(problem.mission[0].load), model.part)
+    if worn.end.startswith("solve failed"):
+        keep(replace(result, state=worn.end))
+        raise SolveFailed(f"wear step {len(worn.cycles)}: {worn.end}")
+    return result
+
+
+def wear_problem(
+    scene: Scene, folder: Path, balance: HarmonicBalance, lost_below: float = 0.0, at_rest: bool = False
+) -> WearProblem:
+    """What a scene wears, by its law and mission; folder : of the scene.
+
+    lost_below : share of the first preload at which the run ends, of that at rest where `at_rest`
+    """
+    assert scene.wear is not None
+    wear = JointWear(settings.law_of(scene, folder), scene.wear.coefficient)
+    area = balance.model.interface.area
+    vibrating, resting = (0.0, lost_below) if at_rest else (lost_below, None)
+    return WearProblem(balance, settings.mission(scene), wear, area, vibrating, resting)
+
+
+def evolve(
+    problem: WearProblem,
+    wear: Wear,
+    limit: float,
+    max_steps: int,
+    on_row: Callable[[WearRow], None] | None = None,
+    resume: WearHistory | None = None,
+) -> WearHistory:
+    """Wear by the rule that a scene asks for; limit : of `step_limit` [m], the rest as for hbm.thesis_rule."""
+    if wear.rule == "thesis":
+        return thesis_rule.evolve(problem, limit, max_steps, on_row, resume)
+    tolerance = error_controlled_rule.Tolerance(wear.tolerance, limit)
+    return error_controlled_rule.evolve(problem, tolerance, max_steps, on_row, resume)
