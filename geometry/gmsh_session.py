@@ -30,6 +30,7 @@ def session() -> Iterator[Any]:
         ) from error
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
+        gmsh.option.restoreDefaults()  # else options of an earlier session of this process stay
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.option.setNumber("General.NumThreads", 1)  # the same mesh on every machine
         yield gmsh

@@ -46,19 +46,3 @@ def permutation(source: np.ndarray, target: np.ndarray) -> np.ndarray:
     if len(source) != len(target) or distance.min(axis=1).max() > 1e-9:
         raise ValueError("the two node numberings do not describe the same element: give both on one reference element")
     return order
-
-
-def serendipity_to_lagrange(positions: np.ndarray) -> np.ndarray:
-    """Add the face and middle nodes that a 20-node hexahedron implies; its shape does not change.
-
-    positions : (n, 20, 3) node positions in the order of meshio
-    Returns (n, 27, 3)
-    Source  the 20-node shape functions at the face centres (corners -1/4, edges 1/2) and in the middle (-1/4, 1/4)
-    """
-    edge_of = {frozenset(edge): 8 + i for i, edge in enumerate(HEX_EDGES)}
-    faces = []
-    for face in HEX_FACES:
-        edges = [edge_of[frozenset(pair)] for pair in zip(face, face[1:] + face[:1], strict=True)]
-        faces.append(positions[:, edges].sum(axis=1) / 2 - positions[:, list(face)].sum(axis=1) / 4)
-    middle = positions[:, 8:].sum(axis=1) / 4 - positions[:, :8].sum(axis=1) / 4
-    return np.concatenate([positions, np.stack([*faces, middle], axis=1)], axis=1)

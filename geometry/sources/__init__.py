@@ -1,0 +1,1 @@
+"""Meshes, decks and CAD files of other programs -> bodies of second-order elements with their groups."""

@@ -1,0 +1,184 @@
+"""Gmsh's own files, MSH 2.2 and 4.1, text or binary, with what else Gmsh has put in when told to save all.
+
+meshio reads what it can without Gmsh's system libraries. It fails where some elements belong to no group, does not know
+groups without a name and loses the groups of MSH 2.2: there Gmsh reads its file itself.
+"""
+
+from __future__ import annotations
+
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+
+from tribodyn.geometry.gmsh_session import session
+from tribodyn.geometry.sources.cells import EDGES_AND_POINTS, SURFACES, VOLUMES
+from tribodyn.geometry.sources.raw import Cells, RawMesh
+
+_ORDER_19 = [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15]
+_WEDGE_15 = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
+_PYRAMID_13 = [0, 1, 2, 3, 4, 5, 8, 10, 6, 7, 9, 11, 12]
+# Gmsh's number of a kind -> meshio's name, and where meshio's nodes stand in Gmsh's order
+_KINDS: dict[int, tuple[str, list[int] | None]] = {
+    2: ("triangle", None),
+    3: ("quad", None),
+    4: ("tetra", None),
+    5: ("hexahedron", None),
+    6: ("wedge", None),
+    7: ("pyramid", None),
+    9: ("triangle6", None),
+    10: ("quad9", None),
+    11: ("tetra10", [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]),
+    12: ("hexahedron27", [*_ORDER_19, 22, 23, 21, 24, 20, 25, 26]),
+    13: ("wedge18", [*_WEDGE_15, 15, 17, 16]),
+    14: ("pyramid14", [*_PYRAMID_13, 13]),
+    16: ("quad8", None),
+    17: ("hexahedron20", _ORDER_19),
+    18: ("wedge15", _WEDGE_15),
+    19: ("pyramid13", _PYRAMID_13),
+}
+_LEFT_BY_MESHIO = {name: order for name, order in _KINDS.values() if name in ("wedge18", "pyramid14")}
+_KIND_OF_GROUP = ("point", "curve", "surface", "volume")
+
+
+def read(path: Path) -> RawMesh:
+    """Read a Gmsh file. Raises ValueError: it is none, or broken."""
+    version = _version(path)
+    if version.startswith("4.1"):
+        try:
+            with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+                file = meshio.gmsh.read(path)
+            if _all_named(file):
+                return from_meshio(file)
+        except (Exception, SystemExit):  # the reader raises what it meets; Gmsh tells below whether the file is broken
+            pass
+    return through_gmsh(path)
+
+
+def through_gmsh(path: Path) -> RawMesh:
+    """Let Gmsh read one of its files. Raises ValueError where it cannot."""
+    with session() as gmsh:
+        try:
+            gmsh.merge(str(path))
+        except Exception as problem:
+            raise ValueError(_cannot(path, str(problem))) from None
+        return from_gmsh(gmsh)
+
+
+def from_gmsh(gmsh: Any) -> RawMesh:
+    """The mesh that a Gmsh session holds; where volumes belong to groups, those that do not are left out.
+
+    Every surface with elements is a group too, "face N" by its number in Gmsh or in the CAD model.
+    """
+    model = gmsh.model
+    labels, coordinates, _ = model.mesh.getNodes()
+    order = np.argsort(labels)
+    labels, points = labels[order].astype(int), coordinates.reshape(-1, 3)[order]
+
+    def rows(nodes: np.ndarray) -> np.ndarray:
+        return np.searchsorted(labels, nodes.astype(int))
+
+    def elements(entity: tuple[int, int]) -> list[tuple[str, np.ndarray, np.ndarray]]:
+        found = []
+        for kind, numbers, nodes in zip(*model.mesh.getElements(*entity), strict=True):
+            if kind not in _KINDS:
+                raise ValueError(
+                    f"elements {model.mesh.getElementProperties(kind)[0]} are of a kind that is not known: "
+                    "write elements of first or second order"
+                )
+            name, order = _KINDS[kind]
+            nodes = rows(nodes).reshape(len(numbers), -1)
+            found.append((name, nodes if order is None else nodes[:, order], numbers.astype(int)))
+        return found
+
+    groups = model.getPhysicalGroups()
+    filled = [tag for _, tag in model.getEntities(3) if len(model.mesh.getElements(3, tag)[0])]
+    grouped = {int(tag) for d, g in groups if d == 3 for tag in model.getEntitiesForPhysicalGroup(3, g)}
+    kept = [tag for tag in filled if tag in grouped or not grouped]
+    unused = [f"{len(filled) - len(kept)} volumes that belong to no group"] if len(kept) < len(filled) else []
+    cells, numbers_of, start = [], {}, 0
+    for tag in kept:
+        blocks = elements((3, tag))
+        cells += [Cells(*block) for block in blocks]
+        count = sum(len(nodes) for _, nodes, _ in blocks)
+        numbers_of[tag] = np.arange(start, start + count)
+        start += count
+    volumes: dict[str, np.ndarray] = {}
+    faces: dict[str, list[np.ndarray]] = {}
+    nodes_of: dict[str, np.ndarray] = {}
+    for dimension, number in groups:
+        name = model.getPhysicalName(dimension, number) or f"{_KIND_OF_GROUP[dimension]} {number}"
+        entities = [int(tag) for tag in model.getEntitiesForPhysicalGroup(dimension, number)]
+        if dimension == 3:
+            members = [numbers_of[tag] for tag in entities if tag in numbers_of]
+            if members:
+                volumes[name] = np.sort(np.concatenate(members))
+        elif dimension == 2:
+            faces[name] = [nodes[:, : SURFACES[kind]] for tag in entities for kind, nodes, _ in elements((2, tag))]
+        else:
+            nodes_of[name] = np.unique(rows(model.mesh.getNodesForPhysicalGroup(dimension, number)[0]))
+    for _, tag in model.getEntities(2):
+        if parts := [nodes[:, : SURFACES[kind]] for kind, nodes, _ in elements((2, tag))]:
+            faces.setdefault(f"face {tag}", parts)
+    return RawMesh(points, labels, cells, volumes, faces, nodes_of, unused=unused)
+
+
+def from_meshio(file: meshio.Mesh) -> RawMesh:
+    """What meshio read of a Gmsh file."""
+    blocks, first, start = [], {}, 0
+    for i, block in enumerate(file.cells):
+        if block.type in VOLUMES:
+            nodes = np.asarray(block.data, dtype=int)
+            nodes = nodes[:, _LEFT_BY_MESHIO.get(block.type) or slice(None)]
+            first[i] = start
+            blocks.append(Cells(block.type, nodes, np.arange(start + 1, start + 1 + len(nodes))))
+            start += len(nodes)
+    volumes, faces, nodes_of, unused = {}, {}, {}, []
+    for name, parts in file.cell_sets.items():
+        if name.startswith("gmsh:"):
+            continue
+        members = {i: np.asarray(ids, dtype=int) for i, ids in enumerate(parts) if ids is not None and len(ids)}
+        dimension = {file.cells[i].dim for i in members}
+        if dimension == {3} and all(i in first for i in members):
+            volumes[name] = np.sort(np.concatenate([ids + first[i] for i, ids in members.items()]))
+        elif dimension == {2} and all(file.cells[i].type in SURFACES for i in members):
+            faces[name] = [file.cells[i].data[ids][:, : SURFACES[file.cells[i].type]] for i, ids in members.items()]
+        elif dimension <= {0, 1} and dimension and all(file.cells[i].type in EDGES_AND_POINTS for i in members):
+            nodes_of[name] = np.unique(np.concatenate([file.cells[i].data[ids].ravel() for i, ids in members.items()]))
+        else:
+            unused.append(f"group '{name}', which {'holds no elements' if not members else 'mixes dimensions'}")
+    other = sorted({block.type for block in file.cells if block.dim == 3} - set(VOLUMES))
+    if other:
+        raise ValueError(
+            f"volume elements {', '.join(other)} are of a kind that is not known: write first or second order"
+        )
+    points = np.asarray(file.points, dtype=float)
+    return RawMesh(points, np.arange(1, len(points) + 1), blocks, volumes, faces, nodes_of, unused=unused)
+
+
+def _version(path: Path) -> str:
+    with path.open("rb") as stream:
+        head = stream.read(4096).split(b"\n")
+    for i, line in enumerate(head[:-1]):
+        if line.strip() == b"$MeshFormat":
+            return head[i + 1].decode("ascii", "replace").strip()
+    raise ValueError(_cannot(path, "it does not begin with $MeshFormat"))
+
+
+def _all_named(file: meshio.Mesh) -> bool:
+    """Whether meshio knows a name for every group: it keeps those of groups without a name as bare numbers."""
+    known = {(int(dimension), int(tag)) for tag, dimension in file.field_data.values()}
+    tags = file.cell_data.get("gmsh:physical")
+    if tags is None:
+        return False
+    return all(
+        (block.dim, int(tag)) in known for block, ids in zip(file.cells, tags, strict=True) for tag in np.unique(ids)
+    )
+
+
+def _cannot(path: Path, why: str) -> str:
+    reason = " ".join(why.split())
+    return f"mesh file '{path}' cannot be read{f' ({reason})' if reason else ''}: write it as a Gmsh file, MSH 4.1"

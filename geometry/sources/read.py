@@ -1,0 +1,109 @@
+"""Any file that holds a mesh or a shape -> its bodies, in metres.
+
+The kind of a file is told by its ending; each reader gives a `RawMesh`, and everything after that is common.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from tribodyn.geometry.sources import msh, solid
+from tribodyn.geometry.sources.cells import common_name, is_first_order
+from tribodyn.geometry.sources.deck import Deck
+from tribodyn.geometry.sources.raw import RawMesh
+from tribodyn.geometry.sources.solid import Body
+
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
+READERS: dict[str, Callable[[Path], RawMesh]] = {".msh": msh.read}
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a file holds.
+
+    bodies : name -> body; parts of the file that share no nodes, see `solid.bodies`
+    deck : materials, ties, loads and supports that the file gives; empty for a mesh
+    points : name -> (3,) reference points that belong to no element [m]
+    said : sentences on what was done to it, such as elements raised to second order
+    unused : clauses that name what was found and is not used
+    """
+
+    bodies: Mapping[str, Body]
+    deck: Deck
+    points: Mapping[str, np.ndarray] = field(default_factory=dict)
+    said: tuple[str, ...] = ()
+    unused: tuple[str, ...] = ()
+
+
+def read(path: str | Path, unit: str = "m") -> Source:
+    """Read a mesh file or a deck as bodies.
+
+    path : its ending tells the format; unit : of length in the file, "m", "mm", "in", ...
+    Raises  ValueError: one sentence that names the file and the cure
+    """
+    raw = read_raw(path, unit)
+    parts = solid.bodies(raw)
+    built = {name: solid.build(raw, elements) for name, elements in parts.items()}
+    return Source(built, raw.deck, raw.points_of_reference, _said(raw, built), (*raw.unused, *lost(raw, built)))
+
+
+def read_raw(path: str | Path, unit: str = "m") -> RawMesh:
+    """What a file says, lengths in metres. Raises ValueError as `read` does."""
+    file = Path(path)
+    if unit not in UNITS:
+        raise ValueError(f"unit = \"{unit}\" of mesh file '{path}' is no length that is known: give {', '.join(UNITS)}")
+    if not file.is_file():
+        raise ValueError(f"mesh file '{path}' does not exist: build the part first or correct the path")
+    reader = READERS.get(file.suffix.lower())
+    if reader is None:
+        raise ValueError(
+            f"mesh file '{path}' cannot be read, its ending is none of {', '.join(sorted(READERS))}: "
+            "write it as a Gmsh file, MSH 4.1"
+        )
+    raw = reader(file)
+    if not raw.cells:
+        raise ValueError(f"mesh file '{path}' has no volume elements: mesh the volume, a surface alone has no mass")
+    return scaled(raw, UNITS[unit])
+
+
+def scaled(raw: RawMesh, metre: float) -> RawMesh:
+    """The mesh in metres where the file counts in a unit of so many metres."""
+    if metre == 1.0:
+        return raw
+    points = {name: metre * point for name, point in raw.points_of_reference.items()}
+    return replace(raw, points=metre * raw.points, points_of_reference=points)
+
+
+def lost(raw: RawMesh, built: Mapping[str, Body]) -> tuple[str, ...]:
+    """A clause for each group of the file that no body has."""
+    clauses = []
+    for name in raw.faces:
+        if any(name in body.unmatched for body in built.values()):
+            clauses.append(f"surface group '{name}', which is not made of faces of the volume mesh: mesh both together")
+        elif not any(name in (body.mesh.boundaries or {}) for body in built.values()):
+            clauses.append(f"surface group '{name}', which has no face on the volume mesh: mesh both together")
+    for name, rows in raw.nodes.items():
+        outside = int(np.logical_and.reduce([body.node_of[rows] < 0 for body in built.values()]).sum())
+        if outside and name not in raw.points_of_reference:
+            clauses.append(
+                f"{outside} of {len(rows)} nodes of group '{name}', which are nodes outside the volume mesh: "
+                "embed its points in a volume"
+            )
+    return tuple(clauses)
+
+
+def _said(raw: RawMesh, built: Mapping[str, Body]) -> tuple[str, ...]:
+    said = list(raw.said)
+    low = [cells for cells in raw.cells if is_first_order(cells.kind)]
+    if low:
+        count = sum(len(cells.nodes) for cells in low)
+        names = " and ".join(sorted({common_name(cells.kind) for cells in low}))
+        said.append(f"{count} {names} of first order are computed as second order, with straight edges")
+    for name, body in built.items():
+        if body.cut:
+            said.append(f"the elements of {name} were cut into {body.mesh.nelements} tetrahedra, as their kinds mix")
+    return tuple(said)

@@ -1,0 +1,224 @@
+"""From what a file says to bodies that scikit-fem can compute: one mesh of one kind for each, with its groups."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import skfem
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation
+from tribodyn.geometry.sources import split
+from tribodyn.geometry.sources.cells import HEXA, TETRA, VOLUMES
+from tribodyn.geometry.sources.raw import Cells, RawMesh
+
+Groups = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Body:
+    """mesh : scikit-fem's MeshHex2 or MeshTet2 [m], its boundaries and subdomains named as in the file
+    node_sets : group of any kind -> its nodes, sorted columns of mesh.doflocs
+    node_of : (n_point,) node that each point of the file is, -1 where it is none of this body
+    cut : whether its elements were cut into tetrahedra because kinds mix
+    unmatched : surface groups of which some faces are no faces of the volume mesh; they are no boundaries
+    """
+
+    mesh: Any
+    node_sets: Groups
+    node_of: np.ndarray
+    cut: bool
+    unmatched: tuple[str, ...] = ()
+
+
+def bodies(raw: RawMesh) -> dict[str, np.ndarray]:
+    """The bodies of a file and their elements: parts that share no node, named by the group that holds them.
+
+    Parts that one group holds together, as four bolts, are one body; a part that several groups share out, as a blade
+    of two materials, bears their names joined by +.
+    """
+    piece = _pieces(raw)
+    n_piece = int(piece.max()) + 1
+    size = np.bincount(piece)
+    chosen: dict[int, str] = {}
+    inside: dict[int, list[str]] = {}
+    named = raw.bodies or sorted(raw.volumes, key=lambda name: len(raw.volumes[name]))
+    for name in named:
+        held = np.bincount(piece[raw.volumes[name]], minlength=n_piece)
+        for i in np.flatnonzero(held).tolist():
+            if held[i] == size[i]:
+                chosen.setdefault(i, name)
+            else:
+                inside.setdefault(i, []).append(name)
+    if not raw.bodies:  # a group of all elements tells nothing where there are several parts
+        chosen = {i: name for i, name in chosen.items() if len(raw.volumes[name]) < len(piece) or n_piece == 1}
+    nameless = [i for i in range(n_piece) if i not in chosen and i not in inside]
+    for count, i in enumerate(nameless, 1):
+        chosen[i] = "body" if n_piece == 1 else f"body{count}"
+    for i, names in inside.items():
+        chosen.setdefault(i, "+".join(sorted(names)))
+    found: dict[str, list[int]] = {}
+    for i in range(n_piece):
+        found.setdefault(chosen[i], []).append(i)
+    return {name: np.flatnonzero(np.isin(piece, parts)) for name, parts in found.items()}
+
+
+def _pieces(raw: RawMesh) -> np.ndarray:
+    """For each element the number of the connected part that it belongs to, counted in the order of the file."""
+    first = np.concatenate([cells.nodes[:, 0] for cells in raw.cells])
+    rows = np.concatenate([np.repeat(cells.nodes[:, 0], cells.nodes.shape[1]) for cells in raw.cells])
+    columns = np.concatenate([cells.nodes.ravel() for cells in raw.cells])
+    n = len(raw.points)
+    _, label = connected_components(coo_matrix((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(n, n)))
+    _, seen, number = np.unique(label[first], return_index=True, return_inverse=True)
+    rank = np.empty(len(seen), dtype=int)
+    rank[seen.argsort()] = np.arange(len(seen))
+    return np.asarray(rank[number])
+
+
+def build(raw: RawMesh, elements: np.ndarray | None = None) -> Body:
+    """One body out of elements of a file, all of them unless told."""
+    cells, number = _chosen(raw, elements)
+    fulls = [split.full(block, raw.points) for block in cells]
+    kinds = {id(VOLUMES[block.kind][0]) for block in cells}
+    cut = kinds not in ({id(HEXA)}, {id(TETRA)})
+    hexahedra = kinds == {id(HEXA)}
+    pieces = [split.tetrahedra(one) if cut else split.whole(one) for one in fulls]
+    rows = np.vstack([np.take_along_axis(one.rows[p.parent], p.local, 1) for one, p in zip(fulls, pieces, strict=True)])
+    points = np.vstack([one.points[p.parent[:, None], p.local] for one, p in zip(fulls, pieces, strict=True)])
+    mesh, node_of = _mesh(rows, points, hexahedra, len(raw.points))
+    part_of = np.concatenate([number[b][p.parent] for b, p in enumerate(pieces)])  # element number of each piece
+
+    found = {name: _facets(mesh, node_of, parts) for name, parts in raw.faces.items()}
+    unmatched = tuple(name for name, ids in found.items() if ids is None)
+    boundaries = {name: ids for name, ids in found.items() if ids is not None and len(ids)}
+    volumes = {name: np.flatnonzero(np.isin(part_of, members)) for name, members in raw.volumes.items()}
+    subdomains = {name: members for name, members in volumes.items() if len(members)}
+    node_sets = {name: np.unique(mesh.dofs.element_dofs[:, members]) for name, members in subdomains.items()}
+    node_sets |= {name: np.unique(mesh.dofs.get_facet_dofs(ids).flatten()) for name, ids in boundaries.items()}
+    implied = _implied(mesh, fulls, pieces, cut)
+    for name, members in raw.nodes.items():
+        mine = node_of[members]
+        mine = mine[mine >= 0]
+        if not len(mine) or name in node_sets:
+            continue
+        node_sets[name] = np.unique(np.concatenate([mine, implied(mine)]))
+        if name in raw.skins and len(skin := _skin(mesh, node_sets[name])):
+            boundaries[name] = skin
+    named = mesh.with_boundaries(boundaries).with_subdomains(subdomains)
+    return Body(named, node_sets, node_of, cut, unmatched)
+
+
+def _chosen(raw: RawMesh, elements: np.ndarray | None) -> tuple[list[Cells], list[np.ndarray]]:
+    """Blocks cut down to some elements, and the numbers of these."""
+    blocks, numbers, start = [], [], 0
+    wanted = None if elements is None else np.asarray(elements)
+    for block in raw.cells:
+        number = np.arange(start, start + len(block.nodes))
+        start += len(block.nodes)
+        keep = np.arange(len(number)) if wanted is None else np.flatnonzero(np.isin(number, wanted))
+        if len(keep):
+            blocks.append(Cells(block.kind, block.nodes[keep], block.labels[keep]))
+            numbers.append(number[keep])
+    return blocks, numbers
+
+
+def _mesh(rows: np.ndarray, points: np.ndarray, hexahedra: bool, n_point: int) -> tuple[Any, np.ndarray]:
+    """scikit-fem's mesh, and for each point of the file its node number or -1.
+
+    rows : (n, 27 or 10) points of the file, -1 where there is none, in the order of meshio; points : (n, k, 3)
+    """
+    first, second = (skfem.MeshHex1, skfem.MeshHex2) if hexahedra else (skfem.MeshTet1, skfem.MeshTet2)
+    n_corner = first.elem.refdom.nnodes
+    order = permutation(REFERENCE_POINTS["hexahedron27" if hexahedra else "tetra10"], second.elem().doflocs)
+    rows, points = rows[:, order], points[:, order]
+    vertices, connectivity = np.unique(rows[:, :n_corner].T, return_inverse=True)
+    corners = np.empty((len(vertices), 3))
+    corners[connectivity.reshape(n_corner, -1)] = points[:, :n_corner].transpose(1, 0, 2)
+    straight = first(corners.T.copy(), connectivity.reshape(n_corner, -1))
+    dofs = skfem.Dofs(straight, second.elem())
+    locations = np.empty((3, dofs.N))
+    locations[:, dofs.element_dofs] = points.transpose(2, 1, 0)
+    node_of = np.full(n_point, -1)
+    from_file = rows.T >= 0
+    node_of[rows.T[from_file]] = dofs.element_dofs[from_file]
+    return second(locations, straight.t), node_of
+
+
+def _facets(mesh: Any, node_of: np.ndarray, parts: Iterable[np.ndarray]) -> np.ndarray | None:
+    """Facets by their corners, rows of the file (k, 3) or (k, 4); those of other bodies are left out.
+
+    Returns None where some are no faces of this mesh, though they touch it. The three lowest nodes tell facets apart.
+    """
+    n_corner = mesh.facets.shape[0]
+    corners = [np.empty((0, n_corner), dtype=int)]
+    for part in parts:
+        if n_corner == 3 and part.shape[1] == 4:
+            part = split.cut_face(part)
+        nodes = node_of[part]
+        here = (nodes >= 0).any(axis=1)
+        if (nodes[here] < 0).any() or (here.any() and part.shape[1] != n_corner):
+            return None
+        corners.append(nodes[here])
+    found = np.vstack([nodes for nodes in corners if nodes.shape[1] == n_corner])
+
+    def key(nodes: np.ndarray) -> np.ndarray:
+        low = np.sort(nodes, axis=1)[:, :3].astype(np.int64)
+        return np.asarray((low[:, 0] * mesh.nvertices + low[:, 1]) * mesh.nvertices + low[:, 2])
+
+    keys, wanted = key(mesh.facets.T), key(found)
+    order = keys.argsort()
+    at = order[np.searchsorted(keys, wanted, sorter=order).clip(max=len(keys) - 1)]
+    return np.unique(at) if (keys[at] == wanted).all() else None
+
+
+def _implied(mesh: Any, fulls: Sequence[split.Full], pieces: Sequence[split.Pieces], cut: bool) -> Any:
+    """A function from nodes of the file to the nodes added between them.
+
+    An added node belongs to a set when every node that it interpolates does: the two ends of an edge, the corners and
+    edges of a face, the whole hexahedron.
+    """
+    elem = mesh.elem()
+    order = permutation(REFERENCE_POINTS["tetra10" if mesh.t.shape[0] == 4 else "hexahedron27"], elem.doflocs)
+    start, tables = 0, []
+    for one, piece in zip(fulls, pieces, strict=True):
+        dofs = mesh.dofs.element_dofs[:, start : start + len(piece.parent)].T
+        start += len(piece.parent)
+        nodes = np.empty(one.rows.shape, dtype=int)
+        nodes[piece.parent[:, None], piece.local[:, order]] = dofs
+        tables.append((one, nodes))
+
+    def added(members: np.ndarray) -> np.ndarray:
+        inside = np.zeros(mesh.doflocs.shape[1], dtype=bool)
+        inside[members] = True
+        before = inside.copy()
+        for one, nodes in tables:
+            for place, support in enumerate(split.supports(one.solid)):
+                new = one.rows[:, place] < 0
+                if len(support) > 1 and new.any():
+                    between = _between(one, support)
+                    here = new & before[nodes[:, between]].all(axis=1)
+                    inside[nodes[here, place]] = True
+        return np.flatnonzero(inside & ~before)
+
+    return added
+
+
+def _between(one: split.Full, support: tuple[int, ...]) -> list[int]:
+    """Places in a full element of the nodes of the file that an added node interpolates."""
+    roles = split.supports(one.solid)
+    in_file = np.all(one.rows >= 0, axis=0).tolist()
+    return [i for i, role in enumerate(roles) if in_file[i] and set(role) <= set(support) and role != support]
+
+
+def _skin(mesh: Any, members: np.ndarray) -> np.ndarray:
+    """Facets of the boundary whose corners and edge nodes all belong to a set."""
+    inside = np.zeros(mesh.doflocs.shape[1], dtype=bool)
+    inside[members] = True
+    outer = np.flatnonzero(mesh.f2t[1] < 0)
+    nodes = np.vstack([mesh.facets[:, outer], mesh.dofs.edge_dofs[0][mesh.f2e[:, outer]]])
+    return np.asarray(outer[inside[nodes].all(axis=0)])

@@ -1,0 +1,124 @@
+"""Gmsh files of every version and kind of element become the same body; kinds that mix are cut conformingly."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import skfem
+
+from tests.helpers.mixed_meshes import mixed_cells, write_mixed
+from tribodyn.geometry.gmsh_session import session
+from tribodyn.geometry.mesh import quality
+from tribodyn.geometry.sources import read, solid
+from tribodyn.geometry.sources.raw import Cells, RawMesh
+
+
+def area(mesh, facets):
+    basis = skfem.FacetBasis(mesh, mesh.elem(), facets=facets, intorder=6)
+    return skfem.Functional(lambda w: 1.0 + 0.0 * w.x[0]).assemble(basis)
+
+
+def outside(mesh):
+    return np.flatnonzero(mesh.f2t[1] < 0)
+
+
+@pytest.mark.parametrize("named", [True, False])
+@pytest.mark.parametrize(("order", "complete"), [(1, True), (2, False), (2, True)])
+@pytest.mark.parametrize(("version", "save_all"), [(4.1, False), (4.1, True), (2.2, False)])
+def test_every_gmsh_file_gives_the_same_body(order, complete, version, save_all, named, tmp_path):
+    path = write_mixed(tmp_path / "box.msh", order, complete, version, save_all, named)
+    source = read.read(path)
+    (name, body), *others = source.bodies.items()
+    assert not others
+    assert name == ("box" if named else "body")
+    mesh = body.mesh
+    assert mesh.nelements == 4 * (6 + 5 * 2 + 2 + 2 * 3)
+    assert mesh.doflocs.shape[1] == 207
+    assert quality(mesh).volume == pytest.approx(12.0, rel=1e-12)
+    assert area(mesh, outside(mesh)) == pytest.approx(32.0, rel=1e-12)  # a crack would add to it
+    bottom, top = ("bottom", "top") if named else ("face 1", "face 2")
+    for face, height in ((bottom, 0.0), (top, 3.0)):
+        assert area(mesh, mesh.boundaries[face]) == pytest.approx(4.0, rel=1e-12)
+        np.testing.assert_array_equal(body.node_sets[face], np.flatnonzero(abs(mesh.doflocs[2] - height) < 1e-9))
+    assert any("cut into 96 tetrahedra" in sentence for sentence in source.said)
+    assert any("first order" in sentence for sentence in source.said) == (order == 1)
+    assert source.unused == ()
+
+
+@pytest.mark.parametrize("complete", [True, False])
+def test_curved_elements_of_mixed_kinds_keep_their_shape(complete, tmp_path):
+    """x + 0.3 z^2 is in every element space: a node taken for its neighbour would fold an element."""
+    raw = read.read_raw(write_mixed(tmp_path / "box.msh", 2, complete))
+    bent = raw.points.copy()
+    bent[:, 0] += 0.3 * raw.points[:, 2] ** 2
+    body = solid.build(replace(raw, points=bent))
+    found = quality(body.mesh)
+    assert found.volume == pytest.approx(12.0, rel=1e-12)
+    assert found.scaled_jacobian > 0.1
+    straight = solid.build(raw).mesh.doflocs
+    straight[0] += 0.3 * straight[2] ** 2
+    np.testing.assert_allclose(body.mesh.doflocs, straight, atol=1e-14)
+
+
+def test_unit_and_version_and_missing_volume(tmp_path):
+    path = write_mixed(tmp_path / "box.msh", 2)
+    assert quality(read.read(path, "mm").bodies["box"].mesh).volume == pytest.approx(12e-9)
+    with pytest.raises(ValueError, match=r'unit = "inch".* is no length'):
+        read.read(path, "inch")
+    with session() as gmsh:
+        gmsh.model.occ.addRectangle(0, 0, 0, 1, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.model.mesh.generate(2)
+        gmsh.write(str(tmp_path / "flat.msh"))
+    with pytest.raises(ValueError, match="no volume elements"):
+        read.read(tmp_path / "flat.msh")
+
+
+def test_prisms_numbered_in_a_mirror_are_turned():
+    points, cells, _ = mixed_cells()
+    kinds = dict(cells, wedge=cells["wedge"][:, [3, 4, 5, 0, 1, 2]])
+    blocks = [Cells(kind, nodes, np.arange(len(nodes))) for kind, nodes in kinds.items()]
+    body = solid.build(RawMesh(points, np.arange(len(points)), blocks))
+    assert quality(body.mesh).volume == pytest.approx(12.0, rel=1e-12)
+
+
+def test_parts_that_share_no_nodes_are_bodies_named_by_their_groups():
+    points, cells, _ = mixed_cells(1)
+    n = len(points)
+    both = np.vstack([points, points + [5.0, 0, 0], points + [9.0, 0, 0]])
+    blocks = [Cells(k, np.vstack([c, c + n, c + 2 * n]), np.arange(3 * len(c))) for k, c in cells.items()]
+    number, start, owner = {}, 0, []
+    for block in blocks:
+        owner.append(np.repeat([0, 1, 2], len(block.nodes) // 3))
+        start += len(block.nodes)
+    owner = np.concatenate(owner)
+    number = {i: np.flatnonzero(owner == i) for i in range(3)}
+    raw = RawMesh(
+        both,
+        np.arange(3 * n),
+        blocks,
+        volumes={"all": np.arange(start), "left": number[0], "half": number[1][:2], "rest": number[1][2:]},
+    )
+    found = solid.bodies(raw)
+    assert set(found) == {"left", "half+rest", "body1"}
+    np.testing.assert_array_equal(found["left"], number[0])
+    np.testing.assert_array_equal(found["body1"], number[2])
+    body = solid.build(raw, found["half+rest"])
+    assert set(body.mesh.subdomains) == {"all", "half", "rest"}
+    assert quality(body.mesh).volume == pytest.approx(3.0)
+
+
+def test_sets_of_corner_nodes_hold_the_nodes_added_between_them():
+    points, cells, _ = mixed_cells()
+    blocks = [Cells("hexahedron", cells["hexahedron"], np.arange(4))]
+    ground = np.flatnonzero(points[:, 2] == 0)
+    edge = np.flatnonzero((points[:, 2] == 0) & (points[:, 1] == 0))
+    raw = RawMesh(
+        points, np.arange(len(points)), blocks, nodes={"ground": ground, "edge": edge}, skins=frozenset(["ground"])
+    )
+    body = solid.build(raw)
+    _, y, z = body.mesh.doflocs
+    np.testing.assert_array_equal(body.node_sets["ground"], np.flatnonzero(z == 0))
+    np.testing.assert_array_equal(body.node_sets["edge"], np.flatnonzero((z == 0) & (y == 0)))
+    assert area(body.mesh, body.mesh.boundaries["ground"]) == pytest.approx(4.0)
+    assert "edge" not in body.mesh.boundaries
