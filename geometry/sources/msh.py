@@ -6,6 +6,7 @@ groups without a name and loses the groups of MSH 2.2: there Gmsh reads its file
 
 from __future__ import annotations
 
+import re
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -47,6 +48,7 @@ _KIND_OF_GROUP = ("point", "curve", "surface", "volume")
 def read(path: Path) -> RawMesh:
     """Read a Gmsh file. Raises ValueError: it is none, or broken."""
     version = _version(path)
+    _check_ends(path)
     if version.startswith("4.1"):
         try:
             with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
@@ -166,6 +168,14 @@ def _version(path: Path) -> str:
         if line.strip() == b"$MeshFormat":
             return head[i + 1].decode("ascii", "replace").strip()
     raise ValueError(_cannot(path, "it does not begin with $MeshFormat"))
+
+
+def _check_ends(path: Path) -> None:
+    """Refuse a file that stops inside a section: Gmsh itself would read on in silence."""
+    text = path.read_bytes()
+    for section in re.findall(rb"(?m)^\$(?!End)([A-Za-z]+)\s*$", text):
+        if b"$End" + section not in text:
+            raise ValueError(_cannot(path, f"it ends inside ${section.decode()}, so it is not complete"))
 
 
 def _all_named(file: meshio.Mesh) -> bool:
