@@ -1,0 +1,152 @@
+"""The wheel of a scene, reduced once: any engine order, range of frequencies and speed, or all sectors at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from tribodyn.fem.cyclic import Sector
+from tribodyn.fem.part import Part
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.branch import Branch
+from tribodyn.hbm.continuation import adaptive
+from tribodyn.hbm.law import ContactParameters
+from tribodyn.hbm.travelling_wave import on_wheel
+from tribodyn.reduction.cyclic import ReducedSector, nodal_diameters, travelling_wave, wheel_model
+from tribodyn.workflows.run import part_reduction, pipeline
+from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
+from tribodyn.workflows.scene.schema import PartScene
+
+MAX_POINTS = 1000  # of a response
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """full, reduced : the sector of the scene's wheel before and after reduction; part : its mesh and DOFs."""
+
+    file: SceneFile
+    part: Part
+    full: Sector
+    reduced: ReducedSector
+
+    @property
+    def scene(self) -> PartScene:
+        """The scene."""
+        return self.file.part_scene
+
+    @property
+    def n_sectors(self) -> int:
+        """Number of sectors."""
+        return self.reduced.sector.n_sectors
+
+    @property
+    def springs(self) -> np.ndarray:
+        """(n_pair, n_component) stuck, closed contact [N/m]."""
+        return pipeline.contact_stiffness(self.scene, travelling_wave(self.reduced, 0))
+
+    def diagram(self, diameters: Sequence[int], families: int, stuck: bool, full: bool = False) -> np.ndarray:
+        """Frequencies (n_diameter, families) [Hz] of nodal diameters, of the reduced or of the full sector."""
+        sector = self.full if full else self.reduced.sector
+        return nodal_diameters(sector, diameters, families, self.springs if stuck else None)
+
+    def wave(self, engine_order: int | None = None, frequency: tuple[float, float] | None = None) -> HarmonicBalance:
+        """The balance under a travelling wave; engine order and range of frequencies [Hz] default to the scene's."""
+        scene = self._asked(engine_order, frequency)
+        assert scene.wheel is not None
+        reduced = pipeline.damped(scene, travelling_wave(self.reduced, scene.wheel.engine_order))
+        return pipeline.make_model(scene, self.part, reduced).balance
+
+    def _asked(self, engine_order: int | None, frequency: tuple[float, float] | None) -> PartScene:
+        wheel, response = self.scene.wheel, self.scene.response
+        assert wheel is not None
+        if engine_order is not None:
+            wheel = wheel.model_copy(update={"engine_order": engine_order})
+        if frequency is not None:
+            response = response.model_copy(update={"frequency": frequency, "references": None})
+        return self.scene.model_copy(update={"wheel": wheel, "response": response})
+
+    def whole(self, stiffness: Sequence[float] | None = None) -> HarmonicBalance:
+        """The balance of all sectors at once, outputs and loads named "<name>@<sector>".
+
+        stiffness : (n_sectors,) factor on the stiffness of each sector, such as blades that differ: what a travelling
+            wave of one sector cannot say
+        """
+        one, wheel = self.wave(), self.scene.wheel
+        assert wheel is not None
+        contact = one.parameters
+        springs = np.tile(contact.stiffness, (self.n_sectors, 1))
+        whole = wheel_model(self.reduced, stiffness)
+        whole = whole.with_damping(partial(pipeline.damping_matrix, self.scene, springs))
+        around = ContactParameters.of(
+            contact.components,
+            springs,
+            friction=self.scene.contact.friction or 0.0,
+            gap=np.tile(contact.gap, self.n_sectors),
+        )
+        load = on_wheel(one.excitation, wheel.engine_order, self.n_sectors)
+        return HarmonicBalance(whole, one.law_name, around, one.basis, load, one.omega_max)
+
+    def at_speed(self, speed: float) -> Wheel:
+        """The same wheel turning at a speed [Hz]: stiffened by its stress, softened by its frame; not meshed again."""
+        wheel = self.scene.wheel
+        assert wheel is not None
+        scene = self.scene.model_copy(update={"wheel": wheel.model_copy(update={"speed": speed})})
+        return assembled(replace(self.file, scene=scene), self.part.mesh, dict(self.part.node_sets))
+
+
+def follow(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: float) -> Branch:
+    """The response over a range [Hz], its points as dense as the tolerance of the curve between them asks.
+
+    Raises  SolveFailed where the curve does not come to the end of the range
+    """
+    low, high = (2 * np.pi * hertz for hertz in frequency)
+    branch = adaptive.follow(balance, low, high, adaptive.Options(tolerance=tolerance, max_points=MAX_POINTS))
+    if not branch.end.startswith("reached"):
+        raise pipeline.SolveFailed(f"the frequency response {branch.end}")
+    return branch
+
+
+def build(file: SceneFile) -> Wheel:
+    """Mesh, assemble and reduce the sector of a scene; raises SceneError for a scene without a wheel."""
+    if file.part_scene.wheel is None:
+        raise SceneError(f"{file.name} has no [wheel]: this study is for a sector of one")
+    with TemporaryDirectory() as folder:
+        mesh, node_sets = pipeline.make_mesh(file, Path(folder))
+    return assembled(file, mesh, node_sets)
+
+
+def assembled(file: SceneFile, mesh: Any, node_sets: dict[str, np.ndarray]) -> Wheel:
+    """Assemble and reduce the sector of a scene with a wheel from its mesh."""
+    scene = file.part_scene
+    part = pipeline.make_part(scene, mesh, node_sets)
+    full = part_reduction.sector(scene, part)
+    return Wheel(file, part, full, part_reduction.reduced_from(scene, full))
+
+
+def campbell(
+    wheel: Wheel, highest: float, count: int, orders: Sequence[int], families: int = 2
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Speeds (n_speed,), and frequencies (n_speed, n_order, families) of each engine order's wave, free and stuck [Hz].
+
+    highest : speed [Hz]; count : speeds from rest to it
+    """
+    speeds = np.linspace(0.0, highest, count)
+    found: dict[str, list[np.ndarray]] = {"free": [], "stuck": []}
+    for speed in speeds:
+        spinning = wheel.at_speed(float(speed))
+        for state, rows in found.items():
+            rows.append(spinning.diagram(orders, families, state == "stuck"))
+    return speeds, {state: np.array(rows) for state, rows in found.items()}
+
+
+def critical_speeds(speeds: np.ndarray, frequency: np.ndarray, order: int) -> list[float]:
+    """Speeds [Hz] at which an engine order meets a frequency (n_speed,) of its wave [Hz]."""
+    miss = frequency - order * speeds
+    cross = np.flatnonzero((miss[:-1] > 0) != (miss[1:] > 0))
+    return [float(speeds[i] + (speeds[i + 1] - speeds[i]) * miss[i] / (miss[i] - miss[i + 1])) for i in cross]
