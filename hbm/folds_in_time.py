@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -133,7 +134,7 @@ def fold_in_time(
 def coexisting(
     balance: HarmonicBalance, branch: Branch, low: float, high: float, output: str, frequencies: int = 24
 ) -> tuple[float, list[Coexisting]]:
-    """The first frequency between two folds at which two stable solutions and an unstable one share it, marched in time.
+    """The first frequency between two folds that two stable solutions and an unstable one share, each marched in time.
 
     low, high : [rad/s]; frequencies : tried between them
     Returns the frequency [rad/s] and the solutions; nan and none where there are no such three
@@ -162,7 +163,7 @@ def _shaped(balance: HarmonicBalance, x: np.ndarray) -> np.ndarray:
 def _stretches(branch: Branch) -> list[tuple[int, int]]:
     """First and last point of each stretch of a curve between its folds."""
     ends = [0, *sorted(branch.folds), len(branch.omega) - 1]
-    return list(zip(ends[:-1], ends[1:], strict=True))
+    return list(pairwise(ends))
 
 
 def _stable_side(balance: HarmonicBalance, branch: Branch, fold: int) -> tuple[tuple[int, int], tuple[int, int]]:

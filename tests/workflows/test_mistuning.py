@@ -1,0 +1,132 @@
+"""Sectors that differ, on a wheel with a flexible disk, which is not the scene that the study was made for."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tribodyn.workflows.command import main as cli
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies import mistuning
+
+WHEEL = """
+[scene]
+title = "Six coarse blades on a flexible disk"
+
+[geometry]
+part = "blade"
+fixed = ["clamp"]
+n_blades = 6
+hub_radius = "60 mm"
+span = "80 mm"
+root_chord = "35 mm"
+tip_chord = "24 mm"
+root_thickness = "10 mm"
+tip_thickness = "8 mm"
+contact_length = "20 mm"
+contact_height = "12 mm"
+shroud_length = "50 mm"
+root_height = "15 mm"
+root_length = "60 mm"
+disk_radius = "25 mm"
+n_along = 2
+n_up = 2
+n_span = 3
+n_side = 1
+n_root = 1
+n_disk = 1
+
+[material]
+young = "210 GPa"
+density = "7860 kg/m3"
+poisson = 0.3
+
+[wheel]
+sectors = 6
+engine_order = 1
+axis = "x"
+seam = ["cyclic_right", "cyclic_left"]
+
+[contact]
+group = "shroud_right"
+opposite = "shroud_left"
+t1 = "x"
+vertices_only = true
+tangential_stiffness = "9 N/um"
+normal_stiffness = "11 N/um"
+friction = 0.5
+gap = "-0.1 mm"
+
+[loads.harmonic.wave]
+group = "excitation"
+direction = "y"
+value = "20 N"
+
+[response]
+group = "tip"
+direction = "y"
+frequency = ["400 Hz", "404 Hz"]
+points = 5
+
+[reduction]
+modes = 6
+
+[harmonics]
+kept = [0, 1]
+samples = 32
+
+[damping]
+modal = "2 %"
+"""
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("wheel") / "wheel.toml"
+    path.write_text(WHEEL, encoding="utf-8")
+    return path
+
+
+def test_drawn_factors_have_the_mean_and_the_spread_asked_for() -> None:
+    factors = mistuning.deviations(12, 0.03, 4)
+    assert factors.mean() == pytest.approx(1.0)
+    assert factors.std() == pytest.approx(0.03)
+    np.testing.assert_array_equal(factors, mistuning.deviations(12, 0.03, 4))
+    assert not np.allclose(factors, mistuning.deviations(12, 0.03, 5))
+    with pytest.raises(ValueError, match="above 0"):
+        mistuning.deviations(12, 0.9, 4)
+
+
+def test_factors_that_move_on_by_a_sector_move_the_amplitudes_on(scene: Path) -> None:
+    """Which sector is counted first does not matter but for the phase of the load."""
+    file = scene_file.read(str(scene))
+    factors = np.array([1.04, 0.97, 1.0, 1.01, 0.99, 1.02])
+    first, moved = (mistuning.respond(file, np.roll(factors, n), tolerance=0.02) for n in (0, 2))
+    assert first.heights.std(axis=1).max() > 0.01 * first.heights.max()
+    at = first.branch.omega
+    for n in range(6):
+        again = np.interp(at, moved.branch.omega, moved.heights[:, (n + 2) % 6])
+        np.testing.assert_allclose(again, first.heights[:, n], rtol=4e-2)
+
+
+def test_sectors_alike_are_amplified_by_nothing(scene: Path) -> None:
+    found = mistuning.respond(scene_file.read(str(scene)), np.ones(6))
+    assert found.amplification == pytest.approx(1.0, rel=5e-3)
+
+
+def test_the_command_takes_any_wheel(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cli.app(["mistuned", str(scene), "--spread", "3 %", "--seed", "2", "--out", str(tmp_path), "--json"],
+            result_action="return_value")  # fmt: skip
+    said = json.loads(capsys.readouterr().out)
+    np.testing.assert_allclose(said["stiffness"], mistuning.deviations(6, 0.03, 2))
+    assert (tmp_path / "mistuned.csv").read_text(encoding="utf-8").startswith("frequency_Hz,sector_0_m")
+
+
+def test_what_cannot_be_is_one_sentence(scene: Path) -> None:
+    with pytest.raises(ValueError, match=r"beam has no \[wheel\]"):
+        mistuning.respond(scene_file.read("beam"))
+    with pytest.raises(ValueError, match="6 sectors, but there are 2 factors"):
+        mistuning.respond(scene_file.read(str(scene)), [1.0, 1.1])

@@ -1,0 +1,119 @@
+"""Studies of any scene: one change at a time, folds in time, supports; on the beam, which none of them was made for."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.workflows.accuracy import measure
+from tribodyn.workflows.command import main as cli
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies import fit_file, variation
+from tribodyn.workflows.studies.supports import support_work
+
+TINY = (
+    "geometry.n_patch=3", "geometry.n_length=2", "geometry.n_height=1", "reduction.modes=3", "harmonics.samples=32",
+    "response.points=8", "wear=",
+)  # fmt: skip
+HANGER = (
+    'springs.hanger={group = "static_load", direction = "z", stiffness = "1 N/um"}',
+    'response.others.hung={group = "static_load", direction = "z"}',
+)
+
+
+def words(*said: str, sets: tuple[str, ...] = TINY) -> list[str]:
+    return [*said, *(word for text in sets for word in ("--set", text))]
+
+
+def call(said: list[str]) -> None:
+    cli.app(said, result_action="return_value")
+
+
+def test_each_change_is_made_alone_and_none_stops_the_others(capsys: pytest.CaptureFixture[str]) -> None:
+    changes = ("damping.modal=4 %", "damping.modal=4 %; contact.friction=1", "response.options.max_steps=0")
+    with pytest.raises(ValueError, match="max_steps"):
+        variation.vary("beam", changes, TINY)
+    call([*words("vary", "beam"), "--change", changes[0], "--change", changes[1], "--json"])
+    own, damped, both = json.loads(capsys.readouterr().out)
+    direct = measure.measure(scene_file.read("beam", (*TINY, "damping.modal=4 %", "contact.friction=1")))
+    assert both["peak_m"] == direct.values["peak_m"]
+    assert damped["peak_m"] < own["peak_m"]
+    assert own["outcome"] == "converged"
+
+
+def test_a_number_is_fitted_again_for_every_change() -> None:
+    """The softer beam needs another load to have the same static force in its contact."""
+    load = {"keys": ("loads.static.press.value",), "low": "5 kN", "high": "40 kN"}
+    task = fit_file.Task.model_validate(
+        {"parameters": {"load": load}, "measured": {"force": {"of": "preload", "value": "6 kN"}}}
+    )
+    rows = variation.vary("beam", ["geometry.length=220 mm"], TINY, task)
+    assert [row.outcome for row in rows] == ["converged"] * 2
+    loads = [float(row.fitted[0].partition("=")[2].split()[0]) for row in rows]
+    assert loads[0] != pytest.approx(loads[1], rel=1e-3)
+    assert "fitted" in variation.as_text(rows)
+
+
+def test_a_failed_change_has_a_row_that_says_why() -> None:
+    def ask(file: scene_file.SceneFile) -> tuple[dict[str, float | None], str]:
+        if file.scene.contact.friction == 1.0:
+            raise RuntimeError("no solution at 400 Hz")
+        return {"answer": file.scene.contact.friction}, "converged"
+
+    rows = variation.vary("beam", ["contact.friction=1", "contact.friction=0.2"], TINY, ask=ask)
+    assert [row.values.get("answer") for row in rows] == [0.5, None, 0.2]
+    assert rows[1].outcome == "no solution at 400 Hz"
+    assert "-60 %" in variation.as_text(rows)
+
+
+def test_folds_of_the_beam_are_found_in_time(capsys: pytest.CaptureFixture[str]) -> None:
+    """A beam pressed on lightly and shaken normally knocks: its response softens through folds."""
+    knocking = (
+        *TINY, "contact.components=['n']", "contact.law=unilateral", "contact.tangential_stiffness=",
+        "contact.friction=", "loads.harmonic.shake.group=static_load", "loads.harmonic.shake.direction=z",
+        "loads.harmonic.shake.value=150 N", "loads.static.press.value=1 kN", "response.direction=z",
+        "response.frequency=['300 Hz', '1500 Hz']", "damping.modal=2 %", "harmonics.kept=[0, 1, 2, 3]",
+    )  # fmt: skip
+    call([*words("folds", "beam", sets=knocking), "--json"])
+    rows = json.loads(capsys.readouterr().out)
+    found = [row for row in rows if row["outcome"] == "converged"]
+    assert found
+    assert all(abs(row["difference"]) < 0.02 for row in found)
+
+
+def test_work_of_a_support_in_closed_form() -> None:
+    basis, k, a = HarmonicBasis((0, 1), 512), 2e5, 1e-3
+    swing = support_work(basis, np.array([0.0, a, 0.0]), k)
+    assert swing == pytest.approx(k * a**2, rel=1e-4)  # twice k a^2 / 2: to either side
+    hung = support_work(basis, np.array([3 * a, 0.0, a]), k)
+    assert hung == pytest.approx(2 * k * 3 * a * a, rel=1e-4)  # k (4 a)^2 / 2 - k (2 a)^2 / 2 once
+
+
+def test_supports_of_the_beam(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = ["--no-pictures", "--out", str(tmp_path)]
+    call([*words("run", "beam", *out, sets=(*TINY, *HANGER))])
+    capsys.readouterr()
+    call(["supports", str(tmp_path), "--area", "hanger=10 mm2", "--coefficient", "2e3 um3/J", "--json"])
+    (row,) = json.loads(capsys.readouterr().out)
+    assert row["support"] == "hanger"
+    assert row["work_J"] > 0
+    assert row["depth_m_per_cycle"] == pytest.approx(2e-15 * row["work_J"] / 10e-6)
+    with (tmp_path / "supports.csv").open(encoding="utf-8") as stream:
+        table = list(csv.DictReader(stream))
+    assert max(float(line["hanger_work_J"]) for line in table) == row["work_J"]
+
+
+@pytest.mark.parametrize(
+    ("sets", "said"),
+    [((), "no spring to the ground"), (HANGER[:1], r"add \[response.others.hanger\]")],
+)
+def test_a_scene_without_observed_supports_says_what_to_add(sets: tuple[str, ...], said: str, tmp_path: Path) -> None:
+    from tribodyn.workflows.studies.supports import supports_of
+
+    with pytest.raises(ValueError, match=said):
+        supports_of(scene_file.read("beam", (*TINY, *sets)).scene)

@@ -1,0 +1,69 @@
+"""Folds of a scene's response curve, by harmonic balance and in time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from tribodyn.hbm.branch import CONVERGED, Branch
+from tribodyn.hbm.continuation import arc_length
+from tribodyn.hbm.folds_in_time import FoldInTime, fold_in_time
+from tribodyn.hbm.time_integration import IntegrationFailed
+from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.scene_file import SceneFile
+
+
+@dataclass(frozen=True)
+class FoldsFound:
+    """The response curve of a scene, by arc length, and its folds in the order of the curve."""
+
+    branch: Branch
+    folds: tuple[FoldInTime, ...]
+
+    def record(self) -> list[dict[str, Any]]:
+        """For machines."""
+        return [
+            {
+                "balance_hz": fold.omega / (2 * np.pi),
+                "time_hz": fold.in_time / (2 * np.pi) if fold.outcome == CONVERGED else None,
+                "difference": fold.omega / fold.in_time - 1 if fold.outcome == CONVERGED else None,
+                "resolution": fold.resolution,
+                "amplitude_m": fold.amplitude,
+                "outcome": fold.outcome,
+            }
+            for fold in self.folds
+        ]
+
+
+def find(file: SceneFile, progress: Progress, bracket: float = 0.02) -> FoldsFound:
+    """The folds of a scene's response within its range of frequencies, each looked for in time too.
+
+    bracket : distance to the fold of the balance, relative, within which its end in time is looked for
+    Raises  SolveFailed where the curve has no first point; ValueError for a sector of a wheel, whose perturbations are
+    other waves than its motion, and for a scene with prescribed nodes, which have no equation of motion
+    """
+    if getattr(file.scene, "prescribed", None) or getattr(file.scene, "wheel", None):
+        raise ValueError(f"{file.name} has a [wheel] or [prescribed] nodes: its folds cannot be looked for in time")
+    low, high = pipeline.response_range(file.scene)
+    with TemporaryDirectory() as folder, threadpool_limits(file.scene.solver.threads):
+        balance = pipeline.build(file, Path(folder), progress).balance
+        with progress.stage("frequency response"):
+            options = arc_length.Options(newton=pipeline.newton_options(file.scene))
+            branch = arc_length.follow(balance, low, high, options)
+        if branch.outcome[0] != CONVERGED:
+            raise pipeline.SolveFailed(f"the frequency response {branch.end}")
+        found = []
+        for fold in branch.folds:
+            with progress.stage(f"fold at {branch.frequency[fold]:.6g} Hz in time"):
+                try:
+                    found.append(fold_in_time(balance, branch, fold, pipeline.OUTPUT, bracket=bracket))
+                except IntegrationFailed as failure:
+                    omega = float(branch.omega[fold])
+                    found.append(FoldInTime(fold, omega, omega, float("nan"), bracket, str(failure)))
+    return FoldsFound(branch, tuple(found))

@@ -1,0 +1,147 @@
+"""Impact wear at the supports of a part: pins, stops and hangers that a scene models as springs.
+
+A support rubs and hammers its seat. The work that the part puts into its spring per cycle, before the spring gives it
+back, is what an impact wear law takes; the wear of the seat does not change the motion, so that it follows from a
+response that is already computed.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tribodyn.hbm.branch import Branch
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.wear.impact import loading_work
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.schema import PartScene, Scene
+
+SAMPLES = 256  # of a cycle, at the least
+
+
+@dataclass(frozen=True)
+class Support:
+    """A spring to the ground whose displacement is observed. name : of the spring; stiffness : [N/m]; output : name."""
+
+    name: str
+    stiffness: float
+    output: str
+
+
+@dataclass(frozen=True)
+class SupportWear:
+    """Wear at a support along a response curve.
+
+    work : (n_point,) that the part puts into the spring per cycle [J]
+    depth : (n_point,) of the seat per cycle [m], nan where no bearing area or coefficient was given
+    """
+
+    support: Support
+    frequency: np.ndarray
+    work: np.ndarray
+    depth: np.ndarray
+
+
+def supports_of(scene: Scene) -> list[Support]:
+    """Springs of a scene to the ground whose group and direction some output has.
+
+    Raises  ValueError, naming the table that is missing, where there is none
+    """
+    springs = scene.springs if isinstance(scene, PartScene) else {}
+    grounded = {name: spring for name, spring in springs.items() if spring.opposite is None}
+    if not grounded or not isinstance(scene, PartScene):
+        raise ValueError("the scene has no spring to the ground: a support is a table such as [springs.left_pin]")
+    outputs = {"response": scene.response, **scene.response.others}
+    found = [
+        Support(name, spring.stiffness, output)
+        for name, spring in grounded.items()
+        for output, seen in outputs.items()
+        if seen.group == spring.group and seen.direction == spring.direction
+    ]
+    if not found:
+        first, spring = next(iter(grounded.items()))
+        raise ValueError(
+            f"no output observes a support: add [response.others.{first}] with the group and direction of its spring, "
+            f'group = "{spring.group}"'
+        )
+    return found
+
+
+def support_work(basis: HarmonicBasis, displacement: np.ndarray, stiffness: float) -> np.ndarray:
+    """Work per cycle (...) that a motion puts into a spring while it stretches it [J].
+
+    displacement : (..., n_coeff) Fourier coefficients of its end [m]; stiffness : [N/m]
+    A spring that never changes sign takes k z_max^2 / 2 - k z_min^2 / 2 of one swing.
+    """
+    z = basis.to_time(displacement)
+    return np.asarray(loading_work(stiffness * z, z))
+
+
+def wear_of(
+    branch: Branch,
+    basis: HarmonicBasis,
+    support: Support,
+    area: float | None = None,
+    coefficient: float | None = None,
+) -> SupportWear:
+    """Wear at one support along a response curve. area : of its seat [m2]; coefficient : of impact wear [m3/J]."""
+    row = branch.response[:, branch.output_names.index(support.output)]
+    work = support_work(basis, row, support.stiffness)
+    known = area is not None and coefficient is not None
+    depth = work * coefficient / area if known else np.full(len(work), np.nan)  # type: ignore[operator]
+    return SupportWear(support, branch.frequency, work, depth)
+
+
+def support_wear(
+    result: Result, areas: Mapping[str, float] | None = None, coefficient: float | None = None
+) -> list[SupportWear]:
+    """Wear at every support along the response curve of a result.
+
+    areas : bearing area of the seat of a spring [m2], by its name; coefficient : of impact wear [m3/J]
+    Raises  ValueError for a result without a response curve, supports or a spring of that name
+    """
+    scene = scene_file.from_json(result.provenance["scene"])
+    supports, areas = supports_of(scene), areas or {}
+    unknown = [name for name in areas if name not in [support.name for support in supports]]
+    if unknown:
+        raise ValueError(
+            f'no support is called "{unknown[0]}", there are {", ".join(support.name for support in supports)}'
+        )
+    if result.response is None:
+        raise ValueError("the result has no response curve: run its scene")
+    highest = result.harmonics[-1]
+    basis = HarmonicBasis(result.harmonics, max(SAMPLES, 32 * highest, scene.harmonics.samples))
+    return [wear_of(result.response, basis, support, areas.get(support.name), coefficient) for support in supports]
+
+
+def record(found: list[SupportWear]) -> list[dict[str, Any]]:
+    """For machines: every support where it takes most work."""
+    rows = []
+    for one in found:
+        top = int(np.argmax(one.work))
+        depth = float(one.depth[top])
+        rows.append(
+            {
+                "support": one.support.name,
+                "hz": float(one.frequency[top]),
+                "work_J": float(one.work[top]),
+                "depth_m_per_cycle": depth if np.isfinite(depth) else None,
+            }
+        )
+    return rows
+
+
+def write(found: list[SupportWear], path: Path) -> None:
+    """Work and depth per cycle of every support over frequency as comma-separated values."""
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        table = csv.writer(stream)
+        names = [one.support.name for one in found]
+        table.writerow(["frequency_Hz", *(f"{n}_work_J" for n in names), *(f"{n}_depth_m_per_cycle" for n in names)])
+        columns = [found[0].frequency, *(one.work for one in found), *(one.depth for one in found)]
+        table.writerows(np.column_stack(columns).tolist())
