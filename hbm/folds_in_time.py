@@ -157,7 +157,7 @@ def coexisting(
 
 
 def _shaped(balance: HarmonicBalance, x: np.ndarray) -> np.ndarray:
-    return x.reshape(balance.parameters.n_pair, -1, balance.basis.n_coeff)
+    return x.reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
 
 
 def _stretches(branch: Branch) -> list[tuple[int, int]]:

@@ -16,7 +16,6 @@ from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.branch import Branch
 from tribodyn.hbm.continuation import adaptive
-from tribodyn.hbm.law import ContactParameters
 from tribodyn.hbm.travelling_wave import on_wheel
 from tribodyn.reduction.cyclic import ReducedSector, nodal_diameters, travelling_wave, wheel_model
 from tribodyn.workflows.run import part_reduction, pipeline
@@ -79,18 +78,11 @@ class Wheel:
         """
         one, wheel = self.wave(), self.scene.wheel
         assert wheel is not None
-        contact = one.parameters
-        springs = np.tile(contact.stiffness, (self.n_sectors, 1))
+        springs = np.tile(one.contact.stiffness, (self.n_sectors, 1))
         whole = wheel_model(self.reduced, stiffness)
         whole = whole.with_damping(partial(pipeline.damping_matrix, self.scene, springs))
-        around = ContactParameters.of(
-            contact.components,
-            springs,
-            friction=self.scene.contact.friction or 0.0,
-            gap=np.tile(contact.gap, self.n_sectors),
-        )
         load = on_wheel(one.excitation, wheel.engine_order, self.n_sectors)
-        return HarmonicBalance(whole, one.law_name, around, one.basis, load, one.omega_max)
+        return HarmonicBalance.of(whole, one.contact.repeated(self.n_sectors), one.basis, load, one.omega_max)
 
     def at_speed(self, speed: float) -> Wheel:
         """The same wheel turning at a speed [Hz]: stiffened by its stress, softened by its frame; not meshed again."""
