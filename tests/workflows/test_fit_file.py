@@ -12,10 +12,11 @@ from tests.cases.test_scene_blade import COARSE as BLADE
 from tribodyn.workflows.cases.rig.model import Rig
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.run import modelling
+from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies import fit_file
-from tribodyn.workflows.studies.fit_file import Bench, Known, Task
+from tribodyn.workflows.studies.fit_file import Known, Task, predict
 from tribodyn.workflows.studies.identification import Measured, Parameter, fit
 
 BEAM = (
@@ -31,7 +32,7 @@ def quiet(sentence):
 def found_again(scene, overrides, true, looked, measured):
     """Measure the scene with the true numbers, then look for them from the scene as it stands."""
     known = {name: Known(value=1.0, **table) for name, table in measured.items()}
-    answers = Bench().predict(scene_file.read(scene, (*overrides, *true)), known)
+    answers = predict(Bench(), scene_file.read(scene, (*overrides, *true)), known)
     assert (answers > 0).all()
     task = Task.model_validate(
         {
@@ -77,7 +78,7 @@ def test_mating_height_is_found_from_the_preload_and_the_part_is_made_once(monke
     """From the scene's own zero, where a relative step would have no length; against the rig's own preload."""
     made = []
     original = modelling.make_mesh
-    monkeypatch.setattr(modelling, "make_mesh", lambda *args: made.append(1) or original(*args))
+    monkeypatch.setattr(pipeline, "make_mesh", lambda *args: made.append(1) or original(*args))
     task = Task.model_validate(
         {
             "parameters": {"height": {"keys": ["surfaces.mating_height"], "low": "-5 um", "high": "5 um"}},
@@ -101,9 +102,9 @@ def test_a_joint_makes_another_reduction_and_a_cycle_is_that_of_the_run(monkeypa
     bench, answers = Bench(), []
     for overrides in ((), ("springs.base_across.stiffness=5e8",), ("springs.base_across.stiffness=5e8", "wear=")):
         file = scene_file.read("rig", (*RIG, *overrides))
-        plain = bench.plain
-        answers.append(bench.predict(file, measured))
-        assert (bench.plain is plain) == ("wear=" in overrides)
+        plain = bench.reduced
+        answers.append(predict(bench, file, measured))
+        assert (bench.reduced is plain) == ("wear=" in overrides)
     assert answers[1][0] < 0.99 * answers[0][0]
     assert answers[2] == pytest.approx(answers[1])
     rig = Rig.of(scene_file.read("rig", RIG))
@@ -114,7 +115,7 @@ def test_a_joint_makes_another_reduction_and_a_cycle_is_that_of_the_run(monkeypa
 def test_a_wheel_has_the_frequencies_of_its_wave():
     known = {"first": Known(of="stuck frequency", mode=1, value=341.0)}
     bench = Bench()
-    one, two = (bench.predict(scene_file.read("blade", (*BLADE, f"wheel.engine_order={o}")), known) for o in (1, 2))
+    one, two = (predict(bench, scene_file.read("blade", (*BLADE, f"wheel.engine_order={o}")), known) for o in (1, 2))
     assert 300 < one[0] < 400 < two[0] < 550
 
 
@@ -170,9 +171,9 @@ def test_a_bad_file_is_one_sentence_and_exit_code_2(text, words, tmp_path, capsy
 def test_a_life_without_wear_and_a_run_that_stops_early_are_told():
     life = {"life": Known(of="life", left=0.1, value=1e6)}
     with pytest.raises(ValueError, match=r"the scene has no \[wear\]"):
-        Bench().predict(scene_file.read("beam", (*BEAM, "wear=")), life)
+        predict(Bench(), scene_file.read("beam", (*BEAM, "wear=")), life)
     with pytest.raises(SolveFailed, match=r"measured.life: the preload did not fall to 0.1 .* stopped"):
-        Bench().predict(scene_file.read("beam", (*BEAM, "wear.max_steps=1")), life)
+        predict(Bench(), scene_file.read("beam", (*BEAM, "wear.max_steps=1")), life)
 
 
 def test_the_file_that_comes_with_the_program_is_sound_and_the_command_prints(tmp_path, capsys):

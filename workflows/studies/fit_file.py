@@ -6,29 +6,23 @@ their values. A scene is built anew for every trial, as far as the trial changes
 
 from __future__ import annotations
 
-import json
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, StrictBool, StrictInt, model_validator
 from threadpoolctl import threadpool_limits
 
-from tribodyn.fem.part import Part
 from tribodyn.hbm import newton
 from tribodyn.hbm.operating_point import OperatingPoint
 from tribodyn.hbm.wear_history import LIFE_SHARE, WearHistory, cycles_to_preload
-from tribodyn.reduction.held import hold
 from tribodyn.reduction.linear import linear_modes
-from tribodyn.reduction.model import ReducedModel
 from tribodyn.workflows.accuracy import measure
-from tribodyn.workflows.run import modelling, part_reduction, settings
-from tribodyn.workflows.run.contact_surfaces import surface_gap
+from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
@@ -42,15 +36,6 @@ MEASURED_IN = {
     "open frequency": "Hz", "stuck frequency": "Hz", "preload": "N", "energy": "J", "amplitude": "m",
     "peak frequency": "Hz", "life": "", "work": "J",
 }  # fmt: skip
-LATE: Any = {
-    "scene": True, "damping": True, "harmonics": True, "wear": True, "solver": True, "pictures": True, "surfaces": True,
-    "loads": {"static": {"__all__": {"value", "pressure"}}, "harmonic": {"__all__": {"value", "pressure", "phase"}}},
-    "prescribed": {"__all__": {"displacement"}},
-    "contact": {"law", "tangential_stiffness", "normal_stiffness", "friction", "punch"},
-    "response": {"frequency", "references", "points", "method", "stability", "bounds", "options"},
-}  # fmt: skip
-"""What a scene may change without another part or reduction."""
-
 Quantity = float | str
 
 
@@ -146,16 +131,16 @@ def run(
         said = {p.name: f"{values[p.name]:.{digits}g} {p.unit}".rstrip() for p in parameters}
         return [f"{key}={text}" for name, text in said.items() for key in task.parameters[name].keys]
 
-    def predict(values: Mapping[str, float]) -> np.ndarray:
+    def tried(values: Mapping[str, float]) -> np.ndarray:
         nonlocal count
         count += 1
         trial = scene_file.read(scene, (*overrides, *changes(values)))
-        found = bench.predict(trial, task.measured)
+        found = predict(bench, trial, task.measured)
         tell(f"trial {count}: " + ", ".join(f"{name} {value:.6g}" for name, value in values.items()))
         return found
 
     with threadpool_limits(1):
-        found = fit(parameters, measured, predict, before if len(before) == len(parameters) else None)
+        found = fit(parameters, measured, tried, before if len(before) == len(parameters) else None)
     return found, changes(found.named(), digits=6)
 
 
@@ -202,35 +187,10 @@ def _si(key: str, value: Quantity, units: tuple[str, ...]) -> tuple[float, str]:
     raise SceneError(f"{key}: {problem}")
 
 
-@dataclass
-class Bench:
-    """Scenes that differ little, each part and reduction made once."""
-
-    early: str = ""
-    part: Part | None = None
-    plain: ReducedModel | None = None
-
-    def model(self, file: SceneFile) -> modelling.Model:
-        """The nonlinear problem of a scene."""
-        scene = file.part_scene
-        early = json.dumps(scene.model_dump(mode="json", exclude=LATE), sort_keys=True)
-        if self.part is None or self.plain is None or early != self.early:
-            with TemporaryDirectory() as folder:
-                mesh, node_sets = modelling.make_mesh(file, Path(folder))
-            self.part = modelling.make_part(scene, mesh, node_sets)
-            self.plain, self.early = hold(part_reduction.reduce(scene, self.part), self.part.held), early
-        plain = self.plain
-        if scene.surfaces is not None:
-            i = plain.interface
-            gap = i.gap + surface_gap(scene.surfaces, self.part.interface, file.folder).gap
-            plain = replace(plain, interface=replace(i, gap=gap))
-        reduced = part_reduction.with_prescribed(scene, self.part, modelling.damped(scene, plain))
-        return modelling.make_model(scene, self.part, reduced)
-
-    def predict(self, file: SceneFile, measured: Mapping[str, Known]) -> np.ndarray:
-        """(n_measured,) what the scene says to each number."""
-        answers = Answers(file, self.model(file))
-        return np.array([answers.to(name, known) for name, known in measured.items()])
+def predict(bench: Bench, file: SceneFile, measured: Mapping[str, Known]) -> np.ndarray:
+    """(n_measured,) what a scene says to each measured number."""
+    answers = Answers(file, bench.model(file))
+    return np.array([answers.to(name, known) for name, known in measured.items()])
 
 
 class Answers:

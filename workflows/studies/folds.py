@@ -14,8 +14,9 @@ from tribodyn.hbm.branch import CONVERGED, Branch
 from tribodyn.hbm.continuation import arc_length
 from tribodyn.hbm.folds_in_time import FoldInTime, fold_in_time
 from tribodyn.hbm.time_integration import IntegrationFailed
-from tribodyn.workflows.run import pipeline
+from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.scene.scene_file import SceneFile
 
 
@@ -50,19 +51,19 @@ def find(file: SceneFile, progress: Progress, bracket: float = 0.02) -> FoldsFou
     """
     if getattr(file.scene, "prescribed", None) or getattr(file.scene, "wheel", None):
         raise ValueError(f"{file.name} has a [wheel] or [prescribed] nodes: its folds cannot be looked for in time")
-    low, high = pipeline.response_range(file.scene)
+    low, high = settings.response_range(file.scene)
     with TemporaryDirectory() as folder, threadpool_limits(file.scene.solver.threads):
-        balance = pipeline.build(file, Path(folder), progress).balance
+        balance = modelling.build(file, Path(folder), progress).balance
         with progress.stage("frequency response"):
-            options = arc_length.Options(newton=pipeline.newton_options(file.scene))
+            options = arc_length.Options(newton=settings.newton_options(file.scene))
             branch = arc_length.follow(balance, low, high, options)
         if branch.outcome[0] != CONVERGED:
-            raise pipeline.SolveFailed(f"the frequency response {branch.end}")
+            raise SolveFailed(f"the frequency response {branch.end}")
         found = []
         for fold in branch.folds:
             with progress.stage(f"fold at {branch.frequency[fold]:.6g} Hz in time"):
                 try:
-                    found.append(fold_in_time(balance, branch, fold, pipeline.OUTPUT, bracket=bracket))
+                    found.append(fold_in_time(balance, branch, fold, settings.OUTPUT, bracket=bracket))
                 except IntegrationFailed as failure:
                     omega = float(branch.omega[fold])
                     found.append(FoldInTime(fold, omega, omega, float("nan"), bracket, str(failure)))

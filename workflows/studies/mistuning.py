@@ -19,7 +19,7 @@ from threadpoolctl import threadpool_limits
 from tribodyn.hbm.branch import Branch, amplitude
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import INK, WEAR_MAP
-from tribodyn.workflows.run.pipeline import OUTPUT
+from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.studies import wheel as wheels
 

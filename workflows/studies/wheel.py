@@ -18,7 +18,8 @@ from tribodyn.hbm.branch import Branch
 from tribodyn.hbm.continuation import adaptive
 from tribodyn.hbm.travelling_wave import on_wheel
 from tribodyn.reduction.cyclic import ReducedSector, nodal_diameters, travelling_wave, wheel_model
-from tribodyn.workflows.run import part_reduction, pipeline
+from tribodyn.workflows.run import modelling, part_reduction
+from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import PartScene
 
@@ -47,7 +48,7 @@ class Wheel:
     @property
     def springs(self) -> np.ndarray:
         """(n_pair, n_component) stuck, closed contact [N/m]."""
-        return pipeline.contact_stiffness(self.scene, travelling_wave(self.reduced, 0))
+        return modelling.contact_stiffness(self.scene, travelling_wave(self.reduced, 0))
 
     def diagram(self, diameters: Sequence[int], families: int, stuck: bool, full: bool = False) -> np.ndarray:
         """Frequencies (n_diameter, families) [Hz] of nodal diameters, of the reduced or of the full sector."""
@@ -58,8 +59,8 @@ class Wheel:
         """The balance under a travelling wave; engine order and range of frequencies [Hz] default to the scene's."""
         scene = self._asked(engine_order, frequency)
         assert scene.wheel is not None
-        reduced = pipeline.damped(scene, travelling_wave(self.reduced, scene.wheel.engine_order))
-        return pipeline.make_model(scene, self.part, reduced).balance
+        reduced = modelling.damped(scene, travelling_wave(self.reduced, scene.wheel.engine_order))
+        return modelling.make_model(scene, self.part, reduced).balance
 
     def _asked(self, engine_order: int | None, frequency: tuple[float, float] | None) -> PartScene:
         wheel, response = self.scene.wheel, self.scene.response
@@ -80,7 +81,7 @@ class Wheel:
         assert wheel is not None
         springs = np.tile(one.contact.stiffness, (self.n_sectors, 1))
         whole = wheel_model(self.reduced, stiffness)
-        whole = whole.with_damping(partial(pipeline.damping_matrix, self.scene, springs))
+        whole = whole.with_damping(partial(modelling.damping_matrix, self.scene, springs))
         load = on_wheel(one.excitation, wheel.engine_order, self.n_sectors)
         return HarmonicBalance.of(whole, one.contact.repeated(self.n_sectors), one.basis, load, one.omega_max)
 
@@ -100,7 +101,7 @@ def follow(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: 
     low, high = (2 * np.pi * hertz for hertz in frequency)
     branch = adaptive.follow(balance, low, high, adaptive.Options(tolerance=tolerance, max_points=MAX_POINTS))
     if not branch.end.startswith("reached"):
-        raise pipeline.SolveFailed(f"the frequency response {branch.end}")
+        raise SolveFailed(f"the frequency response {branch.end}")
     return branch
 
 
@@ -109,14 +110,14 @@ def build(file: SceneFile) -> Wheel:
     if file.part_scene.wheel is None:
         raise SceneError(f"{file.name} has no [wheel]: this study is for a sector of one")
     with TemporaryDirectory() as folder:
-        mesh, node_sets = pipeline.make_mesh(file, Path(folder))
+        mesh, node_sets = modelling.make_mesh(file, Path(folder))
     return assembled(file, mesh, node_sets)
 
 
 def assembled(file: SceneFile, mesh: Any, node_sets: dict[str, np.ndarray]) -> Wheel:
     """Assemble and reduce the sector of a scene with a wheel from its mesh."""
     scene = file.part_scene
-    part = pipeline.make_part(scene, mesh, node_sets)
+    part = modelling.make_part(scene, mesh, node_sets)
     full = part_reduction.sector(scene, part)
     return Wheel(file, part, full, part_reduction.reduced_from(scene, full))
 

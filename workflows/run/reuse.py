@@ -1,0 +1,106 @@
+"""Scenes that differ little: each mesh, part and reduction is made once, and used again where a scene allows it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from tribodyn.fem.part import Part
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.reduction.held import hold
+from tribodyn.reduction.model import ReducedModel
+from tribodyn.workflows.run import modelling, part_reduction, settings
+from tribodyn.workflows.run.contact_surfaces import surface_gap
+from tribodyn.workflows.scene.scene_file import SceneFile
+
+HOLD = "hold"  # the load that takes the place of a prescribed displacement
+LATE: Any = {
+    "scene": True, "damping": True, "harmonics": True, "wear": True, "solver": True, "pictures": True, "surfaces": True,
+    "loads": {"static": {"__all__": {"value", "pressure"}}, "harmonic": {"__all__": {"value", "pressure", "phase"}}},
+    "prescribed": {"__all__": {"displacement"}},
+    "contact": {"law", "tangential_stiffness", "normal_stiffness", "friction", "punch"},
+    "response": {"frequency", "references", "points", "method", "stability", "bounds", "options"},
+}  # fmt: skip
+"""What a scene may change without another part or reduction."""
+
+
+@dataclass
+class Bench:
+    """Builds the problems of scenes, one after the other; what the next one shares with the last is not made again."""
+
+    early: str = ""
+    part: Part | None = None
+    reduced: ReducedModel | None = None
+    measured: tuple[object, np.ndarray] = field(default_factory=lambda: (None, np.empty(0)))
+
+    def plain(self, file: SceneFile, opening: np.ndarray | None = None) -> ReducedModel:
+        """The reduced model, not damped, with nothing prescribed; opening : (n_pair,) added to its gaps [m]."""
+        scene = file.part_scene
+        early = json.dumps(scene.model_dump(mode="json", exclude=LATE), sort_keys=True)
+        if self.part is None or self.reduced is None or early != self.early:
+            with TemporaryDirectory() as folder:
+                mesh, node_sets = modelling.make_mesh(file, Path(folder))
+            self.part = modelling.make_part(scene, mesh, node_sets)
+            self.reduced, self.early = hold(part_reduction.reduce(scene, self.part), self.part.held), early
+        interface = self.reduced.interface
+        gap = interface.gap
+        if scene.surfaces is not None:
+            gap = gap + self._waviness(file)
+        if opening is not None:
+            gap = gap + opening
+        return replace(self.reduced, interface=replace(interface, gap=gap))
+
+    def _waviness(self, file: SceneFile) -> np.ndarray:
+        surfaces = file.part_scene.surfaces
+        assert surfaces is not None
+        assert self.part is not None
+        key = (self.early, surfaces.model_dump_json(), file.folder)
+        if key != self.measured[0]:
+            self.measured = (key, surface_gap(surfaces, self.part.interface, file.folder).gap)
+        return self.measured[1]
+
+    def model(self, file: SceneFile, opening: np.ndarray | None = None) -> modelling.Model:
+        """The nonlinear problem of a scene; opening : (n_pair,) added to its gaps, such as a wear depth [m]."""
+        scene, plain = file.part_scene, self.plain(file, opening)
+        assert self.part is not None
+        reduced = part_reduction.with_prescribed(scene, self.part, modelling.damped(scene, plain))
+        return modelling.make_model(scene, self.part, reduced)
+
+    def held_by_force(self, file: SceneFile, state: State, opening: np.ndarray | None = None) -> HarmonicBalance:
+        """A scene with a prescribed displacement, held instead by the static force that a solved state takes there.
+
+        A displacement prescribed in harmonic 0 alone has no equation of motion in time. With the force as a static load
+        the same state has one: its mean is then free to differ, and the balance solution of both problems is the same.
+        Raises  ValueError for a scene that prescribes nothing
+        """
+        scene, model = file.part_scene, self.model(file, opening)
+        if not scene.prescribed:
+            raise ValueError(f"{file.name} prescribes no displacement: integrate it as it is")
+        name, given = next(iter(scene.prescribed.items()))
+        height, reaction = given.displacement, part_reduction.reaction_of(model.reduced)
+        plain = modelling.damped(scene, self.plain(file, opening))
+        push = np.zeros(plain.system.n_dof)
+        force = reaction.force(height, state.cycle.force[:, :, 0])
+        push[reaction.dofs] = force + reaction.support * reaction.shape * height
+        system = replace(plain.system, loads={**plain.system.loads, HOLD: push})
+        loads = {key: value for key, value in model.balance.excitation.loads.items() if key != (0, name)}
+        return HarmonicBalance.of(
+            replace(plain, system=system),
+            model.balance.contact.joints,
+            model.balance.basis,
+            Excitation({**loads, (0, HOLD): 1.0}),
+            settings.response_range(scene)[1],
+        )
+
+
+def reaction(file: SceneFile, model: modelling.Model, state: State) -> float:
+    """Static force at the prescribed nodes of a scene in a solved state of its model [N]."""
+    given = next(iter(file.part_scene.prescribed.values()))
+    found = part_reduction.reaction_of(model.balance.model)
+    return float(found.force(given.displacement, state.cycle.force[:, :, 0]).sum())
