@@ -12,8 +12,8 @@ from tests.cases.test_scene_blade import COARSE as BLADE
 from tribodyn.workflows.cases.rig.model import Rig
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.run import modelling
-from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies import fit_file
 from tribodyn.workflows.studies.fit_file import Known, Task, predict
@@ -78,7 +78,7 @@ def test_mating_height_is_found_from_the_preload_and_the_part_is_made_once(monke
     """From the scene's own zero, where a relative step would have no length; against the rig's own preload."""
     made = []
     original = modelling.make_mesh
-    monkeypatch.setattr(pipeline, "make_mesh", lambda *args: made.append(1) or original(*args))
+    monkeypatch.setattr(modelling, "make_mesh", lambda *args: made.append(1) or original(*args))
     task = Task.model_validate(
         {
             "parameters": {"height": {"keys": ["surfaces.mating_height"], "low": "-5 um", "high": "5 um"}},

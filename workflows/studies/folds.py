@@ -15,8 +15,8 @@ from tribodyn.hbm.continuation import arc_length
 from tribodyn.hbm.folds_in_time import FoldInTime, fold_in_time
 from tribodyn.hbm.time_integration import IntegrationFailed
 from tribodyn.workflows.run import modelling, settings
-from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 
 
