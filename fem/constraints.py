@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
+from scipy.sparse import csr_matrix, eye_array, vstack
 
 AXES = "xyz"
 
@@ -74,6 +75,63 @@ def free_dofs(n_dof: int, clamps: Iterable[Clamp], node_sets: Mapping[str, np.nd
     if not free.any():
         raise ValueError("the clamps hold every DOF of the part; leave some node free")
     return np.flatnonzero(free)
+
+
+@dataclass(frozen=True)
+class Following:
+    """DOFs that follow others: u[dofs] = map @ u. dofs : (k,); map : (k, n_dof); what : which constraint, for errors."""
+
+    dofs: np.ndarray
+    map: csr_matrix
+    what: str
+
+
+class Constraint(Protocol):
+    """A constraint that knows which DOFs follow which."""
+
+    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following: ...
+
+
+def restriction(n_dof: int, free: np.ndarray, constraints: Sequence[Following]) -> tuple[np.ndarray, csr_matrix]:
+    """The DOFs (n_free,) that are left, and the map (n_dof, n_free) from them to all.
+
+    free : DOFs that no clamp holds
+    Raises  ValueError, naming the constraints, where a DOF follows twice, is clamped and follows, or follows itself
+    """
+    owner = np.full(n_dof, -1)
+    held = np.ones(n_dof, dtype=bool)
+    held[free] = False
+    rows, dofs = [], []
+    for number, one in enumerate(constraints):
+        taken = one.dofs[owner[one.dofs] >= 0]
+        if len(taken):
+            raise ValueError(
+                f"{one.what} and {constraints[owner[taken[0]]].what} both move the same nodes; let one of them take the "
+                "other face first"
+            )
+        if held[one.dofs].any():
+            raise ValueError(f"{one.what} moves nodes that are clamped; swap its faces, or clamp the other one")
+        owner[one.dofs] = number
+        rows.append(one.map)
+        dofs.append(one.dofs)
+    moved = np.concatenate([*dofs, []]).astype(int)
+    every = eye_array(n_dof, format="csr")
+    keep = csr_matrix(every.multiply((owner < 0)[:, None]))
+    place = csr_matrix((np.ones(len(moved)), (moved, np.arange(len(moved)))), shape=(n_dof, len(moved)))
+    step = csr_matrix(keep + place @ csr_matrix(vstack(rows)))
+    follow = step
+    for _ in range(len(constraints)):
+        if not (np.abs(follow[:, moved]).sum() if len(moved) else 0):
+            break
+        follow = csr_matrix(follow @ step)
+    else:
+        if len(moved) and np.abs(follow[:, moved]).sum():
+            names = ", ".join(one.what for one in constraints)
+            raise ValueError(f"the nodes moved by {names} follow each other in a circle; swap the faces of one of them")
+    left = np.setdiff1d(free, moved)
+    follow = csr_matrix(follow[:, left])
+    follow.eliminate_zeros()
+    return left, follow
 
 
 def partition(n_dof: int, chosen: np.ndarray, what: str) -> tuple[np.ndarray, np.ndarray]:

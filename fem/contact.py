@@ -11,8 +11,12 @@ from scipy.sparse import csr_matrix, vstack
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.fem.loads import unit
-from tribodyn.fem.matching import TOLERANCE, partners
-from tribodyn.fem.surface import Surface, surface
+from tribodyn.fem.matching import TOLERANCE, facing_partners, partners
+from tribodyn.fem.mortar_contact import ROUNDING, mortar_halves
+from tribodyn.fem.surface import Surface, facet_nodes, surface
+
+REACH = 0.1  # farthest opening at which two faces still meet unless told, as a part of the length of the first
+PAIRINGS = ("auto", "nodes", "mortar")
 
 
 def ground_contact(
@@ -106,23 +110,101 @@ def pair_halves(
     return interface, _map(turned, face_2.nodes[partner], mesh)
 
 
-def join(interfaces: Sequence[ContactInterface]) -> ContactInterface:
-    """Several contacts of one mesh as one interface, pairs in the order given.
+def facing_halves(
+    mesh: Any,
+    facets_1: np.ndarray,
+    facets_2: np.ndarray,
+    t1: Sequence[float],
+    components: Sequence[str] = COMPONENTS,
+    gap: float | np.ndarray | None = None,
+    vertices_only: bool = False,
+    rotation: np.ndarray | None = None,
+    pairing: str = "auto",
+    reach: float | None = None,
+) -> tuple[ContactInterface, csr_matrix]:
+    """Both halves of a contact of two faces that may be meshed differently and may stand apart or overlap.
 
-    Raises  ValueError where there is none, or where they differ in components or in the shape of their faces
+    gap : opening before loading [m], one or (n_pair,); None takes that of the geometry, interference negative
+    pairing : "nodes" pairs matching nodes, "mortar" weighs both faces over the surface they share, "auto" pairs nodes
+        where every facet of face 1 has its like on face 2
+    reach : farthest opening at which the faces still meet [m], a tenth of the length of face 1 unless told
+    Other arguments and returns as `pair_halves`
+    Raises  ValueError where the faces do not meet, or do not match where nodes are to be paired
     """
-    if not interfaces:
-        raise ValueError("the part has no contact; name at least one contact face")
-    if len({(i.components, i.faces.shape[1]) for i in interfaces}) > 1:
-        raise ValueError("the contacts of a part must have the same components, and faces of one shape")
+    if pairing not in PAIRINGS:
+        raise ValueError(f"there is no pairing '{pairing}': there are {', '.join(PAIRINGS)}")
+    turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
+    corners = facet_nodes(mesh, facets_1)
+    length = float(np.linalg.norm(np.ptp(np.asarray(mesh.doflocs.T)[np.unique(corners)], axis=0)))
+    farthest = REACH * length if reach is None else reach
+    if pairing != "mortar":
+        matched = _matched(mesh, facets_1, facets_2, turn, vertices_only, farthest)
+        if matched is not None:
+            face_1, nodes_2, opening = matched
+            opening[np.abs(opening) < ROUNDING * length] = 0.0
+            interface = _interface(mesh, face_1, t1, components, opening if gap is None else gap)
+            return interface, _map(_rows(interface.frames, components) @ turn, nodes_2, mesh)
+        if pairing == "nodes":
+            return pair_halves(
+                mesh, facets_1, facets_2, t1, components, 0.0 if gap is None else gap, vertices_only, rotation=turn
+            )
+    interface, B_2 = mortar_halves(mesh, facets_1, facets_2, t1, components, farthest, vertices_only, rotation)
+    if gap is not None:
+        if np.ndim(gap) and np.shape(gap) != interface.area.shape:
+            raise ValueError(f"the contact gap has {np.size(gap)} values for {interface.n_pair} points; give one each")
+        interface = replace(interface, gap=np.broadcast_to(np.asarray(gap, dtype=float), interface.area.shape).copy())
+    return interface, B_2
+
+
+def _matched(
+    mesh: Any, facets_1: np.ndarray, facets_2: np.ndarray, turn: np.ndarray, vertices_only: bool, reach: float
+) -> tuple[Surface, np.ndarray, np.ndarray] | None:
+    """Face 1, the partners of its nodes on face 2 and their opening (n_pair,) [m]; None where facets do not match."""
+    one, two = facet_nodes(mesh, facets_1), facet_nodes(mesh, facets_2)
+    if one.shape[1] != two.shape[1] or len(one) > len(two) or (one.shape[1] == 6 and not vertices_only):
+        return None
+    face_1 = surface(mesh, facets_1, vertices_only)
+    points = np.asarray(mesh.doflocs.T)
+    nodes = np.unique(two)
+    found = facing_partners(face_1.points, face_1.normals, points[nodes] @ turn.T, reach)
+    if found is None:
+        return None
+    partner, opening = nodes[found[0]], found[1]
+    n = 4 if one.shape[1] == 9 else 3
+    place = np.searchsorted(face_1.nodes, one[:, :n])
+    there = {tuple(row) for row in np.sort(two[:, :n], axis=1).tolist()}
+    if not all(tuple(row) in there for row in np.sort(partner[place], axis=1).tolist()):
+        return None
+    return face_1, partner, opening
+
+
+def join(interfaces: Sequence[ContactInterface]) -> ContactInterface:
+    """Several contacts of one structure as one interface, pairs in the order given; triangles become quadrangles that
+    repeat a corner where there are quadrangles too.
+
+    Raises  ValueError where they differ in components
+    """
+    if len({i.components for i in interfaces}) > 1:
+        raise ValueError("the contacts of a structure must be built with the same components")
     first = np.cumsum([0] + [i.n_pair for i in interfaces])
     names = ("points", "frames", "area", "gap")
     fields = {name: np.concatenate([getattr(i, name) for i in interfaces]) for name in names}
+    width = max(i.faces.shape[1] for i in interfaces)
+    faces = [np.pad(i.faces, ((0, 0), (0, width - i.faces.shape[1])), mode="edge") for i in interfaces]
     return ContactInterface(
         components=interfaces[0].components,
         **fields,
         B=vstack([i.B for i in interfaces], format="csr"),
-        faces=np.concatenate([i.faces + start for i, start in zip(interfaces, first, strict=False)]),
+        faces=np.concatenate([of + start for of, start in zip(faces, first, strict=False)]),
+    )
+
+
+def no_contact(n_dof: int, components: Sequence[str] = COMPONENTS) -> ContactInterface:
+    """The interface of a structure that touches nothing."""
+    none = np.zeros(0)
+    B = csr_matrix((0, n_dof))
+    return ContactInterface(
+        tuple(components), np.zeros((0, 3)), np.zeros((0, 3, 3)), none, none, B, np.zeros((0, 4), int)
     )
 
 

@@ -17,7 +17,6 @@ from scipy.sparse import csr_matrix, vstack
 
 from tribodyn.fem import part as fem_part
 from tribodyn.fem.constraints import Clamp, named
-from tribodyn.fem.contact import pair_halves
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.loads import Load, NodalForce, unit
 from tribodyn.fem.matching import partners
@@ -89,9 +88,20 @@ def build(
     Returns the part of one sector, its interface the half of the right face; and the sector over the same DOFs
     Raises  ValueError as `cut_from` does
     """
-    right = [replace(contact, opposite=None) for contact in contacts]
+    right = turned(contacts, n_sectors, axis)
     part = fem_part.build(mesh, node_sets, material, clamps, right, loads, outputs, order)
-    return part, cut_from(part, contacts, n_sectors, seam, axis)
+    return part, cut_from(part, right, n_sectors, seam, axis)
+
+
+def turned(contacts: Sequence[Contact], n_sectors: int, axis: Sequence[float] = AXIS) -> list[Contact]:
+    """The contacts of a sector with the faces of its neighbours; raises ValueError as `cut_from` does."""
+    if n_sectors < 2:
+        raise ValueError(f"a wheel of {n_sectors} sectors has no neighbours; give at least 2")
+    missing = [contact.face for contact in contacts if contact.opposite is None]
+    if missing:
+        raise ValueError(f"contact '{missing[0]}' of a cyclic part needs the opposite face, that of the next sector")
+    turn = rotation(axis, 2 * np.pi / n_sectors)
+    return [replace(contact, turn=turn) for contact in contacts]
 
 
 def cut_from(
@@ -101,30 +111,18 @@ def cut_from(
     seam: tuple[str, str] | None = None,
     axis: Sequence[float] = AXIS,
 ) -> Sector:
-    """The sector that a part is; arguments as `build`, the contacts of the part are those with the right faces alone.
+    """The sector that a part is; arguments as `build`, the contacts are those of `turned` that the part was built with.
 
     Raises  ValueError where faces do not match after the turn, a seam is held on one side only, or a contact has no
         opposite face
     """
     if n_sectors < 2:
         raise ValueError(f"a wheel of {n_sectors} sectors has no neighbours; give at least 2")
-    missing = [contact.face for contact in contacts if contact.opposite is None]
-    if missing:
-        raise ValueError(f"contact '{missing[0]}' of a cyclic part needs the opposite face, that of the next sector")
     turn = rotation(axis, 2 * np.pi / n_sectors)
-    left = vstack([_left_half(part.mesh, contact, turn) for contact in contacts], format="csr")[:, part.free]
+    left = part.rows(vstack([contact.halves(part.mesh)[1] for contact in contacts], format="csr"))
     none = np.empty((0, 3), dtype=int)
     seams = (none, none) if seam is None else _seams(part, seam, turn)
     return Sector(part.system, part.interface, left, *seams, turn, n_sectors)
-
-
-def _left_half(mesh: Any, contact: Contact, turn: np.ndarray) -> csr_matrix:
-    faces = mesh.boundaries or {}
-    face, opposite = named(faces, contact.face, "face"), named(faces, contact.opposite or "", "face")
-    _, left = pair_halves(
-        mesh, face, opposite, contact.t1, contact.components, contact.gap, contact.vertices_only, rotation=turn.T
-    )
-    return left
 
 
 def _seams(part: Part, seam: tuple[str, str], turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -11,30 +11,50 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_matrix, identity, kron
+from scipy.sparse import block_diag, csr_matrix, identity, kron
 
+from tribodyn.fem.assembly import materials_of
 from tribodyn.fem.elements import batches, connectivity, scatter
-from tribodyn.fem.material import Material
+from tribodyn.fem.material import AnyMaterial, Material
 
 
-def assemble(
-    mesh: Any, material: Material | Mapping[str, Material], order: int | None = None
-) -> tuple[csr_matrix, csr_matrix]:
-    """Mass and stiffness over all nodes, DOF = node * 3 + component.
+def assemble(mesh: Any, material: Any, order: int | None = None) -> tuple[csr_matrix, csr_matrix]:
+    """Mass and stiffness over all nodes, DOF = node * 3 + component; reference points of an assembly have none.
 
-    mesh : scikit-fem MeshHex2 or MeshTet2
-    material : one for the whole mesh, or subdomain name -> material
+    mesh : scikit-fem MeshHex2 or MeshTet2, or an assembly of such
+    material : one for the whole mesh, or subdomain name -> material; of an assembly one, or body name -> these
     order : quadrature order, 5 unless told
     Returns M [kg], K [N/m], each (3 n_node, 3 n_node), symmetric to the last bit
     """
+    found = [_assemble(piece.mesh, one, order) for piece, one in materials_of(mesh, material)]
+    n_beyond = 3 * mesh.doflocs.shape[1] - sum(M.shape[0] for M, _ in found)
+    if len(found) == 1 and not n_beyond:
+        return found[0]
+    beyond = [csr_matrix((n_beyond, n_beyond))] if n_beyond else []
+    return tuple(block_diag([*blocks, *beyond], format="csr") for blocks in zip(*found, strict=True))  # type: ignore
+
+
+def _assemble(
+    mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial], order: int | None
+) -> tuple[csr_matrix, csr_matrix]:
     nodes = connectivity(mesh)
-    lam, mu, rho = per_element(mesh, material)
+    kinds, kind = of_elements(mesh, material)
+    isotropic = all(isinstance(one, Material) for one in kinds)
+    rho = np.array([one.rho for one in kinds])[kind]
+    if isotropic:
+        lam, mu, _ = per_element(mesh, material)
+    else:
+        tensors = np.array([one.tensor for one in kinds])
     n_element, n_a = nodes.shape
     mass = np.empty((n_element, n_a, n_a, 1, 1))
     stiffness = np.empty((n_element, n_a, n_a, 3, 3))
     for elements, N, gradient, weight in batches(mesh, order):
         mass[elements] = symmetric(mass_blocks(N, weight * rho[elements, None]))
-        stiffness[elements] = symmetric(stiffness_blocks(gradient, weight, lam[elements], mu[elements]))
+        if isotropic:
+            blocks = stiffness_blocks(gradient, weight, lam[elements], mu[elements])
+        else:
+            blocks = tensor_blocks(gradient, weight, tensors[kind[elements]])
+        stiffness[elements] = symmetric(blocks)
     n_node = mesh.doflocs.shape[1]
     return kron(scatter(nodes, n_node, mass), identity(3), format="csr"), scatter(nodes, n_node, stiffness)
 
@@ -60,33 +80,52 @@ def stiffness_blocks(gradient: np.ndarray, weight: np.ndarray, lam: np.ndarray, 
     return lam * G + mu * (G.swapaxes(3, 4) + trace * np.eye(3))
 
 
+def tensor_blocks(gradient: np.ndarray, weight: np.ndarray, C: np.ndarray) -> np.ndarray:
+    """The same as `stiffness_blocks` for any elasticity tensors C (n_e, 3, 3, 3, 3) [Pa].
+
+    K_(ai)(bj) = integral of C_ikjl g_ka g_lb
+    """
+    n_e, n_q, _, n_a = gradient.shape
+    g = gradient.reshape(n_e, n_q, 3 * n_a)
+    G = (g.transpose(0, 2, 1) @ (weight[:, :, None] * g)).reshape(n_e, 3, n_a, 3, n_a)
+    return np.einsum("eikjl,ekalb->eabij", C, G, optimize=True)
+
+
 def symmetric(blocks: np.ndarray) -> np.ndarray:
     """Element matrices (n_e, n_a, n_a, k, k) without the rounding that breaks their symmetry."""
     return (blocks + blocks.transpose(0, 2, 1, 4, 3)) / 2
 
 
-def per_element(
-    mesh: Any, material: Material | Mapping[str, Material]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Lame's constants [Pa] and density [kg/m3] of each element, three arrays (n_element,).
+def of_elements(
+    mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]
+) -> tuple[list[AnyMaterial], np.ndarray]:
+    """Materials, and for each element of one mesh (n_element,) which of them it has.
 
     Raises  ValueError for a subdomain the mesh lacks, or an element with no or two materials
     """
     n_element = mesh.t.shape[1]
-    if isinstance(material, Material):
-        material, members = {"": material}, {"": np.arange(n_element)}
-    else:
-        members = mesh.subdomains or {}
-    count = np.zeros(n_element, dtype=int)
-    values = np.empty((3, n_element))
-    for name, one in material.items():
+    if not isinstance(material, Mapping):
+        return [material], np.zeros(n_element, dtype=int)
+    members = mesh.subdomains or {}
+    count, kind = np.zeros((2, n_element), dtype=int)
+    for i, name in enumerate(material):
         if name not in members:
             raise ValueError(f"material: the mesh has no subdomain '{name}'; it has {sorted(members) or 'none'}")
         count[members[name]] += 1
-        values[:, members[name]] = np.array([*one.lame, one.rho])[:, None]
+        kind[members[name]] = i
     if (count != 1).any():
         raise ValueError(
             f"material: {np.sum(count == 0)} elements have no material and {np.sum(count > 1)} have more than one; "
             f"name each of the subdomains {sorted(members)} once"
         )
-    return values[0], values[1], values[2]
+    return [*material.values()], kind
+
+
+def per_element(
+    mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lame's constants [Pa] and density [kg/m3] of each element of isotropic materials, three arrays (n_element,)."""
+    kinds, kind = of_elements(mesh, material)
+    values = np.array([[*one.lame, one.rho] for one in kinds if isinstance(one, Material)])
+    return values[kind, 0], values[kind, 1], values[kind, 2]
+

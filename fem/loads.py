@@ -10,7 +10,7 @@ import numpy as np
 
 from tribodyn.fem.constraints import named
 from tribodyn.fem.elements import coordinates
-from tribodyn.fem.surface import face_integrals, facet_nodes
+from tribodyn.fem.surface import face_integrals, facet_nodes, outside
 
 
 class Load(Protocol):
@@ -64,6 +64,7 @@ class Pressure:
     def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any = None) -> np.ndarray:
         """Force vector (3 n_node,) [N/Pa]."""
         facets = named(mesh.boundaries or {}, self.face, "face")
+        outside(mesh, facets)
         force = np.zeros((mesh.doflocs.shape[1], 3))
         np.add.at(force, facet_nodes(mesh, facets), -face_integrals(mesh, facets)[1])
         return force.ravel()

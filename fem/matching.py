@@ -30,3 +30,20 @@ def partners(points: np.ndarray, others: np.ndarray, what: str, tolerance: float
             "mesh both with the same grid"
         )
     return partner
+
+
+def facing_partners(
+    points: np.ndarray, normals: np.ndarray, others: np.ndarray, reach: float, tolerance: float = TOLERANCE
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Which of the others lies over each point along its normal, and how far (k,) [m], negative below.
+
+    points, normals : (k, 3); others : (m, 3); reach : farthest distance along the normal [m]
+    tolerance : largest distance across the normal, as a part of the length of the face
+    Returns None where a point has no partner of its own
+    """
+    _, partner = cKDTree(others).query(points)
+    apart = others[partner] - points
+    opening = np.einsum("kx,kx->k", apart, normals)
+    across = np.linalg.norm(apart - opening[:, None] * normals, axis=1)
+    far = (across > tolerance * float(np.linalg.norm(np.ptp(points, axis=0)))) | (np.abs(opening) > reach)
+    return None if far.any() or len(np.unique(partner)) < len(partner) else (partner, opening)

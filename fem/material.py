@@ -1,17 +1,25 @@
-"""Isotropic linear elastic material."""
+"""Linear elastic materials: isotropic, and orthotropic along axes of their own."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
+
+VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
 
 @dataclass(frozen=True)
 class Material:
-    """E : Young's modulus [Pa]; nu : Poisson's ratio, between -1 and 0.5; rho : density [kg/m3]."""
+    """E : Young's modulus [Pa]; nu : Poisson's ratio, between -1 and 0.5; rho : density [kg/m3];
+    expansion : coefficient of thermal expansion [1/K]
+    """
 
     E: float
     nu: float
     rho: float
+    expansion: float = 0.0
 
     def __post_init__(self) -> None:
         if not self.E > 0:
@@ -28,3 +36,86 @@ class Material:
             self.E * self.nu / ((1 + self.nu) * (1 - 2 * self.nu)),
             self.E / (2 * (1 + self.nu)),
         )
+
+    @property
+    def tensor(self) -> np.ndarray:
+        """Elasticity tensor (3, 3, 3, 3) [Pa]."""
+        lam, mu = self.lame
+        eye = np.eye(3)
+        shear = np.einsum("ik,jl->ijkl", eye, eye) + np.einsum("il,jk->ijkl", eye, eye)
+        return lam * np.einsum("ij,kl->ijkl", eye, eye) + mu * shear
+
+    @property
+    def expansion_tensor(self) -> np.ndarray:
+        """Thermal strain per kelvin (3, 3) [1/K]."""
+        return self.expansion * np.eye(3)
+
+
+@dataclass(frozen=True)
+class Orthotropic:
+    """A material with three planes of symmetry, such as a single crystal or a laminate.
+
+    young : E1, E2, E3 [Pa]; poisson : nu12, nu13, nu23, the strain along the second axis when pulled along the first;
+    shear : G12, G13, G23 [Pa]; rho : [kg/m3]
+    axes : (2, 3) directions of the first and second material axis, made orthogonal; the third follows by the right hand
+    expansion : along the three axes [1/K]
+    Source  Lekhnitskii, Theory of Elasticity of an Anisotropic Body, 1981, chapter 1
+    """
+
+    young: Sequence[float]
+    poisson: Sequence[float]
+    shear: Sequence[float]
+    rho: float
+    axes: Sequence[Sequence[float]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    expansion: Sequence[float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not (self.rho > 0 and min(self.young) > 0 and min(self.shear) > 0):
+            raise ValueError("material: Young's moduli, shear moduli and density must all be positive")
+        if not np.linalg.eigvalsh(self.compliance)[0] > 0:
+            raise ValueError(
+                f"material: Poisson's ratios {list(self.poisson)} do not fit Young's moduli {list(self.young)}: "
+                "the material would gain energy when strained; nu12 is the strain along 2 when pulled along 1"
+            )
+        first, second = (np.asarray(axis, dtype=float) for axis in self.axes)
+        if not np.linalg.norm(np.cross(first, second)) > 1e-3 * np.linalg.norm(first) * np.linalg.norm(second):
+            raise ValueError("material: the two axes must be directions that are not parallel")
+
+    @property
+    def compliance(self) -> np.ndarray:
+        """Compliance (6, 6) [1/Pa] in material axes, strains 11, 22, 33, 2*23, 2*13, 2*12."""
+        E1, E2, E3 = self.young
+        nu12, nu13, nu23 = self.poisson
+        S = np.diag([1 / E1, 1 / E2, 1 / E3, 1 / self.shear[2], 1 / self.shear[1], 1 / self.shear[0]])
+        for i, j, value in ((0, 1, -nu12 / E1), (0, 2, -nu13 / E1), (1, 2, -nu23 / E2)):
+            S[i, j] = S[j, i] = value
+        return S
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """(3, 3) rows are the material axes."""
+        first, second = (np.asarray(axis, dtype=float) for axis in self.axes)
+        first = first / np.linalg.norm(first)
+        second = second - (second @ first) * first
+        second /= np.linalg.norm(second)
+        return np.stack([first, second, np.cross(first, second)])
+
+    @property
+    def tensor(self) -> np.ndarray:
+        """Elasticity tensor (3, 3, 3, 3) [Pa] along x, y, z."""
+        D = np.linalg.inv(self.compliance)
+        own = np.empty((3, 3, 3, 3))
+        for a, (i, j) in enumerate(VOIGT):
+            for b, (k, l) in enumerate(VOIGT):
+                own[i, j, k, l] = own[j, i, k, l] = own[i, j, l, k] = own[j, i, l, k] = D[a, b]
+        R = self.rotation
+        return np.einsum("ai,bj,ck,dl,abcd->ijkl", R, R, R, R, own, optimize=True)
+
+    @property
+    def expansion_tensor(self) -> np.ndarray:
+        """Thermal strain per kelvin (3, 3) [1/K] along x, y, z."""
+        R = self.rotation
+        return R.T @ np.diag(np.asarray(self.expansion, dtype=float)) @ R
+
+
+AnyMaterial = Material | Orthotropic

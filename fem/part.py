@@ -1,21 +1,22 @@
-"""From mesh to a full second-order system with its contact: the chain that a scene runs for each part."""
+"""From meshes to a full second-order system with its contacts: the chain that a scene runs for each structure."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
-from tribodyn.fem.constraints import AXES, Clamp, NoMeanRotation, free_dofs, named
-from tribodyn.fem.contact import ground_contact, join, pair_contact, plane_contact
+from tribodyn.fem.constraints import AXES, Clamp, Constraint, NoMeanRotation, free_dofs, named, restriction
+from tribodyn.fem.contact import facing_halves, ground_contact, join, no_contact, plane_contact
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.fem.loads import Load, NodalForce
-from tribodyn.fem.material import Material
-from tribodyn.fem.springs import Spring
+from tribodyn.fem.matching import Mismatch
+from tribodyn.fem.springs import Mass, Spring
 from tribodyn.fem.system import SecondOrderSystem
 
 
@@ -24,19 +25,27 @@ class Contact:
     """What a scene says about one contact.
 
     face : boundary name of body 1; opposite : boundary name of body 2, None for the ground
-    t1 : (3,) direction that the first tangent follows; components : those modelled; gap : [m], one or per pair
+    t1 : (3,) direction that the first tangent follows; components : those modelled
+    gap : [m], one or per pair; None takes that of the geometry between two faces, and 0 to the ground
     vertices_only : pairs at the element corners only
     plane : (3,) towards a ground that is a plane, turned about t1 by inclination [rad]; see `plane_contact`
+    pairing, reach : see `facing_halves`
+    joint : name of the joint that it belongs to, that of the face unless told
+    turn : (3, 3) rotation from a sector of a wheel to the next one, whose opposite face is met; None for the same body
     """
 
     face: str
     t1: Sequence[float]
     opposite: str | None = None
     components: Sequence[str] = COMPONENTS
-    gap: float | np.ndarray = 0.0
+    gap: float | np.ndarray | None = None
     vertices_only: bool = False
     plane: Sequence[float] | None = None
     inclination: float = 0.0
+    pairing: str = "auto"
+    reach: float | None = None
+    joint: str = ""
+    turn: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         if self.plane is not None and self.opposite is not None:
@@ -45,25 +54,41 @@ class Contact:
             raise ValueError(f"contact '{self.face}': an inclination needs a plane ground; give its plane")
 
     def build(self, mesh: Any) -> ContactInterface:
-        """The interface over all DOFs of the mesh."""
-        faces = mesh.boundaries or {}
-        first = named(faces, self.face, "face")
+        """The interface over all DOFs of the mesh; that of the first face alone where the second is a neighbour's."""
+        if self.opposite is not None:
+            interface, B_2 = self.halves(mesh)
+            return interface if self.turn is not None else replace(interface, B=interface.B - B_2)
+        first = named(mesh.boundaries or {}, self.face, "face")
+        gap = 0.0 if self.gap is None else self.gap
         if self.plane is not None:
             return plane_contact(
-                mesh, first, self.plane, self.t1, self.components, self.gap, self.vertices_only, self.inclination
+                mesh, first, self.plane, self.t1, self.components, gap, self.vertices_only, self.inclination
             )
-        if self.opposite is None:
-            return ground_contact(mesh, first, self.t1, self.components, self.gap, self.vertices_only)
-        second = named(faces, self.opposite, "face")
-        return pair_contact(mesh, first, second, self.t1, self.components, self.gap, self.vertices_only)
+        return ground_contact(mesh, first, self.t1, self.components, gap, self.vertices_only)
+
+    def halves(self, mesh: Any) -> tuple[ContactInterface, csr_matrix]:
+        """Both halves over all DOFs of the mesh; see `facing_halves`."""
+        assert self.opposite is not None
+        rotation = None if self.turn is None else self.turn.T
+        faces = mesh.boundaries or {}
+        first, second = named(faces, self.face, "face"), named(faces, self.opposite, "face")
+        try:
+            return facing_halves(
+                mesh, first, second, self.t1, self.components, self.gap, self.vertices_only, rotation,
+                self.pairing, self.reach,
+            )  # fmt: skip
+        except ValueError as trouble:
+            raise type(trouble)(f"contact of '{self.face}' and '{self.opposite}': {trouble}") from None
 
 
 @dataclass(frozen=True)
 class Part:
     """system : over the free DOFs; interface : likewise; free : (n_free,) DOF of the mesh that each one is,
-    node * 3 + component; points : (n_node, 3) coordinates of the nodes [m]; mesh : scikit-fem's;
+    node * 3 + component; points : (n_node, 3) coordinates of the nodes [m]; mesh : scikit-fem's, or an assembly
     held : (k, n_free) motions that are held besides, held @ q = 0, for reduction.held
     pairs : contact face -> its pairs in the interface; node_sets : as geometry.mesh.read gives them
+    joints : joint -> its pairs
+    follow : (n_dof, n_free) displacement of all DOFs where some follow others, None where they are free or held
     """
 
     system: SecondOrderSystem
@@ -74,6 +99,8 @@ class Part:
     held: np.ndarray
     pairs: Mapping[str, slice]
     node_sets: Mapping[str, np.ndarray]
+    joints: Mapping[str, slice] = field(default_factory=dict)
+    follow: csr_matrix | None = None
 
     def dofs(self, group: str, axis: str) -> np.ndarray:
         """Places among the free DOFs (k,) of the displacements of a node set along "x", "y" or "z".
@@ -89,14 +116,31 @@ class Part:
     def field(self, q: np.ndarray) -> np.ndarray:
         """Displacement (n_node, 3, ...) [m] of all nodes from free DOFs q (n_free, ...)."""
         full = np.zeros((3 * len(self.points), *q.shape[1:]), dtype=q.dtype)
-        full[self.free] = q
+        if self.follow is None:
+            full[self.free] = q
+        else:
+            full = (self.follow @ q.reshape(len(q), -1)).reshape(full.shape)
         return full.reshape(len(self.points), 3, *q.shape[1:])
+
+    def rows(self, vectors: Any) -> Any:
+        """Rows (k, n_dof) over all DOFs, sparse, as rows (k, n_free) over the free ones."""
+        return vectors[:, self.free] if self.follow is None else csr_matrix(vectors @ self.follow)
+
+    def restricted(self, matrix: Any) -> csr_matrix:
+        """A symmetric matrix (n_dof, n_dof) over all DOFs as one (n_free, n_free) over the free ones."""
+        if self.follow is None:
+            return matrix[self.free][:, self.free]
+        return csr_matrix(self.follow.T @ matrix @ self.follow)
+
+    def force(self, vector: np.ndarray) -> np.ndarray:
+        """A force (n_dof,) on all DOFs as one (n_free,) on the free ones."""
+        return vector[self.free] if self.follow is None else np.asarray(self.follow.T @ vector)
 
 
 def build(
     mesh: Any,
     node_sets: Mapping[str, np.ndarray],
-    material: Material | Mapping[str, Material],
+    material: Any,
     clamps: Sequence[Clamp],
     contacts: Sequence[Contact],
     loads: Mapping[str, Load],
@@ -104,27 +148,42 @@ def build(
     order: int | None = None,
     springs: Sequence[Spring] = (),
     held: Sequence[NoMeanRotation] = (),
+    constraints: Sequence[Constraint] = (),
+    masses: Sequence[Mass] = (),
 ) -> Part:
-    """Assemble a part, hold it, and say where it touches, is loaded and is watched.
+    """Assemble a part or an assembly, hold it, and say where it touches, is loaded and is watched.
 
-    mesh, node_sets : as geometry.mesh.read gives them; material : one, or subdomain name -> material
+    mesh, node_sets : as geometry.mesh.read gives them, or an Assembly and its node sets
+    material : one, or subdomain name -> material; of an assembly one, or body name -> these
     order : quadrature order, 5 unless told; springs : joints that give way, to the ground or between sets
-    held : motions that are held besides the clamps
+    held : motions that are held besides the clamps; constraints : DOFs that follow others; masses : on points or sets
     Raises  ValueError where a name is unknown or a group is empty, one sentence
     """
     M, K = assemble(mesh, material, order)
     K = sum((spring.matrix(mesh, node_sets) for spring in springs), start=K)
+    M = sum((mass.matrix(mesh, node_sets) for mass in masses), start=M)
     points = coordinates(mesh)
     free = free_dofs(K.shape[0], clamps, node_sets)
+    follow = None
+    if constraints:
+        free, follow = restriction(K.shape[0], free, [one.build(mesh, node_sets) for one in constraints])
     built = [contact.build(mesh) for contact in contacts]
     ends = np.cumsum([0] + [one.n_pair for one in built])
-    pairs = {contact.face: slice(*ends[i : i + 2].tolist()) for i, contact in enumerate(contacts)}
-    interface = join(built)
+    interface = join(built) if built else no_contact(K.shape[0])
+    pairs, joints = {}, {}
+    for i, contact in enumerate(contacts):
+        own = slice(*ends[i : i + 2].tolist())
+        pairs[contact.face if contact.face not in pairs else f"{contact.face} on {contact.opposite}"] = own
+        joint = contact.joint or contact.face
+        joints[joint] = slice(joints[joint].start if joint in joints else own.start, own.stop)
+    rows = np.array([motion.row(points, M) for motion in held]).reshape(len(held), K.shape[0])
+    nothing = SecondOrderSystem(M, K)
+    part = Part(nothing, interface, free, points, mesh, np.zeros((0, 0)), pairs, node_sets, joints, follow)
     system = SecondOrderSystem(
-        mass=M[free][:, free],
-        stiffness=K[free][:, free],
-        loads={name: load.vector(mesh, node_sets, M)[free] for name, load in loads.items()},
-        outputs={name: output.vector(mesh, node_sets)[free] for name, output in outputs.items()},
+        mass=part.restricted(M),
+        stiffness=part.restricted(K),
+        loads={name: part.force(load.vector(mesh, node_sets, M)) for name, load in loads.items()},
+        outputs={name: part.force(output.vector(mesh, node_sets)) for name, output in outputs.items()},
     )
-    rows = np.array([motion.row(points, M)[free] for motion in held]).reshape(len(held), len(free))
-    return Part(system, replace(interface, B=interface.B[:, free]), free, points, mesh, rows, pairs, node_sets)
+    held_rows = np.array([part.force(row) for row in rows]).reshape(len(held), len(free))
+    return replace(part, system=system, interface=replace(interface, B=part.rows(interface.B)), held=held_rows)

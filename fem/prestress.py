@@ -40,7 +40,7 @@ def prestressed(
     K = part.system.stiffness + softening
     T = identity(K.shape[0], format="csr") if tie is None else tie
     u = part.field(T @ factorise(csr_matrix(T.T @ K @ T), definite=False).solve(T.T @ force))
-    stress_stiffness = geometric_stiffness(part.mesh, material, u)[part.free][:, part.free]
+    stress_stiffness = part.restricted(geometric_stiffness(part.mesh, material, u))
     return replace(part, system=replace(part.system, stiffness=csr_matrix(K + stress_stiffness)))
 
 
@@ -57,8 +57,8 @@ def spinning(
     they carry when the blades untwist does not stiffen
     """
     mass, _ = assemble(part.mesh, material)
-    force = speed**2 * Centrifugal(axis).vector(part.mesh, part.node_sets, mass)[part.free]
-    softening = spin_softening(mass, axis, speed)[part.free][:, part.free]
+    force = speed**2 * part.force(Centrifugal(axis).vector(part.mesh, part.node_sets, mass))
+    softening = part.restricted(spin_softening(mass, axis, speed))
     return prestressed(part, material, force, softening, tie)
 
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, diags_array
 from scipy.spatial import cKDTree
 
+from tribodyn.fem.assembly import Assembly
 from tribodyn.fem.constraints import named
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.loads import unit
@@ -83,3 +84,36 @@ def _shares(mesh: Any, node_sets: Mapping[str, np.ndarray], name: str) -> tuple[
         return face.nodes, face.area / face.area.sum()
     nodes = named(node_sets, name)
     return nodes, np.full(len(nodes), 1.0 / len(nodes))
+
+
+@dataclass(frozen=True)
+class Mass:
+    """A lumped mass on a reference point of an assembly or on a node set, where it is shared like a stiffness.
+
+    at : name of the point or of the set; mass : [kg]; inertia : about x, y, z [kg m2], of a point only
+    """
+
+    at: str
+    mass: float
+    inertia: Sequence[float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite([self.mass, *self.inertia]).all() and min(self.mass, *self.inertia) >= 0):
+            raise ValueError(f"mass at '{self.at}': mass and inertia must be finite and not negative")
+
+    def matrix(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> csr_matrix:
+        """Mass (3 n_node, 3 n_node) [kg]; [kg m2] at the rotations of a point.
+
+        Raises  ValueError where the set is unknown or empty, or has an inertia
+        """
+        diagonal = np.zeros((mesh.doflocs.shape[1], 3))
+        points = mesh.points if isinstance(mesh, Assembly) else {}
+        if self.at in points:
+            place, turn = points[self.at]
+            diagonal[place], diagonal[turn] = self.mass, self.inertia
+        else:
+            if any(self.inertia):
+                raise ValueError(f"mass at '{self.at}': only the point of a coupling has an inertia; couple the set first")
+            nodes, share = _shares(mesh, node_sets, self.at)
+            diagonal[nodes] = self.mass * share[:, None]
+        return csr_matrix(diags_array(diagonal.ravel()))

@@ -9,6 +9,7 @@ import numpy as np
 from skfem import ElementQuad1, ElementQuad2, ElementTriP1, ElementTriP2, MeshHex2
 from skfem.quadrature import get_quadrature
 
+from tribodyn.fem.assembly import piece_of_facets
 from tribodyn.fem.elements import connectivity, coordinates
 
 # The four quads that a nine-node face shows, in its own node order: corners, mid-sides, middle.
@@ -41,8 +42,7 @@ def surface(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -> Surfa
     facets = np.asarray(facets, dtype=int)
     if len(facets) == 0:
         raise ValueError("a contact or load surface has no faces; check the geometry that defines it")
-    if (mesh.f2t[1, facets] >= 0).any():
-        raise ValueError("a contact or load surface lies inside the body; give faces of its boundary")
+    outside(mesh, facets)
     face_nodes = facet_nodes(mesh, facets)
     weighted, vectors = face_integrals(mesh, facets, vertices_only)
     if vertices_only:
@@ -61,8 +61,24 @@ def surface(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -> Surfa
     return Surface(nodes, coordinates(mesh)[nodes], normals, area, polygons)
 
 
+def outside(mesh: Any, facets: np.ndarray) -> None:
+    """Raise ValueError where some of the facets lie inside a body."""
+    piece, facets = piece_of_facets(mesh, facets)
+    inside = int(np.sum(piece.mesh.f2t[1, facets] >= 0))
+    if inside:
+        raise ValueError(
+            f"a contact or load surface lies inside the body with {inside} of its {len(facets)} facets; give faces of "
+            "its boundary"
+        )
+
+
 def facet_nodes(mesh: Any, facets: np.ndarray) -> np.ndarray:
     """Nodes of the facets (n_facet, 9 or 6): corners in cyclic order, then mid-sides, then the middle."""
+    piece, facets = piece_of_facets(mesh, facets)
+    return piece.node + _facet_nodes(piece.mesh, facets)
+
+
+def _facet_nodes(mesh: Any, facets: np.ndarray) -> np.ndarray:
     connectivity(mesh)
     parts = [mesh.facets[:, facets], mesh.dofs.edge_dofs[0][mesh.f2e[:, facets]]]
     if isinstance(mesh, MeshHex2):
@@ -75,11 +91,13 @@ def face_integrals(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -
 
     Returns (n_facet, k) [m2] and (n_facet, k, 3) [m2]; k nodes of the facet, or its vertices
     """
+    piece, facets = piece_of_facets(mesh, facets)
+    mesh = piece.mesh
     hexahedra = isinstance(mesh, MeshHex2)
     geometry = ElementQuad2() if hexahedra else ElementTriP2()
     linear: Any = ElementQuad1() if hexahedra else ElementTriP1()
     X, w = get_quadrature(geometry, FACE_ORDER)
-    nodes, points = facet_nodes(mesh, facets), coordinates(mesh)
+    nodes, points = _facet_nodes(mesh, facets), coordinates(mesh)
     slopes = np.stack([_tabulate(geometry.lbasis(X, a)[1]) for a in range(nodes.shape[1])])  # n_a, 2, n_q
     tangents = np.einsum("aiq,fax->fiqx", slopes, points[nodes])
     normal = np.cross(tangents[:, 0], tangents[:, 1])  # |normal| is the area element

@@ -101,7 +101,7 @@ def make_part(scene: PartScene, mesh: Any, node_sets: dict[str, np.ndarray]) -> 
         node_sets,
         part_reduction.material(scene),
         clamps(scene),
-        part_reduction.contacts(scene, alone=scene.wheel is not None),
+        part_reduction.contacts(scene),
         loads,
         {
             name: NodalForce(output.group, output.direction)

@@ -31,16 +31,14 @@ def material(scene: PartScene) -> Material:
     return Material(scene.material.young, scene.material.poisson, scene.material.density)
 
 
-def contacts(scene: PartScene, alone: bool = False) -> list[fem_part.Contact]:
-    """The contact of every face; alone : without what it meets, as it is in a sector before the wheel is closed."""
+def contacts(scene: PartScene) -> list[fem_part.Contact]:
+    """The contact of every face; in a wheel the second face is that of the next sector."""
     c = scene.contact
-    opposite = None if alone else c.opposite
-    return [
-        fem_part.Contact(
-            face, c.t1, opposite, c.components, c.gap, c.vertices_only, c.plane, c.inclination
-        )
+    found = [
+        fem_part.Contact(face, c.t1, c.opposite, c.components, c.gap, c.vertices_only, c.plane, c.inclination)
         for face in c.groups
     ]
+    return found if scene.wheel is None else cyclic.turned(found, scene.wheel.sectors, scene.wheel.axis)
 
 
 def reduce(scene: PartScene, part: Part) -> ReducedModel:

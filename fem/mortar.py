@@ -1,0 +1,283 @@
+"""The surface that two faces of different meshes share: where it lies on both, and integrals over it.
+
+Facets of the second face are carried along the normal of a facet of the first one, cut with it, and Gauss points are
+laid on the triangles of each cut. A flat facet is cut in its plane, which is exact for straight edges; a curved one in
+its own reference coordinates, in which the cuts fill it without overlap.
+Source  Puso and Laursen, Computer Methods in Applied Mechanics and Engineering 193, 2004 (segments); Popp, Wohlmuth,
+    Gee and Wall, SIAM Journal on Scientific Computing 34, 2012 (second order)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+from skfem import ElementQuad1, ElementQuad2, ElementTriP1, ElementTriP2, MeshHex2
+from skfem.quadrature import get_quadrature
+
+from tribodyn.fem.assembly import piece_of_facets
+from tribodyn.fem.elements import coordinates
+from tribodyn.fem.surface import facet_nodes, outside
+
+CURVED = 1e-9  # part of its size by which a flat facet may bulge
+EDGE_PIECES = 6  # straight pieces that stand for a curved edge
+FLAT_ORDER, CURVED_ORDER = 8, 12  # of the rule in a triangle; exact for products of two nine-node shape functions
+FACING = -0.3  # cosine between outward normals above which facets do not face each other
+SLIVER = 1e-10  # part of a facet that is too small to be a cut
+
+
+@dataclass(frozen=True)
+class Side:
+    """A face in space: nodes (n_facet, k), points (n_facet, k, 3) [m], corners first, then mid-sides, then middle;
+    centre, normal : (n_facet, 3), the normal outward; sign : (n_facet,) that makes dx/dxi cross dx/deta outward
+    """
+
+    nodes: np.ndarray
+    points: np.ndarray
+    centre: np.ndarray
+    normal: np.ndarray
+    sign: np.ndarray
+
+    @property
+    def corners(self) -> int:
+        """Corners of a facet: 4 or 3."""
+        return 4 if self.nodes.shape[1] == 9 else 3
+
+    @property
+    def length(self) -> float:
+        """Largest extent [m]."""
+        return float(np.linalg.norm(np.ptp(self.points.reshape(-1, 3), axis=0)))
+
+    @property
+    def bulge(self) -> float:
+        """How far mid-side and middle nodes lie off the plane and the straight edges of their corners, relative."""
+        n = self.corners
+        edges = self.points[:, n : 2 * n] - (self.points[:, :n] + np.roll(self.points[:, :n], -1, axis=1)) / 2
+        off = np.einsum("fkx,fx->fk", self.points - self.centre[:, None], self.normal)
+        size = np.linalg.norm(self.points[:, 1] - self.points[:, 0], axis=1)
+        return float((np.maximum(np.abs(edges).max(axis=(1, 2)), np.abs(off).max(axis=1)) / size).max())
+
+
+def side(mesh: Any, facets: np.ndarray, rotation: np.ndarray | None = None) -> Side:
+    """The side that some facets of one body make, turned by a rotation (3, 3) about the origin."""
+    outside(mesh, facets)
+    nodes = facet_nodes(mesh, facets)
+    piece, own = piece_of_facets(mesh, facets)
+    points, inner = coordinates(mesh)[nodes], piece.mesh.p[:, piece.mesh.t[:, piece.mesh.f2t[0, own]]].mean(axis=1).T
+    if rotation is not None:
+        points, inner = points @ rotation.T, inner @ rotation.T
+    n = 4 if isinstance(piece.mesh, MeshHex2) else 3
+    centre = points[:, :n].mean(axis=1)
+    middle = np.tile(np.full((2, 1), 0.5 if n == 4 else 1 / 3), len(nodes))
+    _, slopes = tabulate(points.shape[1], middle)
+    normal = np.cross(*np.einsum("aid,dax->idx", slopes, points))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    sign = np.sign(np.einsum("fx,fx->f", normal, centre - inner))
+    return Side(nodes, points, centre, normal * sign[:, None], sign)
+
+
+def tabulate(k: int, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Shape functions (k, n) and slopes (k, 2, n) of a facet of k nodes (9, 6, 4 or 3) at xi (2, n)."""
+    element = {9: ElementQuad2, 6: ElementTriP2, 4: ElementQuad1, 3: ElementTriP1}[k]()
+    found = [element.lbasis(xi, a) for a in range(k)]
+    slopes = [np.stack(np.broadcast_arrays(*slope, xi[0])[:2]) for _, slope in found]
+    return np.stack([np.broadcast_to(value, xi.shape[1:]) for value, _ in found]), np.stack(slopes)
+
+
+@dataclass(frozen=True)
+class Common:
+    """Gauss points of the surface that two sides share, cut by cut.
+
+    first, second : (n,) facets; xi, eta : (2, n) places on them; weight : (n,) area [m2] on the first side
+    normal : (n, 3) outward unit normal of the first side; gap : (n,) opening along it [m], negative where they overlap
+    cuts : (n_cut + 1,) where the points of each cut begin; covered : (n_facet,) part of each facet of the first side
+    """
+
+    first: np.ndarray
+    second: np.ndarray
+    xi: np.ndarray
+    eta: np.ndarray
+    weight: np.ndarray
+    normal: np.ndarray
+    gap: np.ndarray
+    cuts: np.ndarray
+    covered: np.ndarray
+
+    def each(self) -> Iterator[tuple[int, int, slice]]:
+        """Facets and points of every cut."""
+        for start, stop in zip(self.cuts[:-1].tolist(), self.cuts[1:].tolist(), strict=True):
+            yield int(self.first[start]), int(self.second[start]), slice(start, stop)
+
+
+def common(one: Side, two: Side, reach: float) -> Common:
+    """Where two sides face each other.
+
+    reach : farthest distance along the normal at which facets still meet [m]
+    Returns the points, none where the sides do not meet
+    """
+    i, j = _candidates(one, two, reach)
+    frames = _planes(one.normal)[i]
+    curved = one.bulge > CURVED
+    outline = _outline(two, two.bulge > CURVED)[j]
+    corners = one.points[:, : one.corners]
+    if curved:
+        region = _reference(one.corners)[None].repeat(len(i), axis=0)
+        s = _place(one.points[i].repeat(outline.shape[1], 0), outline.reshape(-1, 3), frames.repeat(outline.shape[1], 0))
+        subject = s.T.reshape(len(i), -1, 2)
+    else:
+        region = np.einsum("pkx,pdx->pkd", corners[i] - one.centre[i][:, None], frames)
+        subject = np.einsum("pkx,pdx->pkd", outline - one.centre[i][:, None], frames)
+    whole = _area(region)
+    region[whole < 0] = region[whole < 0][:, ::-1]
+    polygon = _clip(subject, region)
+    found = np.abs(_area(polygon)) > SLIVER * np.abs(whole)
+    i, j, frames, polygon, whole = i[found], j[found], frames[found], polygon[found], np.abs(whole[found])
+
+    X, w = get_quadrature(ElementTriP1, CURVED_ORDER if curved else FLAT_ORDER)
+    hub = polygon.mean(axis=1, keepdims=True)
+    a, b = polygon - hub, np.roll(polygon, -1, axis=1) - hub
+    twice = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    twice *= np.sign(twice.sum(axis=1, keepdims=True))
+    pair, corner = np.nonzero(np.abs(twice) > SLIVER * whole[:, None])
+    s = hub[pair, 0][:, None] + X[0][:, None] * a[pair, corner][:, None] + X[1][:, None] * b[pair, corner][:, None]
+    weight = (twice[pair, corner][:, None] * w).ravel()
+    s, of = s.reshape(-1, 2).T, np.repeat(pair, len(w))
+
+    local = one.points[i[of]]
+    if curved:
+        xi = s
+    else:
+        e = frames[of]
+        at = one.centre[i[of]] + s[0][:, None] * e[:, 0] + s[1][:, None] * e[:, 1]
+        xi = _place(local, at, e)
+    N, slopes = tabulate(local.shape[1], xi)
+    x = np.einsum("an,nax->nx", N, local)
+    normal = np.cross(*np.einsum("ain,nax->inx", slopes, local)) * one.sign[i[of]][:, None]
+    size = np.linalg.norm(normal, axis=1)
+    if curved:
+        weight = weight * size
+    normal = normal / size[:, None]
+    eta = _place(two.points[j[of]], x, frames[of])
+    y = np.einsum("an,nax->nx", tabulate(two.points.shape[1], eta)[0], two.points[j[of]])
+    gap = np.einsum("nx,nx->n", y - x, normal)
+    covered = np.bincount(i, np.abs(_area(polygon)) / whole, len(one.nodes))
+    near = np.abs(gap) <= reach
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(of[near])) + 1, [int(near.sum())]]) if near.any() else np.zeros(1)
+    if not near.all():
+        kept = np.bincount(i[of], np.where(near, np.abs(weight), 0.0), len(one.nodes))
+        everything = np.bincount(i[of], np.abs(weight), len(one.nodes))
+        covered = covered * np.divide(kept, everything, out=np.zeros_like(kept), where=everything > 0)
+    return Common(
+        i[of][near], j[of][near], xi[:, near], eta[:, near], weight[near], normal[near], gap[near],
+        starts.astype(int), covered,
+    )  # fmt: skip
+
+
+def _candidates(one: Side, two: Side, reach: float) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of facets that may meet."""
+    r_1, r_2 = (np.linalg.norm(s.points - s.centre[:, None], axis=2).max(axis=1) for s in (one, two))
+    near = cKDTree(two.centre).query_ball_point(one.centre, r_1 + r_2.max() + reach)
+    i = np.repeat(np.arange(len(near)), [len(n) for n in near])
+    j = np.concatenate([np.sort(np.asarray(n, dtype=int)) for n in near]) if len(i) else np.zeros(0, dtype=int)
+    apart = two.centre[j] - one.centre[i]
+    along = np.einsum("px,px->p", apart, one.normal[i])
+    across = np.linalg.norm(apart - along[:, None] * one.normal[i], axis=1)
+    facing = np.einsum("px,px->p", one.normal[i], two.normal[j]) < FACING
+    meet = facing & (across <= r_1[i] + r_2[j]) & (np.abs(along) <= reach + r_1[i] + r_2[j])
+    return i[meet], j[meet]
+
+
+def _planes(normal: np.ndarray) -> np.ndarray:
+    """Two directions (n, 2, 3) normal to each normal and to each other."""
+    least = np.eye(3)[np.abs(normal).argmin(axis=1)]
+    first = np.cross(normal, least)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(normal, first)], axis=1)
+
+
+def _reference(corners: int) -> np.ndarray:
+    return np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]) if corners == 4 else np.array([[0.0, 0], [1, 0], [0, 1]])
+
+
+def _outline(of: Side, curved: bool) -> np.ndarray:
+    """Points (n_facet, m, 3) around each facet: its corners, and more where edges are curved."""
+    n = of.corners
+    corners, middles = of.points[:, :n], of.points[:, n : 2 * n]
+    if not curved:
+        return corners
+    t = np.arange(EDGE_PIECES)[:, None] / EDGE_PIECES
+    following = np.roll(corners, -1, axis=1)
+    shape = (1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)
+    edge = sum(N * p[:, :, None] for N, p in zip(shape, (corners, middles, following), strict=True))
+    return np.asarray(edge).reshape(len(corners), -1, 3)
+
+
+def _area(polygon: np.ndarray) -> np.ndarray:
+    """Signed areas of polygons (n, m, 2)."""
+    x, y = polygon[..., 0], polygon[..., 1]
+    return np.asarray((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) / 2)
+
+
+def _clip(subject: np.ndarray, region: np.ndarray) -> np.ndarray:
+    """Polygons (n, m, 2) cut by convex ones (n, k, 2), counterclockwise; vertices may repeat, none left is all equal.
+
+    Source  Sutherland and Hodgman, Communications of the ACM 17, 1974, for all polygons at once: a vertex that is cut
+        off moves to where its edges cross the line, so that each cut doubles no more than the vertices
+    """
+    for k in range(region.shape[1]):
+        start, end = region[:, k], region[:, (k + 1) % region.shape[1]]
+        edge = end - start
+        away = subject - start[:, None]
+        inside = edge[:, None, 0] * away[..., 1] - edge[:, None, 1] * away[..., 0]
+        following, beyond = np.roll(subject, -1, axis=1), np.roll(inside, -1, axis=1)
+        crosses = (inside >= 0) != (beyond >= 0)
+        t = np.divide(inside, inside - beyond, out=np.zeros_like(inside), where=crosses)
+        crossing = subject + t[..., None] * (following - subject)
+        m = subject.shape[1]
+        candidates = np.stack([subject, crossing], axis=2).reshape(len(subject), 2 * m, 2)
+        kept = np.stack([inside >= 0, crosses], axis=2).reshape(len(subject), 2 * m)
+        count = kept.sum(axis=1)
+        width = max(int(count.max(initial=0)), 1)
+        order = np.argsort(~kept, axis=1, kind="stable")[:, :width]
+        packed = np.take_along_axis(candidates, order[..., None], axis=1)
+        last = np.maximum(count - 1, 0)[:, None]
+        place = np.minimum(np.arange(width)[None], last)
+        subject = np.take_along_axis(packed, place[..., None], axis=1)
+        subject[count == 0] = 0.0
+    return subject
+
+
+def _place(points: np.ndarray, at: np.ndarray, e: np.ndarray) -> np.ndarray:
+    """Reference coordinates (2, n) of the point of each facet that lies at `at` as seen along the normal to e.
+
+    points : (n, k, 3) facets; at : (n, 3); e : (n, 2, 3). Far outside a facet its map at the middle is taken as linear
+    """
+    k = points.shape[1]
+    xi = np.full((2, len(at)), 0.5 if k == 9 else 1 / 3)
+    first = None
+    open_ = np.arange(len(at))
+    for _ in range(25):
+        N, slopes = tabulate(k, xi[:, open_])
+        local = points[open_]
+        off = np.einsum("nix,nx->ni", e[open_], at[open_] - np.einsum("an,nax->nx", N, local))
+        J = np.einsum("nix,ajn,nax->nij", e[open_], slopes, local)
+        det = J[:, 0, 0] * J[:, 1, 1] - J[:, 0, 1] * J[:, 1, 0]
+        det = np.where(det == 0, np.inf, det)
+        step = np.stack(
+            [J[:, 1, 1] * off[:, 0] - J[:, 0, 1] * off[:, 1], J[:, 0, 0] * off[:, 1] - J[:, 1, 0] * off[:, 0]]
+        ) / det
+        xi[:, open_] += step
+        if first is None:
+            first = xi.copy()
+        open_ = open_[np.abs(step).max(axis=0) > 1e-13]
+        if not len(open_):
+            break
+    assert first is not None or not len(at)
+    lost = ~(np.abs(xi - 0.5).max(axis=0, initial=0) < 3.0)
+    lost[open_] |= np.abs(xi[:, open_] - 0.5).max(axis=0, initial=0) > 1.0
+    if lost.any() and first is not None:
+        xi[:, lost] = first[:, lost]
+    return xi

@@ -1,0 +1,156 @@
+"""Contact of two faces whose meshes do not match: weighted relative displacements at points of the first face.
+
+At point A with weight function phi_A the relative displacement is the mean of that of the two faces,
+x_A = (1 / a_A) integral of phi_A (u_1 - u_2), a_A = integral of phi_A > 0. The functions sum to one, so that a constant
+pressure acts on both bodies as its consistent nodal forces. On a whole nine-node facet phi are its shape functions: they
+keep the first and second moments of the face. Where a facet is covered in part, or has three corners, phi are the linear
+functions of its corners, which are positive wherever it is cut.
+Source  Puso and Laursen, Computer Methods in Applied Mechanics and Engineering 193, 2004
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix
+
+from tribodyn.fem.interface import COMPONENTS, ContactInterface
+from tribodyn.fem.matching import Mismatch
+from tribodyn.fem.mortar import Common, Side, common, side, tabulate
+from tribodyn.fem.surface import NINE_NODE_QUADS
+
+WHOLE = 1 - 1e-6  # part of a facet that counts as all of it
+FEW = 1e-6  # part of a point's own area that is too little to carry anything
+ROUNDING = 1e-9  # gap that is rounding of node positions, as a part of the length of the face
+
+
+def mortar_halves(
+    mesh: Any,
+    facets_1: np.ndarray,
+    facets_2: np.ndarray,
+    t1: Sequence[float],
+    components: Sequence[str],
+    reach: float,
+    vertices_only: bool = False,
+    rotation: np.ndarray | None = None,
+) -> tuple[ContactInterface, csr_matrix]:
+    """Both halves of a contact, as `fem.contact.pair_halves` gives them, with the gap of the geometry.
+
+    reach : farthest distance along the normal at which the faces still meet [m]
+    Raises  Mismatch where they do not meet
+    """
+    from tribodyn.fem.contact import contact_frames
+
+    turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
+    one, two = side(mesh, facets_1), side(mesh, facets_2, None if rotation is None else turn)
+    shared = common(one, two, reach)
+    if not len(shared.weight):
+        raise Mismatch(apart(one, two, reach))
+    n = one.corners
+    whole = (shared.covered >= WHOLE) & (n == 4) & (not vertices_only)
+    frames = contact_frames(shared.normal, t1)
+    picked = [COMPONENTS.index(c) for c in components]
+
+    nodes = np.unique(np.where(whole[:, None], one.nodes, one.nodes[:, [*range(n)] + [0] * (one.nodes.shape[1] - n)]))
+    place = {int(node): at for at, node in enumerate(nodes)}
+    area, gap = np.zeros((2, len(nodes)))
+    directions = np.zeros((len(nodes), 3, 3))
+    first: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    second: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    for i, j, g in shared.each():
+        phi = tabulate(one.nodes.shape[1] if whole[i] else n, shared.xi[:, g])[0] * shared.weight[g]
+        at = np.array([place[int(node)] for node in one.nodes[i, : len(phi)]])
+        np.add.at(area, at, phi.sum(axis=1))
+        np.add.at(gap, at, phi @ shared.gap[g])
+        np.add.at(directions, at, np.einsum("ag,gcx->acx", phi, frames[g]))
+        for found, of, xi, frame in (
+            (first, one.nodes[i], shared.xi[:, g], frames[g][:, picked]),
+            (second, two.nodes[j], shared.eta[:, g], frames[g][:, picked] @ turn),
+        ):
+            N = tabulate(len(of), xi)[0]
+            rows = phi @ np.einsum("gcx,kg->gckx", frame, N).reshape(len(xi[0]), -1)
+            lines = at[:, None, None, None] * len(picked) + np.arange(len(picked))[None, :, None, None]
+            columns = of[None, None, :, None] * 3 + np.arange(3)
+            shape = (len(at), len(picked), len(of), 3)
+            found.append((rows, np.broadcast_to(lines, shape).ravel(), np.broadcast_to(columns, shape).ravel()))
+
+    kept = area > FEW * _own_area(one, whole, nodes)
+    area, gap, directions = area[kept], gap[kept] / area[kept], directions[kept]
+    gap[np.abs(gap) < ROUNDING * one.length] = 0.0
+    n_dof = 3 * mesh.doflocs.shape[1]
+    B_1, B_2 = (_map(found, kept, area, len(picked), n_dof) for found in (first, second))
+    new = np.cumsum(kept) - 1
+    faces = [
+        new[[place[int(node)] for node in of[quad]]]
+        for i, of in enumerate(one.nodes)
+        if shared.covered[i] > 0
+        for quad in (NINE_NODE_QUADS if whole[i] else [np.arange(n)])
+        if kept[[place[int(node)] for node in of[quad]]].all()
+    ]
+    interface = ContactInterface(
+        components=tuple(components),
+        points=one.points.reshape(-1, 3)[_first_place(one.nodes, nodes[kept])],
+        frames=_orthonormal(directions),
+        area=area,
+        gap=gap,
+        B=B_1,
+        faces=np.array(faces, dtype=int).reshape(-1, n),
+    )
+    return interface, B_2
+
+
+def apart(one: Side, two: Side, reach: float) -> str:
+    """Why two sides do not meet, in a sentence."""
+    from scipy.spatial import cKDTree
+
+    distance, other = cKDTree(two.centre).query(one.centre)
+    nearest = int(distance.argmin())
+    facing = float(one.normal[nearest] @ two.normal[other[nearest]])
+    if distance.min() <= reach + one.length and facing > 0:
+        return "the two contact faces look the same way: give faces that look at each other"
+    return (
+        f"the two contact faces do not meet: they are about {distance.min():.3g} m apart and the farthest that is looked "
+        f"is {reach:.3g} m; move a body, or give reach"
+    )
+
+
+def _own_area(one: Side, whole: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Area of each point if all its facets were covered, to within their distortion [m2]."""
+    n = one.corners
+    corner = one.points[:, :n]
+    size = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, -1] - corner[:, 0]), axis=1)
+    total = np.zeros(len(nodes))
+    at = np.searchsorted(nodes, one.nodes[:, :n])
+    np.add.at(total, at, np.repeat(size[:, None] / 36, n, axis=1))
+    beyond = np.searchsorted(nodes, one.nodes[whole][:, n:])
+    np.add.at(total, beyond, np.repeat(size[whole][:, None] / 9, one.nodes.shape[1] - n, axis=1))
+    return total
+
+
+def _map(
+    found: list[tuple[np.ndarray, np.ndarray, np.ndarray]], kept: np.ndarray, area: np.ndarray, n_comp: int, n_dof: int
+) -> csr_matrix:
+    """Rows of the kept points over all DOFs, means over their areas."""
+    values = np.concatenate([rows.ravel() for rows, _, _ in found])
+    lines, columns = (np.concatenate([item[k] for item in found]) for k in (1, 2))
+    full = csr_matrix(coo_matrix((values, (lines, columns)), shape=(len(kept) * n_comp, n_dof)))
+    rows = csr_matrix(full[np.repeat(kept, n_comp)])
+    rows.data /= np.repeat(np.repeat(area, n_comp), np.diff(rows.indptr))
+    rows.data[np.abs(rows.data) < 1e-14] = 0.0  # rounding must not make a DOF a master
+    rows.eliminate_zeros()
+    return rows
+
+
+def _first_place(nodes: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    flat, place = np.unique(nodes.ravel(), return_index=True)
+    return place[np.searchsorted(flat, wanted)]
+
+
+def _orthonormal(directions: np.ndarray) -> np.ndarray:
+    """Right-handed frames nearest to mean directions (n, 3, 3), the normal kept."""
+    normal = directions[:, 2] / np.linalg.norm(directions[:, 2], axis=1, keepdims=True)
+    first = directions[:, 0] - np.einsum("nx,nx->n", directions[:, 0], normal)[:, None] * normal
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(normal, first), normal], axis=1)
