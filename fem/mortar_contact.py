@@ -18,7 +18,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.fem.matching import Mismatch
-from tribodyn.fem.mortar import Common, Side, common, side, tabulate
+from tribodyn.fem.mortar import Side, common, side, tabulate
 from tribodyn.fem.surface import NINE_NODE_QUADS
 
 WHOLE = 1 - 1e-6  # part of a facet that counts as all of it

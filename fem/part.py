@@ -15,7 +15,6 @@ from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.fem.loads import Load, NodalForce
-from tribodyn.fem.matching import Mismatch
 from tribodyn.fem.springs import Mass, Spring
 from tribodyn.fem.system import SecondOrderSystem
 

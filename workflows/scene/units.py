@@ -12,26 +12,27 @@ import re
 from dataclasses import dataclass
 from fractions import Fraction
 
-Dimension = tuple[int, int, int, int]  # exponents of kg, m, s, turn
+Dimension = tuple[int, int, int, int, int]  # exponents of kg, m, s, turn, K
 
 PREFIXES = {name: Fraction(10) ** power for name, power in dict(n=-9, u=-6, m=-3, c=-2, k=3, M=6, G=9).items()}
 
 # name -> (SI factor, dimension, prefixes that may stand before it)
 UNITS: dict[str, tuple[Fraction, Dimension, str]] = {
-    "m": (Fraction(1), (0, 1, 0, 0), "numck"),
-    "g": (Fraction(1, 1000), (1, 0, 0, 0), "umk"),
-    "t": (Fraction(1000), (1, 0, 0, 0), ""),
-    "s": (Fraction(1), (0, 0, 1, 0), "num"),
-    "min": (Fraction(60), (0, 0, 1, 0), ""),
-    "h": (Fraction(3600), (0, 0, 1, 0), ""),
-    "N": (Fraction(1), (1, 1, -2, 0), "numkMG"),
-    "Pa": (Fraction(1), (1, -1, -2, 0), "kMG"),
-    "J": (Fraction(1), (1, 2, -2, 0), "numkM"),
-    "Hz": (Fraction(1), (0, 0, -1, 1), "mkM"),
-    "rpm": (Fraction(1, 60), (0, 0, -1, 1), ""),
-    "rad": (Fraction(1 / (2 * math.pi)), (0, 0, 0, 1), "m"),
-    "deg": (Fraction(1, 360), (0, 0, 0, 1), ""),
-    "%": (Fraction(1, 100), (0, 0, 0, 0), ""),
+    "m": (Fraction(1), (0, 1, 0, 0, 0), "numck"),
+    "g": (Fraction(1, 1000), (1, 0, 0, 0, 0), "umk"),
+    "t": (Fraction(1000), (1, 0, 0, 0, 0), ""),
+    "s": (Fraction(1), (0, 0, 1, 0, 0), "num"),
+    "min": (Fraction(60), (0, 0, 1, 0, 0), ""),
+    "h": (Fraction(3600), (0, 0, 1, 0, 0), ""),
+    "N": (Fraction(1), (1, 1, -2, 0, 0), "numkMG"),
+    "Pa": (Fraction(1), (1, -1, -2, 0, 0), "kMG"),
+    "J": (Fraction(1), (1, 2, -2, 0, 0), "numkM"),
+    "Hz": (Fraction(1), (0, 0, -1, 1, 0), "mkM"),
+    "rpm": (Fraction(1, 60), (0, 0, -1, 1, 0), ""),
+    "rad": (Fraction(1 / (2 * math.pi)), (0, 0, 0, 1, 0), "m"),
+    "deg": (Fraction(1, 360), (0, 0, 0, 1, 0), ""),
+    "K": (Fraction(1), (0, 0, 0, 0, 1), "mk"),
+    "%": (Fraction(1, 100), (0, 0, 0, 0, 0), ""),
 }
 
 NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*$")
@@ -52,7 +53,7 @@ def parse_unit(text: str) -> Unit:
     Factors are separated by "*", "·" or a blank; everything after a "/" up to the next "/" divides.
     Raises  ValueError: a factor is not a known unit
     """
-    factor, dimension = Fraction(1), [0, 0, 0, 0]
+    factor, dimension = Fraction(1), [0, 0, 0, 0, 0]
     plain = text.replace("µ", "u").replace("μ", "u").replace("³", "3").replace("²", "2")
     for position, group in enumerate(plain.split("/")):
         sign = -1 if position else 1
@@ -66,7 +67,7 @@ def parse_unit(text: str) -> Unit:
             power = sign * int(match[2] or 1)
             factor *= scale**power
             dimension = [d + power * e for d, e in zip(dimension, exponents, strict=True)]
-    return Unit(factor, (dimension[0], dimension[1], dimension[2], dimension[3]))
+    return Unit(factor, (dimension[0], dimension[1], dimension[2], dimension[3], dimension[4]))
 
 
 def _lookup(name: str) -> tuple[Fraction, Dimension]:
@@ -97,7 +98,7 @@ def to_si(value: object, unit: str) -> float:
     match = NUMBER.match(value)
     if match is None:
         raise ValueError(f'{expected}, got "{value}"')
-    if not match[2] and wanted.dimension != (0, 0, 0, 0):
+    if not match[2] and wanted.dimension != (0, 0, 0, 0, 0):
         raise ValueError(f'{expected}, got "{value}" without a unit')
     try:
         given = parse_unit(match[2])
@@ -124,6 +125,11 @@ EXAMPLES = {
     "1/s": ("a rate", "5 1/s"),
     "J": ("an energy", "3 J"),
     "kg": ("a mass", "3 kg"),
+    "kg m2": ("a moment of inertia", "2e-4 kg m2"),
+    "m/s2": ("an acceleration", "9.81 m/s2"),
+    "N m": ("a moment", "12 N m"),
+    "K": ("a temperature difference", "80 K"),
+    "1/K": ("a coefficient of expansion", "12e-6 1/K"),
     "": ("a number", "0.5"),
 }
 
@@ -139,5 +145,5 @@ def _name(dimension: Dimension) -> str:
     for unit, (name, _) in EXAMPLES.items():
         if parse_unit(unit).dimension == dimension:
             return name
-    symbols = zip(("kg", "m", "s", "turn"), dimension, strict=True)
+    symbols = zip(("kg", "m", "s", "turn", "K"), dimension, strict=True)
     return "in " + " ".join(f"{symbol}^{power}" for symbol, power in symbols if power)

@@ -1,0 +1,124 @@
+"""Contacts of faces that do not match: patch tests, moments, gaps of the geometry."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import skfem
+
+from tribodyn.fem.assembly import Assembly, Body
+from tribodyn.fem.contact import facing_halves
+from tribodyn.fem.loads import Pressure
+from tribodyn.fem.material import Material
+
+STEEL = Material(210e9, 0.3, 7860.0)
+L = np.linspace
+
+
+def block(x, y, z, tets=False, bend=0.0):
+    """A block with its bottom and top named, bent to z + bend (x - 0.3)^2, which second order represents exactly."""
+    grid = skfem.MeshTet if tets else skfem.MeshHex
+    mesh = (skfem.MeshTet2 if tets else skfem.MeshHex2).from_mesh(grid.init_tensor(x, y, z))
+    height = mesh.p[2][mesh.facets]
+    low, high = (np.flatnonzero(np.abs(height - at).max(axis=0) < 1e-9) for at in (z[0], z[-1]))
+    locations = mesh.doflocs.copy()
+    locations[2] += bend * (locations[0] - 0.3) ** 2
+    return replace(mesh, doflocs=locations).with_boundaries({"bottom": low, "top": high})
+
+
+def pair(tets, bend=0.0, gap=0.0, lower=(6, 5)):
+    upper = block(L(0, 1, 4), L(0, 1, 4), L(gap, 0.3, 2), False, bend)
+    under = block(L(0, 1, lower[0]), L(0, 1, lower[1]), L(-0.4, 0, 2), tets, bend)
+    return Assembly([Body("upper", upper, {}, STEEL), Body("lower", under, {}, STEEL)])
+
+
+def halves(of, first, second, **more):
+    return facing_halves(of, of.boundaries[first], of.boundaries[second], (1, 0, 0), **more)
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.2])
+@pytest.mark.parametrize("tets", [False, True])
+@pytest.mark.parametrize("faces", [("upper.bottom", "lower.top"), ("lower.top", "upper.bottom")])
+def test_constant_tractions_are_those_of_both_bodies(tets, bend, faces):
+    both = pair(tets, bend)
+    interface, B_2 = halves(both, *faces)
+    assert (interface.area > 0).all()
+    pressure = np.zeros((interface.n_pair, 3))
+    pressure[:, 2] = interface.area
+    for face, force in ((faces[0], interface.B.T @ pressure.ravel()), (faces[1], -B_2.T @ pressure.ravel())):
+        consistent = -Pressure(face).vector(both, both.node_sets, None)
+        assert np.abs(force - consistent).max() < 1e-12 * np.abs(consistent).max()
+    # a shear of constant direction keeps resultant and moment on both sides
+    shear = interface.frames[:, 0] * interface.area[:, None]
+    local = np.einsum("pcx,px->pc", interface.frames, shear).ravel()
+    f_1, f_2 = ((B.T @ local).reshape(-1, 3) for B in (interface.B, B_2))
+    assert f_1.sum(axis=0) == pytest.approx(f_2.sum(axis=0), abs=1e-12)
+    at = both.doflocs.T
+    assert np.cross(at, f_1).sum(axis=0) == pytest.approx(np.cross(at, f_2).sum(axis=0), abs=1e-12)
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.2])
+def test_rigid_motion_of_both_is_no_relative_motion_and_moments_are_kept(bend):
+    both = pair(True, bend)
+    interface, B_2 = halves(both, "upper.bottom", "lower.top")
+    at = both.doflocs.T
+    rigid = np.cross([0.3, 0.5, 0.7], at) + [1.0, 2.0, 3.0]
+    assert np.abs((interface.B - B_2) @ rigid.ravel()).max() < 1e-13
+    if not bend:
+        seen = (interface.B @ at.ravel()).reshape(-1, 3)[:, :2]
+        assert seen[:, 0] @ interface.area == pytest.approx(1 / 2, rel=1e-13)
+        assert seen[:, 0] ** 2 @ interface.area == pytest.approx(1 / 3, rel=1e-13)
+        assert (seen[:, 0] * seen[:, 1]) @ interface.area == pytest.approx(-1 / 4, rel=1e-13)
+
+
+@pytest.mark.parametrize("gap", [1e-6, -1e-6, 0.02])
+@pytest.mark.parametrize("lower", [(6, 5), (4, 4)])
+def test_the_gap_is_that_of_the_geometry_with_its_sign(gap, lower):
+    both = pair(False, gap=gap, lower=lower)
+    interface, _ = halves(both, "upper.bottom", "lower.top")
+    assert interface.gap == pytest.approx(np.full(interface.n_pair, gap), rel=1e-9)
+    over, _ = halves(both, "upper.bottom", "lower.top", gap=3e-5)
+    assert (over.gap == 3e-5).all()
+
+
+def test_a_coarse_face_on_a_fine_one_uses_every_node_of_it():
+    both = pair(False, lower=(7, 7))  # the upper grid of 4 x 4 lies on every second line of the lower one
+    assert len(both.boundaries["lower.top"]) == 36
+    for faces in (("upper.bottom", "lower.top"), ("lower.top", "upper.bottom")):
+        interface, B_2 = halves(both, *faces)
+        fine = B_2 if faces[0].startswith("upper") else interface.B
+        touched = np.unique(fine.nonzero()[1] // 3)
+        assert len(touched) == 13 * 13
+        assert interface.area.sum() == pytest.approx(1.0, rel=1e-13)
+
+
+def test_a_face_that_overhangs_is_cut_where_the_other_ends():
+    upper = block(L(0.25, 1.5, 6), L(0.1, 0.8, 4), L(0, 0.3, 2))
+    under = block(L(0, 1, 6), L(0, 1, 5), L(-0.4, 0, 2), True)
+    both = Assembly([Body("upper", upper, {}, STEEL), Body("lower", under, {}, STEEL)])
+    interface, B_2 = halves(both, "upper.bottom", "lower.top")
+    assert interface.area.sum() == pytest.approx(0.75 * 0.7, rel=1e-12)
+    assert (interface.area > 0).all()
+    ones = np.ones(3 * both.doflocs.shape[1])
+    assert np.abs((interface.B - B_2) @ ones).max() < 1e-12
+
+
+def test_matching_faces_are_paired_node_by_node():
+    both = pair(False, lower=(4, 4))
+    interface, B_2 = halves(both, "upper.bottom", "lower.top")
+    assert interface.n_pair == 49
+    assert (np.diff(B_2.indptr) == 1).all()
+    weighed, _ = halves(both, "upper.bottom", "lower.top", pairing="mortar")
+    assert weighed.area == pytest.approx(interface.area, rel=1e-12)
+
+
+def test_what_does_not_meet_is_one_sentence():
+    both = pair(False, gap=0.25)
+    with pytest.raises(ValueError, match=r"do not meet: they are about 0.25\d* m apart"):
+        halves(both, "upper.bottom", "lower.top")
+    with pytest.raises(ValueError, match="look the same way"):
+        halves(pair(True), "upper.top", "lower.top", reach=0.5)
+    with pytest.raises(ValueError, match="several bodies"):
+        facing_halves(both, np.concatenate([both.boundaries["upper.bottom"], both.boundaries["lower.top"]]), [0], (1, 0, 0))
