@@ -19,7 +19,9 @@ Materials = AnyMaterial | Mapping[str, AnyMaterial]
 
 @dataclass(frozen=True)
 class Body:
-    """name : unique in an assembly; mesh, node_sets : as geometry.mesh.read gives them; material : one, or by subdomain."""
+    """name : unique in an assembly, may be empty for an only body, whose groups then keep their names;
+    mesh, node_sets : as geometry.mesh.read gives them; material : one, or by subdomain
+    """
 
     name: str
     mesh: Any

@@ -79,7 +79,7 @@ def free_dofs(n_dof: int, clamps: Iterable[Clamp], node_sets: Mapping[str, np.nd
 
 @dataclass(frozen=True)
 class Following:
-    """DOFs that follow others: u[dofs] = map @ u. dofs : (k,); map : (k, n_dof); what : which constraint, for errors."""
+    """DOFs (k,) that follow others: u[dofs] = map @ u with map (k, n_dof); what : which constraint, for errors."""
 
     dofs: np.ndarray
     map: csr_matrix
@@ -106,8 +106,8 @@ def restriction(n_dof: int, free: np.ndarray, constraints: Sequence[Following]) 
         taken = one.dofs[owner[one.dofs] >= 0]
         if len(taken):
             raise ValueError(
-                f"{one.what} and {constraints[owner[taken[0]]].what} both move the same nodes; let one of them take the "
-                "other face first"
+                f"{one.what} and {constraints[owner[taken[0]]].what} both move the same nodes; let one of them take "
+                "the other face first"
             )
         if held[one.dofs].any():
             raise ValueError(f"{one.what} moves nodes that are clamped; swap its faces, or clamp the other one")

@@ -31,7 +31,8 @@ def assemble(mesh: Any, material: Any, order: int | None = None) -> tuple[csr_ma
     if len(found) == 1 and not n_beyond:
         return found[0]
     beyond = [csr_matrix((n_beyond, n_beyond))] if n_beyond else []
-    return tuple(block_diag([*blocks, *beyond], format="csr") for blocks in zip(*found, strict=True))  # type: ignore
+    mass, stiffness = (block_diag([*blocks, *beyond], format="csr") for blocks in zip(*found, strict=True))
+    return mass, stiffness
 
 
 def _assemble(

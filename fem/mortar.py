@@ -125,7 +125,8 @@ def common(one: Side, two: Side, reach: float) -> Common:
     corners = one.points[:, : one.corners]
     if curved:
         region = _reference(one.corners)[None].repeat(len(i), axis=0)
-        s = _place(one.points[i].repeat(outline.shape[1], 0), outline.reshape(-1, 3), frames.repeat(outline.shape[1], 0))
+        m = outline.shape[1]
+        s = _place(one.points[i].repeat(m, 0), outline.reshape(-1, 3), frames.repeat(m, 0))
         subject = s.T.reshape(len(i), -1, 2)
     else:
         region = np.einsum("pkx,pdx->pkd", corners[i] - one.centre[i][:, None], frames)
@@ -165,14 +166,14 @@ def common(one: Side, two: Side, reach: float) -> Common:
     gap = np.einsum("nx,nx->n", y - x, normal)
     covered = np.bincount(i, np.abs(_area(polygon)) / whole, len(one.nodes))
     near = np.abs(gap) <= reach
-    starts = np.concatenate([[0], np.flatnonzero(np.diff(of[near])) + 1, [int(near.sum())]]) if near.any() else np.zeros(1)
+    starts = np.append(np.flatnonzero(np.diff(of[near], prepend=-1)), near.sum())
     if not near.all():
         kept = np.bincount(i[of], np.where(near, np.abs(weight), 0.0), len(one.nodes))
         everything = np.bincount(i[of], np.abs(weight), len(one.nodes))
         covered = covered * np.divide(kept, everything, out=np.zeros_like(kept), where=everything > 0)
     return Common(
         i[of][near], j[of][near], xi[:, near], eta[:, near], weight[near], normal[near], gap[near],
-        starts.astype(int), covered,
+        starts, covered,
     )  # fmt: skip
 
 

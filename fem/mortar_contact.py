@@ -1,10 +1,10 @@
 """Contact of two faces whose meshes do not match: weighted relative displacements at points of the first face.
 
 At point A with weight function phi_A the relative displacement is the mean of that of the two faces,
-x_A = (1 / a_A) integral of phi_A (u_1 - u_2), a_A = integral of phi_A > 0. The functions sum to one, so that a constant
-pressure acts on both bodies as its consistent nodal forces. On a whole nine-node facet phi are its shape functions: they
-keep the first and second moments of the face. Where a facet is covered in part, or has three corners, phi are the linear
-functions of its corners, which are positive wherever it is cut.
+x_A = (1 / a_A) integral of phi_A (u_1 - u_2), a_A = integral of phi_A > 0. The functions sum to one, so that a
+constant pressure acts on both bodies as its consistent nodal forces. On a whole nine-node facet phi are its shape
+functions: they keep the first and second moments of the face. Where a facet is covered in part, or has three corners,
+phi are the linear functions of its corners, which are positive wherever it is cut.
 Source  Puso and Laursen, Computer Methods in Applied Mechanics and Engineering 193, 2004
 """
 
@@ -111,8 +111,8 @@ def apart(one: Side, two: Side, reach: float) -> str:
     if distance.min() <= reach + one.length and facing > 0:
         return "the two contact faces look the same way: give faces that look at each other"
     return (
-        f"the two contact faces do not meet: they are about {distance.min():.3g} m apart and the farthest that is looked "
-        f"is {reach:.3g} m; move a body, or give reach"
+        f"the two contact faces do not meet: they are about {distance.min():.3g} m apart and the farthest that is "
+        f"looked is {reach:.3g} m; move a body, or give reach"
     )
 
 

@@ -169,7 +169,8 @@ def build(
     built = [contact.build(mesh) for contact in contacts]
     ends = np.cumsum([0] + [one.n_pair for one in built])
     interface = join(built) if built else no_contact(K.shape[0])
-    pairs, joints = {}, {}
+    pairs: dict[str, slice] = {}
+    joints: dict[str, slice] = {}
     for i, contact in enumerate(contacts):
         own = slice(*ends[i : i + 2].tolist())
         pairs[contact.face if contact.face not in pairs else f"{contact.face} on {contact.opposite}"] = own

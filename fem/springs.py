@@ -113,7 +113,7 @@ class Mass:
             diagonal[place], diagonal[turn] = self.mass, self.inertia
         else:
             if any(self.inertia):
-                raise ValueError(f"mass at '{self.at}': only the point of a coupling has an inertia; couple the set first")
+                raise ValueError(f"mass at '{self.at}': only a coupling's point has an inertia; couple the set")
             nodes, share = _shares(mesh, node_sets, self.at)
             diagonal[nodes] = self.mass * share[:, None]
         return csr_matrix(diags_array(diagonal.ravel()))

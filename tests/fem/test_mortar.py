@@ -120,5 +120,6 @@ def test_what_does_not_meet_is_one_sentence():
         halves(both, "upper.bottom", "lower.top")
     with pytest.raises(ValueError, match="look the same way"):
         halves(pair(True), "upper.top", "lower.top", reach=0.5)
+    faces = np.concatenate([both.boundaries["upper.bottom"], both.boundaries["lower.top"]])
     with pytest.raises(ValueError, match="several bodies"):
-        facing_halves(both, np.concatenate([both.boundaries["upper.bottom"], both.boundaries["lower.top"]]), [0], (1, 0, 0))
+        facing_halves(both, faces, [0], (1, 0, 0))
