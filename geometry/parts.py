@@ -19,6 +19,13 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(file.stem for file in _FOLDER.glob("*.py") if _is_part(file)))
 
 
+def file_of(name: str) -> Path:
+    """The file of a part; raises ValueError with the parts that there are."""
+    if name not in names():
+        raise ValueError(f"there is no part '{name}': the parts are {', '.join(names())}, or give a file my_part.py")
+    return _FOLDER / f"{name}.py"
+
+
 def load(name: str) -> ModuleType:
     """Import a part.
 
@@ -26,8 +33,7 @@ def load(name: str) -> ModuleType:
     Returns the module, with `Parameters` and `build`
     Raises ValueError: there is no such part
     """
-    if name not in names():
-        raise ValueError(f"there is no part '{name}': the parts are {', '.join(names())}")
+    file_of(name)
     return importlib.import_module(f"tribodyn.geometry.{name}")
 
 

@@ -8,6 +8,7 @@ from types import ModuleType
 import numba
 import numpy as np
 
+from tribodyn.hbm import law as contact_law
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.law import ContactCycle, ContactParameters
 
@@ -40,11 +41,12 @@ def cycle(
     memory : (n_pair, n_state) memory at the start of the load path, zeros if None
     Raises  ValueError where the basis asks for located transitions and the law does not locate them
     """
+    contact_law.require_order(law, parameters)
     if memory is None:
         memory = np.zeros((parameters.n_pair, law.n_state(parameters.components)))
     if basis.transitions == "located":
         if not hasattr(law, "located"):
-            name = law.__name__.rsplit(".", 1)[-1]
+            name = contact_law.called(law)
             raise ValueError(f"contact law '{name}' does not locate its transitions: take transitions = 'sampled'")
         return law.located(x, parameters, memory, basis, jacobian)
     if hasattr(law, "cycle"):

@@ -256,7 +256,7 @@ def _gain(problem: WearProblem, state: WearState) -> np.ndarray:
         works = work > 0
         if np.any(rate[~works] > 0):
             raise ValueError(f'wear law "{wear.law}" wears pairs without friction work: take the thesis\'s rule')
-        own = np.divide(problem.coefficient[pairs], area[pairs])
+        own = problem.numbers(name).get("coefficient", np.ones(len(pairs))) / area[pairs]
         known = works & (own > 0)
         factor = np.mean(rate[known] / (work[known] * own[known])) if known.any() else 1.0
         gain[pairs] = np.divide(rate, work, out=factor * own, where=works)

@@ -67,13 +67,11 @@ class WearProblem:
             return {joint.name: self.wear for joint in joints}
         return {self.balance.contact.joint(name).name: wear for name, wear in self.wear.items()}
 
-    @cached_property
-    def coefficient(self) -> np.ndarray:
-        """(n_pair,) wear coefficient, each in the unit of its joint's law; zero where a joint does not wear."""
-        spread = np.zeros_like(self.area)
-        for name, wear in self.wearing.items():
-            spread[self.balance.contact.joint(name).rows] = wear.coefficient
-        return spread
+    def numbers(self, joint: str) -> dict[str, np.ndarray]:
+        """The own numbers of a joint's wear law, each (n_pair,) of the joint."""
+        n = len(self.balance.contact.joint(joint).rows)
+        given = self.wearing[joint].numbers
+        return {name: np.array(np.broadcast_to(np.asarray(v, float), (n,))) for name, v in given.items()}
 
     @cached_property
     def pairs(self) -> np.ndarray:
@@ -147,7 +145,7 @@ def worn_state(
         balance = problem.at_depth(depth).with_load(duty.load)
         for name, wear in problem.wearing.items():
             pairs = balance.contact.joint(name).rows
-            of_joint = (problem.area[pairs], problem.coefficient[pairs], depth[pairs])
+            of_joint = (problem.area[pairs], problem.numbers(name), depth[pairs])
             exposure = wear_law.Exposure(balance, point.state, *of_joint, cycles, name)
             rate[pairs] += duty.share * wear_law.depth_rate(wear.law, exposure)
             work[pairs] += duty.share * exposure.energy

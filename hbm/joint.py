@@ -28,16 +28,12 @@ class Joint:
     name : of the joint, unique in a balance; law : name of its contact law
     parameters : of its pairs, over the components that the law sees
     pairs : slice or indices of its pairs among those of the contact interface; None for all of them
-    Raises  ValueError where there is no such law, or it does not serve the components
     """
 
     name: str
     law: str
     parameters: ContactParameters
     pairs: np.ndarray | slice | None = None
-
-    def __post_init__(self) -> None:
-        contact_law.check_components(self.module, self.parameters.components)
 
     @property
     def module(self) -> ModuleType:
@@ -70,7 +66,11 @@ class Contact:
 
     @classmethod
     def of(cls, model: ReducedModel, joints: Joint | Sequence[Joint]) -> Contact:
-        """The joints of a model; raises ValueError where they do not share out its pairs and components."""
+        """The joints of a model.
+
+        Raises  ValueError where they do not share out its pairs, there is no such law, it does not serve the
+            components, or one of its numbers is missing, unknown or out of its limits
+        """
         given = (joints,) if isinstance(joints, Joint) else tuple(joints)
         if not given:
             raise ValueError("a harmonic balance needs at least one joint")
@@ -93,7 +93,7 @@ class Contact:
             if [c for c in components if c in seen] != list(seen):
                 raise ValueError(f"joint '{joint.name}' has components {seen}, the contact has {components}")
             np.add.at(owners, pairs, 1)
-            placed.append(replace(joint, pairs=pairs))
+            placed.append(replace(joint, pairs=pairs, parameters=contact_law.checked(joint.law, joint.parameters)))
         if np.any(owners != 1):
             pair = int(np.flatnonzero(owners != 1)[0])
             raise ValueError(f"pair {pair} of the contact belongs to {owners[pair]} joints: each needs exactly one")
@@ -131,8 +131,12 @@ class Contact:
         """(n_pair,) opening of the unloaded pairs [m]."""
         return self._alone.parameters.gap if self._alone is not None else self.gathered(lambda p: p.gap)
 
+    def number(self, name: str) -> np.ndarray:
+        """(n_pair,) one of the laws' own numbers, zero in joints whose law has none of that name."""
+        return self.gathered(lambda p: p.numbers.get(name, np.zeros(p.n_pair)))
+
     def gathered(self, what: Callable[[ContactParameters], np.ndarray]) -> np.ndarray:
-        """(n_pair,) a number of every pair, joint by joint."""
+        """(n_pair,) a value of every pair, joint by joint."""
         out = np.zeros(self.n_pair)
         for joint in self.joints:
             out[joint.rows] = what(joint.parameters)

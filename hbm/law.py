@@ -1,10 +1,11 @@
 """Contact laws: what a law file offers, the parameters it sees, and how it is found by its name.
 
-A law is a module `hbm/contact/<name>.py` with
+A law is a module `hbm/contact/<name>.py`, or a file of one's own, with
 
 - `COMPONENTS` : the component tuples it accepts, such as (("t1", "t2", "n"),)
+- `Parameters` : its own numbers with their units, see `tribodyn.declare`; none where the class is missing
 - `n_state(components)` : number of memory variables of one pair
-- `step` : numba function that advances one pair by one time sample (see `hbm.aft.march`)
+- `step` : numba function that advances one pair by one time sample (see `hbm.aft.march`); its p is a packed row
 - optionally `cycle(x, parameters, memory, basis, jacobian)` : the same periodic cycle at the samples, faster
 - optionally `located(x, parameters, memory, basis, jacobian)` : the cycle with its transitions located between samples
 """
@@ -13,12 +14,15 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cache
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 
+from tribodyn import declare
 from tribodyn.hbm import contact as hbm_contact
 
 STICKS, SLIPS, SEPARATES = 1, 2, 4
@@ -30,18 +34,14 @@ class ContactParameters:
 
     components : which relative displacements the law sees, in the order t1, t2, n
     stiffness : (n_pair, n_component) contact springs [N/m], >= 0 and finite
-    friction : (n_pair,) Coulomb coefficient, >= 0
     gap : (n_pair,) opening of the unloaded pair [m], wear adds to it, interference is negative
-    normal_load : (n_pair,) constant normal load of laws without a normal component [N]
-    cubic : (n_pair,) cubic coefficient of the smooth reference law [N/m3]
+    numbers : the law's own by name, each (n_pair,), in the units that the law declares
     """
 
     components: tuple[str, ...]
     stiffness: np.ndarray
-    friction: np.ndarray
     gap: np.ndarray
-    normal_load: np.ndarray
-    cubic: np.ndarray
+    numbers: Mapping[str, np.ndarray]
 
     @classmethod
     def of(
@@ -49,12 +49,13 @@ class ContactParameters:
         components: tuple[str, ...],
         stiffness: np.ndarray,
         *,
-        friction: np.ndarray | float = 0.0,
         gap: np.ndarray | float = 0.0,
-        normal_load: np.ndarray | float = 0.0,
-        cubic: np.ndarray | float = 0.0,
+        **numbers: np.ndarray | float,
     ) -> ContactParameters:
-        """Parameters with scalars spread over all pairs; raises ValueError for what no contact can have."""
+        """Parameters with scalars spread over all pairs; numbers : the law's own, such as friction=0.4.
+
+        Raises  ValueError for what no contact can have; a `Joint` checks the law's own numbers
+        """
         k = np.atleast_2d(np.asarray(stiffness, float))
         if k.shape[1] != len(components):
             raise ValueError(f"contact stiffness has {k.shape[1]} columns for the components {components}")
@@ -62,9 +63,8 @@ class ContactParameters:
         def spread(value: np.ndarray | float) -> np.ndarray:
             return np.array(np.broadcast_to(np.asarray(value, float), (len(k),)))
 
-        made = cls(tuple(components), k, spread(friction), spread(gap), spread(normal_load), spread(cubic))
-        for name, low in (("stiffness", 0.0), ("friction", 0.0), ("gap", -np.inf), ("normal_load", 0.0)):
-            value = getattr(made, name)
+        made = cls(tuple(components), k, spread(gap), {name: spread(value) for name, value in numbers.items()})
+        for name, value, low in (("stiffness", made.stiffness, 0.0), ("gap", made.gap, -np.inf)):
             if not np.all(np.isfinite(value)) or np.any(value < low):
                 raise ValueError(f"contact {name} must be finite{' and >= 0' if low == 0 else ''} at every pair")
         return made
@@ -76,8 +76,12 @@ class ContactParameters:
 
     def taken(self, pairs: np.ndarray) -> ContactParameters:
         """The parameters of some pairs, by their indices."""
-        own = {f.name: getattr(self, f.name)[pairs] for f in fields(self) if f.name != "components"}
-        return replace(self, **own)
+        numbers = {name: value[pairs] for name, value in self.numbers.items()}
+        return replace(self, stiffness=self.stiffness[pairs], gap=self.gap[pairs], numbers=numbers)
+
+    def scaled(self, name: str, factor: float) -> ContactParameters:
+        """The same with one of the law's own numbers times a factor."""
+        return replace(self, numbers={**self.numbers, name: factor * self.numbers[name]})
 
     @property
     def tangential(self) -> list[int]:
@@ -85,13 +89,15 @@ class ContactParameters:
         return [i for i, c in enumerate(self.components) if c != "n"]
 
     def packed(self) -> np.ndarray:
-        """(n_pair, 7) rows [k of the up to three components, mu, gap, N0, cubic] as the kernels read them."""
-        rows = np.zeros((self.n_pair, 7))
+        """(n_pair, 4 + n_number) rows [k of the up to three components, gap, the law's own numbers] for kernels.
+
+        The numbers stand in the order in which the law declares them, as a `Joint` has put them.
+        """
+        rows = np.zeros((self.n_pair, 4 + len(self.numbers)))
         rows[:, : len(self.components)] = self.stiffness
-        rows[:, 3] = self.friction
-        rows[:, 4] = self.gap
-        rows[:, 5] = self.normal_load
-        rows[:, 6] = self.cubic
+        rows[:, 3] = self.gap
+        for column, value in enumerate(self.numbers.values(), start=4):
+            rows[:, column] = value
         return rows
 
 
@@ -114,16 +120,61 @@ def names() -> list[str]:
     return sorted(m.name for m in pkgutil.iter_modules(hbm_contact.__path__) if not m.name.startswith("_"))
 
 
+def file_of(name: str) -> Path:
+    """The file of a law; raises ValueError with the known names.
+
+    name : of a law of the package, or the path of a file of one's own, which ends with .py
+    """
+    if name.endswith(".py"):
+        return Path(name)
+    if name not in names():
+        raise ValueError(f"no contact law '{name}': there are {', '.join(names())}, or give a file my_law.py")
+    return Path(hbm_contact.__path__[0]) / f"{name}.py"
+
+
 @cache
 def load(name: str) -> ModuleType:
-    """The law module of this name; raises ValueError with the known names."""
-    if name not in names():
-        raise ValueError(f"no contact law '{name}': there are {', '.join(names())}")
-    return importlib.import_module(f"tribodyn.hbm.contact.{name}")
+    """The law module of this name, or of a file of one's own; raises ValueError where there is none."""
+    path = file_of(name)
+    if not name.endswith(".py"):
+        return importlib.import_module(f"tribodyn.hbm.contact.{name}")
+    module = declare.run_file(path, "contact law", ("step", "n_state"))
+    if not isinstance(getattr(module, "COMPONENTS", None), tuple):
+        raise ValueError(f'contact law file \'{path}\' has no COMPONENTS, such as (("t1", "n"),)')
+    return module
 
 
-def check_components(law: ModuleType, components: tuple[str, ...]) -> None:
-    """Raise ValueError where a law cannot serve these components."""
-    if components not in law.COMPONENTS:
+@cache
+def declared(name: str) -> tuple[declare.Number, ...]:
+    """The numbers that a law declares; its file is not run."""
+    return declare.read(file_of(name))
+
+
+def called(law: ModuleType) -> str:
+    """Name of a law for sentences."""
+    return law.__name__.rsplit(".", 1)[-1].removeprefix("tribodyn_own_")
+
+
+@cache
+def _order(law: ModuleType) -> tuple[str, ...]:
+    assert law.__file__ is not None
+    return tuple(n.name for n in declare.read(Path(law.__file__)))
+
+
+def require_order(law: ModuleType, parameters: ContactParameters) -> None:
+    """Raise ValueError where parameters do not hold a law's own numbers in its order, as `checked` gives them."""
+    if tuple(parameters.numbers) != _order(law):
+        has, own = ", ".join(parameters.numbers) or "none", ", ".join(_order(law)) or "none"
+        raise ValueError(f"contact law '{called(law)}' has the numbers {own}, in this order, and was given {has}")
+
+
+def checked(name: str, parameters: ContactParameters) -> ContactParameters:
+    """The parameters with the law's own numbers complete and in their order; raises ValueError where that fails."""
+    law = load(name)
+    if parameters.components not in law.COMPONENTS:
         known = " or ".join("(" + ", ".join(c) + ")" for c in law.COMPONENTS)
-        raise ValueError(f"contact law '{law.__name__.rsplit('.', 1)[-1]}' has components {known}, not {components}")
+        raise ValueError(f"contact law '{Path(name).stem}' has components {known}, not {parameters.components}")
+    values = declare.checked(declared(name), parameters.numbers, f"contact law '{Path(name).stem}'")
+    n = parameters.n_pair
+    numbers = {key: np.array(np.broadcast_to(np.asarray(v, float), (n,))) for key, v in values.items()}
+    return replace(parameters, numbers=numbers)

@@ -50,11 +50,12 @@ def cycle(
         load[:] = kn[:, None] * full[:, -1]
         load[:, 0] -= kn * parameters.gap
     else:
-        load[:, 0] = parameters.normal_load
+        load[:, 0] = parameters.numbers["normal_load"]
     grid = _grid(basis.dynamic)
     x_grid = (full @ grid).reshape(n_pair, n_comp, 5, -1)
     load_grid = (load @ grid).reshape(n_pair, 5, -1)
-    k, mu, hs = parameters.stiffness, parameters.friction, np.asarray(basis.dynamic, np.int64)
+    k, hs = parameters.stiffness, np.asarray(basis.dynamic, np.int64)
+    mu = parameters.numbers.get("friction", np.zeros(n_pair))
     force = np.zeros_like(full)
     jac = np.zeros((n_pair, n_comp * n_coeff, n_comp * n_coeff)) if jacobian else np.zeros((0, 0, 0))
     status = np.zeros(n_pair, np.int64)

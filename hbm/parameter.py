@@ -99,14 +99,22 @@ def stiffness(balance: HarmonicBalance, omega: float) -> Parameter:
     )
 
 
-def friction(balance: HarmonicBalance, omega: float) -> Parameter:
-    """Factor on all friction coefficients, at one frequency [rad/s]."""
+def number(balance: HarmonicBalance, omega: float, name: str) -> Parameter:
+    """Factor on one of the contact laws' own numbers, such as friction, at one frequency [rad/s].
+
+    It acts in every joint whose law has that number. Raises ValueError where none has
+    """
     contact = balance.contact
-    return Parameter(
-        "friction factor",
-        lambda value: balance.with_contact(contact.with_parameters(lambda p: replace(p, friction=value * p.friction))),
-        omega,
-    )
+    known = sorted({own for joint in contact.joints for own in joint.parameters.numbers})
+    if name not in known:
+        raise ValueError(f"no contact law here has a number {name}: there are {', '.join(known) or 'none'}")
+
+    def make(value: float) -> HarmonicBalance:
+        return balance.with_contact(
+            contact.with_parameters(lambda p: p.scaled(name, value) if name in p.numbers else p)
+        )
+
+    return Parameter(f"{name} factor", make, omega)
 
 
 def _length(balance: HarmonicBalance, omega: float) -> float:

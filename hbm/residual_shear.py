@@ -170,11 +170,11 @@ def _check(balance: HarmonicBalance) -> list[int]:
 def _reach(balance: HarmonicBalance, state: State, tangential: list[int]) -> np.ndarray:
     """(n_pair, n_tangential) travel of a slider from one end of its range to the other, at most [m]."""
     contact = balance.contact
-    load = contact.gathered(lambda p: p.normal_load)
+    load = contact.number("normal_load")
     if "n" in contact.components:
         load = np.maximum(load, np.abs(state.cycle.force[:, -1]).sum(axis=1))
     k = contact.stiffness[:, tangential]
-    limit = (contact.gathered(lambda p: p.friction) * load)[:, None]
+    limit = (contact.number("friction") * load)[:, None]
     return np.divide(2 * limit, k, out=np.zeros_like(k), where=k > 0) + np.abs(state.x[:, tangential]).sum(axis=2)
 
 

@@ -1,15 +1,15 @@
 """Wear laws: what a law file sees and offers, and how it is found by its name.
 
 A law is a module `hbm/wear/<name>.py`, or a file of one's own, with `depth_rate(exposure) -> (n_pair,)`: total wear
-depth of each pair per vibration cycle [m]. Depth is the sum over both surfaces; `Exposure.coefficient` carries the unit
-that the law states.
+depth of each pair per vibration cycle [m], the sum over both surfaces. Its own numbers, such as a wear coefficient, it
+declares in `class Parameters` with their units, see `tribodyn.declare`.
 """
 
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import pkgutil
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -17,6 +17,7 @@ from types import ModuleType
 
 import numpy as np
 
+from tribodyn import declare
 from tribodyn.hbm import wear as hbm_wear
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.joint import Joint
@@ -26,16 +27,21 @@ from tribodyn.hbm.joint import Joint
 class JointWear:
     """How a joint wears.
 
-    law : name of a wear law, or path of its file; coefficient : scalar or one a pair, in the unit the law states
+    law : name of a wear law, or path of its file
+    numbers : the law's own, scalars or (n_pair,) of the joint, in the units that the law declares
     """
 
     law: str
-    coefficient: np.ndarray | float
+    numbers: Mapping[str, np.ndarray | float]
 
-    def __post_init__(self) -> None:
-        coefficient = np.asarray(self.coefficient, float)
-        if not np.all(np.isfinite(coefficient)) or np.any(coefficient < 0):
-            raise ValueError("the wear coefficient must be finite and >= 0 at every pair")
+    @classmethod
+    def of(cls, law: str, **numbers: np.ndarray | float) -> JointWear:
+        """A wear law with its numbers, such as coefficient=2e-15.
+
+        Raises  ValueError where there is no such law, or a number is missing, unknown or out of its limits
+        """
+        given = declare.checked(declared(law), numbers, f"wear law '{Path(law).stem}'")
+        return cls(law, given)
 
 
 @dataclass(frozen=True)
@@ -43,7 +49,7 @@ class Exposure:
     """One vibration cycle as a wear law sees it.
 
     The law serves one joint; n_pair counts the pairs of that joint.
-    area : (n_pair,) tributary area [m2]; coefficient : (n_pair,) wear coefficient of the law
+    area : (n_pair,) tributary area [m2]; numbers : the law's own by name, each (n_pair,)
     depth : (n_pair,) wear depth so far [m]; cycles : vibration cycles so far
     on : name of the joint, the first one by default
     """
@@ -51,7 +57,7 @@ class Exposure:
     balance: HarmonicBalance
     state: State
     area: np.ndarray
-    coefficient: np.ndarray
+    numbers: Mapping[str, np.ndarray]
     depth: np.ndarray
     cycles: float
     on: str = ""
@@ -103,16 +109,31 @@ def names() -> list[str]:
     return sorted(m.name for m in pkgutil.iter_modules(hbm_wear.__path__) if not m.name.startswith("_"))
 
 
-def load(name: str) -> ModuleType:
-    """The wear law of this name, or from a file of one's own where the name ends with .py.
+def file_of(name: str) -> Path:
+    """The file of a law; raises ValueError with the known names.
 
-    Raises  ValueError for an unknown name or a file that is no wear law
+    name : of a law of the package, or the path of a file of one's own, which ends with .py
     """
     if name.endswith(".py"):
-        return _from_file(Path(name))
+        return Path(name)
     if name not in names():
         raise ValueError(f"no wear law '{name}': there are {', '.join(names())}, or give a file my_law.py")
+    return Path(hbm_wear.__path__[0]) / f"{name}.py"
+
+
+@cache
+def load(name: str) -> ModuleType:
+    """The wear law of this name, or of a file of one's own; raises ValueError where there is none."""
+    path = file_of(name)
+    if name.endswith(".py"):
+        return declare.run_file(path, "wear law", ("depth_rate",))
     return importlib.import_module(f"tribodyn.hbm.wear.{name}")
+
+
+@cache
+def declared(name: str) -> tuple[declare.Number, ...]:
+    """The numbers that a law declares; its file is not run."""
+    return declare.read(file_of(name))
 
 
 def depth_rate(name: str, exposure: Exposure) -> np.ndarray:
@@ -132,20 +153,3 @@ def depth_rate(name: str, exposure: Exposure) -> np.ndarray:
     if np.isfinite(exposure.energy).all() and not np.isfinite(rate).all():
         raise ValueError(f"wear law file '{name}' gives depths that are not finite")
     return rate
-
-
-@cache
-def _from_file(path: Path) -> ModuleType:
-    if not path.is_file():
-        raise ValueError(f"there is no wear law file '{path}'")
-    spec = importlib.util.spec_from_file_location(f"wear_law_{path.stem}", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        raise ValueError(f"wear law file '{path}' cannot be run: {error}") from error
-    if not callable(getattr(module, "depth_rate", None)):
-        raise ValueError(f"wear law file '{path}' has no function depth_rate(exposure)")
-    return module

@@ -12,13 +12,24 @@ Source  Simo and Hughes 1998, chapter 3 (return mapping); Sanliturk and Ewins 19
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 import math
 
 import numba
 
+from tribodyn.declare import number
 from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS
 
 COMPONENTS = (("t1", "t2", "n"),)
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """The law's own numbers."""
+
+    friction: float = number("", low=0.0)
+    """Coulomb coefficient."""
+
 
 
 def n_state(components: tuple[str, ...]) -> int:
@@ -29,7 +40,7 @@ def n_state(components: tuple[str, ...]) -> int:
 @numba.njit(cache=True)
 def step(x, w, p, f, dfx, dfs, dsx, dss):
     """Advance one pair by one sample; writes force, memory and their derivatives, returns the status bits."""
-    N = p[2] * (x[2] - p[4])
+    N = p[2] * (x[2] - p[3])
     if N <= 0.0:
         for c in range(3):
             f[c] = 0.0
@@ -41,7 +52,7 @@ def step(x, w, p, f, dfx, dfs, dsx, dss):
     dfx[2, 2] = p[2]
     for c in range(2):
         f[c] = p[c] * (x[c] - w[c])  # trial T*
-    limit = p[3] * N
+    limit = p[4] * N
     if math.hypot(f[0], f[1]) <= limit:
         for c in range(2):
             dfx[c, c] = p[c]
@@ -87,7 +98,7 @@ def _slip(creep, limit, w, p, f, dfx, dfs, dsx, dss):
         f[c] *= d[c]
         w[c] += creep * f[c]
     fall = p[0] * d[0] * f[0] ** 2 + p[1] * d[1] * f[1] ** 2
-    normal = -limit * p[3] * p[2] / fall  # d lambda / d v
+    normal = -limit * p[4] * p[2] / fall  # d lambda / d v
     for c in range(2):
         dfx[c, 2] = -f[c] * p[c] * d[c] * normal
         dsx[c, 2] = f[c] * normal + creep * dfx[c, 2]

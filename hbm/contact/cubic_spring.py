@@ -6,11 +6,22 @@ of harmonics up to H is exact at more than 4 H samples.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 import numba
 
+from tribodyn.declare import number
 from tribodyn.hbm.law import STICKS
 
 COMPONENTS = (("t1", "t2", "n"), ("t1", "t2"), ("t1", "n"), ("t2", "n"), ("t1",), ("t2",), ("n",))
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """The law's own numbers."""
+
+    cubic: float = number("N/m3")
+    """Cubic coefficient k_3 of every pair and component."""
+
 
 
 def n_state(components: tuple[str, ...]) -> int:
@@ -22,6 +33,6 @@ def n_state(components: tuple[str, ...]) -> int:
 def step(x, s, p, f, dfx, dfs, dsx, dss):
     """One pair at one sample; it always counts as sticking."""
     for c in range(x.size):
-        f[c] = p[c] * x[c] + p[6] * x[c] ** 3
-        dfx[c, c] = p[c] + 3.0 * p[6] * x[c] ** 2
+        f[c] = p[c] * x[c] + p[4] * x[c] ** 3
+        dfx[c, c] = p[c] + 3.0 * p[4] * x[c] ** 2
     return STICKS

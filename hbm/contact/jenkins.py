@@ -6,9 +6,11 @@ Source  Yang, Chu and Menq 1998; Tamatam 2021, eq. 3.24-3.28.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 import numba
 import numpy as np
 
+from tribodyn.declare import number
 from tribodyn.hbm import located as transitions
 from tribodyn.hbm.aft import by_kernel
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -22,6 +24,15 @@ SIDE = np.array([0.0, 0.0, 1.0, -1.0])  # sign of T in slip
 located = transitions.cycle
 
 
+@dataclass(frozen=True)
+class Parameters:
+    """The law's own numbers."""
+
+    friction: float = number("", low=0.0)
+    """Coulomb coefficient."""
+
+
+
 def n_state(components: tuple[str, ...]) -> int:
     """One slider position per tangential direction [m]."""
     return len(components) - 1
@@ -31,8 +42,8 @@ def n_state(components: tuple[str, ...]) -> int:
 def step(x, w, p, f, dfx, dfs, dsx, dss):
     """Advance one pair by one sample; writes force, memory and their derivatives, returns the status bits."""
     t = x.size - 1
-    kn, mu = p[t], p[3]
-    N = kn * (x[t] - p[4])  # eq. 3.24
+    kn, mu = p[t], p[4]
+    N = kn * (x[t] - p[3])  # eq. 3.24
     if N <= 0.0:
         for c in range(t):
             f[c] = 0.0
@@ -82,7 +93,7 @@ def _cycle(x, p, memory, phi, product, single, force, jac, status):
     want = jac.shape[0] > 0
     kind, slider = np.empty(n_time, np.int8), np.empty(n_time)
     for i in range(n_pair):
-        kn, mu, gap = p[i, t], p[i, 3], p[i, 4]
+        kn, mu, gap = p[i, t], p[i, 4], p[i, 3]
         bits = 0
         n_open = 0
         for j in range(n_time):

@@ -6,9 +6,11 @@ Source  Griffin 1980; Tamatam 2021, eq. 3.26-3.28 with N constant.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 import numba
 import numpy as np
 
+from tribodyn.declare import number
 from tribodyn.hbm import located as transitions
 from tribodyn.hbm.aft import by_kernel
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -19,6 +21,17 @@ COMPONENTS = (("t1", "t2"), ("t1",), ("t2",))
 located = transitions.cycle
 
 
+@dataclass(frozen=True)
+class Parameters:
+    """The law's own numbers."""
+
+    friction: float = number("", low=0.0)
+    """Coulomb coefficient."""
+    normal_load: float = number("N", low=0.0)
+    """Constant normal load of every pair, 0 for no contact."""
+
+
+
 def n_state(components: tuple[str, ...]) -> int:
     """One slider position per tangential direction [m]."""
     return len(components)
@@ -27,7 +40,7 @@ def n_state(components: tuple[str, ...]) -> int:
 @numba.njit(cache=True)
 def step(x, w, p, f, dfx, dfs, dsx, dss):
     """Advance one pair by one sample; writes force, memory and their derivatives, returns the status bits."""
-    limit = p[3] * p[5]  # mu N_0
+    limit = p[4] * p[5]  # mu N_0
     bits = 0
     for c in range(x.size):
         kt = p[c]
@@ -70,7 +83,7 @@ def _cycle(x, p, memory, phi, product, single, force, jac, status):
             status[i] = SEPARATES
             continue
         for c in range(n_comp):
-            limit = p[i, 3] * p[i, 5]
+            limit = p[i, 4] * p[i, 5]
             status[i] |= _slider(p[i, c], limit, i, c, memory[i, c], x, phi, product, single, force, jac)
 
 

@@ -26,7 +26,7 @@ def n_state(components: tuple[str, ...]) -> int:
 @numba.njit(cache=True)
 def step(x, s, p, f, dfx, dfs, dsx, dss):
     """One pair at one sample; a closed pair counts as sticking."""
-    N = p[0] * (x[0] - p[4])
+    N = p[0] * (x[0] - p[3])
     if N <= 0.0:
         f[0] = 0.0
         return SEPARATES

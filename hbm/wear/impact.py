@@ -9,15 +9,27 @@ names the wear of a leaf seal by chattering as the next step and gives no law
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from tribodyn.declare import number
 from tribodyn.hbm.law import SEPARATES
 from tribodyn.hbm.wear_law import Exposure
 
 
+@dataclass(frozen=True)
+class Parameters:
+    """The law's own numbers."""
+
+    coefficient: float = number("m3/J", low=0.0)
+    """Worn volume per work of impacts."""
+
+
+
 def depth_rate(exposure: Exposure) -> np.ndarray:
     """(n_pair,) total wear depth per cycle, alpha W / A [m]."""
-    return exposure.coefficient * impact_work(exposure) / exposure.area
+    return exposure.numbers["coefficient"] * impact_work(exposure) / exposure.area
 
 
 def impact_work(exposure: Exposure) -> np.ndarray:

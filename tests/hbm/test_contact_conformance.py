@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.linalg as sla
 
-from tests.helpers.contact_draws import HARMONICS, LAWS, LOCATED, draw, tangential
+from tests.helpers.contact_draws import HARMONICS, LAWS, LOCATED, draw, own, tangential
 from tests.helpers.verification_models import interface, modal_damping
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import aft, newton
@@ -112,11 +112,11 @@ def test_friction_stays_in_the_coulomb_cone_and_the_normal_force_pushes(name, co
     basis = HarmonicBasis((0, 1, 2, 3), 64)
     x, parameters, memory = draw(law, components, basis, 200, seed=6)
     _, force = aft.history(law, x, parameters, basis, memory)
-    normal = force[:, -1] if "n" in components else np.broadcast_to(parameters.normal_load[:, None], force[:, 0].shape)
+    normal = force[:, -1] if "n" in components else np.broadcast_to(parameters.numbers["normal_load"][:, None], force[:, 0].shape)
     assert normal.min() >= 0.0
     t = force[:, tangential(components)]
     size = np.linalg.norm(t, axis=1) if name == "coulomb_planar" else np.abs(t).max(axis=1)
-    assert np.all(size <= parameters.friction[:, None] * normal * (1 + 1e-12) + 1e-14)
+    assert np.all(size <= parameters.numbers["friction"][:, None] * normal * (1 + 1e-12) + 1e-14)
 
 
 @EVERY_LAW
@@ -232,7 +232,7 @@ def test_action_is_reaction(name, components):
     system = SecondOrderSystem(mass, stiffness, damping, loads, {"first": np.eye(2 * n_body)[-1]})
     model = ReducedModel(system, interface(np.hstack([touching, -touching]), components))
     parameters = ContactParameters.of(
-        components, np.full((n_pair, n_comp), 1.5), friction=0.3, normal_load=1.0, cubic=0.1
+        components, np.full((n_pair, n_comp), 1.5), **own(name, friction=0.3, normal_load=1.0, cubic=0.1)
     )
     basis = HarmonicBasis((0, 1, 2, 3), 64)
     excitation = Excitation.of({"press": 0.5}, {1: {"shake": 1.0}})
@@ -263,13 +263,12 @@ def test_units_of_length_and_force_do_not_matter(name, components, length, unit_
     for way in cycles(name, components):
         basis = HarmonicBasis((0, 1, 2, 3), 64, way)
         x, p, memory = draw(law, components, basis, 100, seed=11)
+        in_units = {"friction": 1.0, "normal_load": unit_force, "cubic": unit_force / length**3}
         scaled = ContactParameters.of(
             components,
             p.stiffness * unit_force / length,
-            friction=p.friction,
             gap=p.gap * length,
-            normal_load=p.normal_load * unit_force,
-            cubic=p.cubic * unit_force / length**3,
+            **{key: value * in_units[key] for key, value in p.numbers.items()},
         )
         first = aft.cycle(law, x, p, basis, memory)
         second = aft.cycle(law, x * length, scaled, basis, memory * length)
@@ -302,7 +301,8 @@ def test_extreme_parameters_give_finite_forces(name, components):
         x, p, memory = draw(law, components, basis, 60, seed=13)
         for k, mu in ((1e-15, 0.0), (1e15, 10.0), (0.0, 0.5), (1e3, 0.0), (1e15, 1e-12)):
             stiffness = np.full_like(p.stiffness, k)
-            extreme = ContactParameters.of(components, stiffness, friction=mu, gap=p.gap, normal_load=1e6)
+            numbers = own(name, friction=mu, normal_load=1e6, cubic=0.0)
+            extreme = ContactParameters.of(components, stiffness, gap=p.gap, **numbers)
             for motion in (x, 0 * x, 1e-12 * x, 1e6 * x):
                 cycle = aft.cycle(law, motion, extreme, basis, memory)
                 assert np.isfinite(cycle.force).all()
@@ -327,5 +327,5 @@ def test_names_and_components():
     with pytest.raises(ValueError, match="no contact law 'glue': there are"):
         contact_law.load("glue")
     with pytest.raises(ValueError, match="'unilateral' has components \\(n\\), not"):
-        contact_law.check_components(contact_law.load("unilateral"), ("t1", "n"))
+        contact_law.checked("unilateral", ContactParameters.of(("t1", "n"), [[1.0, 1.0]]))
     assert contact_law.load("unilateral").n_state(("n",)) == 0

@@ -51,7 +51,7 @@ def test_against_a_fine_integration(name, components, harmonics):
 
         def load(angle, i=i):
             if "n" not in components:
-                return p.normal_load[i] + 0 * angle
+                return p.numbers["normal_load"][i] + 0 * angle
             return p.stiffness[i, -1] * (basis.functions(angle) @ x[i, -1] - p.gap[i])
 
         if "n" in components:
@@ -60,7 +60,7 @@ def test_against_a_fine_integration(name, components, harmonics):
             push = np.maximum(load(angle), 0.0)[:, None] * basis.functions(angle)
             np.testing.assert_allclose(force[i, -1], weight * np.trapezoid(push, angle, axis=0), atol=1e-9)
         for c in range(law.n_state(components)):
-            exact = fine_force(x[i, c], p.stiffness[i, c], p.friction[i], load, memory[i, c], basis)
+            exact = fine_force(x[i, c], p.stiffness[i, c], p.numbers["friction"][i], load, memory[i, c], basis)
             np.testing.assert_allclose(force[i, c], exact, atol=2e-8)
 
 

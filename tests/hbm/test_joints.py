@@ -195,7 +195,7 @@ def test_joints_share_out_the_pairs() -> None:
     with pytest.raises(ValueError, match="at least one joint"):
         made()
     with pytest.raises(ValueError, match="'unilateral' has components"):
-        replace(whole, law="unilateral")
+        made(replace(whole, law="unilateral"))
 
 
 @pytest.mark.parametrize("rule", ["thesis", "error controlled"])
@@ -210,18 +210,18 @@ def test_joints_wear_by_their_own_laws(rule: str) -> None:
 
     one = worn(whole)
     assert np.all(one > 0)
-    same = {"part 0": JointWear("energy", 1e-9), "part 1": JointWear("energy", 1e-9)}
+    same = {"part 0": JointWear.of("energy", coefficient=1e-9), "part 1": JointWear.of("energy", coefficient=1e-9)}
     np.testing.assert_allclose(worn(replace(whole, balance=cut, wear=same)), one, rtol=1e-7)
-    still = worn(replace(whole, balance=cut, wear={"part 1": JointWear("energy", 1e-9)}))
+    still = worn(replace(whole, balance=cut, wear={"part 1": JointWear.of("energy", coefficient=1e-9)}))
     np.testing.assert_array_equal(still[:2], 0.0)
     assert np.all(still[2:] > 0)
-    law_and_law = {"part 0": JointWear("archard", 4e-10), "part 1": JointWear("energy", 1e-9)}
+    law_and_law = {"part 0": JointWear.of("archard", coefficient=4e-10), "part 1": JointWear.of("energy", coefficient=1e-9)}
     other = worn(replace(whole, balance=cut, wear=law_and_law))
     np.testing.assert_allclose(other[2:], one[2:], rtol=0.05)
     # k = mu alpha is the energy law along a line; in the plane a path is up to sqrt(2) shorter than its two parts
     assert np.all((other[:2] > 0.6 * one[:2]) & (other[:2] < 1.03 * one[:2]))
     with pytest.raises(ValueError, match="no joint 'part 2': there are part 0, part 1"):
-        worn(replace(whole, balance=cut, wear={"part 2": JointWear("energy", 1e-9)}))
+        worn(replace(whole, balance=cut, wear={"part 2": JointWear.of("energy", coefficient=1e-9)}))
 
 
 def test_only_the_preload_of_wearing_joints_counts() -> None:
@@ -231,7 +231,7 @@ def test_only_the_preload_of_wearing_joints_counts() -> None:
         whole,
         balance=cut,
         mission=(Duty(AtFrequency("tip", OMEGA)),),
-        wear={"part 1": JointWear("energy", 1e-9)},
+        wear={"part 1": JointWear.of("energy", coefficient=1e-9)},
     )
     history = thesis_rule.evolve(problem, 2e-5, max_steps=40)
     state = newton.solve_from_rest(cut, OMEGA).state

@@ -36,7 +36,7 @@ def static_preload(problem: WearProblem, depth: np.ndarray) -> float:
     def forces(x: np.ndarray) -> np.ndarray:
         u, k = x.reshape(N_PAIR, 3), parameters.stiffness
         normal = np.maximum(k[:, 2] * (u[:, 2] - depth), 0.0)
-        limit = (np.asarray(parameters.friction) * normal)[:, None]
+        limit = (np.asarray(parameters.numbers["friction"]) * normal)[:, None]
         return np.column_stack([np.clip(k[:, :2] * u[:, :2], -limit, limit), normal])
 
     found = root(lambda x: x - free + C @ forces(x).ravel(), np.zeros(3 * N_PAIR), tol=1e-12)

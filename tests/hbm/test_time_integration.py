@@ -198,7 +198,7 @@ def test_light_damping_needs_few_periods():
 
 def test_what_has_no_equation_of_motion_is_refused():
     model = oscillator(1.0, 1e4, 0.01)
-    parameters = ContactParameters.of(("t1", "n"), [[1e4, 1e4]])
+    parameters = ContactParameters.of(("t1", "n"), [[1e4, 1e4]], friction=0.0)
     excitation = Excitation.of({"normal": 1.0}, {1: {"force": 1.0}})
     cyclic = ReducedModel(
         model.system, model.interface, per_harmonic=lambda h: (model.system, np.asarray(model.interface.B))

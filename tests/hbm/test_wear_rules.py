@@ -107,10 +107,10 @@ def test_a_resumed_run_ends_in_the_same_bits(problem: WearProblem, kind: str) ->
 def test_missions_average_their_duties(problem: WearProblem) -> None:
     site = AtFrequency("tip", 420.0)
     mission = (Duty(site, 0.25), Duty(site, 0.75, load=0.5))
-    mixed = WearProblem(problem.balance, mission, JointWear("energy", 1e-9), problem.area)
+    mixed = WearProblem(problem.balance, mission, JointWear.of("energy", coefficient=1e-9), problem.area)
     state = assess(mixed, np.zeros(N_PAIR), 0.0, None)
     full, half = (
-        assess(WearProblem(problem.balance, (Duty(site, 1.0, load),), JointWear("energy", 1e-9), problem.area), *start)
+        assess(WearProblem(problem.balance, (Duty(site, 1.0, load),), JointWear.of("energy", coefficient=1e-9), problem.area), *start)
         for load, start in ((1.0, (np.zeros(N_PAIR), 0.0, None)), (0.5, (np.zeros(N_PAIR), 0.0, None)))
     )
     assert state.rate == pytest.approx(0.25 * full.rate + 0.75 * half.rate, rel=1e-6)
@@ -144,7 +144,7 @@ def test_error_controlled_missions_equal_the_finest_thesis_run(problem: WearProb
 
 @pytest.mark.parametrize("law", ["archard"])
 def test_error_controlled_rule_takes_laws_whose_depth_per_work_changes(law: str) -> None:
-    other = wear_problem(wear=JointWear(law, 4e-10))
+    other = wear_problem(wear=JointWear.of(law, coefficient=4e-10))
     fine = thesis_rule.evolve(other, 5e-7)
     worn = error_controlled_rule.evolve(other, error_controlled_rule.Tolerance(0.02, 2e-4))
     assert life(worn) == pytest.approx(life(fine), rel=0.01)
@@ -152,11 +152,11 @@ def test_error_controlled_rule_takes_laws_whose_depth_per_work_changes(law: str)
 
 def test_a_law_file_of_ones_own_is_taken_by_both_rules() -> None:
     law = str(scene_file.CASES / "beam" / "running_in.py")
-    own = wear_problem(wear=JointWear(law, 4e-10))
+    own = wear_problem(wear=JointWear.of(law, coefficient=4e-10))
     fine = thesis_rule.evolve(own, 5e-7)
     worn = error_controlled_rule.evolve(own, error_controlled_rule.Tolerance(0.02, 2e-4))
     assert life(worn) == pytest.approx(life(fine), rel=0.015)
-    plain_problem = wear_problem(wear=JointWear("energy", 4e-10))
+    plain_problem = wear_problem(wear=JointWear.of("energy", coefficient=4e-10))
     plain = error_controlled_rule.evolve(plain_problem, error_controlled_rule.Tolerance(0.02, 2e-4))
     assert 0.25 * life(plain) < life(worn) < life(plain)  # a fresh face wears four times as fast
 
@@ -182,7 +182,7 @@ def test_a_wear_law_that_fails_in_the_run_is_told(tmp_path: Path, body: str, say
     path = tmp_path / "law.py"
     path.write_text(f"def depth_rate(exposure):\n    {body}\n")
     with pytest.raises(ValueError, match=says):
-        thesis_rule.evolve(wear_problem(wear=JointWear(str(path), 1e-9)), 5e-7, max_steps=1)
+        thesis_rule.evolve(wear_problem(wear=JointWear.of(str(path), coefficient=1e-9)), 5e-7, max_steps=1)
 
 
 def test_events_are_where_the_penetration_of_a_pair_changes_its_sign(problem: WearProblem, fine: WearHistory) -> None:

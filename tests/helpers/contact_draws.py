@@ -20,6 +20,11 @@ def tangential(components: tuple[str, ...]) -> list[int]:
     return [i for i, c in enumerate(components) if c != "n"]
 
 
+def own(name: str, **numbers: np.ndarray | float) -> dict[str, np.ndarray | float]:
+    """Those of the numbers that the law of this name declares, in its order."""
+    return {number.name: numbers[number.name] for number in contact_law.declared(name)}
+
+
 def draw(
     law: ModuleType, components: tuple[str, ...], basis: HarmonicBasis, n_pair: int, seed: int
 ) -> tuple[np.ndarray, ContactParameters, np.ndarray]:
@@ -28,10 +33,13 @@ def draw(
     parameters = ContactParameters.of(
         components,
         rng.uniform(0.5, 2, (n_pair, len(components))),
-        friction=rng.uniform(0.1, 0.8, n_pair),
         gap=rng.normal(size=n_pair) * 0.3 - (0.0 if basis.has_static else rng.uniform(0, 2, n_pair)),
-        normal_load=rng.uniform(0, 1, n_pair),
-        cubic=rng.uniform(0, 1, n_pair),
+        **own(
+            contact_law.called(law),
+            friction=rng.uniform(0.1, 0.8, n_pair),
+            normal_load=rng.uniform(0, 1, n_pair),
+            cubic=rng.uniform(0, 1, n_pair),
+        ),
     )
     size = 10 ** rng.uniform(-1.5, 0.5, (n_pair, 1, 1))
     x = rng.normal(size=(n_pair, len(components), basis.n_coeff)) * size / (1 + basis.order)

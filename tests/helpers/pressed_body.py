@@ -52,7 +52,7 @@ def wear_problem(**changes: object) -> WearProblem:
     given: dict = {
         "balance": balance_of(pressed_body(), (0, 1)),
         "mission": (Duty(AtFrequency("tip", 420.0)),),
-        "wear": JointWear("energy", 1e-9),
+        "wear": JointWear.of("energy", coefficient=1e-9),
         "area": np.full(N_PAIR, 1e-4),
         "lost_below": 0.01,
     }

@@ -16,6 +16,7 @@ import scipy.linalg as sla
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
+from tests.helpers.contact_draws import own
 from tests.helpers.contact_draws import LAWS, LOCATED
 from tests.helpers.verification_models import interface, modal_damping
 from tribodyn.fem.system import SecondOrderSystem
@@ -141,9 +142,16 @@ def problem_of(d: Drawn) -> HarmonicBalance:
     gap = d.gap_sign * 10**d.gap * rng.uniform(0, 1, d.n_pair)
     load = 0.0 if d.static is None else 10**d.static
     parameters = ContactParameters.of(
-        d.components, spread, friction=d.friction, gap=gap, normal_load=load * rng.uniform(0, 1, d.n_pair),
-        cubic=10**d.contact * 10 ** rng.uniform(-3, 3, d.n_pair),
-    )  # fmt: skip
+        d.components,
+        spread,
+        gap=gap,
+        **own(
+            d.law,
+            friction=d.friction,
+            normal_load=load * rng.uniform(0, 1, d.n_pair),
+            cubic=10**d.contact * 10 ** rng.uniform(-3, 3, d.n_pair),
+        ),
+    )
     basis = HarmonicBasis(d.harmonics, d.n_samples, d.transitions)
     loads: dict[tuple[int, str], complex] = {}
     if d.static is not None and basis.has_static:

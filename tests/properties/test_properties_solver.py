@@ -146,7 +146,7 @@ def test_wear_only_grows(d: Drawn, law: str, rule: str, share: float) -> None:
         if not first.converged:
             return
         site = AtFrequency("tip", omega_of(balance))
-        problem = WearProblem(balance, (Duty(site),), JointWear(law, coefficient), area)
+        problem = WearProblem(balance, (Duty(site),), JointWear.of(law, coefficient=coefficient), area)
         depth = share * max(np.abs(first.state.x[:, -1, 0]).max(), 1e-12)
         if rule == "thesis":
             history = thesis_rule.evolve(problem, depth, max_steps=3)

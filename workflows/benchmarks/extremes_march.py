@@ -30,7 +30,7 @@ def force_error(balance: HarmonicBalance, state: State) -> tuple[float, float]:
     weight = np.where(order == 0, 1.0, 2.0) / n
     found = force @ (phi * weight)
     p = balance.contact.only("this check").parameters
-    k, mu, gap = p.stiffness, p.friction, p.gap
+    k, mu, gap = p.stiffness, p.numbers["friction"], p.gap
     across = np.abs(u).max(axis=2)
     across[:, -1] += np.abs(gap)
     size = float(np.linalg.norm(k * across))
@@ -58,7 +58,7 @@ def _columns(angle: np.ndarray, order: np.ndarray) -> np.ndarray:
 def _march(balance: HarmonicBalance, u: np.ndarray) -> np.ndarray:
     """Forces (n_pair, n_component, n) [N] of a cycle that repeats, under displacements u of the same shape [m]."""
     p = balance.contact.only("this check").parameters
-    k_t, k_n, mu = p.stiffness[:, :-1], p.stiffness[:, -1], p.friction
+    k_t, k_n, mu = p.stiffness[:, :-1], p.stiffness[:, -1], p.numbers["friction"]
     normal = np.maximum(k_n[:, None] * (u[:, -1] - p.gap[:, None]), 0.0)
     force = np.empty_like(u)
     force[:, -1] = normal

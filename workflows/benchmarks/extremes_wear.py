@@ -43,7 +43,7 @@ def _problem(body: Body, coefficient: float = ORDINARY) -> tuple[WearProblem, fl
     balance = body.balance(body.ordinary)
     duty = Duty(AtFrequency(balance.compliance.output_names[0], body.ordinary.omega))
     area = body.model.interface.area
-    problem = WearProblem(balance, (duty,), JointWear("energy", coefficient), area, lost_below=0.9 * LIFE_SHARE)
+    problem = WearProblem(balance, (duty,), JointWear.of("energy", coefficient=coefficient), area, lost_below=0.9 * LIFE_SHARE)
     return problem, float(free_deflection(balance).max())
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, StrictBool, StrictInt, model_validator
+from pydantic import ConfigDict, Field, StrictBool, StrictInt, ValidationInfo, model_validator
 
-from tribodyn.workflows.scene.fields import Angle, Direction, Length, Number, Stiffness, Table
+from tribodyn.hbm import law as contact_law
+from tribodyn.workflows.scene.fields import Angle, Direction, Length, Stiffness, Table
+from tribodyn.workflows.scene.own import folder_of, with_own_numbers
 
 
 class Contact(Table):
@@ -15,13 +17,24 @@ class Contact(Table):
     components: tuple[Literal["t1", "t2", "n"], ...] = ("t1", "t2", "n")
     """Contact components that are modelled."""
     law: str = "jenkins"
-    """Contact law."""
+    """Name of a contact law, or a file my_law.py beside the scene; its own numbers, such as friction, are further keys
+    of this table."""
     tangential_stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
     """Tangential stiffness of all pairs together."""
     normal_stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
     """Normal stiffness of all pairs together."""
-    friction: Annotated[Number, Field(ge=0)] | None = None
-    """Coefficient of friction."""
+
+    model_config = ConfigDict(extra="allow")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _own_numbers(cls, table: Any, info: ValidationInfo) -> Any:
+        return with_own_numbers(table, "contact", cls.model_fields, "jenkins", contact_law, folder_of(info))
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The contact law's own numbers, in the units that it declares."""
+        return dict(self.model_extra or {})
 
     @model_validator(mode="after")
     def _only_what_the_components_need(self) -> Contact:
@@ -29,7 +42,6 @@ class Contact(Table):
         given = self.stiffness_is_given
         for name, need in (
             ("tangential_stiffness", along and not given),
-            ("friction", along),
             ("normal_stiffness", across and not given),
         ):
             if need != (getattr(self, name) is not None):

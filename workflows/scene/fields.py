@@ -39,7 +39,6 @@ Stiffness = Annotated[float, quantity("N/m")]
 Frequency = Annotated[float, quantity("Hz")]
 Angle = Annotated[float, quantity("rad")]
 Number = Annotated[float, quantity("")]
-WearCoefficient = Annotated[float, quantity("m3/J")]
 
 
 def _direction(value: object) -> tuple[float, float, float]:

@@ -12,7 +12,8 @@ from typing import Any, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 
 from tribodyn.workflows.scene.matrices import MatrixScene
-from tribodyn.workflows.scene.schema import PartScene, Scene, unknown_key
+from tribodyn.workflows.scene.schema import PartScene, Scene
+from tribodyn.workflows.scene.words import unknown_key
 
 CASES = Path(__file__).parents[1] / "cases"
 MOST_PROBLEMS = 3  # told in one sentence
@@ -106,13 +107,16 @@ def parse(text: str, label: str, overrides: Sequence[str] = (), folder: Path = C
         raise SceneError(f"{label} is not valid TOML: {str(error)[0].lower()}{str(error)[1:]}") from None
     for override in overrides:
         _override(data, override)
-    return SceneFile(Path(label).stem, text, tuple(overrides), folder, checked(kind_of(data), data, label))
+    return SceneFile(Path(label).stem, text, tuple(overrides), folder, checked(kind_of(data), data, label, folder))
 
 
-def checked(kind: type[Kind], data: dict[str, Any], label: str) -> Kind:
-    """The data of a file as a table of a kind; raises SceneError that names the file `label` and the keys."""
+def checked(kind: type[Kind], data: dict[str, Any], label: str, folder: Path | None = None) -> Kind:
+    """The data of a file as a table of a kind; raises SceneError that names the file `label` and the keys.
+
+    folder : of a scene, where the laws and parts of one's own that it names lie
+    """
     try:
-        return kind.model_validate(data)
+        return kind.model_validate(data, context=None if folder is None else {"folder": folder})
     except ValidationError as error:
         problems = [_sentence(problem, kind) for problem in error.errors()]
         more = f"; and {len(problems) - MOST_PROBLEMS} more" if len(problems) > MOST_PROBLEMS else ""

@@ -5,8 +5,8 @@ Every key of the file is a field below; a key that is not here is an error. What
 
 from __future__ import annotations
 
-import difflib
-from dataclasses import asdict, fields
+from dataclasses import asdict
+from pathlib import Path
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
 from pydantic import (
@@ -14,6 +14,7 @@ from pydantic import (
     SerializerFunctionWrapHandler,
     StrictBool,
     StrictInt,
+    ValidationInfo,
     ValidatorFunctionWrapHandler,
     WrapValidator,
     field_serializer,
@@ -21,6 +22,7 @@ from pydantic import (
     model_validator,
 )
 
+from tribodyn.declare import read
 from tribodyn.geometry import parts
 from tribodyn.workflows.scene.contact import Contact, FaceContact, Surfaces
 from tribodyn.workflows.scene.fields import (
@@ -35,9 +37,10 @@ from tribodyn.workflows.scene.fields import (
     Table,
     quantity,
 )
-from tribodyn.workflows.scene.units import to_si
+from tribodyn.workflows.scene.own import beside, folder_of, is_file, numbers
 from tribodyn.workflows.scene.wear import Wear
 from tribodyn.workflows.scene.wheel import Wheel
+from tribodyn.workflows.scene.words import unknown_key
 
 CENTRIFUGAL = "centrifugal"
 HIGHEST = 15  # harmonic that kept = "auto" may keep
@@ -75,7 +78,7 @@ class Geometry(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _gather_parameters(cls, table: Any) -> Any:
+    def _gather_parameters(cls, table: Any, info: ValidationInfo) -> Any:
         if not isinstance(table, dict) or "parameters" in table:
             return table
         own = {key: value for key, value in table.items() if key in cls.model_fields}
@@ -84,44 +87,22 @@ class Geometry(Table):
             raise ValueError('expected either part = "name" or mesh = "file.msh", and not both')
         if not isinstance(own.get("part"), str):
             return own | other  # a mesh file has no parameters: the other keys are unknown ones
-        return own | {"parameters": part_parameters(own["part"], other)}
+        return own | {"parameters": part_parameters(own["part"], other, folder_of(info))}
 
 
-def part_parameters(part: str, given: dict[str, Any]) -> dict[str, int | float]:
-    """Parameters of a part of geometry/ in SI units, all of them.
+def part_parameters(part: str, given: dict[str, Any], folder: Path | None = None) -> dict[str, int | float]:
+    """Parameters of a part in SI units: all of them, or those given to a file of one's own, which is not run here.
 
-    given : key -> number or text with a unit (a length, an angle or a pure number)
+    given : key -> number or text with a unit; folder : of the scene
     Raises  ValueError: no such part, unknown key, or a value that the part refuses
     """
-    kind = parts.load(part).Parameters
-    known = {item.name: item.type for item in fields(kind)}
-    values = {}
-    for key, value in given.items():
-        if key not in known:
-            raise ValueError(unknown_key(f"geometry.{key}", [*Geometry.model_fields, *known]))
-        values[key] = _parameter(key, value, whole=known[key] in (int, "int"))
-    return asdict(kind(**values))
-
-
-def _parameter(key: str, value: Any, whole: bool) -> int | float:
-    if whole:
-        if type(value) is not int:
-            raise ValueError(f"geometry.{key}: expected a whole number, got {value!r}")
-        return value
-    for unit in ("m", "rad", ""):
-        try:
-            return to_si(value, unit)
-        except ValueError:
-            continue
-    raise ValueError(f"geometry.{key}: expected a length, an angle or a number, got {value!r}")
-
-
-def unknown_key(key: str, known: list[str]) -> str:
-    """Clause about a key that does not exist, with the one that was probably meant and all that exist."""
-    names = [name for name in known if name != "parameters"]
-    close = difflib.get_close_matches(key.rpartition(".")[2], names, n=1)
-    hint = f" (did you mean {close[0]}?)" if close else ""
-    return f"unknown key {key}{hint}, known here: {', '.join(names)}"
+    general = [name for name in Geometry.model_fields if name != "parameters"]
+    if is_file(part):
+        if folder is None:
+            raise ValueError(f'geometry.part: "{part}" is a file beside a scene, and this scene has no folder')
+        return numbers("geometry", read(beside(folder, part, "geometry.part")), given, general)
+    values = numbers("geometry", read(parts.file_of(part)), given, general)
+    return asdict(parts.load(part).Parameters(**values))
 
 
 class Material(Table):

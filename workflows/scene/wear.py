@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, StrictInt, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, StrictInt, ValidationInfo, model_validator
 
-from tribodyn.workflows.scene.fields import Number, Table, WearCoefficient
+from tribodyn.hbm import wear_law
+from tribodyn.workflows.scene.fields import Number, Table
+from tribodyn.workflows.scene.own import folder_of, with_own_numbers
 from tribodyn.workflows.scene.units import to_si
 
 
@@ -72,13 +74,12 @@ class Wear(Table):
     """Wear of the contact until it is lost or max_steps are done."""
 
     law: str = "energy"
-    """Name of a wear law, or a file my_law.py beside the scene."""
+    """Name of a wear law, or a file my_law.py beside the scene; its own numbers, such as coefficient, are further keys
+    of this table."""
     split: Annotated[Number, Field(ge=0, le=1)] = 0.5
     """Share of the depth that the scene's own part loses, or the first of two faces; the rest wears the other one."""
     responses: Annotated[StrictInt, Field(ge=0, le=100)] = 0
     """Number of response curves of the worn contact, evenly spread over the worn depth."""
-    coefficient: Annotated[WearCoefficient, Field(ge=0)]
-    """Wear coefficient: volume per friction work."""
     rule: Literal["thesis", "error_controlled"] = "thesis"
     """How the steps are chosen: "thesis" takes `step`, "error_controlled" takes `tolerance`."""
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 0.01
@@ -95,6 +96,18 @@ class Wear(Table):
     """List of duties that share the cycles, instead of `at`."""
     max_steps: Annotated[StrictInt, Field(ge=0)] = 10_000
     """Largest number of wear steps."""
+
+    model_config = ConfigDict(extra="allow")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _own_numbers(cls, table: Any, info: ValidationInfo) -> Any:
+        return with_own_numbers(table, "wear", cls.model_fields, "energy", wear_law, folder_of(info))
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The wear law's own numbers, in the units that it declares."""
+        return dict(self.model_extra or {})
 
     @model_validator(mode="after")
     def _whole(self) -> Wear:
