@@ -11,6 +11,8 @@ import importlib
 from pathlib import Path
 from types import ModuleType
 
+from tribodyn import declare
+
 _FOLDER = Path(__file__).parent
 
 
@@ -29,10 +31,12 @@ def file_of(name: str) -> Path:
 def load(name: str) -> ModuleType:
     """Import a part.
 
-    name : its file name without .py
+    name : its file name without .py, or the path of a file of one's own, which ends with .py
     Returns the module, with `Parameters` and `build`
     Raises ValueError: there is no such part
     """
+    if name.endswith(".py"):
+        return declare.run_file(Path(name), "part", ("build", "Parameters"))
     file_of(name)
     return importlib.import_module(f"tribodyn.geometry.{name}")
 

@@ -168,12 +168,17 @@ def require_order(law: ModuleType, parameters: ContactParameters) -> None:
         raise ValueError(f"contact law '{called(law)}' has the numbers {own}, in this order, and was given {has}")
 
 
+def check_components(name: str, components: tuple[str, ...]) -> None:
+    """Raise ValueError where the law of this name does not serve these components."""
+    accepted = load(name).COMPONENTS
+    if components not in accepted:
+        known = " or ".join("(" + ", ".join(c) + ")" for c in accepted)
+        raise ValueError(f"contact law '{Path(name).stem}' has components {known}, not {components}")
+
+
 def checked(name: str, parameters: ContactParameters) -> ContactParameters:
     """The parameters with the law's own numbers complete and in their order; raises ValueError where that fails."""
-    law = load(name)
-    if parameters.components not in law.COMPONENTS:
-        known = " or ".join("(" + ", ".join(c) + ")" for c in law.COMPONENTS)
-        raise ValueError(f"contact law '{Path(name).stem}' has components {known}, not {parameters.components}")
+    check_components(name, parameters.components)
     values = declare.checked(declared(name), parameters.numbers, f"contact law '{Path(name).stem}'")
     n = parameters.n_pair
     numbers = {key: np.array(np.broadcast_to(np.asarray(v, float), (n,))) for key, v in values.items()}

@@ -14,13 +14,16 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tribodyn import declare
 from tribodyn.hbm import wear as hbm_wear
-from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.joint import Joint
+
+if TYPE_CHECKING:
+    from tribodyn.hbm.balance import HarmonicBalance, State
+    from tribodyn.hbm.joint import Joint
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,8 @@
     balance = HarmonicBalance.of(model, Joint("contact", "jenkins", parameters), basis, excitation, omega_max=900.0)
     response = natural.follow(balance, 200.0, 800.0, natural.Options(n_points=60))
     print(response.frequency, response.amplitude("tip"))
-    wear = WearProblem(balance, (Duty(AtPeak("tip", 200.0, 800.0)),), JointWear.of("energy", coefficient=2e-15), contact.area)
+    law = JointWear.of("energy", coefficient=2e-15)
+    wear = WearProblem(balance, (Duty(AtPeak("tip", 200.0, 800.0)),), law, contact.area)
     history = thesis_rule.evolve(wear, 1e-6, max_steps=5)
     print(history.cycles, history.depth.max(axis=1))
 

@@ -12,8 +12,8 @@ Source  Simo and Hughes 1998, chapter 3 (return mapping); Sanliturk and Ewins 19
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 import math
+from dataclasses import dataclass
 
 import numba
 

@@ -7,6 +7,7 @@ of harmonics up to H is exact at more than 4 H samples.
 from __future__ import annotations
 
 from dataclasses import dataclass
+
 import numba
 
 from tribodyn.declare import number

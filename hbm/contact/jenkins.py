@@ -7,6 +7,7 @@ Source  Yang, Chu and Menq 1998; Tamatam 2021, eq. 3.24-3.28.
 from __future__ import annotations
 
 from dataclasses import dataclass
+
 import numba
 import numpy as np
 

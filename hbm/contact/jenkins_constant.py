@@ -7,6 +7,7 @@ Source  Griffin 1980; Tamatam 2021, eq. 3.26-3.28 with N constant.
 from __future__ import annotations
 
 from dataclasses import dataclass
+
 import numba
 import numpy as np
 

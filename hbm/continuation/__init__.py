@@ -7,7 +7,10 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+from pathlib import Path
 from types import ModuleType
+
+from tribodyn import declare
 
 
 def names() -> list[str]:
@@ -16,7 +19,12 @@ def names() -> list[str]:
 
 
 def load(name: str) -> ModuleType:
-    """The continuation module of this name; raises ValueError with the known names."""
+    """The continuation module of this name, or of a file of one's own; raises ValueError with the known names.
+
+    name : of a method of the package, or the path of a file that ends with .py
+    """
+    if name.endswith(".py"):
+        return declare.run_file(Path(name), "continuation", ("follow", "Options"))
     if name not in names():
-        raise ValueError(f"no continuation '{name}': there are {', '.join(names())}")
+        raise ValueError(f"no continuation '{name}': there are {', '.join(names())}, or give a file my_method.py")
     return importlib.import_module(f"{__name__}.{name}")

@@ -215,7 +215,8 @@ def test_joints_wear_by_their_own_laws(rule: str) -> None:
     still = worn(replace(whole, balance=cut, wear={"part 1": JointWear.of("energy", coefficient=1e-9)}))
     np.testing.assert_array_equal(still[:2], 0.0)
     assert np.all(still[2:] > 0)
-    law_and_law = {"part 0": JointWear.of("archard", coefficient=4e-10), "part 1": JointWear.of("energy", coefficient=1e-9)}
+    archard = JointWear.of("archard", coefficient=4e-10)
+    law_and_law = {"part 0": archard, "part 1": JointWear.of("energy", coefficient=1e-9)}
     other = worn(replace(whole, balance=cut, wear=law_and_law))
     np.testing.assert_allclose(other[2:], one[2:], rtol=0.05)
     # k = mu alpha is the energy law along a line; in the plane a path is up to sqrt(2) shorter than its two parts

@@ -198,7 +198,8 @@ def test_impact_work_is_that_of_the_deepest_compression():
     x[1, 0] = [-1.0, 0.5, 0.0]
     x[2, 0] = [0.5, 0.0, 1.0]
     k = balance.contact.stiffness[0, 0]
-    exposure = Exposure(balance, balance.evaluate(OMEGA, x), np.full(9, 2e-4), np.full(9, 3e-12), np.zeros(9), 0.0)
+    own = {"coefficient": np.full(9, 3e-12)}
+    exposure = Exposure(balance, balance.evaluate(OMEGA, x), np.full(9, 2e-4), own, np.zeros(9), 0.0)
     np.testing.assert_allclose(impact_work(exposure)[:3], [0.0, 0.0, k * 1.5**2 / 2], rtol=1e-5)
     angle = 2 * np.pi * np.arange(400) / 400
     spring = 0.2 + 0.1 * np.cos(angle)

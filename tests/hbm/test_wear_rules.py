@@ -110,7 +110,7 @@ def test_missions_average_their_duties(problem: WearProblem) -> None:
     mixed = WearProblem(problem.balance, mission, JointWear.of("energy", coefficient=1e-9), problem.area)
     state = assess(mixed, np.zeros(N_PAIR), 0.0, None)
     full, half = (
-        assess(WearProblem(problem.balance, (Duty(site, 1.0, load),), JointWear.of("energy", coefficient=1e-9), problem.area), *start)
+        assess(WearProblem(problem.balance, (Duty(site, 1.0, load),), problem.wear, problem.area), *start)
         for load, start in ((1.0, (np.zeros(N_PAIR), 0.0, None)), (0.5, (np.zeros(N_PAIR), 0.0, None)))
     )
     assert state.rate == pytest.approx(0.25 * full.rate + 0.75 * half.rate, rel=1e-6)
@@ -123,7 +123,8 @@ def test_missions_average_their_duties(problem: WearProblem) -> None:
 def test_archard_and_energy_law_agree_up_to_the_uncoupled_directions(problem: WearProblem) -> None:
     point = problem.mission[0].site.first(problem.balance)
     area = problem.area
-    exposure = wear_law.Exposure(problem.balance, point.state, area, np.ones(N_PAIR), np.zeros(N_PAIR), 0.0)
+    own = {"coefficient": np.ones(N_PAIR)}
+    exposure = wear_law.Exposure(problem.balance, point.state, area, own, np.zeros(N_PAIR), 0.0)
     energy = wear_law.load("energy").depth_rate(exposure)
     archard = wear_law.load("archard").depth_rate(exposure)
     slips = energy > 0.05 * energy.max()
@@ -182,7 +183,7 @@ def test_a_wear_law_that_fails_in_the_run_is_told(tmp_path: Path, body: str, say
     path = tmp_path / "law.py"
     path.write_text(f"def depth_rate(exposure):\n    {body}\n")
     with pytest.raises(ValueError, match=says):
-        thesis_rule.evolve(wear_problem(wear=JointWear.of(str(path), coefficient=1e-9)), 5e-7, max_steps=1)
+        thesis_rule.evolve(wear_problem(wear=JointWear.of(str(path))), 5e-7, max_steps=1)
 
 
 def test_events_are_where_the_penetration_of_a_pair_changes_its_sign(problem: WearProblem, fine: WearHistory) -> None:

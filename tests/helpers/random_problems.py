@@ -16,8 +16,7 @@ import scipy.linalg as sla
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
-from tests.helpers.contact_draws import own
-from tests.helpers.contact_draws import LAWS, LOCATED
+from tests.helpers.contact_draws import LAWS, LOCATED, own
 from tests.helpers.verification_models import interface, modal_damping
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import law as contact_law

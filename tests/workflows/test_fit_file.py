@@ -61,7 +61,7 @@ def test_contact_springs_and_friction_are_found_again():
     assert found.origin == pytest.approx([470e6, 0.5])  # the scene's own, where it starts
     assert changes[0].startswith("contact.tangential_stiffness=3")
     assert changes[0].endswith(" N/m")
-    assert scene_file.read("beam", (*BEAM, *changes)).scene.contact.friction == pytest.approx(0.42, rel=1e-3)
+    assert scene_file.read("beam", (*BEAM, *changes)).scene.contact.numbers["friction"] == pytest.approx(0.42, rel=1e-3)
     assert abs(found.sensitivity[0, 1]) < 1e-9  # a stuck mode knows no friction
 
 

@@ -60,7 +60,7 @@ def test_the_import_brings_nothing_heavy() -> None:
 
 def test_a_scene_is_a_name_a_path_or_a_dict(tmp_path: Path) -> None:
     by_name = td.read_scene("beam", {"contact.friction": 0.3, "wear.step": "4 %"})
-    assert by_name.scene.contact.friction == 0.3
+    assert by_name.scene.contact.numbers["friction"] == 0.3
     path = tmp_path / "mine.toml"
     path.write_text(td.read_scene("beam").text)
     by_path = td.read_scene(path, ["contact.friction=0.3", "wear.step=4 %"])

@@ -85,7 +85,7 @@ def test_values_arrive_in_si_units() -> None:
     assert scene.geometry.parameters["length"] == 0.2
     assert scene.geometry.parameters["n_patch"] == 13
     assert scene.wear is not None
-    assert scene.wear.coefficient == 2e-15
+    assert scene.wear.numbers["coefficient"] == 2e-15
     assert scene.wear.step.share == 0.1
 
 

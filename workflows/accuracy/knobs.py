@@ -217,7 +217,7 @@ def _of_harmonics(scene: Scene) -> list[Knob]:
     more = ("harmonics.samples=128",) if scene.harmonics.samples < 128 else ()
     kept = tuple(Setting(top, (f"harmonics.kept={list(range(first, top + 1))}", *more)) for top in tops)
     found = [Knob("harmonics", kept, worn_up_to=WORN_TOP)] if len(kept) > 1 else []
-    if hasattr(law.load(scene.contact.law), "located"):
+    if hasattr(law.load(scene.contact.law_name), "located"):
         top = max(scene.harmonics.kept, default=1)
         sampled = tuple(
             Setting(n, (f"harmonics.samples={n}", 'harmonics.transitions="sampled"')) for n in SAMPLES if n > 2 * top

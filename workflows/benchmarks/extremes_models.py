@@ -75,7 +75,7 @@ def beam(n_patch: int) -> Body:
     contact, loads = file.scene.contact, model.balance.excitation.loads
     tangential, normal = contact.tangential_stiffness or 0.0, contact.normal_stiffness or 0.0
     ordinary = Setting(
-        tangential, normal, contact.friction or 0.0, abs(loads[0, "press"]), abs(loads[1, "shake"]), 2 * np.pi * 860
+        tangential, normal, contact.numbers["friction"], abs(loads[0, "press"]), abs(loads[1, "shake"]), 2 * np.pi * 860
     )
     return Body(f"beam, {n_patch} x {n_patch} nodes", model.reduced, ordinary)
 

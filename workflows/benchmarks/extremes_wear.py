@@ -43,7 +43,8 @@ def _problem(body: Body, coefficient: float = ORDINARY) -> tuple[WearProblem, fl
     balance = body.balance(body.ordinary)
     duty = Duty(AtFrequency(balance.compliance.output_names[0], body.ordinary.omega))
     area = body.model.interface.area
-    problem = WearProblem(balance, (duty,), JointWear.of("energy", coefficient=coefficient), area, lost_below=0.9 * LIFE_SHARE)
+    law = JointWear.of("energy", coefficient=coefficient)
+    problem = WearProblem(balance, (duty,), law, area, lost_below=0.9 * LIFE_SHARE)
     return problem, float(free_deflection(balance).max())
 
 
@@ -76,7 +77,7 @@ def _judged(
     if (worn.worn < 0).any() or (np.diff(worn.depth, axis=0) < 0).any():
         return Verdict(WRONG, "depth falls")
     volume = float(problem.area @ (worn.depth[-1] + worn.worn[-1]))
-    by_work = float(problem.coefficient @ worn.work.sum(axis=0))
+    by_work = float(problem.numbers("contact")["coefficient"] @ worn.work.sum(axis=0))
     if abs(volume - by_work) > 1e-9 * by_work:
         return Verdict(WRONG, f"volume {volume:.6e} m3 for {by_work:.6e} m3 of work")
     if faster == 0:

@@ -85,8 +85,8 @@ def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]
     geometry = file.part_scene.geometry
     if geometry.mesh is not None:
         return mesh_reader.read(file.folder / geometry.mesh)
-    assert geometry.part is not None
-    part, path = parts.load(geometry.part), folder / "mesh.msh"
+    assert geometry.part_name is not None
+    part, path = parts.load(geometry.part_name), folder / "mesh.msh"
     part.build(part.Parameters(**geometry.parameters), path)
     return mesh_reader.read(path)
 
@@ -182,8 +182,8 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
     parameters = law.ContactParameters.of(
         contact.components,
         contact_stiffness(scene, reduced),
-        friction=contact.friction or 0.0,
         gap=reduced.interface.gap,
+        **contact.numbers,
     )
 
     def balance(kept: tuple[int, ...]) -> HarmonicBalance:
@@ -191,7 +191,7 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
         if not basis.has_static and np.any(np.abs(parameters.gap) > NO_GAP):
             raise ValueError("the contact has gaps, which act in harmonic 0: keep it in harmonics.kept")
         base = ground_motion(scene, part, basis) if isinstance(scene, PartScene) and part is not None else None
-        joint = Joint("contact", contact.law, parameters)
+        joint = Joint("contact", contact.law_name, parameters)
         return HarmonicBalance.of(reduced, joint, basis, excite(scene, base), settings.response_range(scene)[1])
 
     choice = None

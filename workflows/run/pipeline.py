@@ -33,7 +33,7 @@ def run(file: SceneFile, folder: Path | None, progress: Progress, earlier: Resul
     Raises  ValueError: the scene asks for what cannot be, SolveFailed: after what was computed is kept
     """
     scene, clock = file.scene, Clock(earlier)
-    settings.check_names(scene, file.folder)
+    settings.check_names(scene)
     keep = Keeper(None if folder is None else folder / "result.h5", clock)
     with threadpool_limits(scene.solver.threads), TemporaryDirectory() as scratch:
         model = modelling.build(file, folder or Path(scratch), progress, () if earlier is None else earlier.harmonics)
@@ -88,7 +88,7 @@ def judged(scene: Scene, balance: HarmonicBalance, result: Result, progress: Pro
 
 def follow_response(scene: Scene, balance: HarmonicBalance, advance: Callable[[float, str], None]) -> Branch:
     """The response curve of the unworn contact by the scene's continuation method."""
-    method, options = continuation.load(scene.response.method), settings.response_options(scene)
+    method, options = continuation.load(scene.response.method_name), settings.response_options(scene)
     low, high = settings.response_range(scene)
     return method.follow(balance, low, high, options, lambda done, wanted: advance(done / wanted, ""))
 

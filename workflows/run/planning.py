@@ -19,6 +19,7 @@ from tribodyn.workflows.run import matrix_model
 from tribodyn.workflows.run.modelling import clamps, make_mesh
 from tribodyn.workflows.run.settings import check_names
 from tribodyn.workflows.scene.matrices import MatrixScene
+from tribodyn.workflows.scene.own import is_file
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import PartScene, Scene
 
@@ -76,13 +77,16 @@ class Plan:
 def plan(file: SceneFile) -> Plan:
     """Plan a scene; raises ValueError for what the run would refuse after reading the mesh."""
     scene = file.scene
-    check_names(scene, file.folder)
+    check_names(scene, own_files=False)
     elements = nodes = held = 0
     if isinstance(scene, MatrixScene):
         reduced = matrix_model.make(scene, file.folder)
         full, pairs, masters = int(str(reduced.info["n_full"])), reduced.interface.n_pair, reduced.system.n_dof
         modes: int | None = 0
     else:
+        part = file.part_scene.geometry.part
+        if part is not None and is_file(part):
+            raise ValueError(f'geometry.part: "{part}" is a file of your own, which a plan does not run: run the scene')
         with tempfile.TemporaryDirectory() as folder:
             mesh, node_sets = make_mesh(file, Path(folder))
         elements, nodes = int(mesh.nelements), mesh.doflocs.shape[1]

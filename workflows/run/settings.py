@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,30 +12,31 @@ from tribodyn.hbm.evolution import Duty
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.operating_point import AtFrequency, AtPeak, BesidePeak
 from tribodyn.workflows.run import references
-from tribodyn.workflows.scene.schema import Scene, unknown_key
+from tribodyn.workflows.scene.own import is_file
+from tribodyn.workflows.scene.schema import Scene
 from tribodyn.workflows.scene.wear import Place
+from tribodyn.workflows.scene.words import unknown_key
 
 OUTPUT = "response"
 
 
-def check_names(scene: Scene, folder: Path) -> None:
-    """Raise ValueError where a scene names a law or a method that does not exist, before anything is built."""
-    law.check_components(law.load(scene.contact.law), scene.contact.components)
-    response_options(scene)
-    if scene.wear is not None:
-        wear_law.load(law_of(scene, folder))
+def check_names(scene: Scene, own_files: bool = True) -> None:
+    """Raise ValueError where a law or a method of a scene does not fit it, before anything is built.
 
-
-def law_of(scene: Scene, folder: Path) -> str:
-    """Name of the wear law of a scene that stands in `folder`, or path of its file."""
-    assert scene.wear is not None
-    name = scene.wear.law
-    return str(folder / name) if name.endswith(".py") else name
+    own_files : run files beside the scene for it, which a plan must not do
+    """
+    contact = scene.contact
+    if own_files or not is_file(contact.law):
+        law.check_components(contact.law_name, contact.components)
+    if own_files or not is_file(scene.response.method):
+        response_options(scene)
+    if scene.wear is not None and (own_files or not is_file(scene.wear.law)):
+        wear_law.load(scene.wear.law_name)
 
 
 def response_options(scene: Scene) -> Any:
     """Options of the scene's continuation method; raises ValueError for one that it does not have."""
-    kind, given = continuation.load(scene.response.method).Options, scene.response.options
+    kind, given = continuation.load(scene.response.method_name).Options, scene.response.options
     known = {option.name: option.type for option in fields(kind) if option.name not in ("newton", "guess", "bounds")}
     for key, value in given.items():
         if key not in known:

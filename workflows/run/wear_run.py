@@ -57,7 +57,7 @@ def wear_problem(
     lost_below : share of the first preload at which the run ends, of that at rest where `at_rest`
     """
     assert scene.wear is not None
-    wear = JointWear(settings.law_of(scene, folder), scene.wear.coefficient)
+    wear = JointWear.of(scene.wear.law_name, **scene.wear.numbers)
     area = balance.model.interface.area
     vibrating, resting = (0.0, lost_below) if at_rest else (lost_below, None)
     return WearProblem(balance, settings.mission(scene), wear, area, vibrating, resting)

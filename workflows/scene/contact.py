@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from types import ModuleType
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import ConfigDict, Field, StrictBool, StrictInt, ValidationInfo, model_validator
+from pydantic import Field, StrictBool, StrictInt, model_validator
 
 from tribodyn.hbm import law as contact_law
 from tribodyn.workflows.scene.fields import Angle, Direction, Length, Stiffness, Table
-from tribodyn.workflows.scene.own import folder_of, with_own_numbers
+from tribodyn.workflows.scene.own import LawTable
 
 
-class Contact(Table):
+class Contact(LawTable):
     """The contact law of every node pair; stiffness is that of all pairs together, shared by their area."""
+
+    TABLE: ClassVar[str] = "contact"
+    LAWS: ClassVar[ModuleType] = contact_law
 
     components: tuple[Literal["t1", "t2", "n"], ...] = ("t1", "t2", "n")
     """Contact components that are modelled."""
@@ -23,18 +27,6 @@ class Contact(Table):
     """Tangential stiffness of all pairs together."""
     normal_stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
     """Normal stiffness of all pairs together."""
-
-    model_config = ConfigDict(extra="allow")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _own_numbers(cls, table: Any, info: ValidationInfo) -> Any:
-        return with_own_numbers(table, "contact", cls.model_fields, "jenkins", contact_law, folder_of(info))
-
-    @property
-    def numbers(self) -> dict[str, float]:
-        """The contact law's own numbers, in the units that it declares."""
-        return dict(self.model_extra or {})
 
     @model_validator(mode="after")
     def _only_what_the_components_need(self) -> Contact:

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import Any, ClassVar, Self
 
-from pydantic import ValidationInfo
+from pydantic import ConfigDict, PrivateAttr, ValidationInfo, model_validator
 
 from tribodyn.declare import Number, read
+from tribodyn.workflows.scene.fields import Table
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.words import unknown_key
 
@@ -82,26 +84,54 @@ def _in_si(key: str, number: Number, value: Any) -> int | float:
 
 
 
-def with_own_numbers(
-    table: Any, key: str, fields: Iterable[str], default: str, laws: Any, folder: Path | None
-) -> Any:
-    """A raw table of a scene with the own numbers of its law checked and in SI units.
-
-    key : of the table; fields : its general keys; default : law where it names none
-    laws : module with `file_of(name)`, such as hbm.law; folder : of the scene; None for a table that was checked before
-    """
-    if folder is None or not isinstance(table, dict):
-        return table
-    general = {name: value for name, value in table.items() if name in fields}
-    given = {name: value for name, value in table.items() if name not in fields}
-    law = general.get("law", default)
-    if not isinstance(law, str):
-        return general  # the table itself says what a law is
-    path = beside(folder, law, f"{key}.law") if is_file(law) else laws.file_of(law)
-    return general | numbers(key, read(path), given, fields)
-
-
 def folder_of(info: ValidationInfo) -> Path | None:
-    """The folder of the scene that is being read; None where a result's scene is read back, which was checked before."""
+    """The folder of the scene that is being read; None where the scene of a result is, which was checked before."""
     folder: Path | None = (info.context or {}).get("folder")
     return folder
+
+
+def own_file(folder: Path | None, name: str | None, key: str) -> Path | None:
+    """The file beside a scene that a key names; None where it names none, or the scene was checked before."""
+    return None if folder is None or name is None or not is_file(name) else beside(folder, name, key)
+
+
+class LawTable(Table):
+    """A table that names a law; the law's own numbers are further keys of it."""
+
+    model_config = ConfigDict(extra="allow")
+    TABLE: ClassVar[str]
+    """Its key in a scene."""
+    LAWS: ClassVar[ModuleType]
+    """Module that finds the file of a law of the package by `file_of(name)`."""
+
+    law: str
+    _own: Path | None = PrivateAttr(None)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _own_numbers(cls, table: Any, info: ValidationInfo) -> Any:
+        folder, fields = folder_of(info), cls.model_fields
+        if folder is None or not isinstance(table, dict):
+            return table
+        general = {name: value for name, value in table.items() if name in fields}
+        given = {name: value for name, value in table.items() if name not in fields}
+        law = general.get("law", fields["law"].default)
+        if not isinstance(law, str):
+            return general  # the field itself says what a law is
+        path = beside(folder, law, f"{cls.TABLE}.law") if is_file(law) else cls.LAWS.file_of(law)
+        return general | numbers(cls.TABLE, read(path), given, fields)
+
+    @model_validator(mode="after")
+    def _remember_the_file(self, info: ValidationInfo) -> Self:
+        self._own = own_file(folder_of(info), self.law, f"{self.TABLE}.law")
+        return self
+
+    @property
+    def law_name(self) -> str:
+        """Name of the law for hbm: that of the package, or the path of the file beside the scene."""
+        return self.law if self._own is None else str(self._own)
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The law's own numbers, in the units that it declares."""
+        return dict(self.model_extra or {})

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Generic, Literal, TypeVar
+from typing import Annotated, Any, Generic, Literal, Self, TypeVar
 
 from pydantic import (
     Field,
+    PrivateAttr,
     SerializerFunctionWrapHandler,
     StrictBool,
     StrictInt,
@@ -37,7 +38,7 @@ from tribodyn.workflows.scene.fields import (
     Table,
     quantity,
 )
-from tribodyn.workflows.scene.own import beside, folder_of, is_file, numbers
+from tribodyn.workflows.scene.own import beside, folder_of, is_file, numbers, own_file
 from tribodyn.workflows.scene.wear import Wear
 from tribodyn.workflows.scene.wheel import Wheel
 from tribodyn.workflows.scene.words import unknown_key
@@ -88,6 +89,18 @@ class Geometry(Table):
         if not isinstance(own.get("part"), str):
             return own | other  # a mesh file has no parameters: the other keys are unknown ones
         return own | {"parameters": part_parameters(own["part"], other, folder_of(info))}
+
+    _own: Path | None = PrivateAttr(None)
+
+    @model_validator(mode="after")
+    def _remember_the_file(self, info: ValidationInfo) -> Self:
+        self._own = own_file(folder_of(info), self.part, "geometry.part")
+        return self
+
+    @property
+    def part_name(self) -> str | None:
+        """The part for geometry.parts: its name, or the path of the file beside the scene."""
+        return self.part if self._own is None else str(self._own)
 
 
 def part_parameters(part: str, given: dict[str, Any], folder: Path | None = None) -> dict[str, int | float]:
@@ -248,6 +261,18 @@ class Response(Table):
     """At every point, how far the response depends on the load path of pairs that always stick."""
     options: dict[str, Any] = Field(default_factory=dict)
     """Options of the continuation method."""
+
+    _own: Path | None = PrivateAttr(None)
+
+    @model_validator(mode="after")
+    def _remember_the_file(self, info: ValidationInfo) -> Self:
+        self._own = own_file(folder_of(info), self.method, "response.method")
+        return self
+
+    @property
+    def method_name(self) -> str:
+        """The continuation for hbm: its name, or the path of the file beside the scene."""
+        return self.method if self._own is None else str(self._own)
 
     @model_validator(mode="after")
     def _range(self) -> Response:

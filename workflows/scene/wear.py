@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from types import ModuleType
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field, StrictInt, ValidationInfo, model_validator
+from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
 from tribodyn.hbm import wear_law
 from tribodyn.workflows.scene.fields import Number, Table
-from tribodyn.workflows.scene.own import folder_of, with_own_numbers
+from tribodyn.workflows.scene.own import LawTable
 from tribodyn.workflows.scene.units import to_si
 
 
@@ -70,8 +71,11 @@ class MissionDuty(Table):
     """Factor on the harmonic loads."""
 
 
-class Wear(Table):
+class Wear(LawTable):
     """Wear of the contact until it is lost or max_steps are done."""
+
+    TABLE: ClassVar[str] = "wear"
+    LAWS: ClassVar[ModuleType] = wear_law
 
     law: str = "energy"
     """Name of a wear law, or a file my_law.py beside the scene; its own numbers, such as coefficient, are further keys
@@ -96,18 +100,6 @@ class Wear(Table):
     """List of duties that share the cycles, instead of `at`."""
     max_steps: Annotated[StrictInt, Field(ge=0)] = 10_000
     """Largest number of wear steps."""
-
-    model_config = ConfigDict(extra="allow")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _own_numbers(cls, table: Any, info: ValidationInfo) -> Any:
-        return with_own_numbers(table, "wear", cls.model_fields, "energy", wear_law, folder_of(info))
-
-    @property
-    def numbers(self) -> dict[str, float]:
-        """The wear law's own numbers, in the units that it declares."""
-        return dict(self.model_extra or {})
 
     @model_validator(mode="after")
     def _whole(self) -> Wear:

@@ -1,20 +1,33 @@
 """Example of a wear law of one's own: the energy law whose coefficient falls while the faces run in.
 
-In a scene, beside which this file lies: law = "running_in.py" in [wear]. A fresh face wears RATIO times as fast as one
-that has lost a depth well above DEPTH.
+In a scene, beside which this file lies: law = "running_in.py" in [wear]. A fresh face wears `ratio` times as fast as
+one that has lost a depth well above `depth`; both are further keys of [wear].
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from tribodyn.declare import number
 from tribodyn.hbm.wear_law import Exposure
 
-RATIO = 4.0
-DEPTH = 20e-6  # [m]
+
+@dataclass(frozen=True)
+class Parameters:
+    """The law's own numbers."""
+
+    coefficient: float = number("m3/J", low=0.0)
+    """Worn volume per friction work of run-in faces."""
+    ratio: float = number("", default=4.0, low=0.0)
+    """Wear of a fresh face over that of a run-in one."""
+    depth: float = number("m", default=20e-6, above=0.0)
+    """Depth over which a face runs in."""
 
 
 def depth_rate(exposure: Exposure) -> np.ndarray:
-    """(n_pair,) total wear depth per cycle [m]; the coefficient of the scene is that of the run-in faces [m3/J]."""
-    coefficient = exposure.coefficient * (1 + (RATIO - 1) * np.exp(-exposure.depth / DEPTH))
+    """(n_pair,) total wear depth per cycle [m]."""
+    own = exposure.numbers
+    coefficient = own["coefficient"] * (1 + (own["ratio"] - 1) * np.exp(-exposure.depth / own["depth"]))
     return coefficient * exposure.energy / exposure.area

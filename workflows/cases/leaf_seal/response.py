@@ -92,7 +92,7 @@ class LeafResponse:
     def impact_work(self, point: int) -> np.ndarray:
         """(n_pair,) work of impacts per cycle [J]."""
         n = self.balance.contact.n_pair
-        exposure = Exposure(self.balance, self.state(point), np.ones(n), np.ones(n), np.zeros(n), 0.0)
+        exposure = Exposure(self.balance, self.state(point), np.ones(n), {}, np.zeros(n), 0.0)
         return impact.impact_work(exposure)
 
     def pin_work(self, point: int) -> dict[str, float]:

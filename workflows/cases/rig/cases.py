@@ -112,7 +112,7 @@ def compute(file: SceneFile, tell: Callable[[str], None]) -> Study:
         references = linear_references(model.balance, settings.OUTPUT, *settings.response_range(scene))
         return Study(
             before, after, _stuck_complex(joints), heights, apart(rig, references), cycles, tight, runs, other, stages,
-            references, rig.patch(model.balance), scene.wear.coefficient, scene.contact.friction or 0.0,
+            references, rig.patch(model.balance), scene.wear.numbers["coefficient"], scene.contact.numbers["friction"],
             time.process_time() - clock,
         )  # fmt: skip
 

@@ -134,7 +134,7 @@ def run(
 def _coefficient(rig: Rig, file: SceneFile, tell: Callable[[str], None]) -> Identification:
     wear = file.part_scene.wear
     assert wear is not None
-    return fit_coefficient(wear_down(rig, 0.0, tell), wear.coefficient)
+    return fit_coefficient(wear_down(rig, 0.0, tell), wear.numbers["coefficient"])
 
 
 def as_text(found: Mapping[str, Identification]) -> str:
