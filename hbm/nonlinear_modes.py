@@ -64,6 +64,16 @@ class Backbone:
     reference_omega: float
     end: str
 
+    @property
+    def frequency(self) -> np.ndarray:
+        """(n_point,) natural frequency [Hz]."""
+        return self.omega / (2 * np.pi)
+
+    @property
+    def reference_frequency(self) -> float:
+        """Frequency of the mode at rest [Hz]."""
+        return self.reference_omega / (2 * np.pi)
+
 
 _Solved = tuple[Point, str, int]
 

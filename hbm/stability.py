@@ -79,6 +79,11 @@ class Bifurcation:
     value: float
     kind: str
 
+    @property
+    def frequency(self) -> float:
+        """Frequency [Hz], of a branch that was followed in frequency."""
+        return self.value / (2 * np.pi)
+
 
 @dataclass(frozen=True)
 class BranchStability:

@@ -93,6 +93,11 @@ class PeriodicMotion:
     outcome: str
     slopes: Slopes | None
 
+    @property
+    def frequency(self) -> float:
+        """Frequency [Hz]."""
+        return self.omega / (2 * np.pi)
+
     def coefficients(self, series: np.ndarray, basis: HarmonicBasis) -> np.ndarray:
         """Fourier coefficients (..., n_coeff) of a series (..., n_step) of this motion, to stand beside the balance."""
         weight = np.where(basis.order == 0, 1.0, 2.0) / series.shape[-1]

@@ -144,6 +144,11 @@ class WearHistory:
     preload_at_rest: np.ndarray | None = None
 
     @property
+    def frequency(self) -> np.ndarray:
+        """(n_row,) frequency of the cycle [Hz]."""
+        return self.omega / (2 * np.pi)
+
+    @property
     def displacement(self) -> np.ndarray:
         """(n_row, n_pair * n_component, n_coeff) Fourier coefficients at the contact, first duty [m]."""
         return self.duty_displacement[:, 0]

@@ -161,22 +161,36 @@ class ForeignMatrices:
             return sp.coo_matrix((weights.ravel(), (rows, columns.ravel())), shape=shape).tocsr()
 
         motion = one_body(first) if second is None else one_body(first) - one_body(second)
-        motion.eliminate_zeros()
-        if (np.diff(motion.indptr) == 0).any():
-            pair = int(np.flatnonzero(np.diff(motion.indptr) == 0)[0]) // len(kept)
-            raise ValueError(f"contact pair {pair} has the same DOF on both bodies: it can never move")
-        areas = np.broadcast_to(np.asarray(area, float) / (n_pair if np.ndim(area) == 0 else 1), n_pair).copy()
-        if not (areas > 0).all():
-            raise ValueError("a contact area is not positive: give the area of the patch, or one per pair, in m2")
-        return ContactInterface(
-            components=kept,
-            points=np.zeros((n_pair, 3)) if points is None else np.asarray(points, float).reshape(n_pair, 3),
-            frames=frames,
-            area=areas,
-            gap=np.broadcast_to(np.asarray(gap, float), n_pair).copy(),
-            B=motion,
-            faces=np.zeros((0, 4), int),
-        )
+        return _interface(motion, kept, frames, area, gap, points)
+
+    def contact_rows(
+        self,
+        rows: Any,
+        components: Sequence[str],
+        *,
+        area: float | np.ndarray,
+        gap: float | np.ndarray = 0.0,
+        points: np.ndarray | None = None,
+    ) -> ContactInterface:
+        """A contact whose relative displacements are any combinations of DOFs, x = w^T q for every row w.
+
+        rows : (n_pair * n_component, n) array or sparse matrix, pair by pair, in each the components in order
+        components : subset of t1, t2, n in this order; n counts as positive where it closes
+        area, gap, points : as in `contact`
+        """
+        kept = tuple(components)
+        if not kept or kept != tuple(name for name in COMPONENTS if name in kept):
+            raise ValueError(f"contact components are {kept}: give some of t1, t2, n in this order")
+        motion = sp.csr_matrix(np.atleast_2d(rows) if not sp.issparse(rows) else rows, dtype=float)
+        if motion.shape[1] != self.n_dof or motion.shape[0] % len(kept) or not motion.shape[0]:
+            raise ValueError(
+                f"contact rows are {motion.shape[0]} x {motion.shape[1]}: give {len(kept)} for each pair "
+                f"({', '.join(kept)}), each with a factor for every one of the {self.n_dof} DOFs"
+            )
+        if not np.isfinite(motion.data).all():
+            raise ValueError("contact rows have entries that are not finite")
+        frames = np.tile(np.eye(3), (motion.shape[0] // len(kept), 1, 1))
+        return _interface(motion, kept, frames, area, gap, points)
 
     def _vector(self, terms: Terms, name: str) -> np.ndarray:
         if isinstance(terms, np.ndarray):
@@ -194,6 +208,19 @@ class ForeignMatrices:
         if not rows or any(len(row) != width for row in rows):
             raise ValueError(f"{name} needs rows of {width} DOFs, one row for each contact node")
         return np.array(rows)
+
+
+def from_arrays(mass: Any, stiffness: Any, damping: Any = None, labels: Labels | None = None) -> ForeignMatrices:
+    """Matrices that are at hand, dense or sparse, with the checks of `read_matrices`.
+
+    mass, stiffness, damping : (n, n) symmetric [kg], [N/m], [N s/m]; damping None or zero where there is none
+    Raises  ValueError: not square, not symmetric, not finite, sizes that differ
+    """
+    given = {"mass": mass, "stiffness": stiffness, "damping": damping}
+    matrices = {
+        part: matrix_files.real(value, f"{part} matrix") for part, value in given.items() if value is not None
+    }
+    return _checked(matrices, labels)
 
 
 def read_matrices(
@@ -238,22 +265,32 @@ def read_matrices(
         if file is not None:
             name = wanted[part] if matrix_files.variables(Path(file)) else None
             matrix, labels[part] = matrix_files.read_matrix(Path(file), name)
-            read[part] = _symmetric(matrix * scale, f"{part} matrix")
+            read[part] = matrix * scale
     rows = labels["stiffness"]
     for part, own in labels.items():
         if rows is not None and own is not None:
             read[part] = abaqus_matrix.onto(read[part], own, rows, f"{part} matrix")
     if mapping is not None:
         rows = harwell_boeing.read_mapping(Path(mapping))
-    n = read["stiffness"].shape[0]
+    return _checked(read, rows)
+
+
+def _checked(read: dict[str, sp.csr_matrix], rows: Labels | None) -> ForeignMatrices:
+    """The matrices of one structure, each symmetric and all of one size; a damping of zero is none."""
+    made = {
+        part: _symmetric(matrix, f"{part} matrix")
+        for part, matrix in read.items()
+        if part != "damping" or abs(matrix).max() > 0 or matrix.shape[0] != matrix.shape[1]
+    }
+    n = made["stiffness"].shape[0]
     for part, matrix in read.items():
         if matrix.shape[0] != n:
             raise ValueError(f"the {part} matrix has {matrix.shape[0]} rows but the stiffness matrix has {n}")
     if rows is not None and len(rows) != n:
         raise ValueError(f"the mapping has {len(rows)} equations but the matrices have {n} rows: is it theirs?")
-    if (read["mass"].diagonal() < 0).any():
+    if (made["mass"].diagonal() < 0).any():
         raise ValueError("the mass matrix has a negative diagonal entry: are mass and stiffness exchanged?")
-    return _without_constrained(ForeignMatrices(**read, labels=rows))
+    return _without_constrained(ForeignMatrices(**made, labels=rows))
 
 
 def reduced_model(system: SecondOrderSystem, interface: ContactInterface) -> ReducedModel:
@@ -314,6 +351,34 @@ def _symmetric(matrix: sp.csr_matrix, name: str) -> sp.csr_matrix:
             f"but ({column}, {row}) is {matrix[column, row]:g}"
         )
     return ((matrix + matrix.T) / 2).tocsr()
+
+
+def _interface(
+    motion: sp.csr_matrix,
+    components: tuple[str, ...],
+    frames: np.ndarray,
+    area: float | np.ndarray,
+    gap: float | np.ndarray,
+    points: np.ndarray | None,
+) -> ContactInterface:
+    """The interface of rows (n_pair * n_component, n_dof); raises ValueError for an empty row and for bad areas."""
+    n_pair = len(frames)
+    motion.eliminate_zeros()
+    if (np.diff(motion.indptr) == 0).any():
+        pair = int(np.flatnonzero(np.diff(motion.indptr) == 0)[0]) // len(components)
+        raise ValueError(f"contact pair {pair} has the same DOF on both bodies, or a row of zeros: it can never move")
+    areas = np.broadcast_to(np.asarray(area, float) / (n_pair if np.ndim(area) == 0 else 1), n_pair).copy()
+    if not (areas > 0).all():
+        raise ValueError("a contact area is not positive: give the area of the patch, or one per pair, in m2")
+    return ContactInterface(
+        components=components,
+        points=np.zeros((n_pair, 3)) if points is None else np.asarray(points, float).reshape(n_pair, 3),
+        frames=frames,
+        area=areas,
+        gap=np.broadcast_to(np.asarray(gap, float), n_pair).copy(),
+        B=motion,
+        faces=np.zeros((0, 4), int),
+    )
 
 
 def _component(component: int | str) -> int:

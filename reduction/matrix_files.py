@@ -15,8 +15,11 @@ import scipy.io
 import scipy.sparse as sp
 from scipy.io.matlab import MatReadError
 
-from tribodyn.reduction import abaqus_matrix, harwell_boeing, matrix_market
+from tribodyn.reduction import abaqus_matrix, harwell_boeing
 from tribodyn.reduction.abaqus_matrix import Labels
+
+MATRIX_MARKET = "%%MatrixMarket"
+NUMBERS = b"0123456789+-.eE \t\r\nnNaAiIfFtTyY"  # what numbers are written with, nan and infinity too
 
 
 def variables(path: Path) -> list[str]:
@@ -54,7 +57,7 @@ def read_matrix(path: Path, variable: str | None = None) -> tuple[sp.csr_matrix,
             matrix = _from_mat(path, str(variable))
         else:
             matrix, labels = _from_text(path)
-    return _real(matrix, f"{path.name} {variable or ''}".strip()), labels
+    return real(matrix, f"{path.name} {variable or ''}".strip()), labels
 
 
 def read_array(path: Path, variable: str) -> np.ndarray:
@@ -116,8 +119,8 @@ def _from_mat(path: Path, variable: str) -> Any:
 def _from_text(path: Path) -> tuple[Any, Labels | None]:
     with path.open(encoding="ascii", errors="replace") as stream:
         head = [line for _, line in zip(range(50), stream, strict=False)]
-    if head and head[0].startswith(matrix_market.BANNER):
-        return matrix_market.read(path), None
+    if head and head[0].startswith(MATRIX_MARKET):
+        return _from_matrix_market(path), None
     if harwell_boeing.looks_like(head):
         return harwell_boeing.read(path), None
     if abaqus_matrix.looks_like(head):
@@ -127,12 +130,48 @@ def _from_text(path: Path) -> tuple[Any, Labels | None]:
     )
 
 
+def _from_matrix_market(path: Path) -> Any:
+    """A Matrix Market file by scipy's reader, which takes 1.0D3 for 1.0: no such number, no other count than announced.
+
+    Raises  ValueError: complex or pattern matrices, a file that is not what it announces
+    Source  Boisvert, Pozo and Remington, The Matrix Market exchange formats, NISTIR 5935, 1996
+    """
+    try:
+        n_row, _, entries, kind, field, symmetry = scipy.io.mminfo(path)
+        if field not in ("real", "double", "integer", "unsigned-integer") or symmetry == "hermitian":
+            raise ValueError(f"{path.name} holds a {field} {symmetry} matrix: real numbers are needed")
+        body = _after_sizes(path.read_bytes())
+        if kind == "array" and symmetry != "general":
+            entries = n_row * (n_row + (1 if symmetry == "symmetric" else -1)) // 2
+        if body.translate(None, NUMBERS):
+            raise ValueError("its numbers are not written as 1.0E+03")
+        if sum(1 for line in body.splitlines() if line.strip()) != entries:
+            raise ValueError(f"it has not the {entries} entries that it announces")
+        return scipy.io.mmread(path)
+    except (ValueError, OverflowError) as problem:
+        if str(problem).startswith(path.name):
+            raise
+        raise ValueError(f"{path.name} is a broken Matrix Market file: {' '.join(str(problem).split())}") from None
+
+
+def _after_sizes(text: bytes) -> bytes:
+    """What follows the line with the sizes, the first that is neither empty nor a comment."""
+    start = 0
+    while start < len(text):
+        stop = text.find(b"\n", start) + 1 or len(text)
+        line = text[start:stop].strip()
+        start = stop
+        if line and not line.startswith(b"%"):
+            break
+    return text[start:]
+
+
 def _require(path: Path) -> None:
     if not path.is_file():
         raise ValueError(f"there is no file {path}: check the name and the folder")
 
 
-def _real(matrix: Any, name: str) -> sp.csr_matrix:
+def real(matrix: Any, name: str) -> sp.csr_matrix:
     """Double precision compressed rows, or a ValueError for entries that cannot belong to a structure."""
     if not sp.issparse(matrix) and np.ndim(matrix) != 2:
         raise ValueError(f"{name} has {np.ndim(matrix)} dimensions: a matrix has two")

@@ -6,7 +6,6 @@ import pytest
 import scipy.io
 import scipy.sparse as sp
 
-from tribodyn.reduction import matrix_market
 from tribodyn.reduction.foreign import ForeignMatrices, read_matrices, reduced_model
 from tribodyn.reduction.matrix_files import read_matrix, variables
 
@@ -310,7 +309,7 @@ def test_matrix_market_is_read_as_scipy_writes_it(storage, symmetry, tmp_path):
     matrix = {"general": square[:, :3], "symmetric": square + square.T, "skew-symmetric": square - square.T}[symmetry]
     stored = sp.coo_matrix(matrix) if storage == "coordinate" else matrix
     scipy.io.mmwrite(tmp_path / "m.mtx", stored, symmetry=symmetry)
-    np.testing.assert_array_equal(matrix_market.read(tmp_path / "m.mtx").toarray(), matrix)
+    np.testing.assert_array_equal(read_matrix(tmp_path / "m.mtx")[0].toarray(), matrix)
 
 
 @pytest.mark.parametrize(
