@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from tribodyn.hbm.wear_law import names as wear_laws
     from tribodyn.reduction.foreign import ForeignMatrices as Matrices
     from tribodyn.reduction.foreign import from_arrays, read_matrices
-    from tribodyn.workflows.api.own_matrices import Balance, Contact, Cycle, Structure, reduce
+    from tribodyn.workflows.api.own_matrices import Balance, Contact, Cycle, Structure, reduce, wear_law
     from tribodyn.workflows.api.scenes import build, load, plan, read_scene, run, scene_names
     from tribodyn.workflows.result.result import Result
     from tribodyn.workflows.result.store import ResultError
@@ -62,6 +62,7 @@ _HOME: dict[str, tuple[str, ...]] = {
     "reduce": ("tribodyn.workflows.api.own_matrices",),
     "run": ("tribodyn.workflows.api.scenes",),
     "scene_names": ("tribodyn.workflows.api.scenes",),
+    "wear_law": ("tribodyn.workflows.api.own_matrices",),
     "wear_laws": ("tribodyn.hbm.wear_law", "names"),
 }
 
@@ -89,6 +90,7 @@ __all__ = [
     "reduce",
     "run",
     "scene_names",
+    "wear_law",
     "wear_laws",
 ]
 

@@ -129,7 +129,7 @@ def test_a_curve_its_stability_a_mode_and_wear_are_told_in_hz() -> None:
     assert 40.0 < peak.frequency < 70.0
     backbone = problem.nonlinear_mode(1e-6, 1e-3, output="tip", points=10)
     assert backbone.frequency[0] == pytest.approx(backbone.reference_frequency, rel=1e-3)
-    worn = problem.wear({"rub": 1e-12}, at=45.0, step=1e-6, max_steps=2)
+    worn = problem.wear({"rub": td.wear_law("energy", coefficient=1e-12)}, at=45.0, step=1e-6, max_steps=2)
     assert worn.frequency == pytest.approx(45.0)
     assert (worn.depth[-1, 0] > 0, worn.depth[-1, 1]) == (True, 0.0)
     assert worn.depth[-1, 0] == pytest.approx(1e-12 * worn.work[:-1, 0].sum() / 1e-4, rel=1e-6)
@@ -160,7 +160,7 @@ def test_rows_that_pick_dofs_are_the_contact_of_those_dofs() -> None:
         (lambda m: balance(structure()).response(1, 2, nonsense=3), "nonsense"),
         (lambda m: balance(structure()).response(1, 2, method="magic"), "no continuation 'magic'"),
         (lambda m: balance(structure()).peak(1, 2, "toe"), "no output 'toe': there are tip, bow"),
-        (lambda m: balance(structure()).wear(1.0, at=50.0), "needs either step, or tolerance"),
+        (lambda m: balance(structure()).wear(td.wear_law("energy", coefficient=1.0), at=50.0), "needs either step"),
     ],
 )
 def test_what_cannot_be_is_one_sentence(call, words: str) -> None:

@@ -251,14 +251,13 @@ class Balance:
 
     def wear(
         self,
-        coefficient: float | Mapping[str, float],
+        law: JointWear | Mapping[str, JointWear],
         *,
         at: float | tuple[float, float],
         step: float | None = None,
         tolerance: float | None = None,
         scale: float | None = None,
         output: str | None = None,
-        law: str = "energy",
         max_steps: int = 100,
         lost_below: float = 0.0,
         on_row: Callable[[WearRow], None] | None = None,
@@ -266,7 +265,7 @@ class Balance:
     ) -> WearHistory:
         """Wear the contacts.
 
-        coefficient : in the unit of the wear law (m3/J for "energy"), for all contacts or by their names
+        law : such as wear_law("energy", coefficient=2e-15), for all contacts or by their names; others do not wear
         at : frequency of the cycles [Hz], or the range (start, stop) whose resonance of `output` they follow
         step : largest depth of one explicit step [m]; or tolerance : local error of an implicit one, a share of the
             depth `scale` [m]
@@ -277,11 +276,7 @@ class Balance:
             site: AtPeak | AtFrequency = AtPeak(name, HZ * at[0], HZ * at[1], newton=self.newton)
         else:
             site = AtFrequency(name, HZ * at, self.newton)
-        if isinstance(coefficient, Mapping):
-            wear: JointWear | dict[str, JointWear] = {n: JointWear(law, value) for n, value in coefficient.items()}
-        else:
-            wear = JointWear(law, coefficient)
-        problem = WearProblem(self.problem, (Duty(site),), wear, self.problem.model.interface.area, lost_below)
+        problem = WearProblem(self.problem, (Duty(site),), law, self.problem.model.interface.area, lost_below)
         if (step is None) == (tolerance is None) or (tolerance is None) != (scale is None):
             raise ValueError("wear needs either step, or tolerance with the depth scale that it is a share of")
         if step is not None:
@@ -296,6 +291,14 @@ class Balance:
         if output is not None and output not in names:
             raise ValueError(f"there is no output '{output}': there are {', '.join(names)}")
         return output or names[0]
+
+
+def wear_law(name: str, **numbers: float | np.ndarray) -> JointWear:
+    """A wear law with its own numbers, such as wear_law("energy", coefficient=2e-15), in the units that it declares.
+
+    Raises  ValueError where there is no such law, or a number is missing or unknown
+    """
+    return JointWear.of(name, **numbers)
 
 
 def reduce(
