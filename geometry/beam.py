@@ -9,6 +9,8 @@ import numpy as np
 
 from tribodyn.geometry import blocks, checks, grid
 
+MESH = ("n_patch", "n_length", "n_height")  # numbers of elements or nodes
+
 
 @dataclass(frozen=True)
 class Parameters:

@@ -17,6 +17,8 @@ from tribodyn.geometry import airfoil, blocks, checks
 from tribodyn.geometry.airfoil import Section
 from tribodyn.geometry.platform import Platform, platform, unit
 
+MESH = ("n_along", "n_up", "n_span", "n_through", "n_side", "n_end", "n_root", "n_disk")  # numbers of elements or nodes
+
 
 @dataclass(frozen=True)
 class Parameters:

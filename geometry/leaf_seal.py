@@ -13,6 +13,8 @@ import numpy as np
 
 from tribodyn.geometry import blocks, checks
 
+MESH = ("n_column", "n_row", "n_web", "n_thickness")  # numbers of elements or nodes
+
 
 @dataclass(frozen=True)
 class Parameters:

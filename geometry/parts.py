@@ -1,15 +1,19 @@
 """Find a part by the name of its file.
 
 A part is a file in this folder that defines `class Parameters` (a frozen dataclass in SI units that validates itself)
-and `def build(parameters, path)` (writes a second-order .msh with physical groups). Nothing else lists it.
+and `def build(parameters, path)` (writes a second-order .msh with physical groups). It may list in `MESH` which of its
+parameters are numbers of elements or nodes, so that its mesh can be made coarser to measure what it costs. Nothing else
+lists it.
 """
 
 from __future__ import annotations
 
 import ast
 import importlib
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from tribodyn import declare
 
@@ -39,6 +43,26 @@ def load(name: str) -> ModuleType:
         return declare.run_file(Path(name), "part", ("build", "Parameters"))
     file_of(name)
     return importlib.import_module(f"tribodyn.geometry.{name}")
+
+
+def coarser(part: ModuleType, parameters: Any, ratio: float) -> dict[str, int]:
+    """Fewer elements along every edge of a part.
+
+    parameters : of the part; ratio : of the counts that the part lists in MESH, below 1
+    Returns the new counts by name, the nearest that the part accepts; empty where it lists none or none can be reduced
+    """
+    fewer: dict[str, int] = {}
+    for name in getattr(part, "MESH", ()):
+        count = getattr(parameters, name)
+        wanted = max(1, round(count * ratio))
+        for candidate in sorted(range(1, count), key=lambda n: (abs(n - wanted), n)):
+            try:
+                parameters = replace(parameters, **{name: candidate})
+            except ValueError:
+                continue
+            fewer[name] = candidate
+            break
+    return fewer
 
 
 def _is_part(file: Path) -> bool:

@@ -33,6 +33,9 @@ COVER_DEPTH = 0.010
 COLUMN_ABOVE = 0.020  # of the column over the beam
 
 
+MESH = ("n_contact_length", "n_contact_width", "n_root", "n_half")  # numbers of elements or nodes
+
+
 @dataclass(frozen=True)
 class Parameters:
     """The rig, contact centre in the middle of the slot, y = 0.

@@ -12,12 +12,16 @@ import numpy as np
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.branch import CONVERGED, amplitude
+from tribodyn.hbm.branch import CONVERGED, Branch, amplitude
 from tribodyn.hbm.continuation import adaptive, arc_length
 from tribodyn.hbm.newton import NewtonOptions, Solution
 
 SCAN_TOLERANCE = 0.03  # of the response between the points of the first search
 COARSEST = 0.05  # longest step of the first search, share of its range
+
+
+class NoPeak(ValueError):
+    """The response has no maximum inside the range that is searched; the message says where it still rises."""
 
 
 @dataclass(frozen=True)
@@ -99,12 +103,14 @@ class AtPeak:
     newton: NewtonOptions = field(default_factory=NewtonOptions)
 
     def first(self, balance: HarmonicBalance) -> OperatingPoint:
-        """Scan the range, points dense where the response bends, then refine its highest point."""
+        """Scan the range, points dense where the response bends, then refine its highest maximum.
+
+        Raises  NoPeak where no maximum lies inside the range: an end of it is no resonance
+        """
         step = min(1 / self.n_scan, COARSEST)
         scan = adaptive.Options(SCAN_TOLERANCE, step, min(5 * step, COARSEST), 1e-3 * step, newton=self.newton)
         branch = adaptive.follow(balance, self.start, self.stop, scan)
-        height = branch.amplitude(self.output)
-        best = int(np.argmax(np.where([o == CONVERGED for o in branch.outcome], height, -1.0)))
+        best = self._highest_maximum(branch)
         x = branch.contact[best].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
         near = branch.omega[max(best - 1, 0) : best + 2]
         width = float(np.ptp(near)) / max(len(near) - 1, 1)
@@ -124,6 +130,24 @@ class AtPeak:
     def accuracy(self) -> float:
         """Relative accuracy that the frequency is wanted with."""
         return self.tolerance
+
+    def _highest_maximum(self, branch: Branch) -> int:
+        """Point of a branch that is the highest of those that are higher than both their neighbours."""
+        good = np.array([outcome == CONVERGED for outcome in branch.outcome])
+        height = np.where(good, branch.amplitude(self.output), -1.0)
+        inner = np.flatnonzero(
+            good[1:-1] & (height[1:-1] > 0) & (height[1:-1] >= height[:-2]) & (height[1:-1] >= height[2:])
+        )
+        if len(inner):
+            return int(inner[np.argmax(height[inner + 1])]) + 1
+        if height.max(initial=0.0) <= 0.0:
+            raise NoPeak(f"no resonance peak of {self.output}: it does not vibrate between {_range(branch)}")
+        end = float(branch.omega[int(np.argmax(height))] / (2 * np.pi))
+        which = "lower" if end == branch.omega.min() / (2 * np.pi) else "upper"
+        raise NoPeak(
+            f"no resonance peak of {self.output} lies between {_range(branch)}: the response still rises towards the "
+            f"{which} end at {end:.5g} Hz; extend response.frequency beyond it, or name a frequency in wear.at"
+        )
 
     def _refine(self, balance: HarmonicBalance, omega: float, x: np.ndarray, stride: float) -> OperatingPoint:
         def solve(w: float, guess: np.ndarray) -> _Slope:
@@ -174,7 +198,18 @@ class AtPeak:
             before, here = here, there
             if abs(there.slope) <= abs(best.slope):
                 best = there
+        if uphill is None and best.slope > 0 and best.omega >= (1 - 1e-9) * balance.omega_max:
+            hertz = balance.omega_max / (2 * np.pi)
+            raise NoPeak(
+                f"the resonance peak of {self.output} has moved beyond {hertz:.5g} Hz, the highest frequency that is "
+                "modelled: extend response.frequency"
+            )
         return _point(balance, best.solution, self.output, solves)
+
+
+def _range(branch: Branch) -> str:
+    low, high = branch.omega.min() / (2 * np.pi), branch.omega.max() / (2 * np.pi)
+    return f"{low:.5g} and {high:.5g} Hz"
 
 
 def _zero(a: _Slope, b: _Slope) -> float:

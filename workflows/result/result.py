@@ -174,6 +174,7 @@ class Result:
     provenance : scene text and overrides, versions, seed, start time, threads
     facts : what was modelled and how long it took: sizes, solver names, delta_max_m, seconds, ...
     state : sentence that says how far the run came
+    verdict : JSON text of accuracy.verdict.Verdict, empty where none was asked for
     response : curve of the unworn contact; stability, bounds : of it, where the scene asks for them
     """
 
@@ -190,6 +191,7 @@ class Result:
     worn: WornResponses | None = None
     fields: Fields | None = None
     loops: Loops | None = None
+    verdict: str = ""
 
     @property
     def harmonics(self) -> tuple[int, ...]:

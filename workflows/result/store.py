@@ -152,6 +152,7 @@ def set_aside(path: Path) -> Path | None:
 def _write(file: h5py.File, result: Result) -> None:
     file.attrs["format"] = FORMAT
     file.attrs["state"] = result.state
+    file.attrs["verdict"] = result.verdict
     for name in ("provenance", "facts"):
         group = file.create_group(name)
         for key, value in getattr(result, name).items():
@@ -216,6 +217,7 @@ def load(path: Path) -> Result:
             provenance=_attributes(file["provenance"].attrs),
             facts=_attributes(file["facts"].attrs),
             state=str(file.attrs["state"]),
+            verdict=str(file.attrs.get("verdict", "")),
             **parts,
         )
 

@@ -10,7 +10,7 @@ from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear_events import events
 from tribodyn.hbm.wear_history import LIFE_SHARE, cycles_to_preload
-from tribodyn.workflows.accuracy import budget
+from tribodyn.workflows.accuracy import budget, verdict
 from tribodyn.workflows.accuracy.trade_table import plain
 from tribodyn.workflows.result.result import Result
 
@@ -32,6 +32,7 @@ def summary(result: Result) -> dict[str, Any]:
     peak_is_stable : whether that peak of the curve is a motion that stays, None where this was not asked for
     stable_peak_hz, stable_peak_m : the highest point of the curve that is
     seconds : of computing, interrupted runs included
+    verdict : quantity -> value, error, dominated_by, stated, reason, see workflows.accuracy.verdict; None without
     error_budget : what each discretisation contributes, see workflows.budget.Entry
     """
     numbers: dict[str, Any] = {"state": result.state, "finished": result.state.startswith("complete")}
@@ -43,6 +44,7 @@ def summary(result: Result) -> dict[str, Any]:
     free = result.facts.get("free_hz")
     numbers["free_hz"] = None if free is None else [float(hertz) for hertz in np.atleast_1d(free)]
     numbers["error_budget"] = budget.of_result(result)
+    numbers["verdict"] = verdict.record(result.verdict)
     return {name: plain(value) for name, value in numbers.items()}
 
 
@@ -140,7 +142,8 @@ def lines(result: Result) -> list[tuple[str, str]]:
         first, last = (float("nan") if value is None else scale * value for value in numbers[name])
         return f"{first:.5g} {unit}" if numbers["wear_steps"] == 0 else f"{first:.5g} -> {last:.5g} {unit}"
 
-    shown = [
+    shown = verdict.lines(verdict.loaded(result.verdict)) if result.verdict else []
+    shown += [
         ("scene", result.provenance["scene_name"]),
         ("state", result.state),
         ("model", _sizes(numbers["full_dofs"], numbers["model_dofs"])),

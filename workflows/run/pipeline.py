@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.branch import CONVERGED, Branch
+from tribodyn.workflows.accuracy import verdict
 from tribodyn.workflows.accuracy.budget import with_budget
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.result import Result
@@ -68,6 +69,8 @@ def run(file: SceneFile, folder: Path | None, progress: Progress, earlier: Resul
                 result = keep(replace(result, worn=curves))
         with progress.stage("error budget"):
             result = with_budget(file, model.balance, result)
+        if scene.verdict.enabled:
+            result = replace(result, verdict=verdict.judge(file, model, result, progress).dumped())
         state = "complete" if result.wear is None else f"complete: {result.wear.end}"
         return keep(replace(result, state=state))
 

@@ -412,6 +412,19 @@ class Solver(Table):
     """Threads of the linear algebra."""
 
 
+class VerdictOptions(Table):
+    """What is measured to judge a finished result, see `tribodyn.workflows.accuracy.verdict`."""
+
+    enabled: StrictBool = True
+    """Judge the result when the run is done."""
+    seconds: Annotated[Number, Field(gt=0)] = 120.0
+    """Processor seconds after which no further measurement is begun."""
+    mesh: StrictBool = True
+    """Solve the unworn contact on a coarser mesh."""
+    in_time: StrictBool = False
+    """Integrate the first, the middle and the last state in time."""
+
+
 class Scene(Table):
     """What every scene says, whatever its model is made from; see PartScene, and MatrixScene in matrix_scene."""
 
@@ -432,6 +445,7 @@ class Scene(Table):
     pictures: Pictures = Pictures()
     """What is drawn."""
     solver: Solver = Solver()
+    verdict: VerdictOptions = VerdictOptions()
     """Tolerances and threads."""
 
     @property

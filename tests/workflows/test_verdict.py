@@ -1,0 +1,83 @@
+"""The verdict: what is stated of a result holds against a finer run of the same scene, or is not stated."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import tribodyn as td
+from tribodyn.hbm.operating_point import NoPeak
+from tribodyn.workflows.accuracy import verdict
+from tribodyn.workflows.accuracy.verdict import LARGEST, QUANTITIES, Contribution
+
+SMALL = (
+    "geometry.n_patch=5", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=4", "wear.tolerance=10 %",
+    "response.points=30", "verdict.in_time=false",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def small() -> td.Result:
+    return td.run("beam", overrides=SMALL)
+
+
+def test_every_quantity_has_a_statement(small: td.Result) -> None:
+    said = small.summary()["verdict"]
+    assert tuple(said) == QUANTITIES
+    for name, statement in said.items():
+        assert set(statement) == {"value", "error", "dominated_by", "stated", "reason"}, name
+        if statement["stated"] and statement["error"] is not None:
+            assert statement["error"] <= LARGEST
+    assert json.loads(json.dumps(said)) == said
+
+
+@pytest.mark.slow
+def test_the_life_with_one_harmonic_is_known_to_be_off(small: td.Result) -> None:
+    """More harmonics make the contact of this scene live half as long again (see the page on accuracy)."""
+    contributions = verdict.loaded(small.verdict).contributions
+    (harmonics,) = (c for c in contributions if c.source == "harmonics" and c.quantity == "life")
+    finer = td.run("beam", overrides=(*SMALL, "harmonics.kept=[0, 1, 2, 3, 4, 5, 6, 7, 8, 9]", "verdict.enabled=false"))
+    ours, theirs = small.summary()["life_cycles"], finer.summary()["life_cycles"]
+    true = abs(ours - theirs) / theirs
+    assert harmonics.error == pytest.approx(true, rel=0.35)
+    assert small.summary()["verdict"]["life"]["dominated_by"] == "harmonics"
+
+
+def test_the_coarser_mesh_tells_the_error_of_this_one(small: td.Result) -> None:
+    """Against a mesh that is finer in every direction, with the factor that a user may expect of an estimate."""
+    finer = td.run(
+        "beam",
+        overrides=(*SMALL[3:], "geometry.n_patch=9", "geometry.n_length=10", "geometry.n_height=3", "wear=",
+                   "verdict.enabled=false"),
+    )  # fmt: skip
+    contributions = verdict.loaded(small.verdict).contributions
+    (mesh,) = (c for c in contributions if c.source.startswith("mesh") and c.quantity == "peak_frequency")
+    true = abs(small.summary()["peak_hz"][0] / finer.summary()["peak_hz"][0] - 1)
+    assert mesh.error is not None
+    assert true < 1.5 * mesh.error < 15 * true
+
+
+def test_a_part_that_nobody_measured_leaves_the_error_unknown() -> None:
+    parts = [Contribution("modes", "energy", 0.01, "estimate"), Contribution("mesh", "energy", None, "no mesh")]
+    said = verdict._statement("energy", 1.0, parts, (), (), "", td.Result({}, {}, ""))
+    assert said.error is None
+    assert said.stated
+    assert "mesh: no mesh" in said.reason
+
+
+def test_an_end_of_the_range_is_no_peak() -> None:
+    with pytest.raises(NoPeak, match=r"still rises towards the upper end at 800 Hz; extend response\.frequency"):
+        td.run("beam", overrides=(*SMALL, 'response.frequency=["400 Hz", "800 Hz"]'))
+    unworn = td.run("beam", overrides=(*SMALL, 'response.frequency=["400 Hz", "800 Hz"]', "wear="))
+    said = unworn.summary()["verdict"]
+    assert not any(statement["stated"] for statement in said.values())
+    assert "no peak" in said["peak_frequency"]["reason"]
+
+
+def test_the_verdict_is_kept(small: td.Result, tmp_path) -> None:
+    again = td.run("beam", tmp_path, overrides=(*SMALL, "wear="))
+    assert td.load(tmp_path).summary()["verdict"] == again.summary()["verdict"]
+    assert again.summary()["verdict"]["life"]["stated"] is False
+    assert np.isfinite(again.summary()["verdict"]["amplitude"]["error"])

@@ -1,0 +1,228 @@
+"""Errors measured on the very scene: the same states solved with more harmonics, on a coarser mesh, and in time.
+
+A run is one set of settings. What another set would say of the first, the middle and the last state of its contact
+tells how far off it is; energy per cycle is carried to life, because wear is in proportion to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from tribodyn.geometry import parts
+from tribodyn.hbm import harmonic_choice, stability
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.operating_point import NoPeak, OperatingPoint, Site
+from tribodyn.hbm.time_integration import IntegrationFailed, Options
+from tribodyn.hbm.verify import verify
+from tribodyn.hbm.wear_history import LIFE_SHARE
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.run import modelling, settings
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.references import delta_max, free_deflection
+from tribodyn.workflows.scene.scene_file import SceneFile, read
+from tribodyn.workflows.scene.schema import PartScene
+
+CLIMB = (3, 5, 7, 9)  # highest harmonics that the estimate climbs through: each start is near enough for Newton
+FURTHER = 6  # harmonics beyond the kept ones that it looks at, where more than CLIMB are kept
+COARSER = 2 / 3  # of the elements along every edge of a part
+STATES = (0.0, 0.5, 0.9)  # shares of the life at which states are looked at: unworn, middle, late
+STEPS, STEPS_PER_HARMONIC = 256, 32  # time steps per period; per period of the highest harmonic kept
+PERIODS = 60
+DRIFT = 1e-4  # of the vibration over one period: periodic enough for differences above a tenth of a per cent
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What one solved cycle says: frequency [Hz], amplitude of the response [m], friction work [J], preload [N]."""
+
+    hertz: float
+    amplitude: float
+    energy: float
+    preload: float
+
+    @classmethod
+    def of(cls, balance: HarmonicBalance, point: OperatingPoint) -> Answers:
+        """The answers of a solved operating point."""
+        state = point.state
+        energy = float(balance.energy(state).sum())
+        return cls(state.omega / (2 * np.pi), point.amplitude, energy, balance.preload(state))
+
+
+@dataclass(frozen=True)
+class State:
+    """A state of the contact that errors are measured at.
+
+    row : of the wear history, None for the peak of the response of a scene that does not wear
+    cycles : passed; depth : (n_pair,) [m]; balance : at that depth; here : its solution
+    """
+
+    row: int | None
+    cycles: float
+    depth: np.ndarray
+    balance: HarmonicBalance
+    site: Site
+    here: OperatingPoint
+
+
+@dataclass(frozen=True)
+class InTime:
+    """The same cycle by direct time integration; differences relative to it.
+
+    own_error : of the integration itself; stable : of the balance solution by Hill's method
+    outcome : "converged", or why there is no periodic motion to compare with
+    """
+
+    amplitude: float
+    energy: float
+    preload: float
+    own_error: float
+    stable: bool
+    outcome: str
+
+
+def states(file: SceneFile, balance: HarmonicBalance, result: Result) -> list[State]:
+    """First, middle and late state of the wear run, or the peak of the response of a scene that does not wear."""
+    scene = file.scene
+    basis = HarmonicBasis(result.harmonics, balance.basis.n_samples)
+    wear = result.wear
+    if wear is None or not len(wear.cycles) or scene.wear is None:
+        return [state] if (state := _at_response_peak(scene_peak(file), balance, result)) is not None else []
+    left = np.flatnonzero(wear.preload > LIFE_SHARE * wear.preload[0]) if wear.preload[0] > 0 else np.arange(1)
+    last = int(left[-1]) if len(left) else 0
+    life = float(wear.cycles[min(last + 1, len(wear.cycles) - 1)])
+    rows = sorted({int(np.searchsorted(wear.cycles[: last + 1], share * life, "right")) - 1 for share in STATES})
+    duty = settings.mission(scene)[0]
+    found = []
+    for row in rows:
+        worn = balance.with_gap(balance.contact.gap + wear.depth[row]).with_load(duty.load)
+        flat = basis.transfer(wear.displacement[row], balance.basis)
+        x = flat.reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
+        point = duty.site.next(worn, float(wear.omega[row]), x)
+        if point.solution.converged:
+            found.append(State(row, float(wear.cycles[row]), wear.depth[row], worn, duty.site, point))
+    return found
+
+
+def scene_peak(file: SceneFile) -> Site:
+    """The resonance peak within the range of the scene's response."""
+    return settings.peak_of(file.scene)
+
+
+def _at_response_peak(site: Site, balance: HarmonicBalance, result: Result) -> State | None:
+    curve = result.response
+    if curve is None:
+        return None
+    height = np.where([o == CONVERGED for o in curve.outcome], curve.amplitude(curve.output_names[0]), -1.0)
+    best = int(np.argmax(height))
+    if height[best] <= 0:
+        return None
+    if best in (0, len(height) - 1):
+        raise NoPeak("the response is highest at an end of response.frequency, which is no peak: widen the range")
+    x = curve.contact[best].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
+    point = site.next(balance, float(curve.omega[best]), x)
+    return State(None, 0.0, np.zeros(len(x)), balance, site, point) if point.solution.converged else None
+
+
+def with_more_harmonics(state: State) -> Answers | None:
+    """The same state with more harmonics, its place followed; None where it is lost on the way."""
+    top = state.balance.basis.harmonics[-1]
+    basis, x, omega = state.balance.basis, state.here.state.x, state.here.state.omega
+    wide = harmonic_choice.widened(state.balance, max(CLIMB[-1], top + FURTHER))
+    answers = None
+    for highest in [h for h in CLIMB if h > top + 1] or [top + FURTHER // 2, top + FURTHER]:
+        finer = wide.with_harmonics(tuple(h for h in wide.basis.harmonics if h <= highest))
+        point = state.site.next(finer, omega, basis.transfer(x, finer.basis))
+        if not point.solution.converged:
+            return None
+        basis, x, omega = finer.basis, point.state.x, point.state.omega
+        answers = Answers.of(finer, point)
+    return answers
+
+
+def in_time(state: State) -> InTime:
+    """The same state by time integration of the reduced model; raises ValueError where that has no equation in time."""
+    harmonics = state.balance.basis.harmonics
+    options = Options(max(STEPS, STEPS_PER_HARMONIC * harmonics[-1]), tolerance=DRIFT, max_periods=PERIODS)
+    stable = stability.stability(state.balance, state.here.state).stable
+    try:
+        found = verify(state.balance, state.here.state, options)
+    except IntegrationFailed as failure:
+        return InTime(np.nan, np.nan, np.nan, np.nan, stable, str(failure))
+    output = next(iter(found.amplitude.values()), 0.0)
+    return InTime(output, found.energy, found.preload, found.step_error, stable, found.outcome)
+
+
+def coarser(file: SceneFile) -> SceneFile | None:
+    """The scene on a mesh with fewer elements along every edge, None where its mesh cannot be made again."""
+    scene = file.scene
+    if not isinstance(scene, PartScene) or scene.geometry.part is None:
+        return None
+    part = parts.load(scene.geometry.part)
+    fewer = parts.coarser(part, part.Parameters(**scene.geometry.parameters), COARSER)
+    if not fewer:
+        return None
+    texts = [f"geometry.{name}={count}" for name, count in fewer.items()]
+    return read(str(file.folder / f"{file.name}.toml"), (*file.overrides, *texts))
+
+
+def on_coarser_mesh(file: SceneFile, harmonics: tuple[int, ...]) -> tuple[Answers, float] | None:
+    """Answers of the unworn contact on a coarser mesh, and its delta_max [m]; None where there is none."""
+    other = coarser(file)
+    if other is None:
+        return None
+    with TemporaryDirectory() as folder:
+        model = modelling.build(other, Path(folder), Progress(), harmonics)
+    scene, balance = other.scene, model.balance
+    site, load = scene_peak(other), 1.0
+    if scene.wear is not None:
+        duty = settings.mission(scene)[0]
+        site, load = duty.site, duty.load
+    point = site.first(balance.with_load(load))
+    if not point.solution.converged:
+        return None
+    area = balance.model.interface.area
+    deepest = delta_max(scene, free_deflection(balance), area) if scene.wear is not None else float("nan")
+    return Answers.of(balance.with_load(load), point), deepest
+
+
+def carried_to_life(seen: list[State], finer: list[Answers | None], cycles: float) -> float | None:
+    """Relative error of the cycles from the ratio of energies per cycle at some states, None where one is not known.
+
+    Wear passes a given depth in a number of cycles that is inversely proportional to the energy per cycle; the ratio is
+    taken as piecewise linear in the cycles passed.
+    """
+    if not seen or any(answer is None for answer in finer):
+        return None
+    at = np.array([state.cycles for state in seen])
+    ours = np.array([float(state.balance.energy(state.here.state).sum()) for state in seen])
+    theirs = np.array([answer.energy for answer in finer if answer is not None])
+    if np.any(ours <= 0) or np.any(theirs <= 0):
+        return None
+    grid = np.linspace(0.0, cycles, 201)
+    ratio = np.interp(grid, at, ours / theirs)
+    finer_life = float(np.mean(ratio)) * cycles
+    return abs(cycles - finer_life) / finer_life
+
+
+def relative(ours: float, theirs: float) -> float:
+    """Difference over the better value; where that vanishes, 0 if both do and 1 if not."""
+    if theirs == 0:
+        return 0.0 if ours == 0 else 1.0
+    return abs(ours - theirs) / abs(theirs)
+
+
+def each(seen: list[State], look: Callable[[State], Answers | None]) -> Iterator[Answers | None]:
+    """What a look says of every state; None where it fails."""
+    for state in seen:
+        try:
+            yield look(state)
+        except (ValueError, RuntimeError):
+            yield None
+

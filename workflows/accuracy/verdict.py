@@ -1,0 +1,313 @@
+"""The verdict on a result: for every quantity its value, its total error, what dominates it, and whether it is stated.
+
+Contributions are added without their signs: what a reader bets on is their sum. A quantity with a part that nobody
+measured has no total error; one whose total is above LARGEST, or that belongs to a motion that does not stay or that
+time integration contradicts, is not stated.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.operating_point import NoPeak
+from tribodyn.hbm.wear_history import LIFE_SHARE, cycles_to_preload
+from tribodyn.workflows.accuracy import budget, probes
+from tribodyn.workflows.accuracy.probes import Answers, InTime, State, relative
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.run.modelling import Model
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.scene_file import SceneFile
+
+QUANTITIES = ("peak_frequency", "amplitude", "energy", "preload", "depth", "life")
+NAMES = {"peak_frequency": "peak frequency"}
+UNITS = {"peak_frequency": "Hz", "amplitude": "m", "energy": "J", "preload": "N", "depth": "m", "life": "cycles"}
+LARGEST = 0.5  # relative error above which a number is no statement
+CONTRADICTION = 3.0  # times the estimated error, from which on time integration contradicts the balance
+RESPONSE = ("amplitude", "energy", "preload")
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """What one discretisation adds to the error of one quantity; error None where nobody measured it."""
+
+    source: str
+    quantity: str
+    error: float | None
+    how: str
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One quantity of a verdict.
+
+    value : in UNITS, None where there is none; error : total and relative, None where a part of it is not known
+    dominated_by : the largest contribution; stated : whether the value may be stated; reason : why, or what is lacking
+    """
+
+    value: float | None
+    error: float | None
+    dominated_by: str | None
+    stated: bool
+    reason: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """statements : by QUANTITIES; contributions : what they were added up from; seconds : of one processor, spent."""
+
+    statements: dict[str, Statement]
+    contributions: tuple[Contribution, ...]
+    seconds: float
+
+    def dumped(self) -> str:
+        """The verdict as JSON text."""
+        return json.dumps(asdict(self))
+
+
+def loaded(text: str) -> Verdict:
+    """A verdict from its JSON text."""
+    data: dict[str, Any] = json.loads(text)
+    statements = {name: Statement(**item) for name, item in data["statements"].items()}
+    return Verdict(statements, tuple(Contribution(**item) for item in data["contributions"]), data["seconds"])
+
+
+def record(text: str) -> dict[str, dict[str, Any]] | None:
+    """Statements by quantity for machines, None without a verdict."""
+    return {name: asdict(said) for name, said in loaded(text).statements.items()} if text else None
+
+
+def judge(file: SceneFile, model: Model, result: Result, progress: Progress) -> Verdict:
+    """Measure the errors of a finished result on its own scene and state what may be stated.
+
+    The scene's [verdict] says which measurements are made and limits their processor seconds
+    """
+    wanted, clock = file.scene.verdict, process_time()
+
+    def left() -> bool:
+        return process_time() - clock < wanted.seconds
+
+    try:
+        seen = probes.states(file, model.balance, result)
+    except NoPeak as refusal:
+        return Verdict(_nothing(str(refusal)), (), process_time() - clock)
+    values = _values(result, seen)
+    parts: list[Contribution] = list(_of_budget(result))
+    skipped = f"the {wanted.seconds:g} s of verdict.seconds are used up"
+    with progress.stage("verdict: harmonics"):
+        finer = list(probes.each(seen, probes.with_more_harmonics)) if left() else [None] * len(seen)
+        parts += _of_harmonics(result, seen, finer, values["life"], "lost with more harmonics" if left() else skipped)
+    with progress.stage("verdict: mesh"):
+        parts += list(_of_mesh(file, result, seen, skipped if not left() else "")) if wanted.mesh else _unknown(
+            "mesh and contact grid", "verdict.mesh is false"
+        )
+    checks: list[InTime] = []
+    refusal = ""
+    if wanted.in_time:
+        with progress.stage("verdict: time integration"):
+            for state in seen:
+                if not left():
+                    refusal = skipped
+                    break
+                try:
+                    checks.append(probes.in_time(state))
+                except ValueError as reason:
+                    refusal = str(reason)
+                    break
+    statements = {name: _statement(name, values[name], parts, seen, checks, refusal, result) for name in QUANTITIES}
+    return Verdict(statements, tuple(parts), process_time() - clock)
+
+
+def _values(result: Result, seen: Sequence[State]) -> dict[str, float | None]:
+    """The quantities of a result: of its first state, and of its whole wear."""
+    values: dict[str, float | None] = dict.fromkeys(QUANTITIES)
+    if seen:
+        first = Answers.of(seen[0].balance, seen[0].here)
+        values |= {"peak_frequency": first.hertz, "amplitude": first.amplitude, "energy": first.energy}
+        values["preload"] = first.preload
+    if result.wear is not None and result.wear_steps:
+        values["depth"] = float(result.depth_after(-1).max())
+        values["life"] = cycles_to_preload(result.wear)
+    return values
+
+
+def _of_budget(result: Result) -> Iterator[Contribution]:
+    """What the error budget has estimated: modes, Newton, samples, wear steps."""
+    for entry in budget.of_result(result):
+        source, error, how = entry["source"], entry["error"], entry["by"]
+        if error is None or not str(how).startswith("estimate") or source == "harmonics":
+            continue
+        if entry["quantity"] == "free frequencies":
+            yield Contribution(source, "peak_frequency", error, how)
+        elif entry["quantity"] == "response at the peak":
+            for quantity in (*RESPONSE, "life"):
+                yield Contribution(source, quantity, error, how)
+        elif entry["quantity"] in ("life", "depth"):
+            yield Contribution(source, entry["quantity"], error, how)
+        elif source == "points" and not result.wear_steps:
+            yield Contribution(source, "amplitude", error, how)
+
+
+def _of_harmonics(
+    result: Result, seen: Sequence[State], finer: Sequence[Answers | None], life: float | None, lost: str
+) -> Iterator[Contribution]:
+    """The first state, and energies of all states carried to life, with more harmonics."""
+    if not seen:
+        yield from _unknown("harmonics", "no state was solved")
+        return
+    first = finer[0]
+    if first is None:
+        yield from _unknown("harmonics", lost)
+        return
+    ours = Answers.of(seen[0].balance, seen[0].here)
+    how = "more harmonics at the same states"
+    for quantity, a, b in _pairs(ours, first):
+        yield Contribution("harmonics", quantity, relative(a, b), how)
+    if life is not None:
+        error = probes.carried_to_life(list(seen), list(finer), life)
+        yield Contribution("harmonics", "life", error, how if error is not None else lost)
+    if result.wear is not None and result.wear_steps and len(seen) > 1:
+        yield Contribution("harmonics", "depth", _depth_error(result, seen, finer), "preload with more harmonics")
+
+
+def _depth_error(result: Result, seen: Sequence[State], finer: Sequence[Answers | None]) -> float | None:
+    """Depth that makes up for the preload that more harmonics change at the last state, over the largest depth."""
+    last, wear = finer[-1], result.wear
+    row = seen[-1].row
+    if last is None or wear is None or not row:
+        return None
+    fall = float(wear.preload[row - 1] - wear.preload[row])
+    deepened = float(wear.depth[row].max() - wear.depth[row - 1].max())
+    if fall <= 0 or deepened <= 0:
+        return None
+    change = abs(seen[-1].balance.preload(seen[-1].here.state) - last.preload)
+    return change / fall * deepened / float(result.depth_after(-1).max())
+
+
+def _of_mesh(file: SceneFile, result: Result, seen: Sequence[State], skipped: str) -> Iterator[Contribution]:
+    """The first state on a coarser mesh: the difference bounds the error of the finer one from second order on."""
+    source = "mesh and contact grid"
+    if skipped or not seen:
+        yield from _unknown(source, skipped or "no state was solved")
+        return
+    try:
+        found = probes.on_coarser_mesh(file, result.harmonics)
+    except (ValueError, RuntimeError) as refusal:
+        yield from _unknown(source, f"on a coarser mesh: {refusal}")
+        return
+    if found is None:
+        yield from _unknown(source, "this mesh cannot be made coarser: compare two meshes with tribodyn converge")
+        return
+    coarse, deepest = found
+    ours, how = Answers.of(seen[0].balance, seen[0].here), "a coarser mesh"
+    for quantity, a, b in _pairs(coarse, ours):
+        yield Contribution(source, quantity, relative(a, b), how)
+    reach = result.facts.get("delta_max_m")
+    if result.wear_steps and reach is not None:
+        depth = relative(deepest, float(np.asarray(reach)))
+        yield Contribution(source, "depth", depth, how)
+        yield Contribution(source, "life", depth + relative(coarse.energy, ours.energy), how)
+
+
+def _pairs(a: Answers, b: Answers) -> Iterator[tuple[str, float, float]]:
+    yield from (
+        ("peak_frequency", a.hertz, b.hertz), ("amplitude", a.amplitude, b.amplitude), ("energy", a.energy, b.energy),
+        ("preload", a.preload, b.preload),
+    )  # fmt: skip
+
+
+def _unknown(source: str, why: str) -> Iterator[Contribution]:
+    for quantity in QUANTITIES:
+        yield Contribution(source, quantity, None, why)
+
+
+def _nothing(why: str) -> dict[str, Statement]:
+    return {name: Statement(None, None, None, False, why) for name in QUANTITIES}
+
+
+def _statement(
+    name: str,
+    value: float | None,
+    parts: Sequence[Contribution],
+    seen: Sequence[State],
+    checks: Sequence[InTime],
+    refusal: str,
+    result: Result,
+) -> Statement:
+    """One quantity, from what contributes to its error and from time integration of the states it belongs to."""
+    if value is None:
+        return Statement(None, None, None, False, _absent(name, result))
+    own = [part for part in parts if part.quantity == name]
+    known = [part for part in own if part.error is not None and np.isfinite(part.error)]
+    lacking = [part for part in own if part.error is None or not np.isfinite(part.error)]
+    total: float | None = float(sum(part.error or 0.0 for part in known)) if not lacking else None
+    largest = max(known, key=lambda part: part.error or 0.0, default=None)
+    dominated = largest.source if largest is not None else None
+    if name in ("peak_frequency", "depth"):
+        concerned: Sequence[InTime] = ()  # time integration at a given frequency and depth tells nothing about these
+    else:
+        concerned = checks if name == "life" else checks[:1]
+    trouble = ""
+    for state, check in zip(seen, concerned, strict=False):
+        where = "of the unworn contact" if not state.row else f"after {state.cycles:.3g} cycles"
+        if check.outcome != CONVERGED:
+            trouble = f"time integration finds no periodic motion {where}: {check.outcome}"
+            break
+        miss = abs({"amplitude": check.amplitude, "preload": check.preload}.get(name, check.energy))
+        if not check.stable and miss > CONTRADICTION * max(check.own_error, 1e-3):
+            trouble = f"the balance solution {where} is unstable, and time integration leaves it by {miss:.1%}"
+            break
+        if total is not None and miss > total:
+            if miss > CONTRADICTION * (total + check.own_error):
+                dominated = "harmonics, by time integration"
+            total = miss + check.own_error
+    if trouble:
+        return Statement(value, total, dominated, False, trouble)
+    if total is None:
+        missing = "; ".join(sorted({f"{part.source}: {part.how}" for part in lacking}))
+        at_least = sum(part.error or 0.0 for part in known)
+        large = at_least > LARGEST
+        reason = f"total error not known ({missing}); the known parts sum to {at_least:.2g}"
+        return Statement(value, None, dominated, not large, reason)
+    if total > LARGEST:
+        return Statement(value, total, dominated, False, f"its error is above {LARGEST:.0%}")
+    checked = "" if concerned else f"; not held against time integration: {refusal}" if refusal else ""
+    return Statement(value, total, dominated, True, f"all contributions measured on this scene{checked}")
+
+
+def _absent(name: str, result: Result) -> str:
+    """Why a quantity has no value."""
+    if name not in ("depth", "life"):
+        return "no state was solved"
+    if result.wear is None or not result.wear_steps:
+        return "nothing was worn"
+    return f"the preload has not fallen to {100 * LIFE_SHARE:g} %: {result.wear.end}"
+
+
+def lines(verdict: Verdict) -> list[tuple[str, str]]:
+    """The verdict as pairs of a name and a readable value."""
+    shown = [("verdict", "")]
+    for name, said in verdict.statements.items():
+        label = f"  {NAMES.get(name, name)}"
+        if said.value is None:
+            shown.append((label, f"none: {said.reason}"))
+            continue
+        number = f"{said.value:.4g} {UNITS[name]}"
+        if not said.stated:
+            shown.append((label, f"not stated: {said.reason}"))
+        elif said.error is None:
+            shown.append((label, f"{number}, {said.reason}"))
+        else:
+            by = f", most of it {said.dominated_by}" if said.dominated_by else ""
+            shown.append((label, f"{number}, error {_percent(said.error)}{by}"))
+    return shown
+
+
+def _percent(error: float) -> str:
+    return f"{100 * error:.2g} %" if error >= 1e-4 else "below 0.01 %"
