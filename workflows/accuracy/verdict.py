@@ -95,8 +95,8 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress) -> 
 
     try:
         seen = probes.states(file, model.balance, result)
-    except NoPeak as refusal:
-        return Verdict(_nothing(str(refusal)), (), process_time() - clock)
+    except NoPeak as missing:
+        return Verdict(_nothing(str(missing)), (), process_time() - clock)
     values = _values(result, seen)
     parts: list[Contribution] = list(_of_budget(result))
     skipped = f"the {wanted.seconds:g} s of verdict.seconds are used up"
