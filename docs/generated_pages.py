@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import importlib
 import re
@@ -44,6 +45,8 @@ def write(folder: Path) -> None:
         "continuations": parameters_of((f"{continuation.__name__}.{name}" for name in continuation.names()), "Options"),
         "commands": commands(app),
         "result": result_layout(),
+        "folders": folders(),
+        "lines": lines_by_folder(),
     }
     for name, text in pages.items():
         path = folder / f"{name}.md"
@@ -192,10 +195,11 @@ def commands(program: App) -> str:
     for name in sorted(word for word in program if not word.startswith("-")):
         command = program[name]
         lines += [f"## `tribodyn {name}`", "", _paragraph(command.help.split("Parameters\n")[0]), ""]
-        arguments = command.assemble_argument_collection()
+        arguments = command.assemble_argument_collection(parse_docstring=True)
         rows = []
         for argument in arguments:
-            words = ", ".join(f"`{word}`" for word in argument.names)
+            names = [argument.name] if argument.required and argument.index is not None else argument.names
+            words = ", ".join(f"`{name.lstrip('-').upper() if argument.index is not None else name}`" for name in names)
             rows.append((words, _argument_default(argument), _paragraph(argument.parameter.help or "")))
         lines += _table(("argument", "default", "meaning"), rows)
     return "\n".join(lines)
@@ -224,6 +228,57 @@ def result_layout() -> str:
             rows.append((f"`{item.name}`", where, unit, _paragraph(meanings.get(item.name, ""))))
         lines += _table(("name", "dimensions", "unit", "meaning"), rows)
     return "\n".join(lines)
+
+
+# The house
+
+TOP = ("geometry", "fem", "reduction", "hbm", "workflows", "tests")
+BEFORE = {"geometry": 2028, "fem": 1589, "reduction": 1779, "hbm": 8762, "workflows": 12839, "tests": 12161}
+
+
+def folders() -> str:
+    """Every folder with the first sentence of its docstring."""
+    rows = []
+    for top in TOP:
+        inside = sorted({path.parent for path in (ROOT / top).rglob("*.py")}) if top != "tests" else []
+        rows += [(f"`{path.relative_to(ROOT)}/`", _paragraph(_head_of(path))) for path in inside]
+    rows += [(f"`tests/{room}/`", said) for room, said in ROOMS_OF_TESTS.items() if (ROOT / "tests" / room).is_dir()]
+    return "\n".join(_table(("folder", "what it holds"), rows))
+
+
+def _head_of(folder: Path) -> str:
+    head = ast.get_docstring(ast.parse((folder / "__init__.py").read_text())) or ""
+    if not head:
+        raise ValueError(f"{folder} says in no docstring what it holds")
+    return head.split("\n")[0]
+
+
+ROOMS_OF_TESTS = {
+    "cases": "What the shipped cases publish and reproduce.",
+    "documentation": "Pages do what they print; their numbers are those of data and code; the start script.",
+    "fem": "Tests of `fem`.",
+    "geometry": "Tests of `geometry`.",
+    "hbm": "Tests of `hbm`.",
+    "helpers": "Models, random problems and tools that several tests share.",
+    "properties": "Properties that hold over random problems and scenes.",
+    "reduction": "Tests of `reduction`.",
+    "workflows": "Tests of `workflows`, those that start a process included.",
+}
+
+
+def lines_by_folder() -> str:
+    """Lines of Python, before and now; the rooms of workflows one by one."""
+    rows = [(f"`{top}/`", str(BEFORE[top]), str(_lines(ROOT / top))) for top in TOP]
+    rows += [
+        (f"`workflows/{room.name}/`", "", str(_lines(room)))
+        for room in sorted((ROOT / "workflows").iterdir())
+        if (room / "__init__.py").exists()
+    ]
+    return "\n".join(_table(("folder", "before", "now"), rows))
+
+
+def _lines(folder: Path) -> int:
+    return sum(len(path.read_text().splitlines()) for path in folder.rglob("*.py"))
 
 
 def _paragraph(text: str | None) -> str:

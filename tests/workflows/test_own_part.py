@@ -1,47 +1,29 @@
-"""A part of one's own, as the README has it: drawing, scene, run, and a study of its grids beside it."""
+"""A part of one's own, as its tutorial has it: drawing, scene, run, and a study of its grids beside it."""
 
 from __future__ import annotations
 
 import json
-import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
+from tests.helpers.pages import ROOT, follow
+from tribodyn.geometry.drawing import mesh_drawing
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.summary import summary
 
-README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
-
-
-def fence(label: str) -> str:
-    (text,) = re.findall(rf"^```{label}\n(.*?)^```", README, re.M | re.S)
-    return str(text)
-
-
-def gmsh(*words: str, folder: Path) -> None:
-    program = Path(sys.executable).with_name("gmsh")
-    subprocess.run([sys.executable, str(program), *words], cwd=folder, check=True, capture_output=True)
+PAGE = ROOT / "docs/tutorials/own_part.md"
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("own")
-    (made / "arm.geo").write_text(fence("geo"))
-    (made / "arm.toml").write_text(fence("toml"))
+    follow(PAGE, made)
     return made
 
 
-def test_the_example_runs_from_its_drawing_to_its_worn_surface(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    mesh, run = fence("sh own").splitlines()
-    assert mesh.startswith(".venv/bin/gmsh ")
-    gmsh(*mesh.split()[1:], folder=folder)
-    monkeypatch.chdir(folder)
-    assert run.startswith("./tribodyn ")
-    cli.app(run.split()[1:], result_action="return_value")
+def test_the_example_runs_from_its_drawing_to_its_worn_surface(folder: Path) -> None:
     result = store.load(folder / "results/arm/result.h5")
     assert result.state.startswith("complete")
     numbers = summary(result)
@@ -52,7 +34,7 @@ def test_the_example_runs_from_its_drawing_to_its_worn_surface(folder: Path, mon
 
 
 def test_the_error_without_vertices_only_names_the_cure(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    gmsh("-3", "-setnumber", "size", "0.02", "arm.geo", "-o", "arm.msh", folder=folder)
+    mesh_drawing(folder / "arm.geo", folder / "arm.msh", {"size": 0.02})
     words = ["run", str(folder / "arm.toml"), "--set", "contact.vertices_only=false", "--out", str(folder / "out")]
     with pytest.raises(SystemExit) as left:
         cli.main(words)
@@ -69,7 +51,7 @@ set = [['geometry.mesh="arm_16.msh"'], ['geometry.mesh="arm_12.msh"'], ['geometr
 
 def test_a_study_beside_the_scene_is_found(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for size in (16, 12, 8):
-        gmsh("-3", "-setnumber", "size", f"{1e-3 * size}", "arm.geo", "-o", f"arm_{size}.msh", folder=folder)
+        mesh_drawing(folder / "arm.geo", folder / f"arm_{size}.msh", {"size": 1e-3 * size})
     (folder / "arm.study.toml").write_text(GRIDS)
     words = ["converge", str(folder / "arm.toml"), "--set", "response.points=20", "--json", "--out", str(folder)]
     cli.app(words, result_action="return_value")

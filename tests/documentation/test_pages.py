@@ -1,0 +1,81 @@
+"""The pages are true: what README and site print as commands and Python runs as printed, see tests.helpers.pages."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.helpers.pages import README, ROOT, SHOWN, fences, follow, name, pages, prepare, runs, shell
+
+FIRST = "./tribodyn run beam"
+FOLLOWED_ELSEWHERE = {"docs/tutorials/own_part.md"}  # in test_own_part, which looks at its result too
+
+
+@pytest.fixture(scope="session")
+def after_the_first_command(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder where the first command of README and site has run."""
+    folder = prepare(tmp_path_factory.mktemp("first"))
+    shell(FIRST, folder)
+    return folder
+
+
+def with_something(long: bool) -> list[Path]:
+    return [
+        page
+        for page in pages()
+        if name(page) not in FOLLOWED_ELSEWHERE
+        and any((f.language == "sh" and f.word == "long") if long else runs(f) for f in fences(page))
+    ]
+
+
+@pytest.mark.parametrize("page", with_something(long=False), ids=name)
+def test_a_page_does_what_it_says(page: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    text = page.read_text(encoding="utf-8")
+    if f"{FIRST}\n" in text:  # the same command gives the same folder
+        shutil.copytree(request.getfixturevalue("after_the_first_command"), tmp_path, dirs_exist_ok=True)
+        page_without = tmp_path / "page.md"
+        page_without.write_text(text.replace(f"{FIRST}\n", ""))
+        page = page_without
+    follow(page, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", with_something(long=True), ids=name)
+def test_the_long_commands_of_a_page_run(page: Path, tmp_path: Path) -> None:
+    follow(page, tmp_path, long=True)
+
+
+def test_the_first_command_draws_what_is_shown(after_the_first_command: Path) -> None:
+    pictures = after_the_first_command / "results/beam/pictures"
+    assert len(list(pictures.glob("*.png"))) == 10
+    shown, made = ROOT / "docs/figures/beam_patch.png", pictures / "patch.png"
+    assert abs(shown.stat().st_size / made.stat().st_size - 1) < 0.2  # the same picture, up to fonts and rounding
+
+
+def test_every_fence_is_known() -> None:
+    """A label with a slip of the pen would be a fence that nobody runs."""
+    for page in pages():
+        for fence in fences(page):
+            assert fence.language in SHOWN | {"sh"}, (name(page), fence.language)
+            if fence.language == "sh":
+                assert fence.word in ("", "long", "check"), (name(page), fence.word)
+
+
+def test_the_check_is_what_ci_runs() -> None:
+    assert any(f.text == "./tribodyn check\n" for f in fences(README) if (f.language, f.word) == ("sh", "check"))
+    assert 'tribodyn" check' in (ROOT / ".ci/run").read_text()
+
+
+def test_pictures_and_links_are_there() -> None:
+    for page in pages():
+        text = re.sub(r"`[^`\n]*`", "", page.read_text(encoding="utf-8"))
+        for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", text, re.S):
+            if "://" not in target:
+                assert (page.parent / target).exists(), (name(page), target)
+
+
+def test_readme_is_short() -> None:
+    assert len(README.read_text(encoding="utf-8").splitlines()) <= 150

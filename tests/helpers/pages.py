@@ -1,0 +1,104 @@
+"""Pages of README and site, followed as a user does: files written, commands run as printed in a shell, Python pasted.
+
+In a page, a fence
+    ```sh              is run by bash in a folder that is fresh for the page
+    ```python          is run by itself, as if pasted into a new session
+    ```toml name.toml  is a file of that name (so are geo and python with a name)
+    ```sh long         is run where slow tests are asked for
+    ```sh check        names the check, which is not run by itself
+Other fences are shown only.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+README = ROOT / "README.md"
+FENCE = re.compile(r"^( *)```([a-z]+)(?: ([\w.]+))?\n(.*?)^ *```", re.M | re.S)
+SHOWN = {"toml", "geo", "python", "json", "text", "yaml", "tree"}
+
+PROGRAM = """#!/bin/sh
+export OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
+export VTK_DEFAULT_OPENGL_WINDOW="${VTK_DEFAULT_OPENGL_WINDOW:-vtkEGLRenderWindow}"
+PYTHONPATH="%(source)s" exec "%(python)s" -m tribodyn "$@"
+"""
+
+
+@dataclass(frozen=True)
+class Fence:
+    """A fence of a page: its language, the word behind it, its text."""
+
+    language: str
+    word: str
+    text: str
+
+
+def pages() -> list[Path]:
+    """README and every page of the site."""
+    site = sorted((ROOT / "docs").rglob("*.md"))
+    return [README, *(page for page in site if not {"generated", "_build"} & set(page.parts))]
+
+
+def fences(page: Path) -> Iterator[Fence]:
+    """The fences of a page in their order; the indentation of a list is taken off."""
+    for indent, language, word, text in FENCE.findall(page.read_text(encoding="utf-8")):
+        yield Fence(language, word, "".join(line.removeprefix(indent) for line in text.splitlines(keepends=True)))
+
+
+def runs(fence: Fence) -> bool:
+    """Whether a fence is run in every check."""
+    return (fence.language == "sh" and not fence.word) or (fence.language == "python" and not fence.word)
+
+
+def name(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+def environment(folder: Path) -> dict[str, str]:
+    """What a user has: the folder with the start script, and no Python of ours on the path."""
+    kept = {key: os.environ[key] for key in ("HOME", "LANG", "NUMBA_CACHE_DIR", "TMPDIR") if key in os.environ}
+    return kept | {"PATH": f"{folder}:/usr/bin:/bin", "MPLBACKEND": "agg"}
+
+
+def prepare(folder: Path) -> Path:
+    """Put a start script into the folder that starts the program of this tree."""
+    program = folder / "tribodyn"
+    program.write_text(PROGRAM % {"source": ROOT / "src", "python": sys.executable})
+    program.chmod(0o755)
+    return folder
+
+
+def shell(text: str, folder: Path) -> None:
+    """Run the text of a fence as printed; the first command that fails ends it."""
+    done = subprocess.run(
+        ["bash", "-e", "-c", text], cwd=folder, env=environment(folder), capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, f"{text}\n{done.stderr}"
+
+
+def python(text: str, folder: Path) -> None:
+    """Run Python as pasted."""
+    env = environment(folder) | {"PYTHONPATH": str(ROOT / "src"), "VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
+    done = subprocess.run(
+        [sys.executable, "-c", text], cwd=folder, env=env, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, f"{text}\n{done.stderr}"
+
+
+def follow(page: Path, folder: Path, long: bool = False) -> None:
+    """Do what a page says, in its order."""
+    prepare(folder)
+    for fence in fences(page):
+        if fence.word and fence.language in SHOWN:
+            (folder / fence.word).write_text(fence.text)
+        elif fence.language == "sh" and (fence.word == "long") == long and fence.word in ("", "long"):
+            shell(fence.text, folder)
+        elif fence.language == "python" and not fence.word and not long:
+            python(fence.text, folder)
