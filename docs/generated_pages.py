@@ -17,8 +17,9 @@ from cyclopts import App
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
+from tribodyn import declare
 from tribodyn.geometry import parts
-from tribodyn.hbm import continuation
+from tribodyn.hbm import contact, continuation, wear
 from tribodyn.workflows.command.main import app
 from tribodyn.workflows.result import store
 from tribodyn.workflows.scene.fields import Direction, Quantity
@@ -43,6 +44,8 @@ def write(folder: Path) -> None:
         "scene_of_matrices": scene_keys(MatrixScene, without=PartScene),
         "parts": parameters_of(f"tribodyn.geometry.{name}" for name in parts.names()),
         "continuations": parameters_of((f"{continuation.__name__}.{name}" for name in continuation.names()), "Options"),
+        "contact_laws": numbers_of(contact.__path__[0]),
+        "wear_laws": numbers_of(wear.__path__[0]),
         "commands": commands(app),
         "result": result_layout(),
         "folders": folders(),
@@ -165,6 +168,25 @@ def parameters_of(modules: Iterable[str], name: str = "Parameters") -> str:
             default = "" if item.default is dataclasses.MISSING or item.default is None else f"`{item.default!r}`"
             rows.append((f"`{item.name}`", default, _paragraph(meanings.get(item.name, ""))))
         lines += _table(("key", "default", "meaning"), rows)
+    return "\n".join(lines)
+
+
+def numbers_of(folder: str) -> str:
+    """A section for each law of a folder, with the numbers that it declares; no law is run for it."""
+    lines: list[str] = []
+    for path in sorted(Path(folder).glob("*.py")):
+        if path.stem == "__init__":
+            continue
+        head = (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").split("\n\n")[0]
+        lines += [f"## `{path.stem}`", "", _paragraph(head), ""]
+        rows = []
+        for own in declare.read(path):
+            default = "required" if own.needed else "" if own.default is None else f"`{own.default:g}`"
+            limits = (("at least", own.low), ("above", own.above), ("at most", own.high))
+            bounds = [f"{word} {limit:g}" for word, limit in limits if limit is not None]
+            meaning = " ".join(filter(None, [_paragraph(own.meaning), _bounds(bounds)]))
+            rows.append((f"`{own.name}`", own.unit or "ratio", default, meaning))
+        lines += _table(("key", "unit", "default", "meaning"), rows) or ["It has no numbers of its own.", ""]
     return "\n".join(lines)
 
 
