@@ -24,9 +24,9 @@ def leaf(
         fit looks for the dimensions that give the published frequency ratios, check shows those of the scene; study
         runs some thirty configurations; accuracy holds 1 to 9 harmonics against time integration.
     out
-        Folder of tables and pictures; results/leaf_study or results/leaf_accuracy unless told.
+        Folder of tables and pictures; results/leaf_study or results/leaf_accuracy by default.
     resume
-        Let a study go on with what is complete in its folder.
+        Resume a study with what is complete in its folder.
     as_json
         Print JSON for machines.
     """
@@ -64,9 +64,9 @@ def blade(
     scene
         Name of a scene with a [wheel] or a .toml file.
     speed
-        Highest speed of a Campbell diagram, such as 6000rpm; no diagram unless told.
+        Highest speed of a Campbell diagram, such as 6000rpm; no diagram by default.
     out
-        Folder of tables and pictures; results/blade_study unless told.
+        Folder of tables and pictures; results/blade_study by default.
     """
     from tribodyn.workflows.cases.blade import mistuning as blade_mistuning
     from tribodyn.workflows.cases.blade import study as blade_study
@@ -109,9 +109,9 @@ def rig(
         fit: the wear coefficient too, from a whole wear run, minutes.
     change
         life: what to change, such as "damping.modal=1 %" or several joined by ";", can be repeated; what the published
-        text leaves open unless told.
+        text leaves open by default.
     out
-        study: folder of table and pictures; results/rig_study unless told.
+        study: folder of table and pictures; results/rig_study by default.
     as_json
         Print JSON for machines.
     """

@@ -23,7 +23,7 @@ def export(result: Path, *, to: Formats, out: Path | None = None, mesh_ending: s
         Formats, one or several: vtk (series for ParaView), csv, parquet, mat, uff (tables and curves), mesh (worn part
         with its fields), npz, mtx, abaqus (reduced matrices).
     out
-        Folder, in which each format gets a folder of its own; export/ beside the result unless told.
+        Folder, in which each format gets a folder of its own; export/ beside the result by default.
     mesh_ending
         Format of the mesh by its ending, such as .vtu, .exo, .msh or .bdf.
     """

@@ -58,11 +58,11 @@ def run(
         cheapest settings that promise it are taken; without depth or life in it nothing is worn. "1 % of life given
         harmonics" leaves a knob as the scene has it, and its error out.
     table
-        The trade to go by; results/NAME/trade.json or the one that comes with the program unless told.
+        The trade to go by; results/NAME/trade.json or the one that comes with the program by default.
     out
-        Folder of the result; results/NAME unless told.
+        Folder of the result; results/NAME by default.
     resume
-        Go on from an unfinished result in the folder.
+        Resume an unfinished result in the folder.
     pictures
         Draw curves, maps and renders when done.
     """
@@ -137,7 +137,7 @@ def render(result: Path, *, out: Path | None = None) -> None:
     result
         Folder or file of a result.
     out
-        Folder of the pictures; beside the result unless told.
+        Folder of the pictures; beside the result by default.
     """
     from tribodyn.workflows.api import scenes
 
@@ -163,13 +163,13 @@ def verify(
     result
         Folder or file of a result.
     at
-        Frequency such as 410Hz; the peak of the response, or the frequency of the row, unless told.
+        Frequency such as 410Hz; the peak of the response, or the frequency of the row, by default.
     row
-        Wear row whose depth the contact has; unworn unless told.
+        Wear row whose depth the contact has; unworn by default.
     steps
-        Time steps per period; 256 or 32 for each harmonic unless told.
+        Time steps per period; 256 or 32 for each harmonic by default.
     out
-        Folder of the picture; beside the result unless told.
+        Folder of the picture; beside the result by default.
     as_json
         Print JSON for machines.
     """

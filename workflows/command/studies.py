@@ -76,12 +76,12 @@ def trade(
     scene
         Name of a scene or a .toml file.
     knob
-        Knob to measure, can be repeated; the other knobs of an earlier table stay. All knobs unless told.
+        Knob to measure, can be repeated; the other knobs of an earlier table stay. All knobs by default.
         wear_step alone is table 4.2 of the thesis with life added.
     most
         Settings of each knob, the finest ones.
     out
-        Table to write (.json), its plot beside it (.png); results/NAME/trade.json unless told.
+        Table to write (.json), its plot beside it (.png); results/NAME/trade.json by default.
     check
         Measure no table, but run what `run --accuracy` would choose for this accuracy, such as "1 %" or "1 % of
         life", against a run that is finer in every knob; exit code 1 where the promise is broken. --out: the table
@@ -131,7 +131,7 @@ def converge(
     most
         Finest grid, in nodes along the patch.
     out
-        Folder of the plots; results/NAME unless told.
+        Folder of the plots; results/NAME by default.
     as_json
         Print JSON for machines.
     """
@@ -203,13 +203,13 @@ def track(
     stop
         Value to end at.
     fold
-        Number of the fold to follow, 1 for that of the highest frequency; the peak unless told.
+        Number of the fold to follow, 1 for that of the highest frequency; the peak by default.
     points
         Values of the peak (21), or the most that a line of folds may have (500).
     worn
         Folder of the result whose last depth is a wear of one.
     out
-        Folder of track.csv and track.png; results/NAME unless told.
+        Folder of track.csv and track.png; results/NAME by default.
     as_json
         Print JSON for machines.
     """
@@ -262,7 +262,7 @@ def backbone(
     points
         Points on an easy way; there are more where the backbone bends.
     out
-        Folder of backbone.csv and backbone.png; results/NAME unless told.
+        Folder of backbone.csv and backbone.png; results/NAME by default.
     as_json
         Print JSON for machines.
     """
