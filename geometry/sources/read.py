@@ -11,14 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
-from tribodyn.geometry.sources import msh, solid
+from tribodyn.geometry.sources import abaqus_cards, msh, solid
 from tribodyn.geometry.sources.cells import common_name, is_first_order
 from tribodyn.geometry.sources.deck import Deck
 from tribodyn.geometry.sources.raw import RawMesh
 from tribodyn.geometry.sources.solid import Body
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
-READERS: dict[str, Callable[[Path], RawMesh]] = {".msh": msh.read}
+READERS: dict[str, Callable[[Path], RawMesh]] = {".msh": msh.read, ".inp": abaqus_cards.read}
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,407 @@
+"""Decks of Abaqus and CalculiX: nodes, elements, parts and instances, sets and surfaces.
+
+Elements of every formulation (reduced, hybrid, incompatible modes) are read as geometry and computed here as second
+order. The cards on materials, constraints and loads are read in `abaqus_cards`. Whatever is not used is named.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from tribodyn.geometry.sources.cells import VOLUMES
+from tribodyn.geometry.sources.keywords import Card, cards
+from tribodyn.geometry.sources.raw import Cells, RawMesh
+
+# first letters and number of nodes of a solid -> meshio's kind
+SOLIDS = {
+    4: "tetra",
+    5: "pyramid",
+    6: "wedge",
+    8: "hexahedron",
+    10: "tetra10",
+    13: "pyramid13",
+    15: "wedge15",
+    20: "hexahedron20",
+    27: "hexahedron27",
+}
+_SOLID = re.compile(r"^(?:D?C3D|F3D|AC3D|DCC3D|Q3D)(\d+)")
+# Abaqus numbers the nodes of a hexahedron beyond 20: middle, then faces S1 to S6
+_HEXAHEDRON_27 = [*range(20), 26, 24, 23, 25, 21, 22, 20]
+# corners of the faces S1, S2, ... of a solid with so many corners
+FACES: dict[int, tuple[tuple[int, ...], ...]] = {
+    4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    5: ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
+    6: ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
+    8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
+}
+GENERATORS = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY")
+
+Node = tuple[str, int]  # instance, label
+
+
+@dataclass
+class Scope:
+    """What a part, an instance or the assembly holds. Sets and surfaces are kept by their names in capitals.
+
+    nsets, elsets : name -> its items as written: labels, or names of other sets, perhaps with "instance." before them
+    surfaces : name -> (kind, items); names : capitals -> as written
+    """
+
+    nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
+    elements: dict[int, tuple[str, tuple[int, ...]]] = field(default_factory=dict)
+    nsets: dict[str, list[str]] = field(default_factory=dict)
+    elsets: dict[str, list[str]] = field(default_factory=dict)
+    surfaces: dict[str, tuple[str, list[tuple[str, str]]]] = field(default_factory=dict)
+    names: dict[str, str] = field(default_factory=dict)
+    sections: list[tuple[str, str]] = field(default_factory=list)
+    masses: list[tuple[str, float]] = field(default_factory=list)
+
+    def name(self, text: str) -> str:
+        """The key of a name, which is remembered as it was first written."""
+        key = text.upper()
+        self.names.setdefault(key, text)
+        return key
+
+
+@dataclass
+class Assembly:
+    """All scopes of a deck: instances by name (one "" for a deck without parts), and the assembly above them."""
+
+    instances: dict[str, Scope]
+    moves: dict[str, tuple[np.ndarray, np.ndarray]]
+    top: Scope
+    cards: list[Card]
+    ignored: Counter[str]
+
+    def scope(self, instance: str) -> Scope:
+        """The scope of an instance, "" for the assembly."""
+        return self.instances[instance] if instance else self.top
+
+    def split(self, item: str, instance: str) -> tuple[str, str]:
+        """Instance and rest of an item such as "BLADE-1.17", whose case does not matter."""
+        head, dot, tail = item.partition(".")
+        if dot:
+            for name in self.instances:
+                if name.upper() == head.upper():
+                    return name, tail
+        return instance, item
+
+    def nodes(self, item: str, instance: str = "", depth: int = 0) -> list[Node]:
+        """Nodes of an item: a label, a node set, or one of an instance; raises KeyError where there is none."""
+        instance, item = self.split(item, instance)
+        scope = self.scope(instance)
+        if item.lstrip("-").isdigit():
+            return [(instance, int(item))]
+        key = item.upper()
+        if key in scope.nsets and depth < 50:
+            return [node for inner in scope.nsets[key] for node in self.nodes(inner, instance, depth + 1)]
+        if key in scope.elsets:
+            return [
+                (where, node)
+                for where, label in self.elements(item, instance)
+                for node in self.scope(where).elements[label][1]
+            ]
+        raise KeyError(item)
+
+    def elements(self, item: str, instance: str = "", depth: int = 0) -> list[Node]:
+        """Elements of an item likewise."""
+        instance, item = self.split(item, instance)
+        scope = self.scope(instance)
+        if item.isdigit():
+            return [(instance, int(item))]
+        key = item.upper()
+        if key in scope.elsets and depth < 50:
+            return [element for inner in scope.elsets[key] for element in self.elements(inner, instance, depth + 1)]
+        raise KeyError(item)
+
+
+def load(path: Path) -> Assembly:
+    """Sort the cards of a deck into parts, instances and the rest. Raises ValueError on what cannot be read."""
+    parts: dict[str, Scope] = {}
+    assembly = Assembly({}, {}, Scope(), [], Counter())
+    scope, flat = assembly.top, True
+    for card in cards(path):
+        if card.name == "PART":
+            flat = False
+            scope = parts[card.option("NAME").upper()] = Scope()
+        elif card.name == "INSTANCE":
+            scope = _instance(card, parts, assembly)
+        elif card.name in ("END PART", "END INSTANCE", "ASSEMBLY", "END ASSEMBLY"):
+            scope = assembly.top
+        elif not _mesh_card(card, scope):
+            assembly.cards.append(card)
+    if flat and not assembly.instances:
+        return assembly
+    if not assembly.instances:
+        raise ValueError(f"deck '{path}' has parts but no *INSTANCE: write the deck with its assembly")
+    return assembly
+
+
+def _instance(card: Card, parts: dict[str, Scope], assembly: Assembly) -> Scope:
+    part, name = card.option("PART"), card.option("NAME")
+    if part.upper() not in parts:
+        known = ", ".join(parts) or "there is none"
+        raise ValueError(f"{card.where} names the part '{part}', which the deck has not ({known}): correct the name")
+    if any(name.upper() == other.upper() for other in assembly.instances):
+        raise ValueError(f"{card.where} has the name '{name}' of another instance: give each its own")
+    source = parts[part.upper()]
+    scope = Scope(
+        dict(source.nodes),
+        dict(source.elements),
+        {key: list(items) for key, items in source.nsets.items()},
+        {key: list(items) for key, items in source.elsets.items()},
+        dict(source.surfaces),
+        dict(source.names),
+        list(source.sections),
+        list(source.masses),
+    )
+    turn, shift = np.eye(3), np.zeros(3)
+    if card.data:
+        shift = np.array(card.floats(card.data[0], 3))
+    if len(card.data) > 1:
+        *axis, angle = card.floats(card.data[1], 7)
+        start, along = np.array(axis[:3]), np.array(axis[3:]) - np.array(axis[:3])
+        turn = rotation(along, math.radians(angle))
+        shift = start + turn @ (shift - start)
+    assembly.instances[name] = scope
+    assembly.moves[name] = (turn, shift)
+    return scope
+
+
+def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Matrix (3, 3) of a rotation [rad] about an axis. Source  Rodrigues' formula"""
+    x, y, z = axis / np.linalg.norm(axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross)
+
+
+def _mesh_card(card: Card, scope: Scope) -> bool:
+    """Put a card on nodes, elements, sets or surfaces into its scope; False where it is another card."""
+    if card.name in GENERATORS:
+        raise ValueError(f"{card.where} generates a mesh: write the deck with its nodes and elements listed")
+    if card.name == "NODE":
+        _nodes(card, scope)
+    elif card.name == "ELEMENT":
+        _elements(card, scope)
+    elif card.name in ("NSET", "ELSET"):
+        _set(card, scope)
+    elif card.name == "SURFACE":
+        kind = card.option("TYPE").upper() or "ELEMENT"
+        items = [(line[0], line[1].upper() if len(line) > 1 else "") for line in card.data]
+        scope.surfaces[scope.name(card.option("NAME"))] = (kind, items)
+    elif card.name == "SOLID SECTION":
+        scope.sections.append((card.option("ELSET"), card.option("MATERIAL")))
+    elif card.name == "MASS":
+        scope.masses.append((card.option("ELSET"), card.number(card.data[0][0]) if card.data else 0.0))
+    else:
+        return False
+    return True
+
+
+def _nodes(card: Card, scope: Scope) -> None:
+    if card.option("SYSTEM").upper() not in ("", "R"):
+        raise ValueError(f"{card.where} gives nodes in another system than the rectangular one: write x, y, z")
+    labels = []
+    for line in card.data:
+        label = card.whole(line[0])
+        x, y, z = card.floats(line[1:], 3)
+        scope.nodes[label] = (x, y, z)
+        labels.append(str(label))
+    if card.option("NSET"):
+        scope.nsets.setdefault(scope.name(card.option("NSET")), []).extend(labels)
+
+
+def _elements(card: Card, scope: Scope) -> None:
+    kind = card.option("TYPE").upper()
+    count = _count(kind)
+    labels = []
+    numbers: list[int] = []
+    for line in card.data:
+        numbers += [card.whole(text) for text in line if text]
+        if count is None or len(numbers) > count:
+            if count is not None or numbers[0] not in scope.elements:
+                scope.elements[numbers[0]] = (kind, tuple(numbers[1:]))
+            labels.append(str(numbers[0]))
+            numbers = []
+    if numbers:
+        raise ValueError(f"{card.where} ends inside element {numbers[0]}: the deck is cut off or a line is missing")
+    if card.option("ELSET"):
+        scope.elsets.setdefault(scope.name(card.option("ELSET")), []).extend(labels)
+
+
+def _count(kind: str) -> int | None:
+    """Nodes of a solid element by its type; None for elements that are none."""
+    found = _SOLID.match(kind)
+    return int(found[1]) if found and int(found[1]) in SOLIDS else None
+
+
+def _set(card: Card, scope: Scope) -> None:
+    key = scope.name(card.option(card.name))
+    target = (scope.nsets if card.name == "NSET" else scope.elsets).setdefault(key, [])
+    prefix = f"{card.option('INSTANCE')}." if card.option("INSTANCE") else ""
+    if card.name == "NSET" and card.option("ELSET"):
+        target.append(prefix + card.option("ELSET"))
+    for line in card.data:
+        if "GENERATE" in card.options:
+            first, last, *step = [card.whole(text) for text in line if text]
+            target += [f"{prefix}{label}" for label in range(first, last + 1, step[0] if step else 1)]
+        else:
+            target += [prefix + text for text in line if text]
+
+
+def raw_of(assembly: Assembly) -> tuple[RawMesh, dict[Node, int]]:
+    """Mesh, sets and surfaces of a deck, lengths as in the file, and the row of each node.
+
+    Raises  ValueError: an element that names a node that is not there
+    """
+    scopes = {**assembly.instances, "": assembly.top}
+    row: dict[Node, int] = {}
+    points: list[np.ndarray] = []
+    for name, scope in scopes.items():
+        turn, shift = assembly.moves.get(name, (np.eye(3), np.zeros(3)))
+        if scope.nodes:
+            start = len(row)
+            row |= {(name, label): start + i for i, label in enumerate(scope.nodes)}
+            points.append(np.array(list(scope.nodes.values())) @ turn.T + shift)
+    number: dict[Node, int] = {}
+    by_kind: dict[str, list[tuple[Node, list[int]]]] = {}
+    other: Counter[str] = Counter()
+    for name, scope in scopes.items():
+        for label, (kind, nodes) in scope.elements.items():
+            count = _count(kind)
+            if count is None:
+                other[kind] += 1
+                continue
+            try:
+                by_kind.setdefault(SOLIDS[count], []).append(((name, label), [row[name, node] for node in nodes[:count]]))
+            except KeyError as missing:
+                raise ValueError(
+                    f"element {label}{f' of {name}' if name else ''} names node {missing.args[0][1]}, which the deck has "
+                    "not: the deck is cut off or nodes are missing"
+                ) from None
+    blocks = []
+    for kind, elements in by_kind.items():
+        number |= {key: len(number) + i for i, (key, _) in enumerate(elements)}
+        nodes = np.array([nodes for _, nodes in elements])
+        nodes = nodes[:, _HEXAHEDRON_27] if kind == "hexahedron27" else nodes
+        blocks.append(Cells(kind, nodes, np.array([key[1] for key, _ in elements])))
+    unused = [f"{count} elements of type {kind}, which are no solids" for kind, count in other.items() if kind != "MASS"]
+    sets = _Sets(assembly, row, number, blocks)
+    sets.collect(scopes)
+    labels = np.array([label for _, label in row], dtype=int)
+    everything = np.vstack(points) if points else np.empty((0, 3))
+    raw = RawMesh(
+        everything,
+        labels,
+        blocks,
+        sets.volumes,
+        sets.faces,
+        sets.nodes,
+        bodies=tuple(name for name in assembly.instances if name in sets.volumes),
+        skins=frozenset(sets.nodes),
+        unused=[*unused, *sets.unused],
+    )
+    return raw, row
+
+
+@dataclass
+class _Sets:
+    """Sets and surfaces of all scopes, resolved to rows and element numbers."""
+
+    assembly: Assembly
+    row: dict[Node, int]
+    number: dict[Node, int]
+    blocks: Sequence[Cells]
+    volumes: dict[str, np.ndarray] = field(default_factory=dict)
+    faces: dict[str, list[np.ndarray]] = field(default_factory=dict)
+    nodes: dict[str, np.ndarray] = field(default_factory=dict)
+    unused: list[str] = field(default_factory=list)
+
+    def collect(self, scopes: dict[str, Scope]) -> None:
+        """Resolve the sets of all scopes; those of an instance bear its name before a dot."""
+        for instance in self.assembly.instances:
+            held = [self.number[key] for key in self.number if key[0] == instance]
+            if held:
+                self.volumes[instance] = np.array(held)
+        for instance, scope in scopes.items():
+            before = f"{instance}." if instance else ""
+            for key in scope.elsets:
+                self._elset(before + scope.names[key], self._try(self.assembly.elements, key, instance, "element set"))
+            for key in scope.nsets:
+                self._nset(before + scope.names[key], self._try(self.assembly.nodes, key, instance, "node set"))
+            for key, (kind, items) in scope.surfaces.items():
+                self._surface(before + scope.names[key], kind, items, instance)
+
+    def _try(self, resolve, key: str, instance: str, what: str) -> list[Node]:  # type: ignore[no-untyped-def]
+        try:
+            return list(resolve(key, instance))
+        except KeyError as missing:
+            self.unused.append(f"{what} '{key}', which names '{missing.args[0]}' that the deck has not")
+            return []
+
+    def _elset(self, name: str, members: Iterable[Node]) -> None:
+        members = list(members)
+        solid = [self.number[key] for key in members if key in self.number]
+        if solid:
+            self.volumes.setdefault(name, np.unique(solid))
+
+    def _nset(self, name: str, members: list[Node]) -> None:
+        rows = [self.row[key] for key in members if key in self.row]
+        if len(rows) < len(members):
+            self.unused.append(f"{len(members) - len(rows)} nodes of node set '{name}', which the deck has not")
+        if rows:
+            self.nodes.setdefault(name, np.unique(rows))
+
+    def _surface(self, name: str, kind: str, items: list[tuple[str, str]], instance: str) -> None:
+        if kind == "NODE":
+            members = [node for item, _ in items for node in self._try(self.assembly.nodes, item, instance, "surface")]
+            self._nset(name, members)
+            return
+        if kind != "ELEMENT":
+            self.unused.append(f"surface '{name}' of type {kind}")
+            return
+        corners: list[np.ndarray] = []
+        for item, face in items:
+            members = self._try(self.assembly.elements, item, instance, f"surface '{name}'")
+            numbers = np.array([self.number[key] for key in members if key in self.number], dtype=int)
+            if len(numbers):
+                corners += self._faces(numbers, face, name)
+        if corners:
+            self.faces[name] = corners
+
+    def _faces(self, numbers: np.ndarray, face: str, name: str) -> list[np.ndarray]:
+        found, start = [], 0
+        for block in self.blocks:
+            inside = numbers[(numbers >= start) & (numbers < start + len(block.nodes))] - start
+            start += len(block.nodes)
+            if not len(inside):
+                continue
+            faces = FACES[VOLUMES[block.kind][0].corners]
+            if face in ("", "SPOS"):
+                found += [block.nodes[inside][:, list(corners)] for corners in faces]
+            elif face[1:].isdigit() and 1 <= int(face[1:]) <= len(faces):
+                found.append(block.nodes[inside][:, list(faces[int(face[1:]) - 1])])
+            else:
+                self.unused.append(f"face {face} of {len(inside)} elements of surface '{name}', which they have not")
+        return free_faces(found, self.blocks) if face in ("", "SPOS") else found
+
+
+def free_faces(parts: list[np.ndarray], blocks: Sequence[Cells]) -> list[np.ndarray]:
+    """Those of some faces, corners (k, 3 or 4), that belong to one element of the mesh only."""
+    seen: Counter[tuple[int, ...]] = Counter()
+    for block in blocks:
+        for corners in FACES[VOLUMES[block.kind][0].corners]:
+            seen.update(map(tuple, np.sort(block.nodes[:, list(corners)], axis=1).tolist()))
+    kept = []
+    for part in parts:
+        outer = np.array([seen[tuple(key)] == 1 for key in np.sort(part, axis=1).tolist()], dtype=bool)
+        if outer.any():
+            kept.append(part[outer])
+    return kept
