@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -280,19 +280,25 @@ def raw_of(assembly: Assembly) -> tuple[RawMesh, dict[Node, int]]:
                 other[kind] += 1
                 continue
             try:
-                by_kind.setdefault(SOLIDS[count], []).append(((name, label), [row[name, node] for node in nodes[:count]]))
+                by_kind.setdefault(SOLIDS[count], []).append(
+                    ((name, label), [row[name, node] for node in nodes[:count]])
+                )
             except KeyError as missing:
                 raise ValueError(
-                    f"element {label}{f' of {name}' if name else ''} names node {missing.args[0][1]}, which the deck has "
-                    "not: the deck is cut off or nodes are missing"
+                    f"element {label}{f' of {name}' if name else ''} names node {missing.args[0][1]}, which the deck "
+                    "has not: the deck is cut off or nodes are missing"
                 ) from None
     blocks = []
     for kind, elements in by_kind.items():
         number |= {key: len(number) + i for i, (key, _) in enumerate(elements)}
-        nodes = np.array([nodes for _, nodes in elements])
-        nodes = nodes[:, _HEXAHEDRON_27] if kind == "hexahedron27" else nodes
-        blocks.append(Cells(kind, nodes, np.array([key[1] for key, _ in elements])))
-    unused = [f"{count} elements of type {kind}, which are no solids" for kind, count in other.items() if kind != "MASS"]
+        table = np.array([members for _, members in elements])
+        table = table[:, _HEXAHEDRON_27] if kind == "hexahedron27" else table
+        blocks.append(Cells(kind, table, np.array([key[1] for key, _ in elements])))
+    if not blocks:
+        return RawMesh(np.empty((0, 3)), np.empty(0, dtype=int), ()), row
+    unused = [
+        f"{count} elements of type {kind}, which are no solids" for kind, count in other.items() if kind != "MASS"
+    ]
     sets = _Sets(assembly, row, number, blocks)
     sets.collect(scopes)
     labels = np.array([label for _, label in row], dtype=int)
@@ -339,7 +345,7 @@ class _Sets:
             for key, (kind, items) in scope.surfaces.items():
                 self._surface(before + scope.names[key], kind, items, instance)
 
-    def _try(self, resolve, key: str, instance: str, what: str) -> list[Node]:  # type: ignore[no-untyped-def]
+    def _try(self, resolve: Callable[[str, str], list[Node]], key: str, instance: str, what: str) -> list[Node]:
         try:
             return list(resolve(key, instance))
         except KeyError as missing:

@@ -38,6 +38,8 @@ def read(path: Path) -> RawMesh:
     """Read a deck. Raises ValueError: one sentence that names the card and the cure."""
     assembly = abaqus.load(path)
     raw, row = abaqus.raw_of(assembly)
+    if not raw.cells:
+        return raw
     reader = _Cards(assembly, raw, row)
     for card in assembly.cards:
         reader.take(card)
@@ -66,6 +68,13 @@ class _Cards:
     steps: int = 0
     material: str = ""
     coupling: Card | None = None
+    solid: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=bool))
+
+    def __post_init__(self) -> None:
+        self.solid = np.zeros(len(self.raw.points), dtype=bool)
+        for block in self.raw.cells:
+            self.solid[block.nodes] = True
+        self.keys = list(self.row)
 
     def take(self, card: Card) -> None:
         """Use a card, or count it among those that are not used."""
@@ -92,7 +101,7 @@ class _Cards:
         elif kind.startswith("ENGINEERING") and len(values) >= 9:
             self._give(card, engineering=tuple(values[:9]))
             rows = len(card.data) // 2
-        elif kind.startswith("ORTHO") and len(values) >= 9:
+        elif kind.startswith("ORTHO") and len(values) >= 9 and _regular(values):
             self._give(card, engineering=engineering_constants(values[:9]))
             rows = len(card.data) // 2
         else:
@@ -133,6 +142,9 @@ class _Cards:
             )
 
     def _equation(self, card: Card) -> None:
+        if "REMOVE" in card.options:
+            self.ignored[card.name + ", REMOVE"] += 1
+            return
         lines = iter(card.data)
         for line in lines:
             count, fields = card.whole(line[0]), [text for text in line[1:] if text]
@@ -141,7 +153,9 @@ class _Cards:
                 if more is None:
                     raise ValueError(f"{card.where} ends before its {count} terms: the deck is cut off")
                 fields += [text for text in more if text]
-            terms = [(fields[i], card.whole(fields[i + 1]) - 1, card.number(fields[i + 2])) for i in range(0, 3 * count, 3)]
+            terms = [
+                (fields[i], card.whole(fields[i + 1]) - 1, card.number(fields[i + 2])) for i in range(0, 3 * count, 3)
+            ]
             members = [self._rows(place, card) for place, _, _ in terms]
             for i in range(max(map(len, members))):
                 picked = [rows[min(i, len(rows) - 1)] for rows in members]
@@ -163,7 +177,7 @@ class _Cards:
     def _couple(self, kind: str, card: Card) -> None:
         head, self.coupling = self.coupling, None
         if head is None:
-            raise ValueError(f"{card.where} needs a *COUPLING before it")
+            raise ValueError(f"{card.where} needs a *COUPLING before it: add its head")
         axes = sorted({axis for line in card.data for axis in _axes(card, line)})
         self.couplings.append(
             deck.Coupling(
@@ -204,16 +218,24 @@ class _Cards:
                 self.unused.append(f"direction {line[1]} of {card.where}")
 
     def _boundary(self, card: Card) -> None:
+        single: dict[tuple[tuple[int, ...], float], list[int]] = {}
         for line in card.data:
-            place = self._place(line[0], card)
             kind = (line[1] if len(line) > 1 else "").upper()
-            value = card.number(line[3]) if len(line) > 3 else 0.0
-            if kind in NAMED_SUPPORTS:
-                axes, value = list(NAMED_SUPPORTS[kind]), 0.0
+            value = card.number(line[3]) if len(line) > 3 and kind not in NAMED_SUPPORTS else 0.0
+            axes = NAMED_SUPPORTS.get(kind) or tuple(_axes(card, line[1:3]))
+            rows = self._rows(line[0], card)
+            if len(rows) == 1 and self.solid[rows[0]] and line[0].rpartition(".")[2].isdigit():
+                single.setdefault((axes, value), []).append(rows[0])
             else:
-                axes = list(_axes(card, line[1:3]))
-            on_solid = place not in self.references.values()
-            self.supports += [deck.Support(place, axis, value) for axis in axes if axis < 3 or not on_solid]
+                self._support(self._place(line[0], card), axes, value)
+        for (axes, value), members in single.items():  # together: what lies between them is held too
+            name = f"support {len(self.supports) + 1}"
+            self.nodes[name] = np.unique(members)
+            self._support(name, axes, value)
+
+    def _support(self, place: str, axes: tuple[int, ...], value: float) -> None:
+        turns = place in self.references.values()
+        self.supports += [deck.Support(place, axis, value) for axis in axes if axis < 3 or turns]
 
     def _dsload(self, card: Card) -> None:
         for line in card.data:
@@ -261,8 +283,8 @@ class _Cards:
         return self.references[row]
 
     def _label(self, row: int) -> str:
-        instance = next((key[0] for key, number in self.row.items() if number == row), "") if self.assembly.moves else ""
-        return f"node {f'{instance}.' if instance else ''}{self.raw.labels[row]}"
+        instance, label = self.keys[row]
+        return f"node {f'{instance}.' if instance else ''}{label}"
 
     def _place(self, text: str, card: Card, face: bool = False) -> str:
         """Name of the group that a card means: a face, a node set, or a group of one node that is made for it."""
@@ -319,9 +341,7 @@ class _Cards:
 
     def finished(self) -> RawMesh:
         """The mesh with everything that the cards say."""
-        solid = np.zeros(len(self.raw.points), dtype=bool)
-        for block in self.raw.cells:
-            solid[block.nodes] = True
+        solid = self.solid
         for row in [row for row in self.references if solid[row]]:
             self.nodes[self.references[row]] = np.array([row])
         points = {name: self.raw.points[row] for row, name in self.references.items() if not solid[row]}
@@ -368,8 +388,8 @@ class _Cards:
                 name = next((name for name in self.raw.volumes if name.upper() == wanted.upper()), None)
                 if name:
                     groups.setdefault(material.upper(), []).append(name)
-        for key, material in self.materials.items():
-            yield replace(material, groups=tuple(groups.get(key, ())))
+        for key, one in self.materials.items():
+            yield replace(one, groups=tuple(groups.get(key, ())))
 
     def _masses(self) -> Iterator[deck.PointMass]:
         for instance, scope in {**self.assembly.instances, "": self.assembly.top}.items():
@@ -388,8 +408,16 @@ def _axes(card: Card, fields: list[str]) -> range:
 
 
 def engineering_constants(D: list[float]) -> tuple[float, ...]:
-    """(E1, E2, E3, nu12, nu13, nu23, G12, G13, G23) from D1111, D1122, D2222, D1133, D2233, D3333, D1212, D1313, D2323."""
-    stiffness = np.array([[D[0], D[1], D[3]], [D[1], D[2], D[4]], [D[3], D[4], D[5]]])
-    S = np.linalg.inv(stiffness)
+    """(E1, E2, E3, nu12, nu13, nu23, G12, G13, G23) from D1111, D1122, D2222, D1133, D2233, D3333, D1212, D1313, ..."""
+    S = np.linalg.inv(_normal_block(D))
     E = 1 / np.diag(S)
     return (*E.tolist(), float(-S[0, 1] * E[0]), float(-S[0, 2] * E[0]), float(-S[1, 2] * E[1]), *D[6:9])
+
+
+def _normal_block(D: list[float]) -> np.ndarray:
+    return np.array([[D[0], D[1], D[3]], [D[1], D[2], D[4]], [D[3], D[4], D[5]]])
+
+
+def _regular(D: list[float]) -> bool:
+    """Whether a stiffness can be inverted; those of fluids cannot."""
+    return bool(np.linalg.eigvalsh(_normal_block(D))[0] > 0)

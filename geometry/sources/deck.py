@@ -7,7 +7,7 @@ mm, t and s, as decks do.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -103,3 +103,33 @@ class Deck:
     pressures: tuple[FacePressure, ...] = ()
     supports: tuple[Support, ...] = ()
     masses: tuple[PointMass, ...] = ()
+
+
+def in_si(deck: Deck, metre: float, newton: float) -> Deck:
+    """A deck in SI units. metre, newton : its units of length and force; its time is in seconds, its mass follows."""
+    area, mass = metre**2, newton / metre
+
+    def scaled(value: float | None, factor: float) -> float | None:
+        return None if value is None else factor * value
+
+    def moduli(values: tuple[float, ...] | None) -> tuple[float, ...] | None:
+        stress = newton / area
+        return values and (*(stress * v for v in values[:3]), *values[3:6], *(stress * v for v in values[6:]))
+
+    return replace(
+        deck,
+        materials=tuple(
+            replace(
+                one,
+                young=scaled(one.young, newton / area),
+                density=scaled(one.density, mass / metre**3),
+                engineering=moduli(one.engineering),
+            )
+            for one in deck.materials
+        ),
+        ties=tuple(replace(one, tolerance=scaled(one.tolerance, metre)) for one in deck.ties),
+        forces=tuple(replace(one, value=one.value * newton * (1.0 if one.axis < 3 else metre)) for one in deck.forces),
+        pressures=tuple(replace(one, value=one.value * newton / area) for one in deck.pressures),
+        supports=tuple(replace(one, value=one.value * (metre if one.axis < 3 else 1.0)) for one in deck.supports),
+        masses=tuple(replace(one, value=one.value * mass) for one in deck.masses),
+    )

@@ -11,8 +11,11 @@ DEEPEST = 10  # files that include files
 
 @dataclass(frozen=True)
 class Card:
-    """One keyword with its data. name : in capitals, without the star; options : key in capitals -> value, "" for a flag
-    data : the data lines, split at commas; file, line : where it stands"""
+    """One keyword with its data.
+
+    name : in capitals, without the star; options : key in capitals -> value, "" for a flag
+    data : the data lines, split at commas; file, line : where it stands
+    """
 
     name: str
     options: dict[str, str]

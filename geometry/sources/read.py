@@ -13,11 +13,12 @@ import numpy as np
 
 from tribodyn.geometry.sources import abaqus_cards, msh, solid
 from tribodyn.geometry.sources.cells import common_name, is_first_order
-from tribodyn.geometry.sources.deck import Deck
+from tribodyn.geometry.sources.deck import Deck, in_si
 from tribodyn.geometry.sources.raw import RawMesh
 from tribodyn.geometry.sources.solid import Body
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
+POUND = 4.4482216152605  # [N], the force of decks in inches and feet
 READERS: dict[str, Callable[[Path], RawMesh]] = {".msh": msh.read, ".inp": abaqus_cards.read}
 
 
@@ -67,15 +68,16 @@ def read_raw(path: str | Path, unit: str = "m") -> RawMesh:
     raw = reader(file)
     if not raw.cells:
         raise ValueError(f"mesh file '{path}' has no volume elements: mesh the volume, a surface alone has no mass")
-    return scaled(raw, UNITS[unit])
+    return scaled(raw, UNITS[unit], POUND if unit in ("in", "ft") else 1.0)
 
 
-def scaled(raw: RawMesh, metre: float) -> RawMesh:
-    """The mesh in metres where the file counts in a unit of so many metres."""
+def scaled(raw: RawMesh, metre: float, newton: float = 1.0) -> RawMesh:
+    """A mesh and its deck in SI units where the file counts in a unit of so many metres and one of so many newton."""
     if metre == 1.0:
         return raw
     points = {name: metre * point for name, point in raw.points_of_reference.items()}
-    return replace(raw, points=metre * raw.points, points_of_reference=points)
+    made = in_si(raw.deck, metre, newton)
+    return replace(raw, points=metre * raw.points, points_of_reference=points, deck=made)
 
 
 def lost(raw: RawMesh, built: Mapping[str, Body]) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -100,7 +100,7 @@ def build(raw: RawMesh, elements: np.ndarray | None = None) -> Body:
     subdomains = {name: members for name, members in volumes.items() if len(members)}
     node_sets = {name: np.unique(mesh.dofs.element_dofs[:, members]) for name, members in subdomains.items()}
     node_sets |= {name: np.unique(mesh.dofs.get_facet_dofs(ids).flatten()) for name, ids in boundaries.items()}
-    implied = _implied(mesh, fulls, pieces, cut)
+    implied = _implied(mesh, fulls, pieces)
     for name, members in raw.nodes.items():
         mine = node_of[members]
         mine = mine[mine >= 0]
@@ -176,36 +176,33 @@ def _facets(mesh: Any, node_of: np.ndarray, parts: Iterable[np.ndarray]) -> np.n
     return np.unique(at) if (keys[at] == wanted).all() else None
 
 
-def _implied(mesh: Any, fulls: Sequence[split.Full], pieces: Sequence[split.Pieces], cut: bool) -> Any:
+def _implied(mesh: Any, fulls: Sequence[split.Full], pieces: Sequence[split.Pieces]) -> Callable[..., np.ndarray]:
     """A function from nodes of the file to the nodes added between them.
 
     An added node belongs to a set when every node that it interpolates does: the two ends of an edge, the corners and
     edges of a face, the whole hexahedron.
     """
-    elem = mesh.elem()
-    order = permutation(REFERENCE_POINTS["tetra10" if mesh.t.shape[0] == 4 else "hexahedron27"], elem.doflocs)
-    start, tables = 0, []
+    order = permutation(REFERENCE_POINTS["tetra10" if mesh.t.shape[0] == 4 else "hexahedron27"], mesh.elem().doflocs)
+    start, tables = 0, []  # (added nodes, the nodes that each interpolates)
     for one, piece in zip(fulls, pieces, strict=True):
         dofs = mesh.dofs.element_dofs[:, start : start + len(piece.parent)].T
         start += len(piece.parent)
         nodes = np.empty(one.rows.shape, dtype=int)
         nodes[piece.parent[:, None], piece.local[:, order]] = dofs
-        tables.append((one, nodes))
+        for place, support in enumerate(split.supports(one.solid)):
+            new = one.rows[:, place] < 0
+            if new.any():
+                added, first = np.unique(nodes[new, place], return_index=True)
+                tables.append((added, nodes[new][first][:, _between(one, support)]))
 
-    def added(members: np.ndarray) -> np.ndarray:
+    def between(members: np.ndarray) -> np.ndarray:
+        if len(members) < 2 or not tables:
+            return np.empty(0, dtype=int)
         inside = np.zeros(mesh.doflocs.shape[1], dtype=bool)
         inside[members] = True
-        before = inside.copy()
-        for one, nodes in tables:
-            for place, support in enumerate(split.supports(one.solid)):
-                new = one.rows[:, place] < 0
-                if len(support) > 1 and new.any():
-                    between = _between(one, support)
-                    here = new & before[nodes[:, between]].all(axis=1)
-                    inside[nodes[here, place]] = True
-        return np.flatnonzero(inside & ~before)
+        return np.unique(np.concatenate([added[inside[ends].all(axis=1)] for added, ends in tables]))
 
-    return added
+    return between
 
 
 def _between(one: split.Full, support: tuple[int, ...]) -> list[int]:
