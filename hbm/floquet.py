@@ -19,7 +19,7 @@ def exponents(balance: HarmonicBalance, state: State, options: Options | None = 
     """
     options = options or Options()
     stepper = TimeStepper(balance, state.omega, options)
-    size = 3 * len(stepper.lam) + balance.memory.size + len(stepper.U)
+    size = 2 * len(stepper.lam) + balance.memory.size + 2 * len(stepper.static)
     if size > LARGEST:
         raise ValueError(f"{size} state variables are too many for Floquet multipliers: use the method hill")
     motion = integrate(balance, state.omega, state, options, with_slopes=True)
@@ -31,33 +31,27 @@ def exponents(balance: HarmonicBalance, state: State, options: Options | None = 
 
 
 def monodromy(stepper: TimeStepper, motion: PeriodicMotion) -> np.ndarray:
-    """Derivative of the state (eta, v, a, f, memory that moves) after a period with respect to the one before."""
-    h, am, af, beta, gamma = stepper.scheme
-    slopes = motion.slopes
-    assert slopes is not None
-    n, n_contact = len(stepper.lam), len(stepper.U)
-    n_memory = stepper.balance.memory.size
-    inverse = np.diag(stepper.inverse[0]) if stepper.diagonal else stepper.inverse
-    damping = np.diag(stepper.damping[0]) if stepper.diagonal else stepper.damping
-    lam, U, A = stepper.lam[:, None], stepper.U, stepper.compliance
-    eta, v, a, f, s = np.split(np.eye(3 * n + n_contact + n_memory), np.cumsum([n, n, n, n_contact]))
-    for j in range(len(slopes.force_x)):
-        J, Fs, Sx, Ss = (_block_diagonal(blocks[j]) for blocks in vars(slopes).values())
-        v_known = v + (1 - af) * h * (1 - gamma) * a
-        eta_known = eta + (1 - af) * h * (v + h * (0.5 - beta) * a)
-        b = inverse @ (-am * a - damping @ v_known - lam * eta_known - af * (U.T @ f))
-        x_free = U @ (eta + h * v + h * h * ((0.5 - beta) * a + beta * b))
-        remembered = Fs @ s
-        x = np.linalg.solve(np.eye(n_contact) + A @ J, x_free - A @ remembered)
-        f = J @ x + remembered
-        s = Sx @ x + Ss @ s
-        a_new = b - (1 - af) * (inverse @ (U.T @ f))
-        eta = eta + h * v + h * h * ((0.5 - beta) * a + beta * a_new)
-        v = v + h * ((1 - gamma) * a + gamma * a_new)
-        a = a_new
-    whole = np.concatenate([eta, v, a, f, s])
+    """Derivative of the state (z, f, x, memory that moves) after a period with respect to the one before."""
+    assert motion.slopes is not None
+    linear, A, c = stepper.linear, stepper.contact.A, stepper.c
+    n, n_contact, n_memory = len(linear.E), len(A), stepper.balance.memory.size
+    n_state = motion.slopes.shape[2] - c
+    z, f, x, s = np.split(np.eye(n + 2 * n_contact + n_memory), np.cumsum([n, n_contact, n_contact]))
+    for D in motion.slopes:
+        free = linear.E @ z - 0.5 * linear.Q @ (linear.U.T @ f)
+        of_x, of_s, of_x0 = (
+            _block_diagonal(part) for part in np.split(D, [c, c + n_state], axis=2)
+        )  # each of (f, memory), pair by pair
+        known = of_s @ s + of_x0 @ x
+        force = np.arange(len(of_x)).reshape(-1, c + n_state)[:, :c].ravel()
+        x_free = linear.U @ free[: n // 2] - A @ known[force]
+        x = np.linalg.solve(np.eye(n_contact) + A @ of_x[force], x_free)
+        both = of_x @ x + known
+        f, s = both[force], np.delete(both, force, axis=0)
+        z = free - 0.5 * linear.Q @ (linear.U.T @ f)
+    whole = np.concatenate([z, f, x, s])
     fixed = np.zeros(len(whole), bool)
-    first = 3 * n + n_contact
+    first = n + 2 * n_contact
     fixed[first:] = np.all(whole[first:] == np.eye(len(whole))[first:], axis=1)
     return whole[np.ix_(~fixed, ~fixed)]
 

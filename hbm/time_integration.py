@@ -1,9 +1,9 @@
 """Direct time integration of the reduced model with the same contact law, to a periodic state.
 
-The independent check of a harmonic balance: M q'' + C q' + K q + B^T f_c = F(t) is stepped through time by the
-generalised alpha method, of second order and unconditionally stable for the linear part, in the modal coordinates of
-the structure without contact, all of them, so that nothing is truncated. The law is the same `step` kernel, but nothing
-else is shared: no harmonics, no compliance between harmonics, no alternation of domains.
+The independent check of a harmonic balance: M q'' + C q' + K q + B^T f_c = F(t) is stepped through time in the modal
+coordinates of the structure without contact, exactly but for the contact forces, which count by their mean over a step
+(hbm.time_step). The law is the same `step` kernel, but nothing else is shared: no harmonics, no compliance between
+harmonics, no alternation of domains.
 The start (a harmonic balance state, or static equilibrium) and the acceleration of the transient only choose where
 the march begins; what is returned is always one plainly integrated period together with the drift over it.
 """
@@ -16,11 +16,15 @@ import numpy as np
 import scipy.linalg as sla
 from threadpoolctl import threadpool_limits
 
+from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton, time_step
 from tribodyn.hbm.anderson import Anderson
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.time_step import Moving, Record
+
+RESOLVED = 1.0  # omega h of a mode from which on its inertia is left out
 
 
 @dataclass(frozen=True)
@@ -28,15 +32,14 @@ class Options:
     """How to integrate.
 
     steps : time steps per period; the error falls with its square
-    spectral_radius : of the method at infinite frequency, 1 for the trapezoidal rule, less damps what is not resolved
     tolerance : periodic when the state changes by less than this over one period, relative to its vibration
     max_periods : periods after which to give up; patience : periods without a smaller drift after which to give up
     accelerate : mix the states of past periods (Anderson) instead of waiting for the transient to decay; finds
-        unstable periodic motions, too, from which a plain march would leave
+        unstable periodic motions, too, from which a plain march would leave. A slider that never slips in the periodic
+        motion then stands where the load path of the balance left it, else where the transient did
     """
 
     steps: int = 1024
-    spectral_radius: float = 0.8
     tolerance: float = 1e-8
     max_periods: int = 2000
     patience: int = 80
@@ -45,22 +48,6 @@ class Options:
     def __post_init__(self) -> None:
         if self.steps < 8:
             raise ValueError(f"steps per period must be at least 8, not {self.steps}")
-        if not 0 <= self.spectral_radius <= 1:
-            raise ValueError(f"spectral_radius must be between 0 and 1, not {self.spectral_radius}")
-
-
-@dataclass(frozen=True)
-class Slopes:
-    """Derivatives of the contact law along one period, for the linearised motion.
-
-    force_x, force_s : (n_step, n_pair, c, c), (n_step, n_pair, c, n_state) force with x and with the memory before
-    memory_x, memory_s : (n_step, n_pair, n_state, c), (n_step, n_pair, n_state, n_state) memory after the step
-    """
-
-    force_x: np.ndarray
-    force_s: np.ndarray
-    memory_x: np.ndarray
-    memory_s: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -76,7 +63,7 @@ class PeriodicMotion:
     drift : change of the state over the period, relative to the vibration (both as square roots of energy)
     periods : periods integrated in all; iterations : contact iterations per step, on average over the last period
     outcome : "converged" or a sentence
-    slopes : derivatives of the law along the period, or None if not asked for
+    slopes : derivatives of the law along the period, see `time_step.Record`, or None if not asked for
     """
 
     omega: float
@@ -91,7 +78,7 @@ class PeriodicMotion:
     periods: int
     iterations: float
     outcome: str
-    slopes: Slopes | None
+    slopes: np.ndarray | None
 
     @property
     def frequency(self) -> float:
@@ -111,9 +98,10 @@ class IntegrationFailed(RuntimeError):
 class TimeStepper:
     """One problem made ready for time stepping at one frequency.
 
-    lam, damping : modal stiffness (n,) and damping, (1, n) where it is diagonal, else (n, n), with unit modal mass
-    U, O : (n_contact, n), (n_output, n) contact and output maps; compliance : (n_contact, n_contact) of one step
-    load : (n_step, n) weighted modal load; base : (n_step, n_pair, c) motion of body 2
+    n_dynamic : modes of the structure without contact that move dynamically, the lowest ones with omega h < RESOLVED;
+        the others follow statically, so that all of them count and the more of them move the finer the steps are
+    lam, damping : of the modes that move, (n_dynamic,) and (n_dynamic, n_dynamic), with unit modal mass
+    linear, contact : see `time_step`; static : (n_contact, n_contact) compliance W of the modes that follow
     Raises  ValueError for models whose harmonics see different systems, or whose mass matrix is singular
     """
 
@@ -126,147 +114,170 @@ class TimeStepper:
             )
         self.balance, self.omega, self.options = balance, omega, options
         system = model.system
-        try:
-            self.lam, phi = sla.eigh(np.asarray(system.stiffness), np.asarray(system.mass))
-        except np.linalg.LinAlgError:
-            raise ValueError(
-                "time integration needs a positive definite mass matrix: give every coordinate some mass"
-            ) from None
-        self.n_pair, self.c = balance.contact.stiffness.shape
-        self.U = np.ascontiguousarray(np.asarray(model.interface.B) @ phi)
-        names = balance.compliance.output_names
-        self.O = np.array([system.outputs[name] @ phi for name in names]).reshape(len(names), len(phi))
-        full = np.zeros_like(phi) if system.damping is None else phi.T @ np.asarray(system.damping) @ phi
-        own = np.abs(np.diag(full))
-        self.diagonal = bool(
-            np.all(np.abs(full - np.diag(np.diag(full))) <= 1e-9 * np.sqrt(np.outer(own, own)) + 1e-13 * own.max())
-        )
-        self.damping = np.diag(full)[None].copy() if self.diagonal else np.ascontiguousarray(full)
-        self._full_damping = full
-        rho = options.spectral_radius
-        am, af = (2 * rho - 1) / (rho + 1), rho / (rho + 1)
-        gamma, beta = 0.5 - am + af, 0.25 * (1 - am + af) ** 2
+        lam, phi = _free_modes(system)
         self.h = 2 * np.pi / omega / options.steps
-        self.scheme = (self.h, am, af, beta, gamma)
-        effective = (1 - am) * np.eye(len(phi)) + (1 - af) * self.h * (gamma * full + beta * self.h * np.diag(self.lam))
-        self.inverse = 1 / np.diag(effective)[None] if self.diagonal else np.ascontiguousarray(np.linalg.inv(effective))
-        through = self.inverse[0][:, None] * self.U.T if self.diagonal else self.inverse @ self.U.T
-        self.compliance = np.ascontiguousarray((1 - af) * beta * self.h**2 * (self.U @ through))
-        joint = balance.contact.only("time integration")
-        self.law = time_step.pointer(joint.module.step)
-        self.packed = joint.parameters.packed()
-        self._load_coefficients = balance.loaded(self._modal_load(phi))
-        samples = self._samples(self._load_coefficients)  # (n, n_step), at t_1 .. t_n_step
-        self.load = np.ascontiguousarray(((1 - af) * samples + af * np.roll(samples, 1, axis=1)).T)
+        m = self.n_dynamic = max(1, int(np.sum(lam < (RESOLVED / self.h) ** 2)))
+        self.lam, moving, rest = lam[:m], phi[:, :m], phi[:, m:] / np.sqrt(lam[m:])
+        self.n_pair, self.c = balance.contact.stiffness.shape
+        B = np.asarray(model.interface.B)
+        U, follows = np.ascontiguousarray(B @ moving), B @ rest
+        self.static = follows @ follows.T
+        full = np.zeros((m, m)) if system.damping is None else moving.T @ np.asarray(system.damping) @ moving
+        self.damping = full
+        own = np.abs(np.diag(full))
+        off = np.abs(full - np.diag(np.diag(full)))
+        diagonal = bool(np.all(off <= 1e-9 * np.sqrt(np.outer(own, own)) + 1e-13 * own.max()))
+        names = balance.compliance.output_names
+        rows = np.array([system.outputs[name] for name in names]).reshape(len(names), len(phi))
+        basis = balance.basis
+        force = balance.loaded(self._load(len(phi)))  # (n, n_coeff)
+        self._modal_load = moving.T @ force
+        samples = basis.functions(2 * np.pi * np.arange(1, options.steps + 1) / options.steps)
         base = balance.excitation.base
-        self._base = np.zeros((len(self.U), balance.basis.n_coeff)) if base is None else balance.loaded(base)
-        self.base = np.ascontiguousarray(self._samples(self._base).T).reshape(options.steps, self.n_pair, self.c)
+        self._base = np.zeros((len(B), basis.n_coeff)) if base is None else balance.loaded(base)
+        E, Q, kick = _exact_step(self.lam, full, diagonal, self.h, self._modal_load, basis, omega)
+        outputs = np.concatenate([rows @ moving, np.zeros((len(rows), m)), -(rows @ rest) @ follows.T], axis=1)
+        self.rest = follows @ (rest.T @ force) - self._base  # (n_contact, n_coeff)
+        output_rest = (rows @ rest) @ (rest.T @ force)
+        self.linear = time_step.Linear(
+            E, Q, U, np.ascontiguousarray(outputs), np.ascontiguousarray(np.roll(samples, 1, axis=0) @ kick.T),
+            np.ascontiguousarray(samples @ self.rest.T), np.ascontiguousarray(samples @ output_rest.T),
+        )  # fmt: skip
+        compliance = 0.5 * U @ (Q[:m] @ U.T) + self.static
+        joint = balance.contact.only("time integration")
+        components = joint.parameters.components
+        normal = components.index("n") if "n" in components else -1
+        compliance = np.ascontiguousarray(0.5 * (compliance + compliance.T))
+        self.contact = time_step.Contact(joint.parameters.packed(), joint.parameters.gap, normal, compliance)
+        self.law = time_step.pointer(joint.module.step)
 
-    def _modal_load(self, phi: np.ndarray) -> np.ndarray:
-        amplitudes = np.zeros((len(phi), len(self.balance.basis.harmonics)), complex)
+    def _load(self, n: int) -> np.ndarray:
+        """(n, n_coeff) coefficients of the loads."""
+        basis = self.balance.basis
+        amplitudes = np.zeros((n, len(basis.harmonics)), complex)
         for (h, name), value in self.balance.excitation.loads.items():
-            if h in self.balance.basis.harmonics:
-                load = phi.T @ self.balance.model.system.loads[name]
-                amplitudes[:, self.balance.basis.harmonics.index(h)] += value * load
-        return self.balance.basis.to_real(amplitudes)
+            if h in basis.harmonics:
+                amplitudes[:, basis.harmonics.index(h)] += value * self.balance.model.system.loads[name]
+        return basis.to_real(amplitudes)
 
-    def _samples(self, coefficients: np.ndarray) -> np.ndarray:
-        """(..., n_step) values at t_1 .. t_n_step."""
-        n = self.options.steps
-        return coefficients @ self.balance.basis.functions(2 * np.pi * np.arange(1, n + 1) / n).T
-
-    def start_from(self, state: State, at_rest: bool = False) -> Motion:
-        """The motion at t = 0 of a balance state, every coordinate in equilibrium with its contact forces.
+    def start_from(self, state: State, at_rest: bool = False) -> Moving:
+        """What moves at t = 0 in a balance state, every coordinate in equilibrium with its contact forces.
 
         at_rest : leave out all but harmonic 0
         """
-        basis = self.balance.basis
-        k = self.balance.compliance.k
-        pull = k[:, None] * (state.flat + self._base) - state.cycle.force.reshape(len(k), -1)
-        force = basis.to_complex(self._load_coefficients + self.U.T @ pull)
-        stuck = np.diag(self.lam) + self.U.T @ (k[:, None] * self.U)
-        eta, v = np.zeros(len(self.lam)), np.zeros(len(self.lam))
+        basis, m = self.balance.basis, self.n_dynamic
+        contact_force = state.cycle.force.reshape(len(self.static), -1)
+        force = basis.to_complex(self._modal_load - self.linear.U.T @ contact_force)
+        eta, v = np.zeros(m), np.zeros(m)
         for i, h in enumerate(basis.harmonics):
-            if at_rest and h > 0:
-                break
-            s = 1j * h * self.omega
-            amplitude = np.linalg.solve(stuck + s * self._full_damping + s * s * np.eye(len(stuck)), force[:, i])
-            eta += amplitude.real
-            v += (s * amplitude).real
-        x = np.moveaxis(self._samples(state.flat).reshape(self.n_pair, self.c, -1), 2, 0)
-        memory, _ = time_step.memory_after(self.law, np.ascontiguousarray(x), self.packed, self.balance.memory)
-        return self.motion(eta, v, None, memory)
+            if h == 0:
+                eta += self._at_rest(state)
+            elif not at_rest:
+                s = 1j * h * self.omega
+                amplitude = np.linalg.solve(np.diag(self.lam + s * s) + s * self.damping, force[:, i])
+                eta += amplitude.real
+                v += (s * amplitude).real
+        angles = 2 * np.pi * np.arange(1, self.options.steps + 1) / self.options.steps
+        x = (state.x @ basis.functions(angles).T).transpose(2, 0, 1)
+        memory = self.memory_of(np.ascontiguousarray(x))
+        return self.moving(np.concatenate([eta, self.h * v]), memory, x[-1], state.cycle.force[..., 0])
 
-    def motion(self, eta: np.ndarray, v: np.ndarray, a: np.ndarray | None, memory: np.ndarray) -> Motion:
-        """A motion at t = 0 with its contact forces; the acceleration from equilibrium where it is not given."""
-        x = (self.U @ eta).reshape(self.n_pair, self.c) - self.base[-1]
-        n_state = memory.shape[1]
-        f, slope = np.zeros_like(x), np.zeros((self.n_pair, self.c, self.c))
-        unused = [
-            np.zeros((self.n_pair, *shape)) for shape in ((self.c, n_state), (n_state, self.c), (n_state, n_state))
-        ]
-        time_step.evaluate(self.law, x, memory.copy(), self.packed, f, slope, *unused)
-        if a is None:
-            load = self._load_coefficients @ self.balance.basis.functions(np.zeros(()))
-            drag = self.damping[0] * v if self.diagonal else self.damping @ v
-            a = load - drag - self.lam * eta - self.U.T @ f.ravel()
-        return Motion(eta.copy(), v.copy(), a.copy(), x, f, memory.copy(), slope)
-
-    def period(self, start: Motion, with_slopes: bool = False) -> tuple[Motion, Record]:
-        """March one period from t = 0; raises IntegrationFailed."""
-        n, n_pair, c, n_state = self.options.steps, self.n_pair, self.c, start.memory.shape[1]
-        end = start.copy()
-        xs, fs, ys = np.empty((n, n_pair, c)), np.empty((n, n_pair, c)), np.empty((n, len(self.O)))
-        bits = np.zeros(n_pair, np.int64)
-        m = n if with_slopes else 0
-        slopes = tuple(
-            np.zeros((m, n_pair, *shape)) for shape in ((c, c), (c, n_state), (n_state, c), (n_state, n_state))
+    def _at_rest(self, state: State) -> np.ndarray:
+        """Modal coordinates of harmonic 0, by the stuck system: without contact a part may be loose."""
+        k, U = self.balance.compliance.k, self.linear.U
+        pull = k * (state.flat[:, 0] - self.rest[:, 0]) - state.cycle.force.reshape(len(k), -1)[:, 0]
+        pull += k * (self.static @ state.cycle.force.reshape(len(k), -1)[:, 0])
+        found: np.ndarray = np.linalg.solve(
+            np.diag(self.lam) + U.T @ (k[:, None] * U), self._modal_load[:, 0] + U.T @ pull
         )
-        factor = time_step.refactor(self.compliance, end.slope)
-        failed, speed, spent, _ = time_step.march(
-            self.law, self.packed, self.scheme, self.lam, self.damping, self.inverse, self.diagonal, self.U,
-            self.O, self.compliance, self.load, self.base, end.eta, end.v, end.a, end.x, end.f, end.memory, factor,
-            end.slope, xs, fs, ys, bits, slopes,
+        return found
+
+    def memory_of(self, x: np.ndarray) -> np.ndarray:
+        """Memory of the periodic cycle of x (n_step, n_pair, c) that begins where the balance's load path does."""
+        memory: np.ndarray = time_step.memory_after(self.law, x, self.contact, self.balance.memory)[0]
+        return memory
+
+    def moving(self, z: np.ndarray, memory: np.ndarray, x: np.ndarray, f: np.ndarray) -> Moving:
+        """What moves at t = 0 from z = (eta, h v) and memory, with guesses for x and f (n_pair, c)."""
+        x, f, s = np.array(x), np.array(f), np.array(memory)
+        x_free = self.linear.U @ z[: self.n_dynamic] + self.rest @ self.balance.basis.functions(np.zeros(()))
+        contact = self.contact._replace(A=self.static)
+        closed = np.zeros(self.n_pair, bool)
+        _, rounds, _ = time_step.solve_contact(
+            self.law, contact, x_free, x.copy(), closed, s, x, f, float(np.abs(x).max())
+        )
+        if rounds < 0:
+            raise IntegrationFailed("the contact has no equilibrium to start from")
+        s, bits = time_step.memory_after(self.law, x[None], self.contact, s)
+        return Moving(z.copy(), x, f, s, bits)
+
+    def period(self, start: Moving, with_slopes: bool = False) -> tuple[Moving, Record, int, float]:
+        """March one period from t = 0.
+
+        Returns what moves after it, its record, the rounds of the contact solver and the largest modal speed
+        Raises  IntegrationFailed
+        """
+        n, n_pair, c, n_state = self.options.steps, self.n_pair, self.c, start.memory.shape[1]
+        end = Moving(*(np.array(part) for part in start))
+        record = Record(
+            np.empty((n, n_pair, c)), np.empty((n, n_pair, c)), np.empty((n, len(self.linear.outputs))),
+            np.zeros(n_pair, np.int64), np.zeros((n if with_slopes else 0, n_pair, c + n_state, 2 * c + n_state)),
         )  # fmt: skip
+        failed, spent, speed = time_step.march(self.law, self.contact, self.linear, end, record)
         if failed >= 0:
             raise IntegrationFailed(
                 f"the contact iteration did not converge in step {failed} of {n}: take more steps per period"
             )
-        return end, Record(xs, fs, ys, bits, speed, spent / n, Slopes(*slopes) if with_slopes else None)
+        return end, record, spent, speed / self.h
 
 
-@dataclass(frozen=True)
-class Motion:
-    """Everything that the future depends on, at one instant: modal eta, v, a (n,); x, f (n_pair, c); memory; df/dx."""
-
-    eta: np.ndarray
-    v: np.ndarray
-    a: np.ndarray
-    x: np.ndarray
-    f: np.ndarray
-    memory: np.ndarray
-    slope: np.ndarray
-
-    def copy(self) -> Motion:
-        """The same motion in arrays of its own."""
-        return Motion(*(np.array(getattr(self, name)) for name in self.__dataclass_fields__))
+def _free_modes(system: SecondOrderSystem) -> tuple[np.ndarray, np.ndarray]:
+    try:
+        lam, phi = sla.eigh(np.asarray(system.stiffness), np.asarray(system.mass))
+    except np.linalg.LinAlgError:
+        raise ValueError(
+            "time integration needs a positive definite mass matrix: give every coordinate some mass"
+        ) from None
+    return lam, phi
 
 
-@dataclass(frozen=True)
-class Record:
-    """What one period leaves behind; see `time_step.march`."""
+def _exact_step(
+    lam: np.ndarray,
+    damping: np.ndarray,
+    diagonal: bool,
+    h: float,
+    load: np.ndarray,
+    basis: HarmonicBasis,
+    omega: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """E, Q and the kick per coefficient of the loads (2 m, n_coeff) at the start of the step; see `time_step`.
 
-    xs: np.ndarray
-    fs: np.ndarray
-    ys: np.ndarray
-    bits: np.ndarray
-    speed: float
-    iterations: float
-    slopes: Slopes | None
+    load : (m, n_coeff) modal load. All are exponentials of the step's motion together with what drives it
+    """
+    m = len(lam)
+    groups = [[i] for i in range(m)] if diagonal else [list(range(m))]
+    E, Q, kick = np.zeros((2 * m, 2 * m)), np.zeros((2 * m, m)), np.zeros((2 * m, basis.n_coeff))
+    turn = basis.rate * (omega * h)  # of the basis functions within a step
+    for g in groups:
+        n, rows = len(g), [*g, *(m + i for i in g)]
+        size = 2 * n + n + basis.n_coeff
+        rate = np.zeros((size, size))
+        rate[:n, n : 2 * n] = np.eye(n)
+        rate[n : 2 * n, :n] = -(h**2) * np.diag(lam[g])
+        rate[n : 2 * n, n : 2 * n] = -h * damping[np.ix_(g, g)]
+        rate[n : 2 * n, 2 * n : 3 * n] = np.eye(n)
+        scale = float(np.abs(load[g]).max()) or 1.0
+        rate[n : 2 * n, 3 * n :] = load[g] / scale
+        rate[3 * n :, 3 * n :] = turn
+        whole = sla.expm(rate)
+        E[np.ix_(rows, rows)] = whole[: 2 * n, : 2 * n]
+        Q[np.ix_(rows, g)] = h**2 * whole[: 2 * n, 2 * n : 3 * n]
+        kick[rows] = h**2 * scale * whole[: 2 * n, 3 * n :]
+    return E, Q, kick
 
 
 class _StateVector:
-    """(eta, v, a, memory) as one vector whose square is an energy, and back."""
+    """(eta, v, memory) as one vector whose square is an energy, and back."""
 
     def __init__(self, stepper: TimeStepper):
         rate = np.sqrt(np.maximum(stepper.lam, 0.0) + stepper.omega**2)
@@ -274,15 +285,14 @@ class _StateVector:
         self._shape = stepper.balance.memory.shape
         spring = np.sqrt(stepper.balance.contact.stiffness[:, : self._shape[1]]).ravel()
         spring[spring == 0] = 1.0
-        self._weight = np.concatenate([rate, np.ones_like(rate), 1 / rate, spring])
+        self._weight = np.concatenate([rate, np.full(len(rate), 1 / stepper.h), spring])
 
-    def pack(self, m: Motion) -> np.ndarray:
-        return self._weight * np.concatenate([m.eta, m.v, m.a, m.memory.ravel()])
+    def pack(self, m: Moving) -> np.ndarray:
+        return self._weight * np.concatenate([m.z, m.memory.ravel()])
 
-    def unpack(self, z: np.ndarray) -> Motion:
-        n = len(self._stepper.lam)
-        eta, v, a, memory = np.split(z / self._weight, [n, 2 * n, 3 * n])
-        return self._stepper.motion(eta, v, a, memory.reshape(self._shape))
+    def unpack(self, vector: np.ndarray, near: Moving) -> Moving:
+        z, memory = np.split(vector / self._weight, [len(near.z)])
+        return self._stepper.moving(z, memory.reshape(self._shape), near.x, near.f)
 
 
 def integrate(
@@ -306,7 +316,7 @@ def integrate(
         return _to_periodic(stepper, motion, options, with_slopes)
 
 
-def _rest(stepper: TimeStepper) -> Motion:
+def _rest(stepper: TimeStepper) -> Moving:
     still = stepper.balance.with_load(0.0)
     solution = newton.solve(still, stepper.omega, still.stuck(stepper.omega))
     if not solution.converged:
@@ -314,47 +324,51 @@ def _rest(stepper: TimeStepper) -> Motion:
     return stepper.start_from(solution.state, at_rest=True)
 
 
-def _to_periodic(stepper: TimeStepper, motion: Motion, options: Options, with_slopes: bool) -> PeriodicMotion:
+def _to_periodic(stepper: TimeStepper, motion: Moving, options: Options, with_slopes: bool) -> PeriodicMotion:
     vector = _StateVector(stepper)
     mixing = Anderson(depth=40)
     best, best_at = np.inf, 0
     for periods in range(1, options.max_periods + 1):
-        end, record = stepper.period(motion, with_slopes)
+        end, record, spent, speed = stepper.period(motion, with_slopes)
+        if options.accelerate:
+            end = end._replace(memory=stepper.memory_of(record.x))
         z, image = vector.pack(motion), vector.pack(end)
         change = float(np.linalg.norm(image - z))
-        drift = change / record.speed if record.speed > 0 else change
+        drift = change / speed if speed > 0 else change
         if drift <= options.tolerance:
-            return _result(stepper, record, drift, periods, CONVERGED)
+            return _result(stepper, record, drift, periods, spent, CONVERGED)
         if drift > 4 * best:
             mixing.forget()
         if drift < 0.9 * best:
             best, best_at = drift, periods
         if periods - best_at >= options.patience:
             break
-        motion = vector.unpack(mixing.propose(z, image)) if options.accelerate else end
+        motion = vector.unpack(mixing.propose(z, image), end) if options.accelerate else end
     hint = "; is the motion stable there (hbm.stability)?" if periods < options.max_periods else ""
     outcome = f"not periodic after {periods} periods: drift {drift:.1e}, smallest {best:.1e}{hint}"
-    return _result(stepper, record, drift, periods, outcome)
+    return _result(stepper, record, drift, periods, spent, outcome)
 
 
-def _result(stepper: TimeStepper, record: Record, drift: float, periods: int, outcome: str) -> PeriodicMotion:
+def _result(
+    stepper: TimeStepper, record: Record, drift: float, periods: int, spent: int, outcome: str
+) -> PeriodicMotion:
     components = stepper.balance.contact.components
-    before = np.roll(record.xs, 1, axis=0), np.roll(record.fs, 1, axis=0)
-    work = 0.5 * ((record.fs + before[1]) * (record.xs - before[0])).sum(axis=0)
+    before = np.roll(record.x, 1, axis=0), np.roll(record.f, 1, axis=0)
+    work = 0.5 * ((record.f + before[1]) * (record.x - before[0])).sum(axis=0)
     work = work[:, stepper.balance.contact.tangential].sum(axis=1)
-    preload = float(record.fs[:, :, components.index("n")].mean(axis=0).sum()) if "n" in components else 0.0
+    preload = float(record.f[:, :, components.index("n")].mean(axis=0).sum()) if "n" in components else 0.0
     return PeriodicMotion(
         omega=stepper.omega,
         time=stepper.h * np.arange(1, stepper.options.steps + 1),
-        x=np.moveaxis(record.xs, 0, 2),
-        force=np.moveaxis(record.fs, 0, 2),
-        outputs=record.ys.T,
+        x=np.moveaxis(record.x, 0, 2),
+        force=np.moveaxis(record.f, 0, 2),
+        outputs=record.y.T,
         energy=work,
         preload=preload,
         status=record.bits,
         drift=drift,
         periods=periods,
-        iterations=record.iterations,
+        iterations=spent / stepper.options.steps,
         outcome=outcome,
-        slopes=record.slopes,
+        slopes=record.slopes if len(record.slopes) else None,
     )

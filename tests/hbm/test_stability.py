@@ -65,18 +65,19 @@ def test_monodromy_with_friction_is_the_finite_difference_of_the_period_map():
     exact = np.linalg.eigvals(monodromy(stepper, motion))
     start = stepper.start_from(state)
     for _ in range(300):
-        start, record = stepper.period(start)
+        start, record, _, _ = stepper.period(start)
     assert np.all(record.bits == 7)
-    n = len(start.eta)
-    unit = np.repeat([1 / OMEGA, 1.0, OMEGA, 1 / OMEGA], [n, n, n, start.memory.size])
+    n = stepper.n_dynamic
+    unit = np.repeat([1 / OMEGA, stepper.h, 1 / OMEGA], [n, n, start.memory.size])
 
     def end_of(change: np.ndarray) -> np.ndarray:
-        eta, v, a, memory = np.split(unit * change, [n, 2 * n, 3 * n])
-        moved = (start.eta + eta, start.v + v, start.a + a, start.memory + memory.reshape(start.memory.shape))
-        end, _ = stepper.period(stepper.motion(*moved))
-        return np.concatenate([end.eta, end.v, end.a, end.memory.ravel()]) / unit
+        z, memory = np.split(unit * change, [2 * n])
+        shape = start.memory.shape
+        moved = stepper.moving(start.z + z, start.memory + memory.reshape(shape), start.x, start.f)
+        end, *_ = stepper.period(moved)
+        return np.concatenate([end.z, end.memory.ravel()]) / unit
 
-    step = 1e-6 * np.abs(start.v).max() * np.eye(len(unit))
+    step = 1e-6 * np.abs(start.z[n:]).max() / stepper.h * np.eye(len(unit))
     columns = [(end_of(e) - end_of(-e)) / (2 * e.max()) for e in step]
     approximate = np.linalg.eigvals(np.array(columns).T)
     for value in exact[np.abs(exact) > 0.05]:
@@ -143,7 +144,7 @@ def test_a_branch_in_another_parameter_is_marked_with_it():
 
 def test_names_and_refusals():
     model = oscillator(1.0, 1e4, 0.01)
-    parameters = ContactParameters.of(("t1", "n"), [[1e4, 1e4]], friction=0.0)
+    parameters = ContactParameters.of(("t1", "n"), [[1e4, 1e4]])
     excitation = Excitation.of({"normal": 1.0}, {1: {"force": 1.0}})
     balance = HarmonicBalance.of(
         model, Joint("contact", "jenkins", parameters), HarmonicBasis((0, 1), 32), excitation, 200.0
