@@ -98,7 +98,7 @@ def _kept(path: Path, scene: str, overrides: Sequence[str]) -> str:
     if not path.exists():
         return "stopped before anything was computed"
     words = [scene, "--out", str(path.parent), *(word for text in overrides for word in ("--set", text))]
-    return f"stopped, {store.load(path).state}, kept in {path}: go on with tribodyn run {shlex.join(words)} --resume"
+    return f"stopped, {store.load(path).state}, kept in {path}: resume with tribodyn run {shlex.join(words)} --resume"
 
 
 @app.command(name="list")

@@ -18,7 +18,7 @@ from tribodyn.workflows.result.result import Patch, Result
 def patch_maps(result: Result, rows: np.ndarray | None = None) -> Figure:
     """Depth after the step, status over the cycle and mean pressure of the step, one column for each chosen step.
 
-    rows : wear rows to show, those of the result unless told
+    rows : wear rows to show, those of the result by default
     """
     wear, patch = result.wear, result.patch
     assert wear is not None

@@ -1,4 +1,4 @@
-"""Checkpoints: what is kept of a run on its way, and which kept result a scene can go on from."""
+"""Checkpoints: what is kept of a run on its way, and which kept result a scene can resume."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def is_complete(result: Result, scene: Scene) -> bool:
 
 
 def same_problem(first: Scene, second: Scene) -> str:
-    """Empty where one scene's result can be gone on from by the other, else the first key that differs.
+    """Empty where one scene's result can be resumed by the other, else the first key that differs.
 
     What is drawn, how many wear steps are wanted, how their result is told and how many threads work may differ.
     """

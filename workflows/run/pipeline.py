@@ -30,7 +30,7 @@ def run(file: SceneFile, folder: Path | None, progress: Progress, earlier: Resul
     """Compute everything that a scene asks for, and keep it in `folder`/result.h5 while it grows.
 
     folder : None keeps nothing on disk
-    earlier : an unfinished result of the same scene to go on from
+    earlier : an unfinished result of the same scene to resume
     Raises  ValueError: the scene asks for what cannot be, SolveFailed: after what was computed is kept
     """
     scene, clock = file.scene, Clock(earlier)

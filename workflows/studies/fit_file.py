@@ -43,8 +43,8 @@ class Looked(Table):
     """A number that is looked for.
 
     keys : of the scene, section.key; several get the same value
-    low, high : bounds, with a unit or in SI; start : one or more to begin from, the scene's own value unless told
-    ratio : count in ratios, for a positive number known to its order only; unless told where both bounds are above 0
+    low, high : bounds, with a unit or in SI; start : one or more to begin from, the scene's own value by default
+    ratio : count in ratios, for a positive number known to its order only; by default where both bounds are above 0
     """
 
     keys: Annotated[tuple[str, ...], Field(min_length=1)]

@@ -151,7 +151,7 @@ def fit(
     """Least squares of logarithmic residuals, from every combination of starts; the best is kept.
 
     predict : parameters by name -> (n_measured,) predictions, above 0
-    before : the parameters as they were, for the report; the first starts unless told
+    before : the parameters as they were, for the report; the first starts by default
     Raises  ValueError where a prediction at a start is not a positive number, or a measured number is not
     Source  bounded trust region: Branch, Coleman, Li 1999, as in scipy.optimize.least_squares
     """

@@ -1,0 +1,89 @@
+"""What is installed: one top-level package, complete, that works beside modules of the same plain names."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import tribodyn
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = ("geometry", "fem", "reduction", "hbm", "workflows")
+OTHERS = 'raise ImportError("this is the module of another package")\n'  # as llama-index-workflows brings one
+SMALL = ["geometry.n_patch=3", "geometry.n_length=2", "geometry.n_height=1", "reduction.modes=3", "wear.max_steps=1"]
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A wheel made from a copy of the tree, as a clean clone has it."""
+    made = tmp_path_factory.mktemp("wheel")
+    tree = made / "tree"
+    tree.mkdir()
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, tree)
+    for name in (*FOLDERS, "src"):
+        hidden = shutil.ignore_patterns("__pycache__", "*.egg-info")
+        shutil.copytree(ROOT / name, tree / name, symlinks=True, ignore=hidden)
+    words = ["-m", "pip", "wheel", str(tree), "--no-deps", "--no-build-isolation", "-q", "-w", str(made)]
+    subprocess.run([sys.executable, *words], check=True, capture_output=True)
+    (found,) = made.glob("*.whl")
+    return found
+
+
+def test_a_wheel_holds_one_package_with_every_file(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        held = {name for name in archive.namelist() if not name.endswith("/")}
+    top = {name.partition("/")[0] for name in held}
+    assert {name for name in top if not name.endswith(".dist-info")} == {"tribodyn"}
+    needed = {
+        f"tribodyn/{path.relative_to(ROOT)}"
+        for folder in FOLDERS
+        for path in (ROOT / folder).rglob("*")
+        if path.suffix in (".py", ".toml", ".json") and "__pycache__" not in path.parts
+    }
+    assert sorted(needed - held) == []
+    assert "tribodyn/py.typed" in held
+
+
+def test_the_wheel_works_from_another_folder_beside_modules_of_the_same_names(wheel: Path, tmp_path: Path) -> None:
+    site = tmp_path / "site"
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(site)
+    for name in FOLDERS:
+        (site / f"{name}.py").write_text(OTHERS)
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    code = "import tribodyn as td; print(td.__file__, td.__version__, *td.scene_names()); td.build; td.Balance; td.load"
+    environment = {**os.environ, "PYTHONPATH": str(site)}
+
+    def said(*words: str) -> str:
+        done = subprocess.run([sys.executable, *words], cwd=elsewhere, env=environment, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    where, version, *names = said("-c", code).split()
+    assert Path(where).is_relative_to(site)
+    assert f"-{version}-" in wheel.name
+    assert set(tribodyn.scene_names()) == set(names)
+    assert said("-m", "tribodyn", "--version").strip() == version
+
+
+@pytest.mark.slow
+def test_a_fresh_environment_runs_a_scene_beside_llama_index_workflows(wheel: Path, tmp_path: Path) -> None:
+    subprocess.run([sys.executable, "-m", "venv", str(tmp_path / "fresh")], check=True)
+    python = tmp_path / "fresh" / "bin" / "python"
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    words = ["-m", "pip", "install", "-q", str(wheel), "llama-index-workflows"]
+    subprocess.run([python, *words], check=True, env=environment, cwd=tmp_path)
+    sets = [word for text in SMALL for word in ("--set", text)]
+    run = ["-m", "tribodyn", "run", "beam", "--no-pictures", *sets, "--out", "out"]
+    subprocess.run([python, *run], check=True, env=environment, cwd=tmp_path)
+    (site,) = (tmp_path / "fresh" / "lib").glob("python*/site-packages")
+    ours = {path.name for path in site.iterdir() if path.name.startswith(("tribodyn", *FOLDERS[:-1], "tests"))}
+    assert {name.partition("-")[0] for name in ours} == {"tribodyn"}
