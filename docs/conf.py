@@ -34,7 +34,7 @@ lexers["geo"] = TextLexer()  # scripts of Gmsh
 # Pages with {code-cell} are executed in every build; a cell that fails ends the build.
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
-nb_execution_timeout = 120
+nb_execution_timeout = 600
 nb_execution_in_temp = True
 nb_merge_streams = True
 nb_execution_show_tb = True
