@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import process_time
@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 from tribodyn.hbm import error_controlled_rule, thesis_rule
 from tribodyn.hbm.evolution import WearProblem
 from tribodyn.hbm.wear_history import LIFE_SHARE, WearHistory, cycles_to_preload
-from tribodyn.workflows.cases.beam.published import WEAR_STEPS
+from tribodyn.workflows.accuracy.published import WearStep, published_wear_steps
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE, STYLE
 from tribodyn.workflows.run import modelling, wear_run
 from tribodyn.workflows.run.progress import Progress
@@ -58,6 +58,7 @@ class Table:
     """Rows with their reference, which two finer runs of the error-controlled rule extrapolate.
 
     depth_uncertainty, life_uncertainty : relative difference of the reference to the finest run
+    published : beside the scene, by the step
     """
 
     scene: str
@@ -65,6 +66,7 @@ class Table:
     reference: Row
     depth_uncertainty: float
     life_uncertainty: float
+    published: dict[float, WearStep] = field(default_factory=dict)
 
 
 def wear_step(scene: str, say: Callable[[str], None], overrides: tuple[str, ...] = ()) -> Table:
@@ -95,6 +97,7 @@ def wear_step(scene: str, say: Callable[[str], None], overrides: tuple[str, ...]
         reference,
         abs(fine[1].depth_m / depth - 1),
         abs(fine[1].life_cycles / life - 1),
+        published_wear_steps(file),
     )
 
 
@@ -191,7 +194,7 @@ def as_text(table: Table) -> str:
         "error   roughness"
     ]
     for row in table.rows:
-        published = WEAR_STEPS.get(table.scene, {}) if row.rule == "thesis" else {}
+        published = table.published if row.rule == "thesis" else {}
         steps, seconds, depth, _ = published.get(row.step, (None,) * 4)
         lines.append(
             f"{row.rule:17} {100 * row.step:5.3g} % {row.wear_steps:6d} {_bracket(steps, 'd'):8} {row.hbm_solves:6d} "

@@ -51,7 +51,7 @@ class JointSprings:
         """Frequencies (n,) [Hz] and mass-normalised shapes (n_dof, n) of the lowest modes, as for `stiffness`."""
         K = self.stiffness(springs, contact)
         squares, shapes = eigh(K, self.model.system.mass, subset_by_index=[0, n - 1])
-        return np.sqrt(np.abs(squares)) / (2 * np.pi), shapes
+        return np.sqrt(np.clip(squares, 0.0, None)) / (2 * np.pi), shapes
 
     def outputs(self, shapes: np.ndarray) -> dict[str, np.ndarray]:
         """Displacement (n,) of every output in the shapes (n_dof, n)."""

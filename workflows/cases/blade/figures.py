@@ -9,9 +9,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from tribodyn.workflows.pictures import maps, plots
-from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, RED, WEAR_MAP
-from tribodyn.workflows.result.result import Result
+from tribodyn import Result, patch_maps, plot_axes
+from tribodyn.style import BLUE, GREY, INK, ORANGE, RED, WEAR_MAP
 
 if TYPE_CHECKING:
     from tribodyn.workflows.cases.blade.study import Curve, Worn
@@ -30,7 +29,7 @@ def diagram_figure(families: Mapping[str, np.ndarray]) -> Figure:
 
     families : "free" and "stuck" (n_diameter, family) [Hz]
     """
-    with plots.axes_of(7.2, 4.8) as (figure, axes):
+    with plot_axes(7.2, 4.8) as (figure, axes):
         diameters = np.arange(len(families["stuck"]))
         for state, style, color in (("free", "o--", GREY), ("stuck", "o-", BLUE)):
             for i, values in enumerate(families[state].T):
@@ -50,7 +49,7 @@ def campbell_figure(
     speeds : (n_speed,) [Hz]; found : "free" and "stuck" (n_speed, n_order, family) [Hz]
     critical : engine order -> speeds [Hz] at which it meets its first stuck frequency
     """
-    with plots.axes_of(7.2, 4.8) as (figure, axes):
+    with plot_axes(7.2, 4.8) as (figure, axes):
         rpm = 60 * speeds
         axes.plot(rpm, found["free"][:, 0, 0], "--", color=GREY, label="free")
         top = 1.5 * float(found["stuck"][:, :, 0].max())
@@ -67,7 +66,7 @@ def campbell_figure(
 
 def orders_figure(curves: Mapping[int, Curve]) -> Figure:
     """Responses to several engine orders, with free and stuck references (figure 4.12)."""
-    with plots.axes_of(8.0, 4.8) as (figure, axes):
+    with plot_axes(8.0, 4.8) as (figure, axes):
         for (order, curve), color in zip(curves.items(), shades(len(curves)), strict=True):
             hertz = curve.references.omega / (2 * np.pi)
             axes.plot(hertz, MILLI * curve.references.stuck, ":", color=color, lw=1)
@@ -85,7 +84,7 @@ def forces_figure(curves: Mapping[float, Curve]) -> Figure:
 
     curves : by amplitude of the force [N]
     """
-    with plots.axes_of(7.6, 4.8) as (figure, axes):
+    with plot_axes(7.6, 4.8) as (figure, axes):
         kilo = 1e-3
         one, first = next(iter(curves.items()))
         hertz = first.references.omega / (2 * np.pi)
@@ -103,13 +102,13 @@ def forces_figure(curves: Mapping[float, Curve]) -> Figure:
 
 def maps_figure(result: Result, rows: np.ndarray) -> Figure:
     """Depth, status and pressure of the right shroud at some wear steps (figure 4.14)."""
-    return maps.patch_maps(result, rows)
+    return patch_maps(result, rows)
 
 
 def backbone_figure(curves: Sequence[tuple[int, Curve]], worn: Worn) -> Figure:
     """Responses of the worn shrouds, and the way of their peak (figure 4.15)."""
     history = worn.history
-    with plots.axes_of(7.6, 4.8) as (figure, axes):
+    with plot_axes(7.6, 4.8) as (figure, axes):
         references = curves[0][1].references
         hertz = references.omega / (2 * np.pi)
         axes.plot(hertz, MILLI * references.free, "--", color=GREY, lw=1.2, label="free")
@@ -128,7 +127,7 @@ def backbone_figure(curves: Sequence[tuple[int, Curve]], worn: Worn) -> Figure:
 def cycles_figure(worn: Worn, published: int | None) -> Figure:
     """Cycles that each wear step stands for; published : number of wear steps (figure 4.16)."""
     count = worn.history.cycles_in_step[worn.history.cycles_in_step > 0]
-    with plots.axes_of() as (figure, axes):
+    with plot_axes() as (figure, axes):
         axes.step(np.arange(1, len(count) + 1), count, where="mid", color=BLUE, label=f"ours, {len(count)} steps")
         if published is not None:
             label = f"contact lost in the thesis, {published} steps"
@@ -141,7 +140,7 @@ def cycles_figure(worn: Worn, published: int | None) -> Figure:
 
 def peaks_figure(runs: Sequence[Worn]) -> Figure:
     """Largest response over cycles for every wear step (figure 4.17)."""
-    with plots.axes_of(7.6, 4.6) as (figure, axes):
+    with plot_axes(7.6, 4.6) as (figure, axes):
         for worn, color in zip(runs, shades(len(runs)), strict=True):
             history = worn.history
             label = f"{100 * worn.step:g} % of delta_max"

@@ -9,32 +9,38 @@ from __future__ import annotations
 import csv
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tribodyn.hbm import thesis_rule
-from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.branch import Branch
-from tribodyn.hbm.evolution import WearProblem
-from tribodyn.hbm.wear_history import WearHistory, cycles_to_preload
-from tribodyn.workflows.cases.beam.published import WEAR_STEPS
+from tribodyn import (
+    OUTPUT,
+    Branch,
+    HarmonicBalance,
+    References,
+    SceneError,
+    WearHistory,
+    Wheel,
+    build_wheel,
+    campbell,
+    critical_speeds,
+    cycles_to_preload,
+    delta_max,
+    follow_adaptive,
+    linear_references,
+    published_wear_steps,
+    read_scene,
+    result_of,
+    worn,
+)
+from tribodyn import wear as wear_down
 from tribodyn.workflows.cases.blade import figures as blade_figures
-from tribodyn.workflows.cases.blade import model as blade_model
-from tribodyn.workflows.cases.blade.model import Blade
-from tribodyn.workflows.result.result import References
-from tribodyn.workflows.run import settings, wear_run
-from tribodyn.workflows.run.description import described
-from tribodyn.workflows.run.references import delta_max, free_deflection, linear_references
-from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.scene.scene_file import SceneError
 
-OUTPUT = settings.OUTPUT
 FULL_DIAMETERS = (0, 1, 2, 5, 10, 20)  # that are held against the full sector
 FAMILIES = 4
-PUBLISHED = WEAR_STEPS["blade"]  # table 4.4
+PUBLISHED = published_wear_steps(read_scene("blade"))  # table 4.4
 
 
 @dataclass(frozen=True)
@@ -101,15 +107,15 @@ class TradeRow:
     end: str
 
 
-def diagram(blade: Blade) -> dict[str, np.ndarray]:
+def diagram(blade: Wheel) -> dict[str, np.ndarray]:
     """Frequencies (n_diameter, family) [Hz] of all nodal diameters, shrouds "free" and "stuck" (figure 4.11)."""
-    diameters = range(blade.reduced.sector.n_sectors // 2 + 1)
+    diameters = range(blade.n_sectors // 2 + 1)
     return {state: blade.diagram(diameters, FAMILIES, state == "stuck") for state in ("free", "stuck")}
 
 
-def reduction_error(blade: Blade) -> dict[str, np.ndarray]:
+def reduction_error(blade: Wheel) -> dict[str, np.ndarray]:
     """Relative error (n_diameter, family) of the reduced sector at FULL_DIAMETERS, against the full one."""
-    diameters = [d for d in FULL_DIAMETERS if d <= blade.reduced.sector.n_sectors // 2]
+    diameters = [d for d in FULL_DIAMETERS if d <= blade.n_sectors // 2]
     return {
         state: blade.diagram(diameters, FAMILIES, state == "stuck")
         / blade.diagram(diameters, FAMILIES, state == "stuck", full=True)
@@ -118,39 +124,18 @@ def reduction_error(blade: Blade) -> dict[str, np.ndarray]:
     }
 
 
-def campbell(
-    blade: Blade, highest: float, count: int, orders: Sequence[int]
-) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Speeds (n_speed,), and frequencies (n_speed, n_order, 2) of each engine order's wave, free and stuck [Hz]."""
-    speeds = np.linspace(0.0, highest, count)
-    found: dict[str, list[np.ndarray]] = {"free": [], "stuck": []}
-    for speed in speeds:
-        spinning = blade.at_speed(float(speed))
-        for state, rows in found.items():
-            rows.append(spinning.diagram(orders, 2, state == "stuck"))
-    return speeds, {state: np.array(rows) for state, rows in found.items()}
-
-
-def critical_speeds(speeds: np.ndarray, frequency: np.ndarray, order: int) -> list[float]:
-    """Speeds [Hz] at which an engine order meets a frequency (n_speed,) of its wave [Hz]."""
-    miss = frequency - order * speeds
-    cross = np.flatnonzero((miss[:-1] > 0) != (miss[1:] > 0))
-    return [float(speeds[i] + (speeds[i + 1] - speeds[i]) * miss[i] / (miss[i] - miss[i + 1])) for i in cross]
-
-
 def respond(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: float) -> Curve:
     """The response over a range [Hz]."""
-    low, high = (2 * np.pi * hertz for hertz in frequency)
-    return Curve(blade_model.follow(balance, frequency, tolerance), linear_references(balance, OUTPUT, low, high))
+    return Curve(follow_adaptive(balance, frequency, tolerance), linear_references(balance, *frequency))
 
 
-def span(blade: Blade, order: int) -> tuple[float, float]:
+def span(blade: Wheel, order: int) -> tuple[float, float]:
     """A range [Hz] from below the free to above the stuck first frequency of an engine order's wave."""
     free, stuck = (float(blade.diagram([order], 1, state)[0, 0]) for state in (False, True))
     return 0.9 * free, 1.1 * stuck
 
 
-def orders(blade: Blade, extent: Extent) -> dict[int, Curve]:
+def orders(blade: Wheel, extent: Extent) -> dict[int, Curve]:
     """Responses to several engine orders (figure 4.12)."""
     return {
         order: respond(blade.wave(order, span(blade, order)), span(blade, order), extent.tolerance)
@@ -158,24 +143,18 @@ def orders(blade: Blade, extent: Extent) -> dict[int, Curve]:
     }
 
 
-def forces(blade: Blade, extent: Extent) -> dict[float, Curve]:
+def forces(blade: Wheel, extent: Extent) -> dict[float, Curve]:
     """Responses to rising excitation at fixed preload (figure 4.13)."""
     frequency = blade.scene.response.frequency
     balance = blade.wave(frequency=frequency)
     return {load: respond(balance.with_load(load), frequency, extent.tolerance) for load in extent.loads}
 
 
-def problem_of(blade: Blade) -> tuple[WearProblem, float]:
-    """The wear of the scene until every pair is separated, and its delta_max [m]."""
-    balance = blade.wave()
-    problem = wear_run.wear_problem(blade.scene, blade.file.folder, balance)
-    return problem, delta_max(blade.scene, free_deflection(balance), problem.area)
-
-
-def wear(problem: WearProblem, delta: float, step: float) -> Worn:
-    """One run of the thesis's rule, its step a share of delta_max."""
+def wear(blade: Wheel, balance: HarmonicBalance, step: float) -> Worn:
+    """One run by the thesis's rule until every pair is separated, its step a share of delta_max."""
     clock, processor = time.perf_counter(), time.process_time()
-    history = thesis_rule.evolve(problem, step * delta)
+    rule = ("wear.rule=thesis", f"wear.step={step!r}", "wear.lost_below=0", "wear.max_steps=10000")
+    history = wear_down(read_scene(blade.file, rule), balance)
     return Worn(step, history, time.perf_counter() - clock, time.process_time() - processor)
 
 
@@ -225,11 +204,11 @@ def _bracket(value: float | None, form: str, unit: str = "") -> str:
     return "" if value is None else f" ({value:{form}}{unit})"
 
 
-def worn_curves(problem: WearProblem, blade: Blade, run: Worn, extent: Extent) -> list[tuple[int, Curve]]:
+def worn_curves(balance: HarmonicBalance, blade: Wheel, run: Worn, extent: Extent) -> list[tuple[int, Curve]]:
     """Responses of worn states of a run, by wear step (figure 4.15)."""
     frequency = blade.scene.response.frequency
     return [
-        (int(row), respond(problem.at_depth(run.history.depth[row]), frequency, extent.tolerance))
+        (int(row), respond(worn(balance, run.history.depth[row]), frequency, extent.tolerance))
         for row in frames(run.history, extent.frames)
     ]
 
@@ -251,20 +230,20 @@ def run(
     extent: Extent,
 ) -> list[Path]:
     """Run the whole study into a folder; highest : speed of the Campbell diagram [Hz], None for no diagram."""
-    file = scene_file.read(scene, overrides)
+    file = read_scene(scene, overrides)
     if file.scene.wear is None:
         raise SceneError(f"{file.name} has no [wear]: nothing of its shrouds is lost")
     folder.mkdir(parents=True, exist_ok=True)
     drawn = {}
     with threadpool_limits(1):
-        blade = blade_model.build(file)
+        blade = build_wheel(file)
         families = diagram(blade)
         _write_table(folder / "diagram.csv", ("nodal_diameter", *_names(families)), _columns(families))
         drawn["diagram"] = blade_figures.diagram_figure(families)
         for state, errors in reduction_error(blade).items():
             say(f"reduced against full sector, {state}: frequencies at most {100 * np.abs(errors).max():.2g} % off")
         if highest is not None:
-            chosen = [o for o in extent.orders if o <= blade.reduced.sector.n_sectors // 2]
+            chosen = [o for o in extent.orders if o <= blade.n_sectors // 2]
             speeds, found = campbell(blade, highest, extent.speeds, chosen)
             met = {o: critical_speeds(speeds, found["stuck"][:, i, 0], o) for i, o in enumerate(chosen)}
             for order, at in met.items():
@@ -280,11 +259,11 @@ def run(
         _write_table(folder / "peaks.csv", ("what", "value", "peak_Hz", "peak_m"), rows)
         for what, value, hertz, height in rows:
             say(f"{what} {value:g}: peak {hertz:.1f} Hz, {1e3 * height:.3f} mm")
-        runs, problem = wear_runs(blade, extent, say)
+        runs, balance = wear_runs(blade, extent, say)
         shown = next((run for run in runs if run.step == extent.shown), runs[0])
-        result = replace(described(file, blade.part, problem.balance), wear=shown.history)
+        result = result_of(file, blade.part, balance, shown.history)
         drawn["maps"] = blade_figures.maps_figure(result, frames(shown.history, extent.frames))
-        drawn["backbone"] = blade_figures.backbone_figure(worn_curves(problem, blade, shown, extent), shown)
+        drawn["backbone"] = blade_figures.backbone_figure(worn_curves(balance, blade, shown, extent), shown)
         drawn["cycles"] = blade_figures.cycles_figure(shown, PUBLISHED.get(shown.step, (None,))[0])
         drawn["peaks"] = blade_figures.peaks_figure(runs)
     table = trade(runs)
@@ -297,19 +276,19 @@ def run(
     return [*paths, folder / "diagram.csv", folder / "peaks.csv", folder / "trade.csv", folder / "trade.md"]
 
 
-def wear_runs(blade: Blade, extent: Extent, say: Callable[[str], None]) -> tuple[list[Worn], WearProblem]:
+def wear_runs(blade: Wheel, extent: Extent, say: Callable[[str], None]) -> tuple[list[Worn], HarmonicBalance]:
     """Wear to loss of contact with every step of the extent."""
-    problem, delta = problem_of(blade)
-    say(f"delta_max {1e3 * delta:.4f} mm")
+    balance = blade.wave()
+    say(f"delta_max {1e3 * delta_max(blade.file, balance):.4f} mm")
     runs = []
     for step in extent.steps:
-        runs.append(wear(problem, delta, step))
+        runs.append(wear(blade, balance, step))
         history = runs[-1].history
         say(
             f"wear step {100 * step:g} %: {len(history.cycles) - 1} steps, {runs[-1].seconds:.0f} s, "
             f"{1e3 * history.depth[-1].max():.4f} mm, {history.end}"
         )
-    return runs, problem
+    return runs, balance
 
 
 def _names(families: dict[str, np.ndarray]) -> list[str]:

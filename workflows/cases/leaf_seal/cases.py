@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tribodyn.workflows.scene.schema import PartScene
+from tribodyn import PartScene
 
 STATIC_UNIT, HARMONIC_UNIT = 0.5e-3, 20e-6  # [m] of one published unit of liner displacement (ours)
 FORCE_UNIT = 1e3  # [Pa] of one published unit of force (ours)

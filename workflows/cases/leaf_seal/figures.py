@@ -10,14 +10,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch as Swatch
 
-from tribodyn.hbm.law import SEPARATES, STICKS
+from tribodyn import OUTPUT, SEPARATES, STICKS, Patch, draw_field, draw_status, linear_references
+from tribodyn.style import BLUE, GREEN, INK, ORANGE, PRESSURE_MAP, RED, STATUS, STYLE
 from tribodyn.workflows.cases.leaf_seal.record import Record
 from tribodyn.workflows.cases.leaf_seal.response import LeafResponse
-from tribodyn.workflows.pictures.maps import draw_field, draw_status
-from tribodyn.workflows.pictures.style import BLUE, GREEN, INK, ORANGE, PRESSURE_MAP, RED, STATUS, STYLE
-from tribodyn.workflows.result.result import Patch
-from tribodyn.workflows.run.references import linear_references
-from tribodyn.workflows.run.settings import OUTPUT
 
 TITLES = {"upper_centre": "upper patch, centre", "middle": "centre of the leaf", OUTPUT: "lower corner"}
 MICRO = 1e6
@@ -43,7 +39,7 @@ def response_figure(response: LeafResponse, low: float, high: float) -> Figure:
         points = response.chosen()
         for (still, moving), output in zip(grid, TITLES, strict=True):
             row = branch.output_names.index(output)
-            references = linear_references(balance, output, 2 * np.pi * low, 2 * np.pi * high)
+            references = linear_references(balance, low, high, output)
             hertz = references.omega / (2 * np.pi)
             moving.plot(hertz, MICRO * references.free, "--", color=BLUE, lw=1, label="linear, free")
             moving.plot(hertz, MICRO * references.stuck, "-", color=GREEN, lw=1, label="linear, stuck")

@@ -12,27 +12,15 @@ none fits better by more than that.
 
 from __future__ import annotations
 
-import json
-import sys
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh
 from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
-from tribodyn.fem.interface import ContactInterface
-from tribodyn.geometry import leaf_seal
-from tribodyn.geometry import mesh as mesh_reader
-from tribodyn.reduction.craig_bampton import craig_bampton
-from tribodyn.reduction.held import hold
-from tribodyn.workflows.run import modelling
-from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.scene.schema import PartScene
+from tribodyn import JointSprings, PartScene, joint_springs, read_scene
 
 PUBLISHED = {
     "leaf alone": (0.00, 0.00, 1.00, 1.71, 2.44, 3.96, 4.78, 5.73, 6.00, 7.11),
@@ -48,32 +36,22 @@ SHAPE = {  # lower bound, start, upper bound, scale of change
     "pin_width / height": (0.01, 0.03, 0.1, 0.03),
 }
 PIN_COLUMNS = (1, 2, 3)
+LENGTHS = ("radius", "height", "thickness", "patch_height", "pin_height", "pin_width", "bow")
 DIFFERENCE = 3e-3  # relative step of the derivatives: frequencies are smooth to 1e-6
 
 
-@dataclass(frozen=True)
-class Leaf:
-    """The reduced leaf without springs and contact, and the displacements that these act on.
+Dimensions = dict[str, float]
+"""Parameters of the part leaf_seal, SI units."""
 
-    mass, stiffness : (n, n); seats : (n_seat, n) and share (n_seat,) of the pin springs
+
+def columns(leaf: JointSprings, spring: float, contact: float) -> np.ndarray:
+    """Ten frequencies [Hz] alone, on springs, and on springs with stuck contact: (3, 10).
+
+    spring : of each pin [N/m]; contact : of both patches together [N/m]
     """
-
-    mass: np.ndarray
-    stiffness: np.ndarray
-    interface: ContactInterface
-    seats: np.ndarray
-    share: np.ndarray
-
-    def columns(self, spring: float, contact: float) -> np.ndarray:
-        """Ten frequencies [Hz] alone, on springs, and on springs with stuck contact: (3, 10).
-
-        spring : of each pin [N/m]; contact : of both patches together [N/m]
-        """
-        B, k = self.interface.B, self.interface.stiffness(0.0, contact).ravel()
-        on_springs = self.stiffness + spring * self.seats.T @ (self.share[:, None] * self.seats)
-        states = (self.stiffness, on_springs, on_springs + B.T @ (k[:, None] * B))
-        values = [eigh(K, self.mass, eigvals_only=True, subset_by_index=[0, 9]) for K in states]
-        return np.sqrt(np.clip(values, 0.0, None)) / (2 * np.pi)
+    stuck = leaf.model.interface.stiffness(0.0, contact)
+    none, all_ = ({name: value for name in leaf.springs} for value in (0.0, spring))
+    return np.array([leaf.modes(*state)[0] for state in ((none,), (all_,), (all_, stuck))])
 
 
 @dataclass(frozen=True)
@@ -84,7 +62,7 @@ class Fit:
     unit : the frequency that counts as one [Hz]; columns : (3, 10) [Hz], as the rows of PUBLISHED
     """
 
-    parameters: leaf_seal.Parameters
+    parameters: Dimensions
     spring: float
     contact: float
     unit: float
@@ -103,7 +81,7 @@ class Fit:
     def line(self) -> str:
         """Error and shape in one line."""
         p = self.parameters
-        return f"{100 * self.rms:.2f} % r.m.s. with angle {p.angle:.3f} rad, height {1e3 * p.height:.1f} mm"
+        return f"{100 * self.rms:.2f} % r.m.s. with angle {p['angle']:.3f} rad, height {1e3 * p['height']:.1f} mm"
 
     def table(self) -> str:
         """Published and fitted ratios side by side."""
@@ -126,18 +104,18 @@ class Fit:
             columns[name] = {"published": PUBLISHED[name], "ours": ours.tolist(), "error": told}
         return {
             "columns": columns, "rms": self.rms, "unit_hz": self.unit, "pin_N_per_m": self.spring,
-            "contact_N_per_m": self.contact, "geometry": asdict(self.parameters),
+            "contact_N_per_m": self.contact, "geometry": dict(self.parameters),
         }  # fmt: skip
 
     def toml(self) -> str:
         """Lines for the scene."""
         p = self.parameters
-        lengths = {name: getattr(p, name) for name in ("height", "patch_height", "pin_height", "pin_width")}
+        lengths = {name: p[name] for name in ("height", "patch_height", "pin_height", "pin_width")}
         return "\n".join(
             [
-                f'angle = "{p.angle:.3f} rad"',
+                f'angle = "{p["angle"]:.3f} rad"',
                 *(f'{name} = "{1e3 * value:.4g} mm"' for name, value in lengths.items()),
-                f"pin_column = {p.pin_column}",
+                f"pin_column = {p['pin_column']:.0f}",
                 f'normal_stiffness = "{1e-6 * self.contact:.4g} N/um"',
                 f'stiffness = "{1e-3 * self.spring:.4g} N/mm"',
             ]
@@ -157,28 +135,17 @@ def relative_errors(ratios: np.ndarray) -> np.ndarray:
     return (ratios - _RATIOS) / np.maximum(_RATIOS, FLOOR)
 
 
-def reduced_leaf(scene: PartScene, parameters: leaf_seal.Parameters) -> Leaf:
-    """The leaf of a scene with other dimensions, by the same chain as a run of the scene, its springs left out."""
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "leaf.msh"
-        leaf_seal.build(parameters, path)
-        mesh, node_sets = mesh_reader.read(path)
-    part = modelling.make_part(scene.model_copy(update={"springs": {}}), mesh, node_sets)
-    rows, shares = zip(*(spring.elongation(mesh, node_sets) for spring in modelling.springs(scene)), strict=True)
-    seats = [row[:, part.free] for row in rows]
-    masters = np.concatenate([seat.nonzero()[1] for seat in seats]).tolist()
-    model = hold(
-        craig_bampton(part.system, part.interface, scene.reduction.modes, scene.reduction.cutoff, masters), part.held
-    )
-    seat_rows = np.concatenate([np.asarray(seat @ model.basis) for seat in seats])
-    system = model.system
-    return Leaf(system.mass, system.stiffness, model.interface, seat_rows, np.concatenate(shares))
+def reduced_leaf(parameters: Dimensions) -> JointSprings:
+    """The leaf of the scene with other dimensions, by the same chain as a run of the scene."""
+    units = {"angle": "rad", **dict.fromkeys(LENGTHS, "m")}
+    said = [f"geometry.{name}={value!r} {units[name]}" for name, value in parameters.items() if name in units]
+    said.append(f"geometry.pin_column={int(parameters['pin_column'])}")
+    return joint_springs(read_scene("leaf_seal", said))
 
 
-def dimensions(scene: PartScene) -> leaf_seal.Parameters:
+def dimensions(scene: PartScene) -> Dimensions:
     """The leaf of a scene."""
-    parameters: dict[str, Any] = scene.geometry.parameters
-    return leaf_seal.Parameters(**parameters)
+    return dict(scene.geometry.parameters)
 
 
 def of_scene(scene: PartScene) -> Fit:
@@ -186,20 +153,20 @@ def of_scene(scene: PartScene) -> Fit:
     parameters = dimensions(scene)
     spring = next(iter(scene.springs.values())).stiffness
     contact = scene.contact.normal_stiffness or 0.0
-    columns = reduced_leaf(scene, parameters).columns(spring, contact)
-    unit = least_squares(lambda u: _counted(columns / u[0]), [columns[0, 2]], x_scale=columns[0, 2]).x[0]
-    return Fit(parameters, spring, contact, float(unit), columns)
+    found = columns(reduced_leaf(parameters), spring, contact)
+    unit = least_squares(lambda u: _counted(found / u[0]), [found[0, 2]], x_scale=found[0, 2]).x[0]
+    return Fit(parameters, spring, contact, float(unit), found)
 
 
-def stiffnesses(leaf: Leaf, mass: float) -> tuple[float, float, float, np.ndarray]:
+def stiffnesses(leaf: JointSprings, mass: float) -> tuple[float, float, float, np.ndarray]:
     """Unit frequency [Hz], spring and contact stiffness [N/m] that suit a leaf best, and the (28,) errors left."""
-    alone = leaf.columns(0.0, 0.0)[0]
+    alone = columns(leaf, 0.0, 0.0)[0]
     unit = np.exp(np.mean(np.log(alone[2:] / _RATIOS[0, 2:])))
     turn = (2 * np.pi * unit) ** 2 * mass
 
     def errors(logarithms: np.ndarray) -> np.ndarray:
         one, spring, contact = np.exp(logarithms)
-        return _counted(leaf.columns(spring, contact) / one)
+        return _counted(columns(leaf, spring, contact) / one)
 
     start = np.log([unit, _RATIOS[1, 1] ** 2 * turn / 2, _RATIOS[2, 0] * _RATIOS[2, 1] * turn])
     found = least_squares(errors, start, x_scale=0.1, max_nfev=12)
@@ -235,60 +202,62 @@ def fit(scene: PartScene, pin_column: int, start: Sequence[float] | None = None,
     lower, usual, upper, scale = (np.array(column) for column in zip(*SHAPE.values(), strict=True))
     begin = usual if start is None else np.clip(start, lower, upper)
 
-    def parameters(shape: np.ndarray) -> leaf_seal.Parameters:
+    def parameters(shape: np.ndarray) -> Dimensions:
         angle, height, patch, pin, seat = (float(value) for value in shape)
-        height *= first.radius
-        return replace(
-            first, angle=angle, height=height, patch_height=patch * height, pin_height=pin * height,
-            pin_width=seat * height, pin_column=pin_column, bow=0.0,
-        )  # fmt: skip
+        height *= first["radius"]
+        changed = {"angle": angle, "height": height, "patch_height": patch * height, "pin_height": pin * height}
+        return {**first, **changed, "pin_width": seat * height, "pin_column": pin_column, "bow": 0.0}
 
-    def solved(shape: np.ndarray) -> tuple[leaf_seal.Parameters, Leaf, tuple[float, float, float, np.ndarray]]:
+    def solved(shape: np.ndarray) -> tuple[Dimensions, JointSprings, tuple[float, float, float, np.ndarray]]:
         p = parameters(shape)
-        leaf = reduced_leaf(scene, p)
-        return p, leaf, stiffnesses(leaf, scene.material.density * p.angle * p.radius * p.height * p.thickness)
+        leaf = reduced_leaf(p)
+        volume = p["angle"] * p["radius"] * p["height"] * p["thickness"]
+        return p, leaf, stiffnesses(leaf, scene.material.density * volume)
 
     found = least_squares(
         lambda shape: solved(shape)[2][3], begin, bounds=(lower, upper), x_scale=scale, diff_step=DIFFERENCE,
         max_nfev=max_steps, ftol=1e-4,
     )  # fmt: skip
     p, leaf, (unit, spring, contact, _) = solved(found.x)
-    return Fit(p, spring, contact, unit, leaf.columns(spring, contact))
+    return Fit(p, spring, contact, unit, columns(leaf, spring, contact))
 
 
-def shape_of(p: leaf_seal.Parameters) -> tuple[float, ...]:
+def shape_of(p: Dimensions) -> tuple[float, ...]:
     """A leaf in the order of SHAPE."""
-    return p.angle, p.height / p.radius, p.patch_height / p.height, p.pin_height / p.height, p.pin_width / p.height
+    parts = (p[name] / p["height"] for name in ("patch_height", "pin_height", "pin_width"))
+    return p["angle"], p["height"] / p["radius"], *parts
 
 
-def run(check_only: bool, as_json: bool = False) -> None:
-    """Fit from the scene's own leaf, and afresh for every column the pins may stand in; print what is chosen.
+def search(tell: Callable[[str], None]) -> Fit:
+    """Fit from the scene's own leaf, and afresh for every column the pins may stand in; what is chosen.
 
-    check_only : just print the leaf as the scene has it
+    tell : called with a sentence on every fit
     """
-    scene = scene_file.read("leaf_seal").part_scene
+    scene = read_scene("leaf_seal").part_scene
     with threadpool_limits(1):
-        if check_only:
-            found = of_scene(scene)
-        else:
-            first = dimensions(scene)
-            own = fit(scene, first.pin_column, shape_of(first))
-            print(f"from the scene's own leaf: {own.line()}", file=sys.stderr, flush=True)
-            others = []
-            for column in PIN_COLUMNS:
-                others.append(fit(scene, column))
-                print(f"afresh, pins in column {column}: {others[-1].line()}", file=sys.stderr, flush=True)
-            found, best = chosen(own, others), min(others, key=lambda one: one.rms)
-            verdict = "is kept" if found is own else "gives way"
-            print(
-                f"the best of these is {100 * (own.rms - best.rms):.2f} points better than the scene's own, which "
-                f"{verdict}: the standard error of that is {100 * doubt(own, best):.2f} points (jackknife)",
-                file=sys.stderr,
-            )
-    if as_json:
-        print(json.dumps(found.record(), indent=2))
-        return
-    print(found.table())
-    print(f"error {100 * found.rms:.2f} % r.m.s.; 1.00 is {found.unit:.4g} Hz")
-    print(f"contact of both patches over spring of one pin: {found.contact / found.spring:.3g}")
-    print(found.toml())
+        first = dimensions(scene)
+        own = fit(scene, int(first["pin_column"]), shape_of(first))
+        tell(f"from the scene's own leaf: {own.line()}")
+        others = []
+        for column in PIN_COLUMNS:
+            others.append(fit(scene, column))
+            tell(f"afresh, pins in column {column}: {others[-1].line()}")
+        found, best = chosen(own, others), min(others, key=lambda one: one.rms)
+        verdict = "is kept" if found is own else "gives way"
+        tell(
+            f"the best of these is {100 * (own.rms - best.rms):.2f} points better than the scene's own, which "
+            f"{verdict}: the standard error of that is {100 * doubt(own, best):.2f} points (jackknife)"
+        )
+    return found
+
+
+def as_text(found: Fit) -> str:
+    """For people."""
+    return "\n".join(
+        [
+            found.table(),
+            f"error {100 * found.rms:.2f} % r.m.s.; 1.00 is {found.unit:.4g} Hz",
+            f"contact of both patches over spring of one pin: {found.contact / found.spring:.3g}",
+            found.toml(),
+        ]
+    )

@@ -11,11 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm.law import SEPARATES, STICKS
+from tribodyn import SEPARATES, STICKS, Scene, write_whole
 from tribodyn.workflows.cases.leaf_seal.cases import Case
 from tribodyn.workflows.cases.leaf_seal.response import LINER_NODE, LeafResponse
-from tribodyn.workflows.result.whole_file import replacing
-from tribodyn.workflows.scene.schema import Scene
 
 COLUMNS = (
     "group", "value", "points", "folds", "fold_hz", "unstable_points", "peak_hz", "peak_um",
@@ -106,7 +104,7 @@ def save(record: Record, scene: Scene, folder: Path) -> None:
     """Write a record; a kill at any moment leaves the old file or the new one."""
     path = file_of(record.case, folder)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(path) as new, new.open("wb") as file:
+    with write_whole(path) as new, new.open("wb") as file:
         np.savez(
             file,
             scene=scene.model_dump_json(),

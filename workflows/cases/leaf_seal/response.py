@@ -5,26 +5,33 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from tribodyn.fem.part import Part
-from tribodyn.hbm import stability
-from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.branch import CONVERGED, Branch
-from tribodyn.hbm.chatter import Chatter, chatter
-from tribodyn.hbm.law import SEPARATES, STICKS
-from tribodyn.hbm.stability import BranchStability
-from tribodyn.hbm.wear import impact
-from tribodyn.hbm.wear_law import Exposure
-from tribodyn.workflows.run import modelling, pipeline, settings
-from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn import (
+    CONVERGED,
+    OUTPUT,
+    SEPARATES,
+    STICKS,
+    Bench,
+    Branch,
+    BranchStability,
+    Chatter,
+    HarmonicBalance,
+    Part,
+    SceneFile,
+    SolveFailed,
+    State,
+    chatter,
+    follow_response,
+    impact_work,
+    mark_stability,
+    state_at,
+    support_work,
+)
 
 LINEAR, APART = 0.85, 1.12  # frequencies of the linear points, over those where separation begins and ends
-LINER_NODE = settings.OUTPUT  # the lower corner, which moves most where the leaf chatters
+LINER_NODE = OUTPUT  # the lower corner, which moves most where the leaf chatters
 WEAR_COEFFICIENT = 2e-15  # [m3/J], that of the thesis's friction contacts put to impacts (ours)
 
 
@@ -46,12 +53,11 @@ class LeafResponse:
     @cached_property
     def stability(self) -> BranchStability:
         """Stability along the curve, by Hill's method."""
-        return stability.mark(self.balance, self.branch)
+        return mark_stability(self.balance, self.branch)
 
     def state(self, point: int) -> State:
         """The solved state of a point of the curve."""
-        x = self.branch.contact[point].reshape(self.balance.contact.n_pair, -1, self.balance.basis.n_coeff)
-        return self.balance.evaluate(self.branch.omega[point], x)
+        return state_at(self.balance, self.branch.omega[point], self.branch.contact[point])
 
     def status(self) -> np.ndarray:
         """(n_point, n_pair) status bits along the curve."""
@@ -91,17 +97,14 @@ class LeafResponse:
 
     def impact_work(self, point: int) -> np.ndarray:
         """(n_pair,) work of impacts per cycle [J]."""
-        n = self.balance.contact.n_pair
-        exposure = Exposure(self.balance, self.state(point), np.ones(n), {}, np.zeros(n), 0.0)
-        return impact.impact_work(exposure)
+        return impact_work(self.balance, self.state(point))
 
     def pin_work(self, point: int) -> dict[str, float]:
         """Work per cycle that the leaf puts into the spring of each pin, which rubs and hammers its seat [J]."""
         work = {}
         for name, stiffness in self.springs.items():
             row = self.branch.response[point, self.branch.output_names.index(name)]
-            z = self.balance.basis.to_time(row)
-            work[name] = float(impact.loading_work(stiffness * z, z))
+            work[name] = float(support_work(self.balance.basis, row, stiffness))
         return work
 
     def wear_rates(self, point: int, coefficient: float = WEAR_COEFFICIENT) -> tuple[np.ndarray, np.ndarray]:
@@ -117,11 +120,11 @@ def respond(file: SceneFile) -> LeafResponse:
     """
     start = time.process_time()
     scene = file.part_scene
-    with TemporaryDirectory() as folder:
-        mesh, node_sets = modelling.make_mesh(file, Path(folder))
-    part = modelling.make_part(scene, mesh, node_sets)
-    balance = modelling.make_model(scene, part, modelling.reduce_part(scene, part)).balance
-    branch = pipeline.follow_response(scene, balance, lambda done, said: None)
+    bench = Bench()
+    balance = bench.model(file).balance
+    part = bench.part
+    assert part is not None
+    branch = follow_response(file, balance)
     seconds = time.process_time() - start
     if branch.outcome[-1] != CONVERGED:  # only the last point of a branch may be unsolved
         if len(branch.omega) == 1:

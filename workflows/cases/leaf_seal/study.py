@@ -8,24 +8,22 @@ one that is done is kept, so that a stopped study can go on.
 from __future__ import annotations
 
 import csv
-import json
-import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
+from tribodyn import peak_memory, read_scene
+from tribodyn.style import STATUS
 from tribodyn.workflows.cases.leaf_seal import figures as leaf_figures
 from tribodyn.workflows.cases.leaf_seal import record as leaf_record
 from tribodyn.workflows.cases.leaf_seal.cases import Case, cases
 from tribodyn.workflows.cases.leaf_seal.record import COLUMNS, STRUCK_POINT, Record
 from tribodyn.workflows.cases.leaf_seal.response import LeafResponse, respond
-from tribodyn.workflows.pictures.style import STATUS
-from tribodyn.workflows.run import memory
-from tribodyn.workflows.scene import scene_file
 
 MAPS = ("inclination", "bow")  # parameters whose contact is drawn
 LINEAR_POINT = 4  # of the chosen five
@@ -44,14 +42,14 @@ def sizes(response: LeafResponse) -> str:
         f"{balance.model.system.n_dof} DOFs; {balance.n_unknown} unknowns = {pairs} pairs x "
         f"{len(balance.contact.components)} component x {basis.n_coeff} coefficients; "
         f"friction memory {balance.memory.size} numbers; contact state with derivative {kilobytes:.0f} kB; "
-        f"peak memory of the process {memory.peak() / 1e6:.0f} MB"
+        f"peak memory of the process {peak_memory() / 1e6:.0f} MB"
     )
 
 
 def solve(case: Case) -> Record:
     """Solve one configuration; what goes wrong stands in the record."""
     try:
-        return leaf_record.of_response(case, respond(scene_file.read("leaf_seal", case.overrides)))
+        return leaf_record.of_response(case, respond(read_scene("leaf_seal", case.overrides)))
     except (ArithmeticError, RuntimeError, ValueError) as error:
         return leaf_record.of_failure(case, " ".join(str(error).split()))
 
@@ -65,7 +63,7 @@ def study(
     """
     records: list[Record] = []
     for case in chosen:
-        scene = scene_file.read("leaf_seal", case.overrides).scene
+        scene = read_scene("leaf_seal", case.overrides).scene
         kept = leaf_record.load(case, scene, folder / KEPT) if resume else None
         record = kept if kept is not None and kept.complete else solve(case)
         if record is not kept:
@@ -147,17 +145,41 @@ def write_chatter(response: LeafResponse, points: Sequence[int], path: Path) -> 
                 )
 
 
-def run(folder: Path, resume: bool = False, as_json: bool = False) -> None:
-    """Run the whole study into a folder and print its table, or JSON for machines."""
+@dataclass(frozen=True)
+class Study:
+    """A whole study. allocated : of `sizes`; files : that were written; totals : counts and seconds by name."""
+
+    records: list[Record]
+    allocated: str
+    files: list[Path]
+    totals: dict[str, float]
+
+    def record(self) -> dict[str, Any]:
+        """For machines."""
+        rows, files = [record.numbers for record in self.records], [str(path) for path in self.files]
+        return {"rows": rows, **self.totals, "sizes": self.allocated, "files": files}
+
+    def text(self) -> str:
+        """For people, below the table that was told on the way."""
+        total = self.totals
+        return "\n".join(
+            [
+                self.allocated,
+                *(str(path) for path in self.files),
+                f"{total['configurations']} configurations, {total['incomplete']} incomplete; models and curves "
+                f"{total['curve_seconds']} s of processor time, with stability and pictures "
+                f"{total['processor_seconds']} s, {total['seconds']} s by the clock",
+            ]
+        )
+
+
+def whole(folder: Path, resume: bool, tell: Callable[[str], None]) -> Study:
+    """Run the whole study into a folder. tell : called with the rows of its table as they come."""
     started, clock = time.perf_counter(), time.process_time()
     folder.mkdir(parents=True, exist_ok=True)
-
-    def tell(line: str) -> None:
-        print(line, file=sys.stderr if as_json else sys.stdout, flush=True)
-
     tell("  ".join(f"{name:{_width(name)}}" for name in COLUMNS))
     with threadpool_limits(1):
-        records = study(cases(scene_file.read("leaf_seal").part_scene), folder, resume, tell)
+        records = study(cases(read_scene("leaf_seal").part_scene), folder, resume, tell)
         first = _response(records[0])
         paths = draw([replace(records[0], response=first), *records[1:]], folder)
         allocated = "" if first is None else sizes(first)
@@ -168,13 +190,4 @@ def run(folder: Path, resume: bool = False, as_json: bool = False) -> None:
         "seconds": round(time.perf_counter() - started, 1),
         "processor_seconds": round(time.process_time() - clock, 1),
     }
-    if as_json:
-        rows = [record.numbers for record in records]
-        print(json.dumps({"rows": rows, **total, "sizes": allocated, "files": [str(p) for p in paths]}, indent=2))
-        return
-    print(allocated, *paths, sep="\n")
-    print(
-        f"{total['configurations']} configurations, {total['incomplete']} incomplete; models and curves "
-        f"{total['curve_seconds']} s of processor time, with stability and pictures {total['processor_seconds']} s, "
-        f"{total['seconds']} s by the clock"
-    )
+    return Study(records, allocated, paths, total)

@@ -14,19 +14,23 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tribodyn.hbm.branch import CONVERGED, Branch
-from tribodyn.hbm.continuation import arc_length
-from tribodyn.hbm.continuation.arc_length import Options
+from tribodyn import (
+    CONVERGED,
+    Branch,
+    Patch,
+    References,
+    SceneFile,
+    contact_patch,
+    follow_arc_length,
+    linear_references,
+    state_at,
+)
 from tribodyn.workflows.cases.rig import fit as rig_fit
 from tribodyn.workflows.cases.rig.joints import Joints, joints_of
-from tribodyn.workflows.cases.rig.model import Cycle, Rig, cycle_of
+from tribodyn.workflows.cases.rig.model import Cycle, Rig
 from tribodyn.workflows.cases.rig.published import MATING_HEIGHTS, STUCK_COMPLEX, TABLE_5_3
 from tribodyn.workflows.cases.rig.time import InTime, in_time
 from tribodyn.workflows.cases.rig.wear import RigWear, loop, wear_down
-from tribodyn.workflows.result.result import Patch, References
-from tribodyn.workflows.run import settings
-from tribodyn.workflows.run.references import linear_references
-from tribodyn.workflows.scene.scene_file import SceneFile
 
 STAGES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the volume worn when the preload is lost
 APART = 1e-4  # mating height that leaves the faces apart [m]
@@ -109,10 +113,11 @@ def compute(file: SceneFile, tell: Callable[[str], None]) -> Study:
         other = wear_down(rig.with_harmonics(READINGS[1]), 0.0, tell)
         stages = tuple(_stage(rig, runs[0], share, tell) for share in STAGES)
         model = rig.model()
-        references = linear_references(model.balance, settings.OUTPUT, *settings.response_range(scene))
+        references = linear_references(model.balance, *scene.response.frequency)
         return Study(
             before, after, _stuck_complex(joints), heights, apart(rig, references), cycles, tight, runs, other, stages,
-            references, rig.patch(model.balance), scene.wear.numbers["coefficient"], scene.contact.numbers["friction"],
+            references, contact_patch(model.balance), scene.wear.numbers["coefficient"],
+            scene.contact.numbers["friction"],
             time.process_time() - clock,
         )  # fmt: skip
 
@@ -134,20 +139,20 @@ def _energies(rig: Rig) -> dict[float, Cycle]:
 def apart(rig: Rig, references: References) -> float:
     """Largest relative difference of the response of faces held apart to that of the linear open rig."""
     loose, some = rig.with_mating_height(-APART), slice(None, None, len(references.omega) // 8)
-    found = np.array([loose.cycle(float(omega)).amplitude for omega in references.omega[some]])
+    found = np.array([loose.cycle(float(omega / (2 * np.pi))).amplitude for omega in references.omega[some]])
     return float(np.max(np.abs(found / references.free[some] - 1)))
 
 
 def _stage(rig: Rig, run: RigWear, share: float, tell: Callable[[str], None]) -> Stage:
     row = run.nearest(share)
-    worn = rig.with_opening(run.history.depth[row])
-    balance = worn.model().balance
+    opened = rig.with_opening(run.history.depth[row])
+    model = opened.model()
+    balance = model.balance
     tell(f"response and time integration after {run.history.cycles[row]:.3g} cycles")
-    low, high = settings.response_range(rig.scene)
-    response = arc_length.follow(balance, low, high, Options(newton=settings.newton_options(rig.scene)))
-    x = run.history.displacement[row].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
-    cycle = cycle_of(balance, balance.evaluate(rig.omega, x), rig.height)
-    return Stage(row, cycle, in_time(worn, cycle), response, *loop(rig.model().balance, run.history, row))
+    response = follow_arc_length(rig.file, balance)
+    state = state_at(balance, 2 * np.pi * rig.frequency, run.history.displacement[row])
+    cycle = opened.told(model, state)
+    return Stage(row, cycle, in_time(opened, cycle), response, *loop(rig.model().balance, run.history, row))
 
 
 def solved(branch: Branch) -> np.ndarray:

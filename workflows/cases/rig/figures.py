@@ -13,11 +13,11 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from tribodyn import draw_field
+from tribodyn.style import BLUE, GREEN, GREY, INK, ORANGE, RED, STYLE, WEAR_MAP
 from tribodyn.workflows.cases.rig import published
 from tribodyn.workflows.cases.rig.cases import READINGS, Study, solved
 from tribodyn.workflows.cases.rig.wear import WORN, RigWear
-from tribodyn.workflows.pictures.maps import draw_field
-from tribodyn.workflows.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, RED, STYLE, WEAR_MAP
 
 MILLION, MICRO = 1e-6, 1e6
 COLOURS = (BLUE, ORANGE, GREEN)

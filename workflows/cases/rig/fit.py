@@ -19,13 +19,11 @@ from functools import lru_cache
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from tribodyn import Identification, Measured, Parameter, SceneFile, identify, read_scene
 from tribodyn.workflows.cases.rig.joints import Joints, joints_of
 from tribodyn.workflows.cases.rig.model import TIED, Rig, check
 from tribodyn.workflows.cases.rig.published import LIFE_MEASURED, OPEN, PRELOAD, STUCK, TABLE_5_3, WORK
 from tribodyn.workflows.cases.rig.wear import RigWear, wear_down
-from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.studies.identification import Identification, Measured, Parameter, fit
 
 RIGID = 1e11  # stiffness beyond which no published frequency changes by one in a thousand [N/m]
 MICROMETRE = 1e-6
@@ -51,7 +49,7 @@ def fit_joints(joints: Joints) -> Identification:
     """Joint springs to the published frequencies; "before" is the rig with rigid joints."""
     parameters = [Parameter(name, 1e8, RIGID, (1e9 if name.startswith("base") else RIGID,), "N/m") for name in TIED]
     before = dict.fromkeys(TIED, RIGID)
-    return fit(parameters, FREQUENCIES, lambda values: joints.frequencies(stiffnesses(values)), before)
+    return identify(parameters, FREQUENCIES, lambda values: joints.frequencies(stiffnesses(values)), before)
 
 
 def fit_column(scene: str, overrides: Sequence[str] = ()) -> Identification:
@@ -60,7 +58,7 @@ def fit_column(scene: str, overrides: Sequence[str] = ()) -> Identification:
     @lru_cache(maxsize=SECTIONS)
     def joints(length: float, depth: float) -> Joints:
         section = (f"geometry.column_length={length!r} m", f"geometry.column_depth={depth!r} m")
-        return joints_of(scene_file.read(scene, (*overrides, *section)))
+        return joints_of(read_scene(scene, (*overrides, *section)))
 
     def predict(values: Mapping[str, float]) -> np.ndarray:
         length, depth = (round(values[name] / MICROMETRE) * MICROMETRE for name in ("column_length", "column_depth"))
@@ -68,13 +66,13 @@ def fit_column(scene: str, overrides: Sequence[str] = ()) -> Identification:
 
     springs = [Parameter(name, 1e8, RIGID, (1e9,), "N/m") for name in ("base_vertical", "base_sliding")]
     section = [Parameter(name, 0.085, 0.13, (0.1,), "m") for name in ("column_length", "column_depth")]
-    return fit([*springs, *section], FREQUENCIES, predict)
+    return identify([*springs, *section], FREQUENCIES, predict)
 
 
 def fit_height(rig: Rig) -> Identification:
     """Platform height to the published preload."""
     parameter = Parameter("platform", 5e-6, 50e-6, (rig.height,), "m")
-    return fit(
+    return identify(
         [parameter],
         [Measured("preload", PRELOAD, "N")],
         lambda values: np.array([rig.with_height(values["platform"]).at_rest().preload]),
@@ -89,7 +87,7 @@ def fit_damping(rig: Rig) -> Identification:
         damped = rig.with_damping(values["modal damping"])
         return np.array([max(damped.with_force(force).cycle().energy, 1e-9) for force in TABLE_5_3])
 
-    return fit([Parameter("modal damping", 0.005, 0.06, (0.01, 0.03), "-")], measured, energies)
+    return identify([Parameter("modal damping", 0.005, 0.06, (0.01, 0.03), "-")], measured, energies)
 
 
 def fit_coefficient(run: RigWear, coefficient: float) -> Identification:
@@ -102,7 +100,7 @@ def fit_coefficient(run: RigWear, coefficient: float) -> Identification:
     found = np.array([run.history.cycles[-1], run.spent[-1]])
     measured = [Measured("cycles to loss", LIFE_MEASURED), Measured("work to loss", WORK, "J")]
     parameter = Parameter("coefficient", coefficient / 10, 10 * coefficient, (coefficient,), "m3/J")
-    return fit([parameter], measured, lambda values: found * coefficient / values["coefficient"])
+    return identify([parameter], measured, lambda values: found * coefficient / values["coefficient"])
 
 
 def run(
@@ -113,7 +111,7 @@ def run(
     tell : called with a sentence on what is under way
     """
     found = {}
-    file = scene_file.read(scene, overrides)
+    file = read_scene(scene, overrides)
     check(file)
     with threadpool_limits(1):
         if column:

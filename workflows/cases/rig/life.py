@@ -13,12 +13,11 @@ from dataclasses import asdict, dataclass
 
 from threadpoolctl import threadpool_limits
 
+from tribodyn import SceneFile, changed
 from tribodyn.workflows.cases.rig.fit import fit_height
 from tribodyn.workflows.cases.rig.model import NoSolution, Rig
 from tribodyn.workflows.cases.rig.published import LIFE_MEASURED, PRELOAD, TABLE_5_3, WORK
 from tribodyn.workflows.cases.rig.wear import wear_down
-from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.scene.scene_file import SceneFile
 
 CLOSE = 1e-6  # of the published preload, to which that of a changed rig is set
 LOST = "lost"
@@ -74,13 +73,9 @@ def run(scene: str, overrides: Sequence[str], changes: Sequence[str], tell: Call
     tell : as `rig_wear.wear_down`
     Raises  ValueError for a change that the scene does not know, before anything is computed
     """
-    files = {"": scene_file.read(scene, overrides)}
-    for change in changes or CHANGES:
-        own = [one.strip() for one in change.split(";")]
-        files[change] = scene_file.read(scene, (*overrides, *own))
     rows = []
     with threadpool_limits(1):
-        for change, file in files.items():
+        for change, file in changed(scene, overrides, changes or CHANGES).items():
             tell(change or "the scene")
             rows.append(_row(change, file, tell))
     return rows

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from tribodyn import read_scene
 from tribodyn.workflows.cases.rig import cases as rig_cases
 from tribodyn.workflows.cases.rig import figures as rig_figures
 from tribodyn.workflows.cases.rig import model as rig_model
 from tribodyn.workflows.cases.rig import table as rig_table
-from tribodyn.workflows.scene import scene_file
 
 
 def run(
@@ -19,7 +19,7 @@ def run(
 
     tell : called with a sentence on what is under way
     """
-    file = scene_file.read(scene, overrides)
+    file = read_scene(scene, overrides)
     rig_model.check(file)
     study = rig_cases.compute(file, tell)
     table = rig_table.table(study)

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from tribodyn.hbm.law import SEPARATES, SLIPS
+from tribodyn import SEPARATES, SLIPS
 from tribodyn.workflows.cases.rig import published
 from tribodyn.workflows.cases.rig.cases import READINGS, STUCK_PRELOAD, Stage, Study, solved
 from tribodyn.workflows.cases.rig.fit import FREQUENCIES

@@ -7,19 +7,11 @@ the two problems is the same.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-import numpy as np
+from tribodyn import CONVERGED, OUTPUT, IntegrationFailed, TimeOptions, verify_in_time
+from tribodyn.workflows.cases.rig.model import Cycle, Rig
 
-from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.branch import CONVERGED
-from tribodyn.hbm.excitation import Excitation
-from tribodyn.hbm.time_integration import IntegrationFailed, Options
-from tribodyn.hbm.verify import verify
-from tribodyn.workflows.cases.rig.model import PLATFORM, Cycle, Rig
-from tribodyn.workflows.run import modelling, part_reduction, settings
-
-HOLD = "hold"  # the load that takes the place of the height
 STEPS, PERIODS, DRIFT = 1024, 200, 1e-5  # per period; periods to settle in; of the state over one period
 
 
@@ -42,31 +34,13 @@ class InTime:
         return self.outcome == CONVERGED
 
 
-def held_by_force(rig: Rig, cycle: Cycle) -> HarmonicBalance:
-    """The rig's problem with the static force of a solved cycle at the platform instead of its height."""
-    model = rig.model()
-    reaction = part_reduction.reaction_of(model.reduced)
-    plain = modelling.damped(rig.scene, rig.plain)
-    push = np.zeros(plain.system.n_dof)
-    force = reaction.force(rig.height, cycle.state.cycle.force[:, :, 0])
-    push[reaction.dofs] = force + reaction.support * reaction.shape * rig.height
-    system = replace(plain.system, loads={**plain.system.loads, HOLD: push})
-    loads = {key: value for key, value in model.balance.excitation.loads.items() if key != (0, PLATFORM)}
-    return HarmonicBalance.of(
-        replace(plain, system=system),
-        model.balance.contact.joints,
-        model.balance.basis,
-        Excitation({**loads, (0, HOLD): 1.0}),
-        settings.response_range(rig.scene)[1],
-    )
-
-
 def in_time(rig: Rig, cycle: Cycle) -> InTime:
     """Integrate from a solved cycle to the periodic motion nearby."""
-    options = Options(STEPS, tolerance=DRIFT, max_periods=PERIODS)
+    options = TimeOptions(STEPS, tolerance=DRIFT, max_periods=PERIODS)
     try:
-        found = verify(held_by_force(rig, cycle), cycle.state, options)
+        balance = rig.bench.held_by_force(rig.file, cycle.state, rig.opening)
+        found = verify_in_time(balance, cycle.state, options)
     except IntegrationFailed as failure:
         return InTime(None, None, None, str(failure))
-    amplitude = found.amplitude[settings.OUTPUT]
+    amplitude = found.amplitude[OUTPUT]
     return InTime(float(found.motion.energy.sum()), found.motion.preload, amplitude, found.outcome)

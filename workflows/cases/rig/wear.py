@@ -13,15 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.evolution import WearState, assess
-from tribodyn.hbm.wear_history import WearHistory
-from tribodyn.hbm.wear_history import history as joined
+from tribodyn import HarmonicBalance, WearHistory, state_at, wear, worn
 from tribodyn.workflows.cases.rig.model import NoSolution, Rig
-from tribodyn.workflows.run import settings, wear_run
-from tribodyn.workflows.run.references import free_deflection
 
-STRIDE = 8  # wear steps between two looks at the preload at rest
 WORN = 0.1e-6  # depth from which on a pair counts as worn [m]: what a profilometer tells from noise
 
 
@@ -83,47 +77,22 @@ class RigWear:
 def wear_down(rig: Rig, shift: float, tell: Callable[[str], None]) -> RigWear:
     """Wear the rig by the rule of its scene until the preload at rest has fallen to the scene's `lost_below`.
 
-    shift : mating height over that of the scene [m]; tell : called with a sentence as the run goes on
+    shift : mating height over that of the scene [m]; tell : called with a sentence when the run is done
     Raises  NoSolution where a wear step fails
     """
-    wear, clock = rig.scene.wear, time.process_time()
-    assert wear is not None
-    rig = rig.with_mating_height(shift)
-    balance, still = rig.model().balance, rig.with_force(0.0).model().balance
-    problem, quiet = (wear_run.wear_problem(rig.scene, rig.folder, b) for b in (balance, still))
-    area = problem.area
-    limit = settings.step_limit(rig.scene, free_deflection(balance), area)
-    history: WearHistory | None = None
-    rest: list[float] = []
-    resting: WearState | None = None
-    while True:
-        count = min(len(rest) + STRIDE, wear.max_steps)
-        history = wear_run.evolve(problem, wear, limit, count, resume=history)
-        if history.end.startswith("solve failed"):
-            raise NoSolution(f"mating height {shift * 1e6:+.3g} um, wear step {len(history.cycles)}: {history.end}")
-        for depth in history.depth[len(rest) :]:
-            resting = assess(quiet, depth, 0.0, resting)
-            if resting.failure:
-                raise NoSolution(f"mating height {shift * 1e6:+.3g} um, at rest, step {len(rest)}: {resting.failure}")
-            rest.append(still.preload(resting.points[0].state))
-        tell(
-            f"mating height {shift * 1e6:+.3g} um: step {len(rest)}, {history.cycles[-1]:.3g} cycles, "
-            f"preload {rest[-1]:.3g} N at rest"
-        )
-        below = np.flatnonzero(np.array(rest) < wear.lost_below * rest[0])
-        if len(below) or len(rest) >= wear.max_steps or history.cycles_in_step[-1] == 0:
-            break
-    rows = len(rest) if not len(below) else int(below[0]) + 1
-    end = f"preload at rest fell below {wear.lost_below:.3g} of its first value" if len(below) else history.end
-    kept = history_of(history, rows)
-    points = rig.plain.interface.points
-    in_plane = (points - points.mean(axis=0))[:, :2]
-    return RigWear(shift, kept, np.array(rest[:rows]), area, in_plane, end, time.process_time() - clock)
-
-
-def history_of(history: WearHistory, rows: int) -> WearHistory:
-    """The first rows of a history."""
-    return joined(history.rows()[:rows], history.end)
+    clock = time.process_time()
+    rig = rig.with_mating_height(shift).with_keys("wear.end_at=at_rest")
+    balance = rig.model().balance
+    history = wear(rig.file, balance)
+    name = f"mating height {shift * 1e6:+.3g} um"
+    if history.end.startswith("solve failed"):
+        raise NoSolution(f"{name}, wear step {len(history.cycles)}: {history.end}")
+    rest = history.preload_at_rest
+    assert rest is not None
+    tell(f"{name}: {len(rest)} steps, {history.cycles[-1]:.3g} cycles, preload {rest[-1]:.3g} N at rest; {history.end}")
+    interface = balance.model.interface
+    in_plane = (interface.points - interface.points.mean(axis=0))[:, :2]
+    return RigWear(shift, history, rest, interface.area, in_plane, history.end, time.process_time() - clock)
 
 
 def loop(balance: HarmonicBalance, history: WearHistory, row: int) -> tuple[np.ndarray, np.ndarray]:
@@ -131,8 +100,7 @@ def loop(balance: HarmonicBalance, history: WearHistory, row: int) -> tuple[np.n
 
     balance : the unworn problem
     """
-    shape = (balance.contact.n_pair, -1, balance.basis.n_coeff)
-    worn = balance.with_gap(balance.contact.gap + history.depth[row])
-    x, f = worn.contact.history(history.displacement[row].reshape(shape), worn.basis, worn.memory)
+    here = worn(balance, history.depth[row])
+    x, f = here.history(state_at(here, float(history.omega[row]), history.displacement[row]))
     share = balance.model.interface.area / balance.model.interface.area.sum()
     return np.asarray(share @ x[:, 0]), np.asarray(f[:, 0].sum(axis=0))
