@@ -19,9 +19,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from tests.helpers.matrix_scene import SCENE
 from tests.helpers.random_problems import cases
 from tests.helpers.verification_models import random_structure
-from tests.workflows.test_matrices import SCENE
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene import scene_file
 

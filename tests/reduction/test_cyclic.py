@@ -15,8 +15,8 @@ from tribodyn.reduction import cyclic as waves
 from tribodyn.reduction.damping import modal_damping
 from tribodyn.reduction.linear import linear_modes, system_modes
 from tribodyn.reduction.store import load, save
-from tribodyn.workflows.cases.blade import model as blade_model
 from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies import wheel as wheels
 
 
 @pytest.fixture(scope="module", params=[0.0, 0.02], ids=["rigid disk", "flexible disk"])
@@ -27,7 +27,7 @@ def reduced(request, tmp_path_factory):
 @pytest.fixture(scope="module")
 def published():
     """The blade as its scene has it, on its rigid disk, full and reduced."""
-    blade = blade_model.build(scene_file.read("blade"))
+    blade = wheels.build(scene_file.read("blade"))
     return blade.full, blade.reduced
 
 

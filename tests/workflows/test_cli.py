@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.helpers.command import leave
 from tests.helpers.synthetic_result import result
 from tribodyn.workflows.command import exits
-from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.result import store, summary
 
 ROOT = Path(__file__).parents[2]
@@ -42,17 +42,6 @@ BAD = {
     "no result": (["show", "nowhere"], 'no result file "nowhere"'),
     "nothing to render": (["render", "nowhere"], 'no result file "nowhere"'),
 }
-
-
-def leave(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
-    """Exit code, standard output and standard error of the command."""
-    code = 0
-    try:
-        cli.main(arguments)
-    except SystemExit as stop:
-        code = int(stop.code or 0)
-    out, err = capsys.readouterr()
-    return code, out, err
 
 
 @pytest.mark.parametrize("case", BAD)

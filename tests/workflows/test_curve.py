@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.workflows.test_cli import leave
-from tests.workflows.test_matrices import folder as folder  # the fixture
+from tests.helpers.command import leave
+from tests.helpers.matrix_scene import matrix_folder
 from tribodyn.hbm.harmonic_choice import estimate, widened
 from tribodyn.hbm.stability import mark
 from tribodyn.workflows.result import store
@@ -18,6 +18,12 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import from_json, read
 
 QUICK = ["wear.max_steps=0", "response.points=20"]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with a scene and its matrices, and with lists that a scene may name."""
+    return matrix_folder(tmp_path)
 
 
 def run(folder: Path, *overrides: str) -> store.Result:

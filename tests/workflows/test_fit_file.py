@@ -7,9 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from tests.cases.test_rig import COARSE as RIG
-from tests.cases.test_scene_blade import COARSE as BLADE
-from tribodyn.workflows.cases.rig.model import Rig
+from tests.helpers.coarse_scenes import BLADE, RIG
+from tribodyn.workflows.api.studies import cycle_at
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.failure import SolveFailed
@@ -89,8 +88,9 @@ def test_mating_height_is_found_from_the_preload_and_the_part_is_made_once(monke
     assert len(made) == 1
     assert 1e-6 < found.values[0] < 4e-6
     assert changes[0].endswith(" m")
-    rig = Rig.of(scene_file.read("rig", (*RIG, *changes)))
-    assert rig.at_rest().preload == pytest.approx(36.0, rel=1e-4)
+    file = scene_file.read("rig", (*RIG, *changes, "loads.harmonic.shaker.value=0"))
+    balance = Bench().model(file).balance
+    assert balance.preload(cycle_at(file, balance, 290.0)) == pytest.approx(36.0, rel=1e-4)
 
 
 def test_a_joint_makes_another_reduction_and_a_cycle_is_that_of_the_run(monkeypatch):
@@ -107,9 +107,10 @@ def test_a_joint_makes_another_reduction_and_a_cycle_is_that_of_the_run(monkeypa
         assert (bench.reduced is plain) == ("wear=" in overrides)
     assert answers[1][0] < 0.99 * answers[0][0]
     assert answers[2] == pytest.approx(answers[1])
-    rig = Rig.of(scene_file.read("rig", RIG))
-    cycle = rig.cycle()
-    assert answers[0][1:] == pytest.approx([cycle.energy, cycle.preload], rel=1e-6)
+    file = scene_file.read("rig", RIG)
+    balance = Bench().model(file).balance
+    state = cycle_at(file, balance, 290.0)
+    assert answers[0][1:] == pytest.approx([balance.energy(state).sum(), balance.preload(state)], rel=1e-6)
 
 
 def test_a_wheel_has_the_frequencies_of_its_wave():

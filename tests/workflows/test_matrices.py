@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.helpers.command import leave
+from tests.helpers.matrix_scene import SCENE, matrix_folder
 from tests.helpers.verification_models import random_structure
-from tests.workflows.test_cli import leave
 from tribodyn.hbm import thesis_rule
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.branch import CONVERGED
@@ -26,58 +27,6 @@ from tribodyn.workflows.result import store
 from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import parse, read
-
-SCENE = """
-[scene]
-title = "Matrices of another program"
-
-[model]
-file = "part.npz"
-
-[contact]
-dofs = [[0, 1, 2], [3, 4, 5]]
-area = "10 mm2"
-tangential_stiffness = "2 N/um"
-normal_stiffness = "3 N/um"
-friction = 0.4
-
-[loads.static.press]
-dofs = [2, 5]
-value = "50 N"
-
-[loads.harmonic.shaker]
-dofs = [8]
-value = "20 N"
-
-[response]
-dofs = [9]
-frequency = ["35 Hz", "120 Hz"]
-points = 30
-
-[response.others.mid]
-dofs = [6, 7]
-
-[harmonics]
-kept = [0, 1, 2, 3]
-
-[wear]
-coefficient = "2e3 um3/J"
-step = "1 um"
-max_steps = 4
-"""
-
-
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """A folder with a scene and its matrices, and with lists that a scene may name."""
-    system = random_structure(2, n_extra=12).system
-    np.savez(
-        tmp_path / "part.npz", M=system.mass, K=system.stiffness, C=system.damping,
-        touching=np.arange(6).reshape(2, 3), areas=np.full((2, 1), 5e-6), tip=np.eye(18)[9], half=[0.5, 1.0, 1.5],
-        corners=np.array([[0.0, 0, 0], [1e-3, 0, 0]]),
-    )  # fmt: skip
-    (tmp_path / "own.toml").write_text(SCENE)
-    return tmp_path
 
 
 def test_a_scene_of_matrices_runs_to_wear_and_pictures(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -102,6 +51,12 @@ def test_a_scene_of_matrices_runs_to_wear_and_pictures(folder: Path, capsys: pyt
     code, out, _ = leave(["plan", str(folder / "own.toml")], capsys)
     assert code == 0
     assert "2 node pairs" in out
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with a scene and its matrices, and with lists that a scene may name."""
+    return matrix_folder(tmp_path)
 
 
 def test_the_scene_is_the_same_as_the_documented_python(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

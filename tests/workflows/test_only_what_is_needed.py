@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.helpers.matrix_scene import SCENE
 from tests.helpers.verification_models import random_structure
-from tests.workflows.test_matrices import SCENE
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis

@@ -5,19 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import matplotlib.image
 import numpy as np
 import pytest
 
+from tests.helpers.pictures import assert_not_blank
 from tests.helpers.synthetic_result import result
 from tribodyn.workflows.pictures import plots, render, view
-
-
-def assert_not_blank(path: Path) -> None:
-    picture = matplotlib.image.imread(path)[..., :3]
-    assert min(picture.shape[:2]) > 200
-    assert np.mean(np.any(picture < 0.9, axis=-1)) > 0.005
-    assert len(np.unique((picture * 255).astype(int).reshape(-1, 3), axis=0)) > 20
 
 
 def test_curves_and_maps(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.workflows.test_cli import leave
+from tests.helpers.command import leave
 from tribodyn.hbm.continuation import arc_length
 from tribodyn.workflows.run import modelling, pipeline, settings
 from tribodyn.workflows.run.progress import Progress

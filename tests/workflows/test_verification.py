@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.workflows.test_cli import leave
+from tests.helpers.command import leave
 from tribodyn.workflows.accuracy import verification
 from tribodyn.workflows.result import store
 from tribodyn.workflows.run import pipeline

@@ -63,6 +63,7 @@ __all__ = [
     "BranchStability",
     "Chatter",
     "Coexisting",
+    "Exposure",
     "FoldInTime",
     "HarmonicBalance",
     "Identification",

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tribodyn import Exposure
 from tribodyn.declare import number
-from tribodyn.hbm.wear_law import Exposure
 
 
 @dataclass(frozen=True)

@@ -111,8 +111,9 @@ def test_fitted_columns_stand_beside_the_published_ones():
 def test_the_scene_has_the_stiffnesses_that_suit_its_leaf_best():
     scene = scene_file.read("leaf_seal").scene
     p = leaf_fit.dimensions(scene)
-    leaf = leaf_fit.reduced_leaf(scene, p)
-    unit, spring, contact, errors = leaf_fit.stiffnesses(leaf, 7860 * p.angle * p.radius * p.height * p.thickness)
+    leaf = leaf_fit.reduced_leaf(p)
+    mass = 7860 * p["angle"] * p["radius"] * p["height"] * p["thickness"]
+    unit, spring, contact, errors = leaf_fit.stiffnesses(leaf, mass)
     assert spring == pytest.approx(scene.springs["left_pin"].stiffness, rel=0.05)  # rounding of the seat's width
     assert contact == pytest.approx(scene.contact.normal_stiffness, rel=0.01)
     assert unit == pytest.approx(160.0, rel=0.01)

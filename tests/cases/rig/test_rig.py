@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
+from tests.helpers.coarse_scenes import QUICK_RIG as QUICK
+from tests.helpers.coarse_scenes import RIG as COARSE
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.workflows.cases.rig import fit as rig_fit
 from tribodyn.workflows.cases.rig import published
@@ -16,22 +18,13 @@ from tribodyn.workflows.cases.rig import table as rig_table
 from tribodyn.workflows.cases.rig.cases import apart
 from tribodyn.workflows.cases.rig.joints import Modes, joints_of
 from tribodyn.workflows.cases.rig.model import Rig
-from tribodyn.workflows.cases.rig.time import held_by_force, in_time
+from tribodyn.workflows.cases.rig.time import in_time
 from tribodyn.workflows.cases.rig.wear import RigWear, wear_down
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.identification import Measured, Parameter, fit
-
-COARSE = (
-    "geometry.n_contact_length=3", "geometry.n_contact_width=5", "reduction.modes=6", "harmonics.kept=[0, 1]",
-    "harmonics.samples=32", "harmonics.transitions=sampled",
-)  # fmt: skip
-QUICK = (
-    *COARSE, "damping.modal=6 %", "wear.step=15 %", "wear.lost_below=30 %", "wear.max_steps=60",
-    "response.frequency=['270 Hz', '310 Hz']",
-)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +62,7 @@ def test_platform_height_and_mating_height_are_the_same_interference(rig):
 def test_lost_contact_is_the_open_rig(rig):
     references = linear_references(rig.model().balance, settings.OUTPUT, 2 * np.pi * 240, 2 * np.pi * 450)
     assert apart(rig, references) < 1e-3
-    worn = rig.with_opening(np.full(rig.plain.interface.n_pair, 1e-4)).cycle()
+    worn = rig.with_opening(np.full(rig.plain().interface.n_pair, 1e-4)).cycle()
     assert worn.energy == 0.0
     assert worn.preload == 0.0
 
@@ -80,7 +73,7 @@ def test_the_force_found_instead_of_the_height_makes_the_same_motion(rig):
     for kept in ((0, 1), (0, 1, 2, 3, 4, 5)):
         more = rig.with_harmonics(kept)
         cycle = more.cycle()
-        same = held_by_force(more, cycle).evaluate(rig.omega, cycle.state.x)
+        same = more.bench.held_by_force(more.file, cycle.state).evaluate(2 * np.pi * rig.frequency, cycle.state.x)
         assert np.abs(same.residual).max() < 1e-7 * np.abs(same.x).max()
         found = in_time(more, cycle)
         assert found.periodic
@@ -96,10 +89,10 @@ def test_the_force_found_instead_of_the_height_makes_the_same_motion(rig):
 
 def test_frequencies_of_the_joint_model_are_those_of_the_rig(rig, joints):
     """Other masters, the same rig: springs put in after the reduction or before it."""
-    system, stuck = rig.plain.system, modelling.contact_stiffness(rig.scene, rig.plain)
+    system, stuck = rig.plain().system, modelling.contact_stiffness(rig.scene, rig.plain())
     for K, state in (
         (system.stiffness, False),
-        (stuck_stiffness(system.stiffness, rig.plain.interface.B, stuck), True),
+        (stuck_stiffness(system.stiffness, rig.plain().interface.B, stuck), True),
     ):
         exact = np.sqrt(eigh(K, system.mass, eigvals_only=True, subset_by_index=[0, 2])) / (2 * np.pi)
         np.testing.assert_allclose(joints.modes({}, state).frequency[:3], exact, rtol=3e-3)

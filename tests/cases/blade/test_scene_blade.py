@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import scipy.linalg as sla
 
-from tests.workflows.test_pictures import assert_not_blank
+from tests.helpers.coarse_scenes import BLADE as COARSE
+from tests.helpers.pictures import assert_not_blank
 from tribodyn.fem.constraints import named
 from tribodyn.fem.cyclic import rotation
 from tribodyn.fem.elasticity import assemble
@@ -21,15 +22,6 @@ from tribodyn.workflows.result import store, summary
 from tribodyn.workflows.run import modelling, part_reduction, pipeline, planning
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
-
-COARSE = (
-    "geometry.n_span=4",
-    "geometry.n_side=1",
-    "geometry.n_root=1",
-    "reduction.cutoff=6 kHz",
-    "response.points=40",
-    "wear.step=40 %",
-)
 
 
 def built(folder, *overrides):

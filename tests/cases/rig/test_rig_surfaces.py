@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.workflows.test_cli import leave
+from tests.helpers.command import leave
 from tribodyn.geometry.surface_pair import synthetic_pair
 from tribodyn.workflows.scene import scene_file
 

@@ -7,26 +7,27 @@ import csv
 import numpy as np
 import pytest
 
-from tests.cases.test_scene_blade import COARSE
-from tests.workflows.test_pictures import assert_not_blank
+from tests.helpers.coarse_scenes import BLADE as COARSE
+from tests.helpers.pictures import assert_not_blank
+from tribodyn import build_wheel, critical_speeds
 from tribodyn.hbm import newton
 from tribodyn.hbm import travelling_wave as waves
 from tribodyn.hbm.branch import CONVERGED
-from tribodyn.workflows.cases.blade import mistuning as blade_mistuning
-from tribodyn.workflows.cases.blade import model as blade_model
 from tribodyn.workflows.cases.blade import study as blade_study
+from tribodyn.workflows.cases.blade.few_sectors import FEW_SECTORS
 from tribodyn.workflows.cases.blade.study import Extent
+from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene import scene_file
 
 SHORT = Extent(
     orders=(1, 20), loads=(0.02, 1.0), tolerance=0.02, steps=(0.6, 0.4), shown=0.4, frames=2, speeds=2
 )  # fmt: skip
-FEWER = (*blade_mistuning.FEW_SECTORS, "geometry.n_span=3", "harmonics.samples=32", "response.points=21")
+FEWER = (*FEW_SECTORS, "geometry.n_span=3", "harmonics.samples=32", "response.points=21")
 
 
 @pytest.fixture(scope="module")
 def blade():
-    return blade_model.build(scene_file.read("blade", COARSE))
+    return build_wheel(scene_file.read("blade", COARSE))
 
 
 def rows_of(path):
@@ -65,8 +66,8 @@ def test_diagram_of_blades_alone_and_stuck(blade):
 
 def test_critical_speeds_are_where_the_order_meets_its_frequency():
     speeds = np.linspace(0, 100, 11)
-    assert blade_study.critical_speeds(speeds, 100 + 1.0 * speeds, 3) == pytest.approx([50.0])
-    assert blade_study.critical_speeds(speeds, np.full(11, 500.0), 2) == []
+    assert critical_speeds(speeds, 100 + 1.0 * speeds, 3) == pytest.approx([50.0])
+    assert critical_speeds(speeds, np.full(11, 500.0), 2) == []
 
 
 def test_speed_stiffens_and_loads(blade):
@@ -94,8 +95,8 @@ def test_references_carry_the_load_of_their_curve(blade):
 
 def test_blades_alike_are_a_travelling_wave():
     """The wheel that the mistuned example solves, with no deviation, is the sector: same parts, same answer."""
-    blade = blade_model.build(scene_file.read("blade", FEWER))
-    one, wheel = blade.wave(), blade.whole_wheel()
+    blade = build_wheel(scene_file.read("blade", FEWER))
+    one, wheel = blade.wave(), blade.whole()
     exact = newton.NewtonOptions(tolerance=1e-11)
     mine, theirs = (newton.solve_from_rest(balance, 2 * np.pi * 1000, exact) for balance in (one, wheel))
     assert mine.outcome == theirs.outcome == CONVERGED
@@ -107,15 +108,15 @@ def test_blades_alike_are_a_travelling_wave():
 
 
 def test_mistuned_wheel(tmp_path, capsys):
-    factors = blade_mistuning.deviations(8)
-    assert factors.mean() == pytest.approx(1.0)
-    assert factors.std() == pytest.approx(blade_mistuning.SPREAD)
-    paths = blade_mistuning.run("blade", FEWER[-3:], tmp_path)
-    assert_not_blank(paths[1])
-    amplification = float(capsys.readouterr().out.split(": ")[1])
+    words = [word for text in FEWER[-3:] for word in ("--set", text)]
+    cli.app(["blade", "mistuned", "--out", str(tmp_path), *words], result_action="return_value")
+    said, *paths = capsys.readouterr().out.splitlines()
+    assert [path.rsplit("/", 1)[-1] for path in paths] == ["mistuned.csv", "mistuned.png"]
+    assert_not_blank(tmp_path / "mistuned.png")
+    amplification = float(said.split(": ")[1])
     assert 1.1 < amplification < 0.5 * (1 + np.sqrt(8)) * 1.2  # Whitehead's bound for a linear wheel, and some slack
 
 
 def test_a_part_alone_has_no_such_study():
     with pytest.raises(ValueError, match=r"beam has no \[wheel\]"):
-        blade_model.build(scene_file.read("beam"))
+        build_wheel(scene_file.read("beam"))

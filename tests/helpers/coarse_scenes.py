@@ -1,0 +1,18 @@
+"""Coarse settings of the blade and of the rig, for tests that need their scenes and not their numbers."""
+
+BLADE = (
+    "geometry.n_span=4",
+    "geometry.n_side=1",
+    "geometry.n_root=1",
+    "reduction.cutoff=6 kHz",
+    "response.points=40",
+    "wear.step=40 %",
+)
+RIG = (
+    "geometry.n_contact_length=3", "geometry.n_contact_width=5", "reduction.modes=6", "harmonics.kept=[0, 1]",
+    "harmonics.samples=32", "harmonics.transitions=sampled",
+)  # fmt: skip
+QUICK_RIG = (
+    *RIG, "damping.modal=6 %", "wear.step=15 %", "wear.lost_below=30 %", "wear.max_steps=60",
+    "response.frequency=['270 Hz', '310 Hz']",
+)  # fmt: skip
