@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import hashlib
 import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from scipy.sparse import eye_array
 
+from tests.helpers.digest import digest
 from tribodyn.fem.factor import factorise
 
 FRESH = """
 import sys
 from pathlib import Path
-from tests.fem.test_factor import digest
+from tests.helpers.digest import digest
 print(digest(Path(sys.argv[1])))
 """
 WORN = """
@@ -25,18 +24,6 @@ from tribodyn.fem.factor import factorise
 some = sp.random(300, 300, 0.05, random_state=0)
 factorise(some @ some.T + 10 * sp.eye(300)).solve(np.ones(300))
 """
-
-
-def digest(folder: Path) -> str:
-    """Of the reduced matrices of a small beam."""
-    from tribodyn.workflows.run import modelling
-    from tribodyn.workflows.run.progress import Progress
-    from tribodyn.workflows.scene.scene_file import read
-
-    small = ("geometry.n_patch=5", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=4", "wear=")
-    system = modelling.build(read("beam", small), folder, Progress()).reduced.system
-    both = np.ascontiguousarray(np.concatenate([np.asarray(system.stiffness), np.asarray(system.mass)]))
-    return hashlib.sha256(both.tobytes()).hexdigest()
 
 
 def test_an_unknown_solver_is_refused() -> None:

@@ -1,6 +1,6 @@
 """Run a scene in a fresh interpreter and tell as JSON what it imported, factorised, allocated and stored.
 
-python -m tests.run_probe SCENE [section.key=value ...]
+python -m tests.helpers.run_probe SCENE [section.key=value ...]
 """
 
 from __future__ import annotations

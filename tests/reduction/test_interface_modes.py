@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.reduction.test_craig_bampton import make
+from tests.helpers.coarse_beam import make
 from tribodyn.hbm.operating_point import AtPeak, OperatingPoint
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.interface_modes import interface_modes

@@ -151,7 +151,7 @@ def test_a_run_killed_again_and_again_at_its_last_row_keeps_one_of_it(
 def test_ten_kills_at_random_moments_change_no_bit(rule: str, tmp_path: Path) -> None:
     overrides = (*SMALL, f"wear.rule={rule}", "wear.step=40 %", "wear.tolerance=0.2", "wear.lost_below=0.01")
     server = multiprocessing.get_context("forkserver")
-    server.set_forkserver_preload(["tests.killed_runs"])
+    server.set_forkserver_preload(["tests.helpers.killed_runs"])
     undisturbed = server.Process(target=go_on, args=(tmp_path, overrides))
     undisturbed.start()
     undisturbed.join()
