@@ -45,7 +45,7 @@ def test_every_name_is_there_and_is_told_once() -> None:
         if isinstance(line, ast.ImportFrom)
         for alias in line.names
     }
-    assert sorted(td.__all__) == list(td.__all__) == sorted({*typed, "__version__"})
+    assert sorted(td.__all__) == sorted({*typed, "__version__"})
     for name in td.__all__:
         assert getattr(td, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
