@@ -61,14 +61,17 @@ class JointSprings:
 def joint_springs(file: SceneFile, probes: Mapping[str, tuple[str, str]] | None = None) -> JointSprings:
     """Reduce the part of a scene with the nodes of all its springs kept.
 
-    probes : name -> group and axis, such as ("tip", "y"), of displacements that are observed beside the response
+    probes : name -> group and axis, such as ("tip", "y"), of displacements that are observed beside the response;
+        those of the scene by default
     Raises  ValueError for a scene without springs
     """
     scene = file.part_scene
     if not scene.springs:
         raise ValueError(f"{file.name} has no springs whose stiffness could change: add a table such as [springs.seat]")
     axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-    others = {name: Output(group=group, direction=axes[axis]) for name, (group, axis) in (probes or {}).items()}
+    others = scene.response.others
+    if probes is not None:
+        others = {name: Output(group=group, direction=axes[axis]) for name, (group, axis) in probes.items()}
     changes: dict[str, Any] = {"springs": {}, "prescribed": {}}
     bare = scene.model_copy(update={**changes, "response": scene.response.model_copy(update={"others": others})})
     with TemporaryDirectory() as folder:
