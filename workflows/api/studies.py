@@ -204,7 +204,7 @@ def wear(file: SceneFile, balance: HarmonicBalance) -> WearHistory:
 def impact_work(balance: HarmonicBalance, state: State) -> np.ndarray:
     """(n_pair,) work of impacts at the contact per cycle [J]."""
     n = balance.contact.n_pair
-    return impact.impact_work(Exposure(balance, state, np.ones(n), np.ones(n), np.zeros(n), 0.0))
+    return impact.impact_work(Exposure(balance, state, np.ones(n), {}, np.zeros(n), 0.0))
 
 
 def verify_in_time(balance: HarmonicBalance, state: State, options: TimeOptions) -> Verification:
