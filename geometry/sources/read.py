@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tribodyn.geometry.sources import abaqus_cards, msh, solid
+from tribodyn.geometry.sources import abaqus_cards, ansys, general, msh, nastran, solid
 from tribodyn.geometry.sources.cells import common_name, is_first_order
 from tribodyn.geometry.sources.deck import Deck, in_si
 from tribodyn.geometry.sources.raw import RawMesh
@@ -19,7 +19,13 @@ from tribodyn.geometry.sources.solid import Body
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
 POUND = 4.4482216152605  # [N], the force of decks in inches and feet
-READERS: dict[str, Callable[[Path], RawMesh]] = {".msh": msh.read, ".inp": abaqus_cards.read}
+READERS: dict[str, Callable[[Path], RawMesh]] = {
+    ".msh": msh.read,
+    ".inp": abaqus_cards.read,
+    **dict.fromkeys((".bdf", ".nas", ".dat"), nastran.read),
+    ".cdb": ansys.read,
+    **dict.fromkeys((".vtk", ".vtu", ".med"), general.read),
+}
 
 
 @dataclass(frozen=True)
@@ -65,7 +71,13 @@ def read_raw(path: str | Path, unit: str = "m") -> RawMesh:
             f"mesh file '{path}' cannot be read, its ending is none of {', '.join(sorted(READERS))}: "
             "write it as a Gmsh file, MSH 4.1"
         )
-    raw = reader(file)
+    try:
+        raw = reader(file)
+    except (IndexError, KeyError) as problem:
+        where = f"near {problem.args[0]!r}" if isinstance(problem, KeyError) else "in the middle of a line"
+        raise ValueError(
+            f"mesh file '{path}' cannot be read {where}: it is cut off or broken, write it again"
+        ) from None
     if not raw.cells:
         raise ValueError(f"mesh file '{path}' has no volume elements: mesh the volume, a surface alone has no mass")
     return scaled(raw, UNITS[unit], POUND if unit in ("in", "ft") else 1.0)

@@ -63,6 +63,8 @@ def full(cells: Cells, points: np.ndarray) -> Full:
         ends = np.array(solid.edges)
         positions[:, n_corner : n_corner + n_edge] = (corner[:, ends[:, 0]] + corner[:, ends[:, 1]]) / 2
     edge_of = {frozenset(edge): n_corner + i for i, edge in enumerate(solid.edges)}
+    if has_edges:
+        _check_between(solid, positions, cells)
     if not has_quads:
         for i, quad in enumerate(solid.quads):
             around = [edge_of[frozenset(pair)] for pair in zip(quad, quad[1:] + quad[:1], strict=True)]
@@ -72,6 +74,20 @@ def full(cells: Cells, points: np.ndarray) -> Full:
         edges = positions[:, n_corner : n_corner + n_edge]
         positions[:, -1] = edges.sum(axis=1) / 4 - corner.sum(axis=1) / 4
     return Full(solid, rows, positions)
+
+
+def _check_between(solid: Solid, positions: np.ndarray, cells: Cells) -> None:
+    """Refuse edge nodes that lie nowhere near their edge: the file counts them in another order."""
+    ends = np.array(solid.edges)
+    a, b = positions[:, ends[:, 0]], positions[:, ends[:, 1]]
+    middle = positions[:, solid.corners : solid.corners + len(ends)]
+    off = np.linalg.norm(middle - (a + b) / 2, axis=2) > 0.5 * np.linalg.norm(b - a, axis=2)
+    if off.any():
+        label = cells.labels[off.any(axis=1).argmax()]
+        raise ValueError(
+            f"element {label} ({cells.kind}) has an edge node away from its edge: "
+            "the nodes are in another order than the format's, or the mesh is folded"
+        )
 
 
 @dataclass(frozen=True)
