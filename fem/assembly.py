@@ -45,7 +45,7 @@ class Assembly:
     points : (n_point, 3) reference points [m]; each counts as two nodes, the first for its translation, the second for
         its rotation [rad] about x, y, z
     doflocs, boundaries, subdomains, nelements : as of a mesh; facets and elements are numbered body by body
-    node_sets : "body.group" -> nodes; "body" -> all nodes of a body
+    node_sets : "body.group" -> nodes; "body" -> all nodes of a body; "point" and "point.turn" of a reference point
     Raises  ValueError where two bodies have one name
     """
 
@@ -68,16 +68,19 @@ class Assembly:
         self.boundaries: dict[str, np.ndarray] = {}
         self.subdomains: dict[str, np.ndarray] = {}
         for body, piece in zip(self.bodies, self.pieces, strict=True):
-            self.node_sets[body.name] = piece.node + np.arange(body.mesh.doflocs.shape[1])
-            self.subdomains[body.name] = piece.element + np.arange(body.mesh.t.shape[1])
+            prefix = f"{body.name}." if body.name else ""
+            if body.name:
+                self.node_sets[body.name] = piece.node + np.arange(body.mesh.doflocs.shape[1])
+                self.subdomains[body.name] = piece.element + np.arange(body.mesh.t.shape[1])
             for own, shared, start in (
                 (body.node_sets, self.node_sets, piece.node),
                 (body.mesh.boundaries or {}, self.boundaries, piece.facet),
                 (body.mesh.subdomains or {}, self.subdomains, piece.element),
             ):
-                shared.update({f"{body.name}.{name}": np.asarray(of) + start for name, of in own.items()})
-        for name, (node, _) in self.points.items():
+                shared.update({f"{prefix}{name}": np.asarray(of) + start for name, of in own.items()})
+        for name, (node, turn) in self.points.items():
             self.node_sets[name] = np.array([node])
+            self.node_sets[f"{name}.turn"] = np.array([turn])
 
     @property
     def material(self) -> dict[str, Materials]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -38,7 +39,7 @@ def factorise(K: Any, definite: bool = True, solver: str | None = None) -> Facto
         raise ValueError(f"no solver '{solver}': there are pardiso, superlu")
     try:
         factor: Factor = Pardiso(K, definite) if solver == "pardiso" else SuperLU(K)
-        regular = softest_residual(K, factor) < SINGULAR
+        regular = softest_residual(K, factor.solve) < SINGULAR
     except (RuntimeError, ArithmeticError):
         regular = False
     if not regular:
@@ -49,7 +50,7 @@ def factorise(K: Any, definite: bool = True, solver: str | None = None) -> Facto
     return factor
 
 
-def softest_residual(K: csr_matrix, factor: Factor) -> float:
+def softest_residual(K: Any, solve: Callable[[np.ndarray], np.ndarray]) -> float:
     """|K x - b| / |b| for b along the softest direction, found by two inverse iterations from a fixed start.
 
     A rigid-body motion cannot be balanced by K, whatever the factorisation made of its pivots.
@@ -58,7 +59,7 @@ def softest_residual(K: csr_matrix, factor: Factor) -> float:
     residual = np.inf
     for _ in range(2):
         b = x / np.linalg.norm(x)
-        x = factor.solve(b)
+        x = solve(b)
         residual = float(np.linalg.norm(K @ x - b))
         if not np.isfinite(residual) or not x.any():
             return np.inf

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from tribodyn.fem.assembly import Assembly
 from tribodyn.fem.constraints import named
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.surface import face_integrals, facet_nodes, outside
@@ -21,38 +22,64 @@ class Load(Protocol):
 
 @dataclass(frozen=True)
 class NodalForce:
-    """A resultant of 1 N in a direction, shared evenly by a node set.
+    """A resultant of 1 N in a direction, shared by a node set.
 
     As an output the same vector observes the mean displacement of the set in that direction [m/m].
     nodes : name of the node set; direction : (3,), need not be a unit vector
+    shared : "nodes" for evenly; "area" for the consistent forces of a uniform traction where the set is a face
     """
 
     nodes: str
     direction: Sequence[float]
+    shared: str = "nodes"
 
     def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any = None) -> np.ndarray:
         """Force vector (3 n_node,) [N/N]."""
         nodes = named(node_sets, self.nodes)
         force = np.zeros((mesh.doflocs.shape[1], 3))
-        force[nodes] = unit(self.direction, f"the direction at node set '{self.nodes}'") / len(nodes)
+        direction = unit(self.direction, f"the direction at node set '{self.nodes}'")
+        if self.shared == "area" and self.nodes in (mesh.boundaries or {}):
+            facets = mesh.boundaries[self.nodes]
+            shares = face_integrals(mesh, facets)[0]
+            np.add.at(force, facet_nodes(mesh, facets), shares[:, :, None] / shares.sum() * direction)
+        else:
+            force[nodes] = direction / len(nodes)
         return force.ravel()
 
 
 @dataclass(frozen=True)
 class Couple:
-    """1 N in a direction on one node set and 1 N against it on another, each shared evenly: a torque without resultant.
+    """1 N in a direction on one node set and 1 N against it on another: a torque without resultant.
 
-    nodes, opposite : names of the node sets; direction : (3,), need not be a unit vector
+    nodes, opposite : names of the node sets; direction : (3,), need not be a unit vector; shared : as of NodalForce
     """
 
     nodes: str
     opposite: str
     direction: Sequence[float]
+    shared: str = "nodes"
 
     def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any = None) -> np.ndarray:
         """Force vector (3 n_node,) [N/N]."""
-        pair = [NodalForce(name, self.direction).vector(mesh, node_sets) for name in (self.nodes, self.opposite)]
-        return pair[0] - pair[1]
+        one, two = (NodalForce(name, self.direction, self.shared) for name in (self.nodes, self.opposite))
+        return one.vector(mesh, node_sets) - two.vector(mesh, node_sets)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """1 N m about a direction on a reference point of an assembly. point : its name; direction : (3,)."""
+
+    point: str
+    direction: Sequence[float]
+
+    def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any = None) -> np.ndarray:
+        """Force vector (3 n_node,) [N m/N m]; raises ValueError where there is no such point."""
+        points = mesh.points if isinstance(mesh, Assembly) else {}
+        if self.point not in points:
+            raise ValueError(f"a moment acts on the point of a coupling, but '{self.point}' is none; couple the group")
+        moment = np.zeros((mesh.doflocs.shape[1], 3))
+        moment[points[self.point][1]] = unit(self.direction, f"the direction of the moment on '{self.point}'")
+        return moment.ravel()
 
 
 @dataclass(frozen=True)

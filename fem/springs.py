@@ -47,7 +47,7 @@ class Spring:
 
     def elongation(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> tuple[csr_matrix, np.ndarray]:
         """Map (n, 3 n_node) from DOFs to the elongations of the shares, and the shares (n,), which sum to one."""
-        nodes, share = _shares(mesh, node_sets, self.nodes)
+        nodes, share = shares(mesh, node_sets, self.nodes)
         direction = unit(self.direction, f"the direction of the spring at '{self.nodes}'")
         rows = np.repeat(np.arange(len(nodes)), 3)
         shape = (len(nodes), 3 * mesh.doflocs.shape[1])
@@ -76,7 +76,7 @@ class Spring:
         return others[place]
 
 
-def _shares(mesh: Any, node_sets: Mapping[str, np.ndarray], name: str) -> tuple[np.ndarray, np.ndarray]:
+def shares(mesh: Any, node_sets: Mapping[str, np.ndarray], name: str) -> tuple[np.ndarray, np.ndarray]:
     """Nodes of a set and the part of a stiffness that each one takes."""
     faces = mesh.boundaries or {}
     if name in faces:
@@ -114,6 +114,6 @@ class Mass:
         else:
             if any(self.inertia):
                 raise ValueError(f"mass at '{self.at}': only a coupling's point has an inertia; couple the set")
-            nodes, share = _shares(mesh, node_sets, self.at)
+            nodes, share = shares(mesh, node_sets, self.at)
             diagonal[nodes] = self.mass * share[:, None]
         return csr_matrix(diags_array(diagonal.ravel()))

@@ -217,14 +217,15 @@ def _of_harmonics(scene: Scene) -> list[Knob]:
     more = ("harmonics.samples=128",) if scene.harmonics.samples < 128 else ()
     kept = tuple(Setting(top, (f"harmonics.kept={list(range(first, top + 1))}", *more)) for top in tops)
     found = [Knob("harmonics", kept, worn_up_to=WORN_TOP)] if len(kept) > 1 else []
-    if hasattr(law.load(scene.contact.law_name), "located"):
+    if all(hasattr(law.load(contact.law_name), "located") for contact in scene.joints.values()):
         top = max(scene.harmonics.kept, default=1)
         sampled = tuple(
             Setting(n, (f"harmonics.samples={n}", 'harmonics.transitions="sampled"')) for n in SAMPLES if n > 2 * top
         )
         located = ("harmonics.samples=128", 'harmonics.transitions="located"')
         found.append(Knob("samples", (*sampled, Setting(EXACT, located))))
-    if scene.contact.components == ("t1", "t2", "n") and scene.contact.law == "jenkins":
+    one = scene.joints.get("contact")
+    if one is not None and one.components == ("t1", "t2", "n") and one.law == "jenkins":
         common = ["harmonics.samples=256", 'harmonics.transitions="sampled"']
         if scene.wear is not None:  # the error-controlled rule solves for depth and knows no planar slider
             common += ['wear.rule="thesis"', f"wear.step={WEAR_STEPS[0]:g}"]

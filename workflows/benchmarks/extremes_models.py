@@ -72,7 +72,7 @@ def beam(n_patch: int) -> Body:
     file = scene_file.read("beam", (f"geometry.n_patch={n_patch}", "damping="))
     with TemporaryDirectory() as folder:
         model = modelling.build(file, Path(folder), Progress())
-    contact, loads = file.scene.contact, model.balance.excitation.loads
+    contact, loads = file.part_scene.contact, model.balance.excitation.loads
     tangential, normal = contact.tangential_stiffness or 0.0, contact.normal_stiffness or 0.0
     ordinary = Setting(
         tangential, normal, contact.numbers["friction"], abs(loads[0, "press"]), abs(loads[1, "shake"]), 2 * np.pi * 860

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 import numpy as np
 from scipy.spatial import cKDTree
 
+from tribodyn.fem.assembly import pieces
 from tribodyn.fem.part import Part
 from tribodyn.geometry import mesh as mesh_reader
 from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation
@@ -17,7 +18,7 @@ from tribodyn.version import package_version
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
 from tribodyn.workflows.run.references import delta_max, free_deflection
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.scene.schema import MeshScene
 
 VTK_KIND = {27: ("hexahedron27", "triquadratic_hexahedron"), 10: ("tetra10", "quadratic_tetra")}
 PACKAGES = ("tribodyn", "numpy", "scipy", "numba", "scikit-fem", "gmsh", "meshio", "h5py", "pydantic")
@@ -46,7 +47,7 @@ def described(
         facts |= {
             "elements": int(part.mesh.nelements),
             "nodes": len(part.points),
-            "scaled_jacobian": mesh_reader.quality(part.mesh).scaled_jacobian,
+            "scaled_jacobian": min(mesh_reader.quality(piece.mesh).scaled_jacobian for piece in pieces(part.mesh)),
         }
     if "factorisation" in reduced.info:  # reduced here, not as the matrices came
         facts |= {
@@ -58,7 +59,7 @@ def described(
         facts |= {"interface_modes": int(str(reduced.info["n_interface_modes"]))}
     if file.scene.wear is not None:
         facts |= {"delta_max_m": delta_max(file.scene, free, i.area), "wear_split": file.scene.wear.split}
-    if isinstance(file.scene, PartScene) and (around := file.scene.wheel) is not None:
+    if isinstance(file.scene, MeshScene) and (around := file.scene.wheel) is not None:
         facts |= {"sectors": around.sectors, "engine_order": around.engine_order, "axis": np.array(around.axis)}
     if choice is not None:
         facts |= {"harmonics_error": choice.estimate.error, "harmonics_choice": choice.outcome}
@@ -83,9 +84,14 @@ def provenance(file: SceneFile) -> dict[str, str]:
     }
 
 
-def part_mesh(part: Part) -> PartMesh:
-    """The mesh of a part in the node order of VTK."""
-    cells = part.mesh.dofs.element_dofs.T
-    reference, kind = VTK_KIND[cells.shape[1]]
-    to_vtk = permutation(part.mesh.elem.doflocs, REFERENCE_POINTS[reference])
-    return PartMesh(kind, part.points, cells[:, to_vtk])
+def part_mesh(part: Part) -> PartMesh | None:
+    """The mesh of a part in the node order of VTK; None where its bodies are of different elements."""
+    found = []
+    for piece in pieces(part.mesh):
+        cells = piece.mesh.dofs.element_dofs.T
+        reference, kind = VTK_KIND[cells.shape[1]]
+        to_vtk = permutation(piece.mesh.elem.doflocs, REFERENCE_POINTS[reference])
+        found.append((kind, piece.node + cells[:, to_vtk]))
+    if len({kind for kind, _ in found}) > 1:
+        return None
+    return PartMesh(found[0][0], part.points, np.concatenate([cells for _, cells in found]))

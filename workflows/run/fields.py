@@ -25,7 +25,7 @@ def with_shown(scene: Scene, result: Result, balance: HarmonicBalance, part: Par
     rows, numbers = result.wear.rows(), replace(result, fields=None).shown_rows()
     if scene.pictures.renders and part is not None:
         result = replace(result, fields=displacement_fields(balance, part, rows, numbers))
-    if scene.pictures.plots and any(component != "n" for component in scene.contact.components):
+    if scene.pictures.plots and any(c != "n" for contact in scene.joints.values() for c in contact.components):
         result = replace(result, loops=hysteresis_loops(balance, rows, numbers))
     return result
 

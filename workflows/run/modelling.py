@@ -11,13 +11,14 @@ import numpy as np
 
 from tribodyn.fem import part as fem_part
 from tribodyn.fem.constraints import Clamp, NoMeanRotation
+from tribodyn.fem.elements import coordinates
 from tribodyn.fem.interface import COMPONENTS
-from tribodyn.fem.loads import Centrifugal, Couple, Load, NodalForce, Pressure
+from tribodyn.fem.loads import BodyForce, Centrifugal, Couple, Load, Moment, NodalForce, Pressure
+from tribodyn.fem.material import Material
 from tribodyn.fem.part import Part
 from tribodyn.fem.springs import Spring
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.geometry import mesh as mesh_reader
-from tribodyn.geometry import parts
+from tribodyn.fem.thermal import Heating, temperature_at
 from tribodyn.hbm import law
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact_stiffness import rectangular_punch
@@ -29,12 +30,14 @@ from tribodyn.reduction.damping import modal_damping, rayleigh
 from tribodyn.reduction.held import hold
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ReducedModel
-from tribodyn.workflows.run import curve, matrix_model, part_reduction, settings
+from tribodyn.workflows.run import bodies, curve, matrix_model, part_reduction, settings
 from tribodyn.workflows.run.contact_surfaces import surface_gap
 from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.contact import Contact, FaceContact
 from tribodyn.workflows.scene.matrices import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.schema import CENTRIFUGAL, HIGHEST, PartScene, Scene, StaticLoad
+from tribodyn.workflows.scene.schema import CENTRIFUGAL, HIGHEST, MeshScene, PartScene, Scene, StaticLoad
+from tribodyn.workflows.scene.structure import StructureScene
 
 NO_GAP = 1e-12  # [m], rounding of node positions
 TOLERANCE = 0.01  # of the response, where a scene leaves the choice of harmonics
@@ -67,12 +70,12 @@ def build(file: SceneFile, folder: Path, progress: Progress, chosen: tuple[int, 
         with progress.stage("mesh"):
             mesh, node_sets = make_mesh(file, folder)
         with progress.stage("mass and stiffness"):
-            part = make_part(file.part_scene, mesh, node_sets)
-        part, repairs = with_surfaces(file.part_scene, part, file.folder)
+            part = make_part(file.mesh_scene, mesh, node_sets, file.folder)
+        part, repairs = with_surfaces(file.mesh_scene, part, file.folder)
         for sentence in repairs:
             progress.say(sentence)
         with progress.stage("reduction"):
-            reduced = reduce_part(file.part_scene, part)
+            reduced = reduce_part(file.mesh_scene, part)
     with progress.stage("choice of harmonics" if scene.harmonics.automatic and not chosen else "contact compliance"):
         model = make_model(scene, part, reduced, chosen)
     if model.choice is not None:
@@ -82,24 +85,28 @@ def build(file: SceneFile, folder: Path, progress: Progress, chosen: tuple[int, 
 
 def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]]:
     """The mesh with its node sets: read from the scene's file, or built from the part and kept in `folder`."""
-    geometry = file.part_scene.geometry
-    if geometry.mesh is not None:
-        return mesh_reader.read(file.folder / geometry.mesh)
-    assert geometry.part_name is not None
-    part, path = parts.load(geometry.part_name), folder / "mesh.msh"
-    part.build(part.Parameters(**geometry.parameters), path)
-    return mesh_reader.read(path)
+    scene = file.mesh_scene
+    if isinstance(scene, StructureScene):
+        whole = bodies.assembly(scene, file.folder, folder)
+        return whole, whole.node_sets
+    return bodies.geometry_mesh(file.part_scene.geometry, file.folder, folder)
 
 
-def make_part(scene: PartScene, mesh: Any, node_sets: dict[str, np.ndarray]) -> Part:
-    """Mass, stiffness, loads, outputs and contact of the mesh, held where the scene says."""
-    loads = {name: make_load(load) for name, load in {**scene.loads.static, **scene.loads.harmonic}.items()}
+def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], folder: Path | None = None) -> Part:
+    """Mass, stiffness, loads, outputs and contact of the mesh, held where the scene says; its files are in `folder`."""
+    material = part_reduction.material(scene, mesh)
+    loads = {
+        name: make_load(load, mesh, material, folder or Path())
+        for name, load in {**scene.loads.static, **scene.loads.harmonic}.items()
+    }
     if scene.wheel is not None and scene.wheel.speed:
         loads[CENTRIFUGAL] = Centrifugal(scene.wheel.axis)
+    geometry = scene.geometry if isinstance(scene, PartScene | StructureScene) else None
+    turning = None if geometry is None else geometry.no_turning
     return fem_part.build(
         mesh,
         node_sets,
-        part_reduction.material(scene),
+        material,
         clamps(scene),
         part_reduction.contacts(scene),
         loads,
@@ -108,11 +115,13 @@ def make_part(scene: PartScene, mesh: Any, node_sets: dict[str, np.ndarray]) -> 
             for name, output in {settings.OUTPUT: scene.response, **scene.response.others}.items()
         },
         springs=springs(scene),
-        held=[] if scene.geometry.no_turning is None else [NoMeanRotation(scene.geometry.no_turning)],
+        held=[] if turning is None else [NoMeanRotation(turning)],
+        constraints=bodies.constraints(scene) if isinstance(scene, StructureScene) else (),
+        masses=bodies.masses(scene) if isinstance(scene, StructureScene) else (),
     )
 
 
-def with_surfaces(scene: PartScene, part: Part, folder: Path) -> tuple[Part, tuple[str, ...]]:
+def with_surfaces(scene: MeshScene, part: Part, folder: Path) -> tuple[Part, tuple[str, ...]]:
     """The part with the waviness of measured faces in its gap, and a sentence for each repair of a height map."""
     if scene.surfaces is None:
         return part, ()
@@ -120,29 +129,43 @@ def with_surfaces(scene: PartScene, part: Part, folder: Path) -> tuple[Part, tup
     return replace(part, interface=replace(part.interface, gap=part.interface.gap + measured.gap)), measured.repairs
 
 
-def clamps(scene: PartScene) -> list[Clamp]:
+def clamps(scene: MeshScene) -> list[Clamp]:
     """What holds the part, whole groups or along some axes."""
+    if isinstance(scene, StructureScene):
+        return bodies.clamps(scene)
+    assert isinstance(scene, PartScene)
     geometry = scene.geometry
     return [*(Clamp(group) for group in geometry.fixed), *(Clamp(*item) for item in geometry.fixed_axes.items())]
 
 
-def springs(scene: PartScene) -> list[Spring]:
+def springs(scene: MeshScene) -> list[Spring]:
     """Joints that give way."""
     return [Spring(s.group, s.direction, s.stiffness, s.opposite) for s in scene.springs.values()]
 
 
-def make_load(load: StaticLoad) -> Load:
-    """A force at the nodes of a group, a couple of two forces, or a pressure on a face."""
-    if load.direction is None:
+def make_load(load: StaticLoad, mesh: Any, material: Any, folder: Path) -> Load:
+    """The load of a table of a scene, per unit of its amplitude; its file is in `folder`."""
+    if load.pressure is not None:
         return Pressure(load.group)
+    if load.direction is None:
+        values = None if load.field is None else temperature_at(folder / load.field, coordinates(mesh))
+        return Heating(material, load.bodies, values)
+    if load.acceleration is not None or load.base_acceleration is not None:
+        along = 1.0 if load.acceleration is not None else -1.0
+        return BodyForce([along * c for c in load.direction])
+    if load.speed is not None:
+        return Centrifugal(load.direction, load.point)
+    if load.moment is not None:
+        return Moment(load.group, load.direction)
     if load.opposite is not None:
-        return Couple(load.group, load.opposite, load.direction)
-    return NodalForce(load.group, load.direction)
+        return Couple(load.group, load.opposite, load.direction, load.shared)
+    return NodalForce(load.group, load.direction, load.shared)
 
 
-def reduce_part(scene: PartScene, part: Part) -> ReducedModel:
+def reduce_part(scene: MeshScene, part: Part) -> ReducedModel:
     """The part on its contact and load nodes and a few modes, damped and held as the scene says."""
-    reduced = damped(scene, hold(part_reduction.reduce(scene, part), part.held))
+    reduced = hold(part_reduction.reduce(scene, part), part.held)
+    reduced = damped(scene, replace(reduced, info={**reduced.info, "joints": dict(part.joints)}))
     return part_reduction.with_prescribed(scene, part, reduced)
 
 
@@ -168,31 +191,63 @@ def damping_matrix(scene: Scene, springs: np.ndarray, system: SecondOrderSystem,
 
 
 def contact_stiffness(scene: Scene, reduced: ReducedModel) -> np.ndarray:
-    """Contact springs (n_pair, n_component) [N/m]; those of a punch in shear along t1 serve both tangents."""
-    if isinstance(scene, PartScene) and scene.contact.punch is not None:
-        body = (scene.material.young, scene.material.poisson)
-        normal, tangential = rectangular_punch(*scene.contact.punch, *body, *body)
-        return reduced.interface.stiffness(tangential, normal)
-    return reduced.interface.stiffness(scene.contact.tangential_stiffness or 0.0, scene.contact.normal_stiffness or 0.0)
+    """Contact springs (n_pair, n_component) [N/m], each joint's shared by its areas; zero where it models nothing."""
+    interface = reduced.interface
+    k = np.zeros((interface.n_pair, len(interface.components)))
+    for name, pairs in joint_pairs(scene, reduced).items():
+        contact = scene.joints[name]
+        tangential, normal = joint_stiffness(scene, contact)
+        total = {"t1": tangential, "t2": tangential, "n": normal}
+        along = [total[c] if c in contact.components else 0.0 for c in interface.components]
+        k[pairs] = np.outer(interface.area[pairs] / interface.area[pairs].sum(), along)
+    return k
+
+
+def joint_pairs(scene: Scene, reduced: ReducedModel) -> dict[str, slice]:
+    """Pairs of every joint; all of them where there is one."""
+    if len(scene.joints) == 1:
+        return {name: slice(0, reduced.interface.n_pair) for name in scene.joints}
+    found = reduced.info.get("joints", {})
+    assert isinstance(found, dict)
+    return found
+
+
+def joint_stiffness(scene: Scene, contact: Contact) -> tuple[float, float]:
+    """Tangential and normal stiffness of a joint [N/m]; those of a punch in shear along t1 serve both tangents."""
+    if isinstance(contact, FaceContact) and contact.punch is not None:
+        first = elastic(scene, contact.groups[0])
+        second = first if contact.opposite is None else elastic(scene, contact.opposite)
+        normal, tangential = rectangular_punch(*contact.punch, *first, *second)
+        return tangential, normal
+    return contact.tangential_stiffness or 0.0, contact.normal_stiffness or 0.0
+
+
+def elastic(scene: Scene, face: str) -> tuple[float, float]:
+    """Young's modulus [Pa] and Poisson's ratio of the body that a face belongs to.
+
+    Raises  ValueError where it is orthotropic or of several materials
+    """
+    if isinstance(scene, PartScene | StructureScene) and scene.material is not None:
+        return scene.material.young, scene.material.poisson
+    assert isinstance(scene, StructureScene)
+    body = scene.bodies[face.partition(".")[0]]
+    solid = None if not isinstance(body.material, str) else bodies.solid(scene.materials[body.material])
+    if not isinstance(solid, Material):
+        raise ValueError(f"the punch on '{face}' needs a body of one isotropic material: give its stiffness")
+    return solid.E, solid.nu
 
 
 def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: tuple[int, ...] = ()) -> Model:
     """The harmonic balance of the scene; harmonics are those it names, else `chosen`, else chosen here."""
-    contact, harmonics = scene.contact, scene.harmonics
-    parameters = law.ContactParameters.of(
-        contact.components,
-        contact_stiffness(scene, reduced),
-        gap=reduced.interface.gap,
-        **contact.numbers,
-    )
+    harmonics, gap = scene.harmonics, reduced.interface.gap
+    joints = make_joints(scene, reduced)
 
     def balance(kept: tuple[int, ...]) -> HarmonicBalance:
         basis = HarmonicBasis(kept, harmonics.samples, harmonics.transitions)
-        if not basis.has_static and np.any(np.abs(parameters.gap) > NO_GAP):
+        if not basis.has_static and np.any(np.abs(gap) > NO_GAP):
             raise ValueError("the contact has gaps, which act in harmonic 0: keep it in harmonics.kept")
-        base = ground_motion(scene, part, basis) if isinstance(scene, PartScene) and part is not None else None
-        joint = Joint("contact", contact.law_name, parameters)
-        return HarmonicBalance.of(reduced, joint, basis, excite(scene, base), settings.response_range(scene)[1])
+        base = ground_motion(scene, part, basis) if isinstance(scene, MeshScene) and part is not None else None
+        return HarmonicBalance.of(reduced, joints, basis, excite(scene, base), settings.response_range(scene)[1])
 
     choice = None
     if harmonics.automatic and not chosen:
@@ -208,10 +263,24 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
     return Model(part, reduced, balance(harmonics.kept or chosen), choice)
 
 
+def make_joints(scene: Scene, reduced: ReducedModel) -> list[Joint]:
+    """Every joint with its law and that law's parameters."""
+    springs, interface = contact_stiffness(scene, reduced), reduced.interface
+    found = []
+    for name, pairs in joint_pairs(scene, reduced).items():
+        contact = scene.joints[name]
+        seen = [interface.components.index(c) for c in contact.components]
+        parameters = law.ContactParameters.of(
+            contact.components, springs[pairs][:, seen], gap=interface.gap[pairs], **contact.numbers
+        )
+        found.append(Joint(name, contact.law_name, parameters, pairs))
+    return found
+
+
 def excite(scene: Scene, base: np.ndarray | None) -> Excitation:
     """The loads of the scene, F cos(h w t + phase) as amplitude F exp(i phase), and the motion of the ground."""
     loads: dict[tuple[int, str], complex] = {(0, name): load.amplitude for name, load in scene.loads.static.items()}
-    if isinstance(scene, PartScene):
+    if isinstance(scene, MeshScene):
         loads |= {(0, name): given.displacement for name, given in scene.prescribed.items()}
         if scene.wheel is not None and scene.wheel.speed:
             loads[0, CENTRIFUGAL] = (2 * np.pi * scene.wheel.speed) ** 2
@@ -220,7 +289,7 @@ def excite(scene: Scene, base: np.ndarray | None) -> Excitation:
     return Excitation(loads, base)
 
 
-def ground_motion(scene: PartScene, part: Part, basis: HarmonicBasis) -> np.ndarray | None:
+def ground_motion(scene: MeshScene, part: Part, basis: HarmonicBasis) -> np.ndarray | None:
     """Motion of the ground (n_pair * n_component, n_coeff) [m] along the contact components, None where it rests.
 
     Raises  ValueError where a face has no contact or a harmonic is not kept

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from tribodyn.fem import cyclic
 from tribodyn.fem import part as fem_part
 from tribodyn.fem.cyclic import Sector
+from tribodyn.fem.interface import COMPONENTS
 from tribodyn.fem.matching import Mismatch
 from tribodyn.fem.material import Material
 from tribodyn.fem.part import Part
@@ -20,28 +22,40 @@ from tribodyn.reduction.interface_modes import interface_modes
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.prescribed import StaticReaction, prescribe
 from tribodyn.reduction.relative import relative
-from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
 
 SEAM = ("cyclic_right", "cyclic_left")  # what a part calls the faces where its wheel is one piece
 REACTION = "reaction"  # where the facts of a model keep its StaticReaction
 
 
-def material(scene: PartScene) -> Material:
-    """What the part is made of."""
-    return Material(scene.material.young, scene.material.poisson, scene.material.density)
+def material(scene: MeshScene, mesh: Any = None) -> Any:
+    """What the part is made of, or what every body of an assembly is made of."""
+    if isinstance(scene, PartScene):
+        one = scene.material
+        return Material(one.young, one.poisson, one.density, one.expansion)
+    return mesh.material
 
 
-def contacts(scene: PartScene) -> list[fem_part.Contact]:
+def components(scene: Scene) -> tuple[str, ...]:
+    """Contact components that some joint models, in their order."""
+    modelled = {c for contact in scene.joints.values() for c in contact.components}
+    return tuple(c for c in COMPONENTS if c in modelled) or COMPONENTS
+
+
+def contacts(scene: MeshScene) -> list[fem_part.Contact]:
     """The contact of every face; in a wheel the second face is that of the next sector."""
-    c = scene.contact
     found = [
-        fem_part.Contact(face, c.t1, c.opposite, c.components, c.gap, c.vertices_only, c.plane, c.inclination)
+        fem_part.Contact(
+            face, c.t1, c.opposite, components(scene), c.gap, c.vertices_only, c.plane, c.inclination,
+            c.pairing, c.reach, name,
+        )
+        for name, c in scene.joints.items()
         for face in c.groups
-    ]
+    ]  # fmt: skip
     return found if scene.wheel is None else cyclic.turned(found, scene.wheel.sectors, scene.wheel.axis)
 
 
-def reduce(scene: PartScene, part: Part) -> ReducedModel:
+def reduce(scene: MeshScene, part: Part) -> ReducedModel:
     """The part on its contact, load and prescribed nodes and a few modes; not damped yet, nothing prescribed yet."""
     if scene.wheel is not None:
         return travelling_wave(reduced_sector(scene, part), scene.wheel.engine_order)
@@ -64,7 +78,7 @@ def reduce(scene: PartScene, part: Part) -> ReducedModel:
     return reduced if back is None else replace(reduced, basis=back @ reduced.basis)
 
 
-def sector(scene: PartScene, part: Part) -> Sector:
+def sector(scene: MeshScene, part: Part) -> Sector:
     """The full sector of the scene's wheel, stiffened by its stress where the wheel spins.
 
     Raises  ValueError where its faces do not match those of its neighbours, or where the disk is left cut open
@@ -85,15 +99,16 @@ def sector(scene: PartScene, part: Part) -> Sector:
     if not wheel.speed:
         return cut
     tie = cyclic.seam_map(cut, 0)
-    return replace(cut, system=spinning(part, material(scene), wheel.axis, 2 * np.pi * wheel.speed, tie).system)
+    spun = spinning(part, material(scene, part.mesh), wheel.axis, 2 * np.pi * wheel.speed, tie)
+    return replace(cut, system=spun.system)
 
 
-def reduced_sector(scene: PartScene, part: Part) -> ReducedSector:
+def reduced_sector(scene: MeshScene, part: Part) -> ReducedSector:
     """The sector on its shroud, seam and load nodes and a few modes: what serves every engine order."""
     return reduced_from(scene, sector(scene, part))
 
 
-def reduced_from(scene: PartScene, full: Sector) -> ReducedSector:
+def reduced_from(scene: MeshScene, full: Sector) -> ReducedSector:
     """The full sector reduced as the scene says; raises ValueError where it cannot stand, by itself or at its speed."""
     try:
         return reduce_sector(full, scene.reduction.modes, scene.reduction.cutoff)
@@ -104,7 +119,7 @@ def reduced_from(scene: PartScene, full: Sector) -> ReducedSector:
         raise ValueError(f"at wheel.speed = {rpm:.6g} rpm {trouble}, or let it turn slower") from None
 
 
-def with_prescribed(scene: PartScene, part: Part, reduced: ReducedModel) -> ReducedModel:
+def with_prescribed(scene: MeshScene, part: Part, reduced: ReducedModel) -> ReducedModel:
     """The reduced model with the static displacement that the scene prescribes as a static load of that name."""
     for name, given in scene.prescribed.items():
         dofs = part.dofs(given.group, given.axis)

@@ -9,19 +9,22 @@ from __future__ import annotations
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from tribodyn.fem.assembly import pieces
 from tribodyn.fem.constraints import free_dofs, named
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.craig_bampton import POINT_LOAD
 from tribodyn.workflows.run import matrix_model
 from tribodyn.workflows.run.modelling import clamps, make_mesh
+from tribodyn.workflows.run.part_reduction import components
 from tribodyn.workflows.run.settings import check_names
 from tribodyn.workflows.scene.matrices import MatrixScene
 from tribodyn.workflows.scene.own import is_file
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.schema import PartScene, Scene
+from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
 
 FACTOR_BYTES = 15e3  # of a sparse Cholesky factor, for each DOF
 FACTOR_SECONDS = 2e-7  # N^1.5 law
@@ -89,14 +92,16 @@ def plan(file: SceneFile) -> Plan:
             raise ValueError(f'geometry.part: "{part}" is a file of your own, which a plan does not run: run the scene')
         with tempfile.TemporaryDirectory() as folder:
             mesh, node_sets = make_mesh(file, Path(folder))
+        built = file.mesh_scene
         elements, nodes = int(mesh.nelements), mesh.doflocs.shape[1]
-        free = free_dofs(3 * nodes, clamps(file.part_scene), node_sets)
+        free = free_dofs(3 * nodes, clamps(built), node_sets)
         full = len(free)
-        pairs, masters = _contact(file.part_scene, mesh, node_sets, free)
-        held = int(file.part_scene.geometry.no_turning is not None)
-        modes, cutoff = file.part_scene.reduction.modes, file.part_scene.reduction.cutoff
+        pairs, masters = _contact(built, mesh, node_sets, free)
+        held = int(isinstance(built, PartScene) and built.geometry.no_turning is not None)
+        modes, cutoff = built.reduction.modes, built.reduction.cutoff
     basis = HarmonicBasis(scene.harmonics.kept or LIKELY, scene.harmonics.samples, scene.harmonics.transitions)
-    contact = pairs * len(scene.contact.components)
+    n_component = len(components(scene))
+    contact = pairs * n_component
     model = masters + (modes if modes is not None else 50) - held
     memory = (
         200e6  # the program itself
@@ -104,7 +109,7 @@ def plan(file: SceneFile) -> Plan:
         + 3 * 8.0 * full * model
         + 10 * 8.0 * model**2
         + 8 * 8.0 * contact**2
-        + 4 * 8.0 * pairs * (len(scene.contact.components) * basis.n_coeff) ** 2
+        + 4 * 8.0 * pairs * (n_component * basis.n_coeff) ** 2
     )
     reduction = (
         FACTOR_SECONDS * full**1.5 + BACK_SUBSTITUTION_SECONDS * full * model + 4 * DENSE_SECONDS * model**3
@@ -126,31 +131,32 @@ def plan(file: SceneFile) -> Plan:
     )
 
 
-def _contact(scene: PartScene, mesh: object, node_sets: dict[str, np.ndarray], free: np.ndarray) -> tuple[int, int]:
-    """Number of node pairs, and of master DOFs that the contact, point loads and the output make."""
-    contact = scene.contact
-    faces = [*contact.groups, *([] if contact.opposite is None else [contact.opposite])]
+def _contact(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], free: np.ndarray) -> tuple[int, int]:
+    """Number of contact pairs, and of master DOFs that contacts, point loads and outputs make."""
     loads = [*scene.loads.static.values(), *scene.loads.harmonic.values()]
     points = [
         (group, load.direction)
         for load in loads
         for group in (load.group, load.opposite)
-        if load.direction is not None and group is not None
+        if load.direction is not None and group
     ]
     points += [(output.group, output.direction) for output in (scene.response, *scene.response.others.values())]
-    nodes = [named(node_sets, name, "face") for name in faces]
-    corners = np.arange(int(mesh.nvertices))  # type: ignore[attr-defined]
-    if contact.vertices_only:
-        nodes = [np.intersect1d(side, corners) for side in nodes]
-    axes = np.arange(3)
-    if contact.plane is not None and contact.components == ("n",):
-        axes = np.flatnonzero(contact.plane)
-    masters = [(side[:, None] * 3 + axes).ravel() for side in (nodes[:1] if scene.reduction.relative else nodes)]
+    corners = np.concatenate([piece.node + np.arange(piece.mesh.nvertices) for piece in pieces(mesh)])
+    pairs, masters = 0, []
+    for contact in scene.joints.values():
+        faces = [*contact.groups, *([] if contact.opposite is None else [contact.opposite])]
+        nodes = [named(node_sets, name, "face") for name in faces]
+        if contact.vertices_only:
+            nodes = [np.intersect1d(side, corners) for side in nodes]
+        axes = np.arange(3)
+        if contact.plane is not None and contact.components == ("n",):
+            axes = np.flatnonzero(contact.plane)
+        masters += [(side[:, None] * 3 + axes).ravel() for side in (nodes[:1] if scene.reduction.relative else nodes)]
+        pairs += sum(len(side) for side in nodes[: len(contact.groups)])
     masters += [named(node_sets, given.group) * 3 + "xyz".index(given.axis) for given in scene.prescribed.values()]
     touched = [(named(node_sets, group)[:, None] * 3 + np.flatnonzero(axis)).ravel() for group, axis in points]
     masters += [dofs for dofs in touched if len(dofs) <= POINT_LOAD]
-    pairs = sum(len(side) for side in nodes[: len(contact.groups)])
-    return pairs, len(np.intersect1d(np.concatenate(masters), free))
+    return pairs, len(np.intersect1d(np.concatenate([*masters, []]).astype(int), free))
 
 
 def _wear(scene: Scene) -> tuple[int | None, int]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as sla
 
+from tribodyn.fem.factor import SINGULAR, softest_residual
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.branch import amplitude
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.workflows.result.result import References
-from tribodyn.workflows.scene.schema import PartScene, Scene
+from tribodyn.workflows.scene.schema import MeshScene, Scene
 
 POINTS = 401
 MODES = 100
@@ -31,7 +32,7 @@ def delta_max(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:
     approach : (n_pair,) as `free_deflection`; area : (n_pair,) [m2]
     Of a wheel: mean over the area of the displacement of one face, half the approach of two (Tamatam 2021, 4.3.1)
     """
-    if isinstance(scene, PartScene) and scene.wheel is not None:
+    if isinstance(scene, MeshScene) and scene.wheel is not None:
         return float(0.5 * approach @ area / area.sum())
     return float(approach.max())
 
@@ -86,7 +87,10 @@ def free_deflection(balance: HarmonicBalance) -> np.ndarray:
         if harmonic == 0:
             force += np.real(value) * system.loads[name]
     try:
-        q = sla.cho_solve(sla.cho_factor(system.stiffness), force)
+        factor = sla.cho_factor(system.stiffness)
     except np.linalg.LinAlgError:
         return missing
+    if softest_residual(system.stiffness, lambda b: sla.cho_solve(factor, b)) > SINGULAR:
+        return missing  # it can move rigidly, but rounding let the factorisation pass
+    q = sla.cho_solve(factor, force)
     return np.asarray((B @ q)[interface.components.index("n") :: len(interface.components)])

@@ -25,9 +25,9 @@ def check_names(scene: Scene, own_files: bool = True) -> None:
 
     own_files : run files beside the scene for it, which a plan must not do
     """
-    contact = scene.contact
-    if own_files or not is_file(contact.law):
-        law.check_components(contact.law_name, contact.components)
+    for contact in scene.joints.values():
+        if own_files or not is_file(contact.law):
+            law.check_components(contact.law_name, contact.components)
     if own_files or not is_file(scene.response.method):
         response_options(scene)
     if scene.wear is not None and (own_files or not is_file(scene.wear.law)):

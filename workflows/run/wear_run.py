@@ -19,6 +19,7 @@ from tribodyn.workflows.run.fields import with_shown
 from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import Scene
+from tribodyn.workflows.scene.structure import NamedContact
 from tribodyn.workflows.scene.wear import Wear
 
 
@@ -57,7 +58,10 @@ def wear_problem(
     lost_below : share of the first preload at which the run ends, of that at rest where `at_rest`
     """
     assert scene.wear is not None
-    wear = JointWear.of(scene.wear.law_name, **scene.wear.numbers)
+    of_all = JointWear.of(scene.wear.law_name, **scene.wear.numbers)
+    own = {name: c.wear for name, c in scene.joints.items() if isinstance(c, NamedContact) and c.wear is not None}
+    by_name = {name: JointWear.of(table.law_name, **table.numbers) for name, table in own.items()}
+    wear = dict.fromkeys(scene.joints, of_all) | by_name if own else of_all
     area = balance.model.interface.area
     vibrating, resting = (0.0, lost_below) if at_rest else (lost_below, None)
     return WearProblem(balance, settings.mission(scene), wear, area, vibrating, resting)

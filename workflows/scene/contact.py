@@ -59,8 +59,13 @@ class FaceContact(Contact):
     """Direction that the first tangential component follows."""
     vertices_only: StrictBool = False
     """Leave the mid-side nodes of the mesh out."""
-    gap: Length = 0.0
-    """Initial gap of all pairs."""
+    gap: Length | None = None
+    """Initial gap of all pairs; by default that of the geometry, interference negative, and 0 against the ground."""
+    pairing: Literal["auto", "nodes", "mortar"] = "auto"
+    """"nodes" pairs matching nodes, "mortar" weighs both faces over the surface they share, "auto" pairs nodes where
+    every facet of the first face has its like on the second."""
+    reach: Annotated[Length, Field(ge=0)] | None = None
+    """Farthest opening at which two faces still meet; a tenth of the length of the first face by default."""
     plane: Direction | None = None
     """Direction towards a ground that is a plane, which each face touches with its nearest node."""
     inclination: Angle = 0.0

@@ -174,3 +174,8 @@ class MatrixScene(Scene):
     """The response that is computed."""
     reduction: Reduction | None = None
     """Craig-Bampton reduction; left out, the matrices stay as they are."""
+
+    @property
+    def joints(self) -> dict[str, DofContact]:
+        """The one contact by its name."""
+        return {"contact": self.contact}

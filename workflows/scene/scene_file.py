@@ -12,7 +12,8 @@ from typing import Any, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 
 from tribodyn.workflows.scene.matrices import MatrixScene
-from tribodyn.workflows.scene.schema import PartScene, Scene
+from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
+from tribodyn.workflows.scene.structure import StructureScene
 from tribodyn.workflows.scene.words import unknown_key
 
 CASES = Path(__file__).parents[1] / "cases"
@@ -55,6 +56,14 @@ class SceneFile:
     def part_scene(self) -> PartScene:
         """The scene, for what needs a mesh; raises SceneError where it is one of matrices."""
         if not isinstance(self.scene, PartScene):
+            kind = "of several bodies or joints" if isinstance(self.scene, StructureScene) else "of matrices"
+            raise SceneError(f"{self.name} is a scene {kind}, but this needs one of a single part")
+        return self.scene
+
+    @property
+    def mesh_scene(self) -> MeshScene:
+        """The scene, for what needs a mesh; raises SceneError where it is one of matrices."""
+        if not isinstance(self.scene, MeshScene):
             raise SceneError(f"{self.name} is made of matrices and has no mesh")
         return self.scene
 
@@ -124,8 +133,11 @@ def checked(kind: type[Kind], data: dict[str, Any], label: str, folder: Path | N
 
 
 def kind_of(data: dict[str, Any]) -> type[Scene]:
-    """A scene with a [model] is one of matrices, any other one of a part."""
-    return MatrixScene if "model" in data else PartScene
+    """A scene with a [model] is one of matrices, one with bodies, named joints or none one of a structure."""
+    if "model" in data:
+        return MatrixScene
+    beyond = StructureScene.model_fields.keys() - PartScene.model_fields.keys()
+    return StructureScene if beyond & data.keys() or "contact" not in data else PartScene
 
 
 def from_json(text: str) -> Scene:

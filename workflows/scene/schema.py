@@ -5,6 +5,8 @@ Every key of the file is a field below; a key that is not here is an error. What
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Generic, Literal, Self, TypeVar
@@ -127,6 +129,8 @@ class Material(Table):
     """Density."""
     poisson: Annotated[Number, Field(gt=-1, lt=0.5)]
     """Poisson's ratio."""
+    expansion: Annotated[float, quantity("1/K")] = 0.0
+    """Coefficient of thermal expansion."""
 
 
 class Spring(Table):
@@ -155,11 +159,19 @@ class Prescribed(Table):
     """Names of springs between these nodes and the ground that act about the prescribed position."""
 
 
-class StaticLoad(Table):
-    """A load that does not change: a force shared equally by the nodes of a group, or a pressure into a face."""
+KINDS = ("value", "pressure", "moment", "acceleration", "base_acceleration", "speed", "temperature")
+LATER = (
+    "opposite", "shared", "moment", "acceleration", "base_acceleration", "speed", "point", "temperature", "bodies",
+    "field",
+)  # fmt: skip
 
-    group: str
-    """Group that is loaded."""
+
+class StaticLoad(Table):
+    """A load that does not change: a force on a group, a pressure into a face, a moment on the point of a coupling, an
+    acceleration, a rotation, or a change of temperature."""
+
+    group: str = ""
+    """Group that is loaded by a force, a pressure or a moment; a force on a face is shared by area."""
     direction: Direction | None = None
     """Direction of the force."""
     value: Force | None = None
@@ -168,27 +180,61 @@ class StaticLoad(Table):
     """Pressure into the face, instead of a force."""
     opposite: str | None = None
     """Group on which the same force acts the other way: a couple."""
+    shared: Literal["area", "nodes"] = "area"
+    """How a force is shared on a face: "area" by tributary area, "nodes" equally by its nodes."""
+    moment: Annotated[float, quantity("N m")] | None = None
+    """Moment about the direction, on the point of a coupling."""
+    acceleration: Annotated[float, quantity("m/s2")] | None = None
+    """Gravity or another acceleration field along the direction, on all mass."""
+    base_acceleration: Annotated[float, quantity("m/s2")] | None = None
+    """Acceleration of the ground along the direction; displacements are then those relative to the ground."""
+    speed: Frequency | None = None
+    """Speed of rotation about an axis along the direction through `point`, whose centrifugal force acts."""
+    point: tuple[Length, Length, Length] = (0.0, 0.0, 0.0)
+    """Point on the axis of rotation."""
+    temperature: Annotated[float, quantity("K")] | None = None
+    """Change of temperature."""
+    bodies: tuple[str, ...] = ()
+    """Bodies that are heated; all by default."""
+    field: str | None = None
+    """File with columns x, y, z and change of temperature, comma-separated, in metres and kelvin; its values times
+    `temperature`, which is 1 K by default."""
 
     @model_validator(mode="after")
     def _one_kind(self) -> StaticLoad:
-        if (self.pressure is None) == (self.value is None) or (self.value is None) != (self.direction is None):
-            raise ValueError("expected either value and direction, for a force, or pressure alone")
-        if self.opposite is not None and self.pressure is not None:
+        given = [kind for kind in KINDS if getattr(self, kind) is not None]
+        if self.field is not None and "temperature" not in given:
+            given.append("temperature")
+        if len(given) != 1:
+            raise ValueError(f"expected one out of {', '.join(KINDS)}, got {', '.join(given) or 'none'}")
+        directed = given[0] not in ("pressure", "temperature")
+        if directed != (self.direction is not None):
+            raise ValueError(f"expected {'a' if directed else 'no'} direction with {given[0]}")
+        if bool(self.group) != (given[0] in ("value", "pressure", "moment")):
+            raise ValueError(f"expected {'no ' if self.group else ''}group with {given[0]}")
+        if self.opposite is not None and given[0] != "value":
             raise ValueError("expected opposite only with value and direction, for a couple of forces")
+        if self.bodies and given[0] != "temperature":
+            raise ValueError("expected bodies only with temperature")
         return self
 
     @model_serializer(mode="wrap")
     def _without_none(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """A force that is no couple is told as ever, so that results and tables made before are of the same scene."""
         said: dict[str, Any] = write(self)
-        if self.opposite is None:
-            said.pop("opposite", None)
+        for name in LATER:
+            if said.get(name) == type(self).model_fields[name].default:
+                said.pop(name)
         return said
 
     @property
     def amplitude(self) -> float:
-        """Its size [N] or [Pa]."""
-        return self.pressure or self.value or 0.0
+        """Its size [N], [Pa], [N m], [m/s2], [rad2/s2] or [K]."""
+        if self.speed is not None:
+            return (2 * math.pi * self.speed) ** 2
+        if self.field is not None and self.temperature is None:
+            return 1.0
+        return next((size for kind in KINDS if (size := getattr(self, kind)) is not None), 0.0)
 
 
 class HarmonicLoad(StaticLoad):
@@ -430,8 +476,6 @@ class Scene(Table):
 
     scene: Heading
     """Title and source."""
-    contact: Contact
-    """The contact."""
     loads: Loads[Any, Any]
     """The loads."""
     response: Response
@@ -449,20 +493,19 @@ class Scene(Table):
     """Tolerances and threads."""
 
     @property
+    def joints(self) -> Mapping[str, Contact]:
+        """The contacts by name."""
+        raise NotImplementedError
+
+    @property
     def wears(self) -> bool:
         """Whether wear steps are asked for."""
         return self.wear is not None and self.wear.max_steps > 0
 
 
-class PartScene(Scene):
-    """Which geometry, material, contact, loads, reduction, response and wear are modelled."""
+class MeshScene(Scene):
+    """What every scene with a mesh says; see PartScene for one part, StructureScene in structure for several bodies."""
 
-    geometry: Geometry
-    """Part or mesh."""
-    material: Material
-    """Material."""
-    contact: FaceContact
-    """The contact faces and their law."""
     springs: dict[str, Spring] = Field(default_factory=dict)
     """Springs by name."""
     prescribed: dict[str, Prescribed] = Field(default_factory=dict)
@@ -480,19 +523,24 @@ class PartScene(Scene):
     wheel: Wheel | None = None
     """The wheel of which the part is one sector."""
 
+    @property
+    def joints(self) -> Mapping[str, FaceContact]:
+        """The contacts by name."""
+        raise NotImplementedError
+
     @model_validator(mode="after")
-    def _what_a_sector_is(self) -> PartScene:
+    def _what_a_sector_is(self) -> MeshScene:
         if self.wheel is None:
             return self
-        if self.contact.opposite is None or not isinstance(self.contact.group, str):
-            raise ValueError("wheel: the contact needs one group, the right face, and its opposite, the left one")
+        for contact in self.joints.values():
+            if contact.opposite is None or not isinstance(contact.group, str):
+                raise ValueError("wheel: the contact needs one group, the right face, and its opposite, the left one")
         for key, has in (
-            ("contact.plane", self.contact.plane is not None),
+            ("contact.plane", any(contact.plane is not None for contact in self.joints.values())),
             ("motion", bool(self.motion)),
             ("prescribed", bool(self.prescribed)),
             ("reduction.relative", self.reduction.relative),
             ("reduction.interface_modes", self.reduction.interface_modes is not None),
-            ("geometry.no_turning", self.geometry.no_turning is not None),
             ("response.stability", self.response.stability),  # perturbations see other waves than the solution does
         ):
             if has:
@@ -502,7 +550,7 @@ class PartScene(Scene):
         return self
 
     @model_validator(mode="after")
-    def _one_prescribed(self) -> PartScene:
+    def _one_prescribed(self) -> MeshScene:
         if len(self.prescribed) > 1:
             raise ValueError(f"expected one table under prescribed, got {', '.join(self.prescribed)}")
         for name, held in self.prescribed.items():
@@ -513,4 +561,26 @@ class PartScene(Scene):
                     raise ValueError(unknown_key(f"springs.{spring}", [f"springs.{known}" for known in self.springs]))
                 if self.springs[spring].group != held.group or self.springs[spring].opposite is not None:
                     raise ValueError(f"prescribed.{name}: springs.{spring} must hold {held.group} to the ground")
+        return self
+
+
+class PartScene(MeshScene):
+    """Which geometry, material, contact, loads, reduction, response and wear are modelled."""
+
+    geometry: Geometry
+    """Part or mesh."""
+    material: Material
+    """Material."""
+    contact: FaceContact
+    """The contact faces and their law."""
+
+    @property
+    def joints(self) -> dict[str, FaceContact]:
+        """The one contact by its name."""
+        return {"contact": self.contact}
+
+    @model_validator(mode="after")
+    def _turns(self) -> PartScene:
+        if self.wheel is not None and self.geometry.no_turning is not None:
+            raise ValueError("geometry.no_turning has no meaning for a sector of a wheel: leave it out")
         return self

@@ -71,6 +71,17 @@ class MissionDuty(Table):
     """Factor on the harmonic loads."""
 
 
+class JointWear(LawTable):
+    """How one joint wears."""
+
+    TABLE: ClassVar[str] = "wear"
+    LAWS: ClassVar[ModuleType] = wear_law
+
+    law: str = "energy"
+    """Name of a wear law, or a file my_law.py beside the scene; its own numbers, such as coefficient, are further keys
+    of this table."""
+
+
 class Wear(LawTable):
     """Wear of the contact until it is lost or max_steps are done."""
 

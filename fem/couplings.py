@@ -1,0 +1,146 @@
+"""Constraints: faces glued together though their meshes differ, and points that carry faces.
+
+Source  ties: Bernardi, Maday and Patera, A new nonconforming approach to domain decomposition: the mortar element
+    method, 1994; distributed coupling: the mean motion of a face in the sense of least squares, weighted by area
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix, kron
+from scipy.sparse.linalg import splu
+
+from tribodyn.fem.constraints import Following, named
+from tribodyn.fem.elements import coordinates
+from tribodyn.fem.mortar import common, side, tabulate
+from tribodyn.fem.mortar_contact import apart
+from tribodyn.fem.springs import shares
+
+REACH = 0.1  # farthest opening that a tie bridges unless told, as a part of the length of its first face
+COVERED = 1e-3  # part of a node's own share of its face below which it is not tied
+SMALL = 1e-13  # of a coefficient that is left out
+
+
+@dataclass(frozen=True)
+class Tie:
+    """Glue a face to another one: the jump vanishes in the mean against every shape function of the first face.
+
+    what : name for errors; first, second : boundary names; reach : farthest opening [m]
+    """
+
+    what: str
+    first: str
+    second: str
+    reach: float | None = None
+
+    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following:
+        """The nodes of the first face in terms of the others.
+
+        Raises  ValueError where a face is unknown, or the faces do not meet
+        """
+        faces = mesh.boundaries or {}
+        one, two = (side(mesh, named(faces, name, "face")) for name in (self.first, self.second))
+        reach = REACH * one.length if self.reach is None else self.reach
+        shared = common(one, two, reach)
+        if not len(shared.weight):
+            raise ValueError(f"{self.what}: {apart(one, two, reach).replace('contact faces', 'tied faces')}")
+        n = mesh.doflocs.shape[1]
+        parts: list[list[tuple[np.ndarray, np.ndarray, np.ndarray]]] = [[], []]
+        for i, j, g in shared.each():
+            own = tabulate(one.nodes.shape[1], shared.xi[:, g])[0]
+            other = tabulate(two.nodes.shape[1], shared.eta[:, g])[0]
+            for into, N, nodes in ((parts[0], own, one.nodes[i]), (parts[1], other, two.nodes[j])):
+                block = (own * shared.weight[g]) @ N.T
+                into.append((block.ravel(), np.repeat(one.nodes[i], len(nodes)), np.tile(nodes, len(own))))
+        D, M = (_summed(part, n) for part in parts)
+        size = D.diagonal()
+        nodes = np.unique(one.nodes)
+        whole = np.zeros(n)
+        edge = one.points[:, 1:3] - one.points[:, :1]
+        np.add.at(whole, one.nodes, np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1)[:, None] / 100)
+        tied = nodes[size[nodes] > COVERED * whole[nodes]]
+        rest = np.setdiff1d(nodes, tied)
+        solve = splu(D[tied][:, tied].tocsc())
+        right = csr_matrix(M[tied])
+        if len(rest):
+            spread = csr_matrix((np.ones(len(rest)), (np.arange(len(rest)), rest)), shape=(len(rest), n))
+            right = csr_matrix(right - csr_matrix(D[tied][:, rest]) @ spread)
+        columns = np.unique(right.nonzero()[1])
+        dense = solve.solve(right[:, columns].toarray())
+        dense[np.abs(dense) < SMALL] = 0.0
+        scalar = coo_matrix(dense)
+        moved = csr_matrix((scalar.data, (scalar.row, columns[scalar.col])), shape=(len(tied), n))
+        dofs = (tied[:, None] * 3 + np.arange(3)).ravel()
+        return Following(dofs, csr_matrix(kron(moved, np.eye(3), format="csr")), self.what)
+
+
+def _summed(blocks: list[tuple[np.ndarray, np.ndarray, np.ndarray]], n: int) -> csr_matrix:
+    """Matrix (n, n) of blocks of values, rows and columns."""
+    values, rows, columns = (np.concatenate(of) for of in zip(*blocks, strict=True))
+    return csr_matrix(coo_matrix((values, (rows, columns)), shape=(n, n)))
+
+
+@dataclass(frozen=True)
+class RigidCoupling:
+    """A face that moves as a rigid body with a reference point of the assembly. point, face : names."""
+
+    point: str
+    face: str
+
+    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following:
+        """The nodes of the face in terms of the point; raises ValueError where the face is unknown."""
+        nodes = named(node_sets, self.face)
+        place, turn = mesh.points[self.point]
+        arm = coordinates(mesh)[nodes] - coordinates(mesh)[place]
+        rows = 3 * len(nodes)
+        columns = np.concatenate([3 * place + np.arange(3), 3 * turn + np.arange(3)])
+        values = np.zeros((rows, 6))
+        values[:, :3] = np.tile(np.eye(3), (len(nodes), 1))
+        values[:, 3:] = _turning(arm).reshape(rows, 3)
+        matrix = csr_matrix((values.ravel(), (np.repeat(np.arange(rows), 6), np.tile(columns, rows))),
+                            shape=(rows, 3 * mesh.doflocs.shape[1]))  # fmt: skip
+        matrix.eliminate_zeros()
+        return Following((nodes[:, None] * 3 + np.arange(3)).ravel(), matrix, f"couplings.{self.point}")
+
+
+@dataclass(frozen=True)
+class DistributedCoupling:
+    """A reference point of the assembly that moves as the mean of a face does. point, face : names."""
+
+    point: str
+    face: str
+
+    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following:
+        """The point in terms of the nodes of the face.
+
+        Raises  ValueError where the face is unknown, or its nodes lie on one line, so that it has no turn
+        """
+        nodes, share = shares(mesh, node_sets, self.face)
+        place, turn = mesh.points[self.point]
+        points = coordinates(mesh)
+        centre = share @ points[nodes]
+        arm = points[nodes] - centre
+        cross = _turning(arm)  # u = theta x arm
+        inertia = np.einsum("k,kij,kil->jl", share, cross, cross)
+        if not np.linalg.eigvalsh(inertia)[0] > 1e-9 * np.trace(inertia):
+            raise ValueError(f"couplings.{self.point}: the nodes of '{self.face}' lie on one line; give a face")
+        theta = np.linalg.solve(inertia, np.einsum("k,kij->jki", share, cross).reshape(3, -1))  # 3, k * 3
+        mean = np.kron(share, np.eye(3))
+        at = mean + _turning((points[place] - centre)[None])[0] @ theta
+        columns = (nodes[:, None] * 3 + np.arange(3)).ravel()
+        values = np.vstack([at, theta])
+        matrix = csr_matrix((values.ravel(), (np.repeat(np.arange(6), len(columns)), np.tile(columns, 6))),
+                            shape=(6, 3 * len(points)))  # fmt: skip
+        dofs = np.concatenate([3 * place + np.arange(3), 3 * turn + np.arange(3)])
+        return Following(dofs, matrix, f"couplings.{self.point}")
+
+
+def _turning(arm: np.ndarray) -> np.ndarray:
+    """(k, 3, 3) matrices A with theta x arm = A theta."""
+    x, y, z = arm.T
+    zero = np.zeros(len(arm))
+    return np.stack([zero, z, -y, -z, zero, x, y, -x, zero], axis=1).reshape(-1, 3, 3)

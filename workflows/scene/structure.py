@@ -1,0 +1,299 @@
+"""A scene of several bodies with named joints between them; what holds of one part too is in schema.
+
+Groups of a body are named "body.group".
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import BeforeValidator, Field, PrivateAttr, ValidationInfo, model_validator
+
+from tribodyn.workflows.scene.contact import FaceContact
+from tribodyn.workflows.scene.fields import Angle, Direction, Length, Number, Stiffness, Table, quantity
+from tribodyn.workflows.scene.own import folder_of, own_file
+from tribodyn.workflows.scene.schema import (
+    CENTRIFUGAL,
+    Geometry,
+    Material,
+    MeshScene,
+    part_parameters,
+)
+from tribodyn.workflows.scene.units import to_si
+from tribodyn.workflows.scene.wear import JointWear
+from tribodyn.workflows.scene.words import unknown_key
+
+GROUND = "ground"
+Point = tuple[Length, Length, Length]
+
+
+def _unit(value: object) -> object:
+    return to_si(f"1 {value}", "m") if isinstance(value, str) else value
+
+
+class Rotation(Table):
+    """A turn about an axis through a point, by the right hand."""
+
+    axis: Direction
+    """Axis of the turn."""
+    angle: Angle
+    """Angle of the turn."""
+    point: Point = (0.0, 0.0, 0.0)
+    """Point on the axis."""
+
+
+class Body(Table):
+    """A body: a part of geometry/ or a mesh file, where it stands, what it is made of and what holds it.
+
+    All other keys of the table are parameters of the part; those left out have the part's own defaults.
+    """
+
+    part: str | None = None
+    """Name of a parametric part; its parameters are further keys of this table."""
+    mesh: str | None = None
+    """Mesh file, relative to the scene file, instead of a part."""
+    volume: str | None = None
+    """Volume group of the mesh that is this body; the whole mesh by default."""
+    unit: Annotated[float, BeforeValidator(_unit), Field(gt=0)] = 1.0
+    """Length unit of the mesh file, such as "mm"."""
+    rotation: Rotation | tuple[Rotation, ...] = ()
+    """Turn of the body, or several one after the other, before it is moved."""
+    translation: Point = (0.0, 0.0, 0.0)
+    """Where the origin of the body is moved to."""
+    material: str | dict[str, str]
+    """Name of its material, or volume group = material for each of its volumes."""
+    fixed: tuple[str, ...] = ()
+    """Groups of this body that are clamped, without its name before them."""
+    fixed_axes: dict[str, str] = Field(default_factory=dict)
+    """Groups of this body held along some axes only: group = letters out of "xyz"."""
+    parameters: dict[str, int | float] = Field(default_factory=dict)
+    """Parameters of the part, gathered from the other keys of the table."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _gather_parameters(cls, table: Any, info: ValidationInfo) -> Any:
+        if not isinstance(table, dict) or "parameters" in table:
+            return table
+        own = {key: value for key, value in table.items() if key in cls.model_fields}
+        other = {key: value for key, value in table.items() if key not in cls.model_fields}
+        if ("part" in own) == ("mesh" in own):
+            raise ValueError('expected either part = "name" or mesh = "file.msh", and not both')
+        if not isinstance(own.get("part"), str):
+            return own | other
+        try:
+            return own | {"parameters": part_parameters(own["part"], other, folder_of(info))}
+        except ValueError as trouble:
+            raise ValueError(str(trouble).replace("geometry.", "")) from None
+
+    _own: Path | None = PrivateAttr(None)
+
+    @model_validator(mode="after")
+    def _remember_the_file(self, info: ValidationInfo) -> Self:
+        self._own = own_file(folder_of(info), self.part, "part")
+        return self
+
+    @property
+    def part_name(self) -> str | None:
+        """The part for geometry.parts: its name, or the path of the file beside the scene."""
+        return self.part if self._own is None else str(self._own)
+
+    @property
+    def turns(self) -> tuple[Rotation, ...]:
+        """Its turns, one after the other."""
+        return (self.rotation,) if isinstance(self.rotation, Rotation) else self.rotation
+
+    @property
+    def materials(self) -> tuple[str, ...]:
+        """Names of its materials."""
+        return (self.material,) if isinstance(self.material, str) else tuple(self.material.values())
+
+
+Modulus = Annotated[float, quantity("Pa"), Field(gt=0)]
+Expansion = Annotated[float, quantity("1/K")]
+
+
+class SolidMaterial(Table):
+    """An isotropic material by single numbers, or an orthotropic one by three along its own axes."""
+
+    young: Modulus | tuple[Modulus, Modulus, Modulus]
+    """Young's modulus; three along the axes of an orthotropic material."""
+    poisson: Annotated[Number, Field(gt=-1, lt=0.5)] | tuple[Number, Number, Number]
+    """Poisson's ratio; nu12, nu13, nu23 of an orthotropic material, the strain along the second axis when it is pulled
+    along the first."""
+    shear: tuple[Modulus, Modulus, Modulus] | None = None
+    """Shear moduli G12, G13, G23 of an orthotropic material."""
+    density: Annotated[float, quantity("kg/m3"), Field(gt=0)]
+    """Density."""
+    axes: tuple[Direction, Direction] | None = None
+    """First and second axis of an orthotropic material; x and y by default."""
+    expansion: Expansion | tuple[Expansion, Expansion, Expansion] = 0.0
+    """Coefficient of thermal expansion; three along the axes of an orthotropic material."""
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> SolidMaterial:
+        three = isinstance(self.young, tuple)
+        if three != isinstance(self.poisson, tuple) or three != (self.shear is not None):
+            raise ValueError("expected three values each of young, poisson and shear for an orthotropic material")
+        if not three and (self.axes is not None or isinstance(self.expansion, tuple)):
+            raise ValueError("expected axes and three expansions only with three values of young, poisson and shear")
+        return self
+
+
+class NamedContact(FaceContact):
+    """A joint: a face against another one, whose mesh need not match, or against the ground."""
+
+    wear: JointWear | None = None
+    """How this joint wears, instead of what [wear] says for all."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _first_and_second(cls, table: Any) -> Any:
+        if not isinstance(table, dict) or "group" in table:
+            return table
+        if "first" not in table or "second" not in table:
+            missing = "first" if "first" not in table else "second"
+            raise ValueError(f'{missing} is missing: give first = "body.face", and second the same or "{GROUND}"')
+        rest = {key: value for key, value in table.items() if key not in ("first", "second")}
+        other = {} if table["second"] == GROUND else {"opposite": table["second"]}
+        return {**rest, "group": table["first"], **other}
+
+
+class Tie(Table):
+    """Two faces that are glued; their meshes need not match."""
+
+    first: str
+    """Face whose nodes follow the other one; the finer of the two, and not clamped."""
+    second: str
+    """Face that it is glued to."""
+    reach: Annotated[Length, Field(ge=0)] | None = None
+    """Farthest opening at which the faces still meet; a tenth of the length of the first face by default."""
+
+
+AXES = ("x", "y", "z", "rx", "ry", "rz")
+
+
+class Coupling(Table):
+    """A point that carries a face; loads, springs, masses and outputs may name it."""
+
+    face: str
+    """Face or group that is coupled."""
+    kind: str = "distributed"
+    """"rigid": the face moves as a rigid body with the point; "distributed": the point moves as the mean of the face,
+    which stays soft."""
+    point: Point | None = None
+    """Where the point is; the middle of the face by default."""
+    fixed: tuple[str, ...] = ()
+    """What of the point is held: out of "x", "y", "z" and the turns "rx", "ry", "rz"; only of a rigid coupling."""
+
+    @model_validator(mode="after")
+    def _kinds(self) -> Coupling:
+        if self.kind not in ("rigid", "distributed"):
+            raise ValueError(f'kind: expected "rigid" or "distributed", got {self.kind!r}')
+        if set(self.fixed) - set(AXES):
+            raise ValueError(f"fixed: expected some of {', '.join(AXES)}, got {list(self.fixed)}")
+        if self.fixed and self.kind == "distributed":
+            raise ValueError('fixed: a point that follows its face cannot be held: give kind = "rigid"')
+        return self
+
+
+Inertia = Annotated[float, quantity("kg m2"), Field(ge=0)]
+
+
+class PointMass(Table):
+    """A lumped mass."""
+
+    at: str
+    """Name of a coupling, or of a group over which it is shared."""
+    mass: Annotated[float, quantity("kg"), Field(ge=0)]
+    """The mass."""
+    inertia: tuple[Inertia, Inertia, Inertia] = (0.0, 0.0, 0.0)
+    """Moments of inertia about x, y, z at the point of a coupling."""
+
+
+class Bolt(Table):
+    """A bolt between the faces under its head and under its nut, as an elastic rod with a preload."""
+
+    first: str
+    """Face under the head."""
+    second: str
+    """Face under the nut."""
+    preload: Annotated[float, quantity("N"), Field(ge=0)]
+    """Force in the shank when it is tightened, all other loads away."""
+    state: str = "locked"
+    """"locked": the shank keeps its length after tightening, so that its force follows the structure; "constant": the
+    force stays what it is."""
+    diameter: Annotated[Length, Field(gt=0)] | None = None
+    """Diameter of the shank."""
+    material: str | None = None
+    """Its material."""
+    stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
+    """Stiffness along the shank instead of diameter and material."""
+
+    @model_validator(mode="after")
+    def _stiff(self) -> Bolt:
+        if self.state not in ("locked", "constant"):
+            raise ValueError(f'state: expected "locked" or "constant", got {self.state!r}')
+        shank = self.diameter is not None and self.material is not None
+        if self.state == "locked" and shank == (self.stiffness is not None):
+            raise ValueError("a locked bolt needs either diameter and material of its shank, or its stiffness")
+        return self
+
+
+class StructureScene(MeshScene):
+    """Bodies, what joins them, loads, reduction, response and wear; a single part may stand in [geometry]."""
+
+    bodies: dict[str, Body] = Field(default_factory=dict)
+    """Bodies by name."""
+    materials: dict[str, SolidMaterial] = Field(default_factory=dict)
+    """Materials by name."""
+    geometry: Geometry | None = None
+    """A single part or mesh, instead of bodies."""
+    material: Material | None = None
+    """Its material."""
+    contact: FaceContact | None = None
+    """A single contact, instead of contacts."""
+    contacts: dict[str, NamedContact] = Field(default_factory=dict)
+    """Joints by name."""
+    ties: dict[str, Tie] = Field(default_factory=dict)
+    """Faces glued together, by name."""
+    couplings: dict[str, Coupling] = Field(default_factory=dict)
+    """Points that carry faces, by name."""
+    masses: dict[str, PointMass] = Field(default_factory=dict)
+    """Lumped masses by name."""
+    bolts: dict[str, Bolt] = Field(default_factory=dict)
+    """Bolts by name."""
+
+    @property
+    def joints(self) -> dict[str, FaceContact]:
+        """The contacts by name."""
+        return {**({} if self.contact is None else {"contact": self.contact}), **self.contacts}
+
+    @model_validator(mode="after")
+    def _whole(self) -> StructureScene:
+        if bool(self.bodies) == (self.geometry is not None) or (self.geometry is None) != (self.material is None):
+            raise ValueError("expected either [bodies.NAME] with [materials.NAME], or [geometry] with [material]")
+        if self.wear is not None and not self.joints:
+            raise ValueError("contact is missing: [wear] needs [contact] or [contacts.NAME]")
+        if self.contact is not None and self.contacts:
+            raise ValueError("expected either [contact] or [contacts.NAME], and not both")
+        for name, body in self.bodies.items():
+            if "." in name or name == GROUND:
+                raise ValueError(f'bodies.{name}: give a name without a dot that is not "{GROUND}"')
+            for material in body.materials:
+                if material not in self.materials:
+                    raise ValueError(f"bodies.{name}: {unknown_key(f'materials.{material}', [*self.materials])}")
+        for name, bolt in self.bolts.items():
+            if bolt.material is not None and bolt.material not in self.materials:
+                raise ValueError(f"bolts.{name}: {unknown_key(f'materials.{bolt.material}', [*self.materials])}")
+        taken = [*self.loads.static, *self.loads.harmonic]
+        for name in self.bolts:
+            if name in taken or name == CENTRIFUGAL:
+                raise ValueError(f"bolts.{name} has the name of a load: give it another")
+        for name in self.couplings:
+            if name in self.bodies:
+                raise ValueError(f"couplings.{name} has the name of a body: give it another")
+        for name, contact in self.contacts.items():
+            if contact.wear is not None and self.wear is None:
+                raise ValueError(f"contacts.{name}.wear needs [wear], which says how far the wear goes")
+        return self
