@@ -11,6 +11,7 @@ from skfem.quadrature import get_quadrature
 
 from tribodyn.geometry.sources import read as sources
 from tribodyn.geometry.sources import solid
+from tribodyn.geometry.sources.deck import Deck
 
 Groups = dict[str, np.ndarray]
 
@@ -27,7 +28,7 @@ def read(path: str | Path) -> tuple[Any, Groups]:
     raw = sources.read_raw(path)
     body = solid.build(raw)
     lost = sources.lost(raw, {"": body})
-    if lost:
+    if lost and raw.deck == Deck() and Path(path).suffix.lower() == ".msh":
         raise ValueError(f"mesh file '{path}' has {lost[0]}")
     quality(body.mesh)
     return body.mesh, body.node_sets

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tribodyn.geometry.sources import abaqus_cards, ansys, general, msh, nastran, solid
+from tribodyn.geometry.sources import abaqus_cards, ansys, cad, general, msh, nastran, solid
 from tribodyn.geometry.sources.cells import common_name, is_first_order
 from tribodyn.geometry.sources.deck import Deck, in_si
 from tribodyn.geometry.sources.raw import RawMesh
@@ -25,7 +25,10 @@ READERS: dict[str, Callable[[Path], RawMesh]] = {
     **dict.fromkeys((".bdf", ".nas", ".dat"), nastran.read),
     ".cdb": ansys.read,
     **dict.fromkeys((".vtk", ".vtu", ".med"), general.read),
+    **dict.fromkeys(cad.ENDINGS, cad.read),
+    ".geo": cad.read_drawing,
 }
+ENDINGS = tuple(READERS)
 
 
 @dataclass(frozen=True)
@@ -46,19 +49,20 @@ class Source:
     unused: tuple[str, ...] = ()
 
 
-def read(path: str | Path, unit: str = "m") -> Source:
-    """Read a mesh file or a deck as bodies.
+def read(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> Source:
+    """Read a mesh file, a deck or a CAD file as bodies.
 
     path : its ending tells the format; unit : of length in the file, "m", "mm", "in", ...
+    sizes : of the elements of a CAD file, in its unit
     Raises  ValueError: one sentence that names the file and the cure
     """
-    raw = read_raw(path, unit)
+    raw = read_raw(path, unit, sizes)
     parts = solid.bodies(raw)
     built = {name: solid.build(raw, elements) for name, elements in parts.items()}
     return Source(built, raw.deck, raw.points_of_reference, _said(raw, built), (*raw.unused, *lost(raw, built)))
 
 
-def read_raw(path: str | Path, unit: str = "m") -> RawMesh:
+def read_raw(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> RawMesh:
     """What a file says, lengths in metres. Raises ValueError as `read` does."""
     file = Path(path)
     if unit not in UNITS:
@@ -71,8 +75,10 @@ def read_raw(path: str | Path, unit: str = "m") -> RawMesh:
             f"mesh file '{path}' cannot be read, its ending is none of {', '.join(sorted(READERS))}: "
             "write it as a Gmsh file, MSH 4.1"
         )
+    if sizes is not None and reader is not cad.read:
+        raise ValueError(f"mesh file '{path}' is meshed already: element sizes are for CAD files")
     try:
-        raw = reader(file)
+        raw = reader(file) if sizes is None else cad.read(file, sizes)
     except (IndexError, KeyError) as problem:
         where = f"near {problem.args[0]!r}" if isinstance(problem, KeyError) else "in the middle of a line"
         raise ValueError(

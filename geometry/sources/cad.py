@@ -1,0 +1,128 @@
+"""Shapes of CAD programs (STEP, IGES, BREP) and drawings of Gmsh (.geo) -> tetrahedra of second order.
+
+Solids become bodies under the names that the STEP file gives them. Faces are groups "face N" by their number in the CAD
+file. Solids that touch stay apart, each with its own mesh, so that a contact can lie between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tribodyn.geometry.gmsh_session import session
+from tribodyn.geometry.sources import msh
+from tribodyn.geometry.sources.raw import RawMesh
+
+ENDINGS = (".step", ".stp", ".iges", ".igs", ".brep")
+_NO_NAME = "Open CASCADE"  # how its writer calls what has no name
+ELEMENTS_ALONG = 10  # on the longest edge of the box, where no size is asked for
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Element sizes, in the unit of the file. everywhere : None for a tenth of the shape's length
+    bodies : name of a solid -> size; faces : number of a face -> size there
+    """
+
+    everywhere: float | None = None
+    bodies: Mapping[str, float] = field(default_factory=dict)
+    faces: Mapping[int, float] = field(default_factory=dict)
+
+
+def read(path: Path, sizes: Sizes | None = None) -> RawMesh:
+    """Mesh a CAD file. Lengths are those of the file: Gmsh is told not to convert them.
+
+    Raises  ValueError: a file that cannot be read, has no solid or cannot be meshed, a size for what is not there
+    """
+    with session() as gmsh:
+        shapes = _solids(gmsh, path)
+        return _meshed(gmsh, path, shapes, sizes or Sizes())
+
+
+def read_drawing(path: Path) -> RawMesh:
+    """Mesh a drawing in Gmsh's language, which says its own sizes. Raises ValueError as `read` does."""
+    with session() as gmsh:
+        try:
+            gmsh.open(str(path))
+            gmsh.model.mesh.generate(3)
+            gmsh.model.mesh.setOrder(2)
+        except Exception as problem:  # gmsh raises this and nothing finer
+            raise ValueError(f"drawing '{path}' cannot be meshed ({_line(problem)}): correct it in Gmsh") from None
+        return msh.from_gmsh(gmsh)
+
+
+def _solids(gmsh: Any, path: Path) -> dict[str, int]:
+    """Import the solids of a file: name -> tag."""
+    gmsh.option.setString("Geometry.OCCTargetUnit", "")
+    gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
+    try:
+        gmsh.model.occ.importShapes(str(path), highestDimOnly=True)
+        gmsh.model.occ.synchronize()
+    except Exception as problem:
+        raise ValueError(f"CAD file '{path}' cannot be read ({_line(problem)}): export it again as STEP") from None
+    tags = [tag for _, tag in gmsh.model.getEntities(3)]
+    if not tags:
+        raise ValueError(f"CAD file '{path}' has no solid: close its surfaces in the CAD program and export solids")
+    names: dict[str, int] = {}
+    for tag in tags:
+        label = gmsh.model.getEntityName(3, tag).rstrip("/").rpartition("/")[2].strip()
+        name = f"solid {tag}" if not label or label.startswith(_NO_NAME) else label
+        names[name if name not in names else f"{name} {tag}"] = tag
+    return names
+
+
+def _meshed(gmsh: Any, path: Path, shapes: Mapping[str, int], sizes: Sizes) -> RawMesh:
+    model = gmsh.model
+    faces = {tag for _, tag in model.getEntities(2)}
+    for what, wanted, known in (("solid", sizes.bodies, shapes), ("face", sizes.faces, faces)):
+        for key in wanted:
+            if key not in known:
+                listed = ", ".join(map(str, sorted(known, key=str)[:12]))
+                raise ValueError(f"CAD file '{path}' has no {what} {key} to give a size to: it has {listed}")
+    box = np.array(model.getBoundingBox(-1, -1)).reshape(2, 3)
+    everywhere = sizes.everywhere or float(np.ptp(box, axis=0).max()) / ELEMENTS_ALONG
+    for values in ((everywhere,), sizes.bodies.values(), sizes.faces.values()):
+        if any(not value > 0 for value in values):
+            raise ValueError(f"CAD file '{path}': element sizes must be above zero")
+    fields = []
+
+    def constant(size: float, **entities: list[int]) -> None:
+        number = model.mesh.field.add("Constant")
+        model.mesh.field.setNumber(number, "VIn", size)
+        model.mesh.field.setNumber(number, "VOut", everywhere)
+        for key, tags in entities.items():
+            model.mesh.field.setNumbers(number, key, tags)
+        fields.append(number)
+
+    for name, size in sizes.bodies.items():
+        around = [tag for _, tag in model.getBoundary([(3, shapes[name])], oriented=False)]
+        constant(size, VolumesList=[shapes[name]], SurfacesList=around)
+    for face, size in sizes.faces.items():
+        constant(size, SurfacesList=[face])
+    gmsh.option.setNumber("Mesh.MeshSizeMax", max(everywhere, *sizes.bodies.values(), *sizes.faces.values(), 0.0))
+    if fields:
+        least = model.mesh.field.add("Min")
+        model.mesh.field.setNumbers(least, "FieldsList", fields)
+        model.mesh.field.setAsBackgroundMesh(least)
+    else:
+        gmsh.option.setNumber("Mesh.MeshSizeMin", everywhere / 4)
+    try:
+        model.mesh.generate(3)
+        model.mesh.setOrder(2)
+    except Exception as problem:
+        raise ValueError(
+            f"CAD file '{path}' cannot be meshed ({_line(problem)}): heal it or give a smaller size"
+        ) from None
+    for name, tag in shapes.items():
+        model.addPhysicalGroup(3, [tag], name=name)
+    raw = msh.from_gmsh(gmsh)
+    said = f"meshed with elements of {everywhere:.4g} in the unit of the file, tetrahedra of second order"
+    return replace(raw, said=(said,))
+
+
+def _line(problem: Exception) -> str:
+    return " ".join(str(problem).split())

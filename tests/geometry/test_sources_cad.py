@@ -1,0 +1,115 @@
+"""CAD files become bodies of second order under their names; faces are picked by number and by rule."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tribodyn.geometry import facts
+from tribodyn.geometry.gmsh_session import session
+from tribodyn.geometry.sources import picking, read
+from tribodyn.geometry.sources.cad import Sizes
+
+
+@pytest.fixture(scope="module")
+def blocks(tmp_path_factory):
+    """Two blocks of 60 x 20 x 10, one on the other, as a CAD program writes them."""
+    path = tmp_path_factory.mktemp("cad") / "blocks.step"
+    with session() as gmsh:
+        gmsh.model.occ.addBox(0, 0, 0, 60, 20, 10)
+        gmsh.model.occ.addBox(40, 0, 10, 60, 20, 10)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(path))
+    lines = path.read_text().splitlines()
+    number = 0
+    for i, line in enumerate(lines):
+        if "PRODUCT('" in line and "translator" in line and line.split("'")[1].rpartition(".")[2] in ("1", "2"):
+            product = line.split("'")[1]
+            if product.count(".") == 2:
+                lines[i] = line.replace(product, ("lower", "upper")[number])
+                number += 1
+    path.write_text("\n".join(lines))
+    return path
+
+
+def test_solids_are_bodies_that_stay_apart(blocks):
+    source = read.read(blocks, "mm")
+    assert len(source.bodies) == 2
+    for body in source.bodies.values():
+        found = facts.facts(body.mesh)
+        assert found.volume == pytest.approx(60e-3 * 20e-3 * 10e-3, rel=1e-9)
+        assert sorted(np.round(found.high - found.low, 9)) == [0.01, 0.02, 0.06]
+        areas = {name: facts.area(body.mesh, ids) for name, ids in body.mesh.boundaries.items()}
+        assert len(areas) == 6
+        assert sum(areas.values()) == pytest.approx(2 * (60 * 20 + 60 * 10 + 20 * 10) * 1e-6)
+    assert any("second order" in sentence for sentence in source.said)
+
+
+def test_sizes_by_body_and_by_face_refine_there(blocks):
+    coarse = read.read(blocks, "mm", Sizes(15.0))
+    first, second = coarse.bodies
+    number = int(next(iter(coarse.bodies[second].mesh.boundaries)).split()[1])
+    fine = read.read(blocks, "mm", Sizes(15.0, bodies={first: 5.0}))
+    at_face = read.read(blocks, "mm", Sizes(15.0, faces={number: 3.0}))
+    assert fine.bodies[first].mesh.nelements > 4 * coarse.bodies[first].mesh.nelements
+    face = f"face {number}"
+    count = {s: len(one.bodies[second].mesh.boundaries[face]) for s, one in (("coarse", coarse), ("fine", at_face))}
+    assert count["fine"] > 6 * count["coarse"]
+
+
+@pytest.mark.parametrize(
+    ("sizes", "sentence"),
+    [
+        (Sizes(faces={99: 1.0}), "has no face 99 to give a size to"),
+        (Sizes(bodies={"middle": 1.0}), "has no solid middle"),
+        (Sizes(-1.0), "must be above zero"),
+    ],
+)
+def test_sizes_that_cannot_be_are_refused(blocks, sizes, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        read.read(blocks, "mm", sizes)
+
+
+def test_broken_cad_files_are_refused_in_one_sentence(tmp_path, blocks):
+    broken = tmp_path / "broken.step"
+    broken.write_text("ISO-10303-21;\nhello\n")
+    with pytest.raises(ValueError, match=r"cannot be read|has no solid") as said:
+        read.read(broken)
+    assert "\n" not in str(said.value)
+    drawing = tmp_path / "broken.geo"
+    drawing.write_text("Box(1) = {0, 0, 0};")
+    with pytest.raises(ValueError, match=r"cannot be meshed|no volume"):
+        read.read(drawing)
+    with pytest.raises(ValueError, match="meshed already"):
+        read.read(Path(__file__).parent / "decks" / "lap.inp", "mm", Sizes(1.0))
+
+
+def test_drawings_are_meshed(tmp_path):
+    drawing = tmp_path / "box.geo"
+    text = (
+        'SetFactory("OpenCASCADE");',
+        "Box(1) = {0, 0, 0, 1, 2, 3};",
+        'Physical Volume("box") = {1};',
+        'Physical Surface("end") = {1};',
+        "Mesh.MeshSizeMax = 1;",
+    )
+    drawing.write_text("\n".join(text) + "\n")
+    (body,) = read.read(drawing, "mm").bodies.values()
+    assert facts.facts(body.mesh).volume == pytest.approx(6e-9)
+    assert facts.area(body.mesh, body.mesh.boundaries["end"]) == pytest.approx(6e-6)
+
+
+def test_faces_are_picked_by_rule(blocks):
+    source = read.read(blocks, "mm")
+    body = min(source.bodies.values(), key=lambda one: one.mesh.p[2].min())
+    mesh = body.mesh
+    top = picking.by_normal(mesh, (0, 0, 1))
+    assert facts.area(mesh, top) == pytest.approx(60e-3 * 20e-3)
+    np.testing.assert_array_equal(np.sort(picking.nearest(mesh, (0.03, 0.01, 0.02))), np.sort(top))
+    np.testing.assert_array_equal(np.sort(picking.within_box(mesh, (0, 0, 0.01), (0.06, 0.02, 0.01))), np.sort(top))
+    with pytest.raises(ValueError, match="no face of the boundary lies within the box"):
+        picking.within_box(mesh, (1, 1, 1), (2, 2, 2))
+    with pytest.raises(ValueError, match="no face of the boundary faces"):
+        picking.by_normal(mesh, (1, 1, 1))
+    with pytest.raises(ValueError, match="not all zero"):
+        picking.by_normal(mesh, (0, 0, 0))

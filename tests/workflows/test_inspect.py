@@ -1,0 +1,82 @@
+"""`tribodyn inspect`: facts of files and scenes for people and machines, and a remark on what is off by a thousand."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.helpers import foreign_files
+from tribodyn.fem.material import Material
+from tribodyn.workflows.command.main import main
+from tribodyn.workflows.studies import inspection
+
+LAP = Path(__file__).parents[1] / "geometry" / "decks" / "lap.inp"
+
+
+def said(capsys, *words):
+    with pytest.raises(SystemExit) as end:
+        main(["inspect", *map(str, words)])
+    out = capsys.readouterr()
+    return end.value.code, out.out, out.err
+
+
+def test_a_deck_for_machines(capsys):
+    code, out, _ = said(capsys, LAP, "--unit", "mm", "--modes", "14", "--json")
+    assert not code
+    found = json.loads(out)
+    assert found["mass_kg"] == pytest.approx(2 * 2e-6 * 7850)
+    assert found["volume_m3"] == pytest.approx(4e-6)
+    np.testing.assert_allclose(found["size_m"], [0.03, 0.02, 0.02])
+    np.testing.assert_allclose(found["centre_m"], [0.0025, 0.0075, 0.01], atol=1e-9)
+    assert set(found["bodies"]) == {"Block-1", "Block-2"}
+    assert found["groups"]["Upper"] == {"area_m2": pytest.approx(2e-4), "nodes": 15}
+    assert found["worst_element"]["scaled_jacobian"] == pytest.approx(1.0)
+    assert any("*PLASTIC" in clause for clause in found["unused"])
+    assert found["gaps"] == {}
+    assert found["frequencies_hz"][:12] == [0.0] * 12
+    assert found["frequencies_hz"][12] == pytest.approx(found["frequencies_hz"][13], rel=1e-6)  # equal blocks
+    assert found["remarks"] == []
+
+
+def test_units_that_slipped_are_remarked(capsys, tmp_path):
+    _, out, _ = said(capsys, LAP)
+    assert "30 m long, as a mesh in millimetres read in metres" in out
+    bar = foreign_files.write(foreign_files.bricks(tmp_path), tmp_path / "bar.inp", "")
+    remarks = " ".join(inspection.inspect(str(bar), material=Material(210.0, 0.3, 7.86)).remarks)
+    assert "the density of body is 7.86 kg/m3, as a value in g/cm3" in remarks
+    assert "Young's modulus of body is 210 Pa, as a value in GPa" in remarks
+    assert "in MPa" in " ".join(inspection.inspect(str(bar), material=Material(210e3, 0.3, 7860)).remarks)
+    assert inspection.inspect(str(bar), material=Material(210e9, 0.3, 7860)).remarks == ()
+
+
+def test_a_scene_with_the_deflection_that_deserves_a_remark(capsys):
+    coarse = ("geometry.n_patch=5", "geometry.n_length=4", "geometry.n_height=1")
+    words = [word for text in coarse for word in ("--set", text)]
+    code, out, _ = said(capsys, "beam", *words, "--modes", "2", "--json")
+    assert not code
+    found = json.loads(out)
+    assert found["mass_kg"] == pytest.approx(0.6288)
+    assert found["gaps"] == {"contact": {"least_m": 0.0, "largest_m": 0.0}}
+    assert found["frequencies_hz"] == pytest.approx([416.5, 416.5], rel=2e-2)
+    assert "more than a linear model describes" in found["remarks"][0]
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("nowhere.inp",), "does not exist"),
+        ((LAP, "--unit", "parsec"), "is no length that is known"),
+        ((LAP, "--unit", "mm", "--young", "210GPa"), "go together"),
+        ((LAP, "--unit", "mm", "--modes", "-1"), "give a number of modes"),
+        (("beam", "--unit", "mm"), "are for files"),
+        (("nothing",), "there is no scene"),
+        ((LAP, "--unit", "mm", "--picture", "a.xyz"), "give a file that ends with"),
+    ],
+)
+def test_what_cannot_be_inspected_is_one_sentence(capsys, words, sentence):
+    code, out, err = said(capsys, *words)
+    assert code == 2
+    assert sentence in err
+    assert err.count("\n") == 1
+    assert out == ""

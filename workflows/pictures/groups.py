@@ -1,0 +1,71 @@
+"""The bodies of a file or scene with their groups in colour, from two sides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from tribodyn.workflows.pictures import render
+from tribodyn.workflows.pictures.style import INK
+from tribodyn.workflows.pictures.view import BODY, PAPER, SHADE
+
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#f0e442", "#7f3c8d", "#8c564b", "#17becf")
+MOST = 20  # groups drawn; a colour comes twice beyond ten
+SIZE = (1700, 680)
+
+
+class Solid(Protocol):
+    """What is drawn of a body."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def mesh(self) -> Any: ...
+
+
+def draw(solids: Sequence[Solid], path: Path) -> Path:
+    """Draw every face group of some bodies in a colour of its own. Raises RenderingUnavailable"""
+    render.check()
+    import pyvista as pv
+
+    view = pv.Plotter(off_screen=True, shape=(1, 3), col_weights=[3, 3, 1.6], window_size=SIZE, border=False)
+    named = [(solid, name, ids) for solid in solids for name, ids in (solid.mesh.boundaries or {}).items()]
+    for side in (0, 1):
+        view.subplot(0, side)
+        view.set_background(PAPER)
+        for solid in solids:
+            outer = np.flatnonzero(solid.mesh.f2t[1] < 0)
+            covered = np.concatenate([np.asarray(i) for s, _, i in named[:MOST] if s is solid] or [np.empty(0, int)])
+            rest = np.setdiff1d(outer, covered)
+            if len(rest):
+                view.add_mesh(_surface(pv, solid.mesh, rest), color=BODY, show_edges=True, **SHADE)
+        for i, (solid, _, ids) in enumerate(named[:MOST]):
+            face = _surface(pv, solid.mesh, np.asarray(ids))
+            view.add_mesh(face, color=COLOURS[i % len(COLOURS)], show_edges=True, **SHADE)
+        view.view_isometric()
+        if side:
+            view.camera.azimuth += 180
+            view.camera.elevation -= 60
+        view.add_axes(color=INK)
+    view.subplot(0, 2)
+    view.set_background(PAPER)
+    if named:
+        labels = [name if len(solids) == 1 else f"{name} of {solid.name}" for solid, name, _ in named[:MOST]]
+        entries = [(label, COLOURS[i % len(COLOURS)]) for i, label in enumerate(labels)]
+        tall = min(0.05 * len(entries) + 0.02, 0.95)
+        view.add_legend(entries, bcolor=PAPER, face="rectangle", size=(0.95, tall), loc="center left")
+    if path.suffix.lower() == ".png":
+        view.screenshot(str(path))
+    else:
+        view.save_graphic(str(path))
+    view.close()
+    return path
+
+
+def _surface(pv: Any, mesh: Any, facets: np.ndarray) -> Any:
+    corners = mesh.facets[:, facets].T
+    faces = np.hstack([np.full((len(corners), 1), corners.shape[1]), corners])
+    return pv.PolyData(mesh.p.T, faces.ravel())

@@ -1,0 +1,294 @@
+"""What a file or a scene holds, before it is computed: sizes, masses, groups, gaps, free modes, oddities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from tribodyn.fem.elasticity import assemble
+from tribodyn.fem.factor import factorise
+from tribodyn.fem.material import Material
+from tribodyn.fem.modes import modes
+from tribodyn.geometry.facts import area, facts
+from tribodyn.geometry.sources import read as sources
+from tribodyn.workflows.run import modelling
+from tribodyn.workflows.scene import scene_file
+
+LARGE, SMALL = 20.0, 1e-4  # [m], sizes beyond which the unit of length is doubted
+LIGHT, HEAVY = 50.0, 30_000.0  # [kg/m3]; foams are below, nothing is above
+SOFT, HARD = 1e6, 2e12  # [Pa]; rubber and diamond
+BENT = 0.1  # of its size: more is no small displacement
+WATCHED = 6  # modes whose resonance is looked at
+
+
+@dataclass(frozen=True)
+class Solid:
+    """One body. material : None where nothing says it"""
+
+    name: str
+    mesh: Any
+    node_sets: Mapping[str, np.ndarray]
+    material: Material | None = None
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What was found, in SI units; see `record` for the fields. solids : the bodies, for a picture"""
+
+    solids: tuple[Solid, ...]
+    size: np.ndarray
+    volume: float
+    mass: float | None
+    centre: np.ndarray
+    bodies: Mapping[str, Mapping[str, Any]]
+    groups: Mapping[str, Mapping[str, Any]]
+    worst: Mapping[str, Any]
+    unused: tuple[str, ...] = ()
+    said: tuple[str, ...] = ()
+    gaps: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    frequencies: tuple[float, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    def record(self) -> dict[str, Any]:
+        """For machines."""
+        return {
+            "size_m": self.size.tolist(),
+            "mass_kg": self.mass,
+            "volume_m3": self.volume,
+            "centre_m": self.centre.tolist(),
+            "bodies": dict(self.bodies),
+            "groups": dict(self.groups),
+            "unused": list(self.unused),
+            "worst_element": dict(self.worst),
+            "gaps": dict(self.gaps),
+            "frequencies_hz": list(self.frequencies),
+            "said": list(self.said),
+            "remarks": list(self.remarks),
+        }
+
+    def lines(self) -> list[tuple[str, str]]:
+        """For people."""
+        mass = "not known, no density is given" if self.mass is None else f"{self.mass:.6g} kg"
+        lines = [
+            ("size", " x ".join(f"{1e3 * x:.6g}" for x in self.size) + " mm"),
+            ("volume", f"{1e6 * self.volume:.6g} cm3"),
+            ("mass", mass),
+            ("centre", f"({', '.join(f'{1e3 * x:.5g}' for x in self.centre)}) mm"),
+        ]
+        lines += [
+            ("body", f"{name}: {b['elements']} {b['kind']}, {b['nodes']} nodes") for name, b in self.bodies.items()
+        ]
+        for name, group in self.groups.items():
+            wide = f", {1e6 * group['area_m2']:.5g} mm2" if group["area_m2"] else ""
+            lines.append(("group", f"{name}: {group['nodes']} nodes{wide}"))
+        at = ", ".join(f"{1e3 * x:.4g}" for x in self.worst["centre_m"])
+        lines.append(("worst element", f"scaled Jacobian {self.worst['scaled_jacobian']:.3g} at ({at}) mm"))
+        for name, gap in self.gaps.items():
+            lines.append(("gap", f"{name}: {1e6 * gap['least_m']:.4g} to {1e6 * gap['largest_m']:.4g} um"))
+        if self.frequencies:
+            lines.append(("free modes", ", ".join(f"{f:.5g}" for f in self.frequencies) + " Hz"))
+        lines += [("done", sentence) for sentence in self.said]
+        lines += [("not used", clause) for clause in self.unused]
+        return lines + [("look again", sentence) for sentence in self.remarks]
+
+    def short(self) -> str:
+        """One line for the head of a run."""
+        size = " x ".join(f"{1e3 * x:.4g}" for x in self.size)
+        mass = "" if self.mass is None else f", {self.mass:.4g} kg"
+        count = f"{len(self.bodies)} bodies" if len(self.bodies) > 1 else "one body"
+        return f"{count}, {size} mm{mass}, worst element {self.worst['scaled_jacobian']:.2g}"
+
+
+def inspect(
+    what: str,
+    overrides: Sequence[str] = (),
+    unit: str = "m",
+    material: Material | None = None,
+    n_modes: int = 0,
+) -> Inspection:
+    """Inspect a mesh, a deck, a CAD file, or a scene.
+
+    what : name of a scene, or path of a .toml file or of a file that `geometry.sources.read` knows
+    unit : of length of a file that is no scene; material : of its bodies where the file gives none
+    n_modes : how many free frequencies are wanted; supports and springs of a scene hold, contacts are open
+    Raises  ValueError: what cannot be, one sentence
+    """
+    if Path(what).suffix.lower() in sources.ENDINGS:
+        return _of_file(Path(what), unit, material, n_modes)
+    if unit != "m" or material is not None:
+        raise ValueError("--unit, --young, --poisson and --density are for files: a scene says them itself")
+    return _of_scene(scene_file.read(what, overrides), n_modes)
+
+
+def _of_file(path: Path, unit: str, material: Material | None, n_modes: int) -> Inspection:
+    source = sources.read(path, unit)
+    given = {group: one for one in source.deck.materials for group in one.groups}
+    solids, remarks = [], []
+    for name, body in source.bodies.items():
+        own = next((given[group] for group in body.mesh.subdomains or {} if group in given), None)
+        made = material
+        if own is not None and own.young and own.poisson is not None and own.density:
+            made = Material(own.young, own.poisson, own.density)
+        solids.append(Solid(name, body.mesh, body.node_sets, made))
+    found = measured(solids, (f"{sentence}" for sentence in source.said), source.unused)
+    if n_modes:
+        if any(solid.material is None for solid in solids):
+            raise ValueError(f"{path} gives no material to compute modes with: give --young, --poisson and --density")
+        found = replace(found, frequencies=_free_frequencies(solids, n_modes))
+    hint = 'give --unit mm (in a scene: unit = "mm")'
+    remarks += _odd_sizes(found.size, hint) + _odd_materials({s.name: s.material for s in solids if s.material})
+    return replace(found, remarks=tuple(remarks))
+
+
+def _free_frequencies(solids: Sequence[Solid], count: int) -> tuple[float, ...]:
+    """The lowest natural frequencies of bodies that nothing holds [Hz]; rigid motions are 0."""
+    found: list[float] = []
+    for solid in solids:
+        assert solid.material is not None
+        M, K = assemble(solid.mesh, solid.material)
+        omega, _ = modes(K, M, min(count, K.shape[0]))
+        elastic = omega.copy()
+        elastic[:6] = 0.0
+        found += (elastic / (2 * np.pi)).tolist()
+    return tuple(sorted(found)[:count])
+
+
+def _of_scene(file: scene_file.SceneFile, n_modes: int) -> Inspection:
+    with TemporaryDirectory() as folder:
+        mesh, node_sets = modelling.make_mesh(file, Path(folder))
+    part = modelling.make_part(file.part_scene, mesh, node_sets)
+    found = of_part(file, part)
+    if n_modes:
+        system = part.system
+        omega, _ = modes(system.stiffness, system.mass, min(n_modes, system.mass.shape[0]))
+        found = replace(found, frequencies=tuple((omega / (2 * np.pi)).tolist()))
+    return found
+
+
+def of_part(file: scene_file.SceneFile, part: Any) -> Inspection:
+    """The facts of a part of a scene that is assembled already."""
+    scene = file.part_scene
+    material = Material(scene.material.young, scene.material.poisson, scene.material.density)
+    found = measured([Solid(file.name, part.mesh, part.node_sets, material)])
+    gap = np.asarray(part.interface.gap)
+    gaps = {
+        name: {"least_m": float(gap[pairs].min()), "largest_m": float(gap[pairs].max())}
+        for name, pairs in part.pairs.items()
+        if gap[pairs].size
+    }
+    remarks = [
+        *_odd_sizes(found.size, "scale the mesh to metres"),
+        *_odd_materials({"the part": material}),
+        *_odd_deflection(scene, part, float(np.linalg.norm(found.size))),
+    ]
+    return replace(found, gaps=gaps, remarks=tuple(remarks))
+
+
+def measured(solids: Sequence[Solid], said: Iterable[str] = (), unused: Iterable[str] = ()) -> Inspection:
+    """Sizes, volumes, masses, groups and the worst element of bodies."""
+    all_facts = {solid.name: facts(solid.mesh) for solid in solids}
+    volume = sum(one.volume for one in all_facts.values())
+    masses = [s.material.rho * all_facts[s.name].volume for s in solids if s.material is not None]
+    mass = sum(masses) if len(masses) == len(solids) else None
+    weights = masses if mass else [all_facts[s.name].volume for s in solids]
+    centre = np.average([all_facts[s.name].centre for s in solids], axis=0, weights=weights)
+    low = np.min([one.low for one in all_facts.values()], axis=0)
+    high = np.max([one.high for one in all_facts.values()], axis=0)
+    bodies, groups = {}, {}
+    for solid in solids:
+        one = all_facts[solid.name]
+        bodies[solid.name] = {
+            "elements": solid.mesh.nelements,
+            "kind": "hexahedra" if solid.mesh.t.shape[0] == 8 else "tetrahedra",
+            "nodes": solid.mesh.doflocs.shape[1],
+            "volume_m3": one.volume,
+            "mass_kg": None if solid.material is None else solid.material.rho * one.volume,
+            "centre_m": one.centre.tolist(),
+        }
+        faces = solid.mesh.boundaries or {}
+        for name, nodes in solid.node_sets.items():
+            key = name if len(solids) == 1 or name not in groups else f"{solid.name}.{name}"
+            wide = area(solid.mesh, faces[name]) if name in faces else 0.0
+            groups[key] = {"area_m2": wide, "nodes": len(nodes)}
+    name = min(all_facts, key=lambda key: all_facts[key].scaled_jacobian)
+    worst = {
+        "body": name,
+        "scaled_jacobian": all_facts[name].scaled_jacobian,
+        "centre_m": all_facts[name].worst_centre.tolist(),
+    }
+    return Inspection(
+        tuple(solids), high - low, volume, mass, centre, bodies, groups, worst, tuple(unused), tuple(said)
+    )
+
+
+def _odd_sizes(size: np.ndarray, cure: str) -> list[str]:
+    longest = float(size.max())
+    if longest > LARGE:
+        return [f"it is {longest:.4g} m long, as a mesh in millimetres read in metres would be: {cure}"]
+    if longest < SMALL:
+        return [
+            f"it is {1e6 * longest:.4g} um long, as a mesh in metres read in millimetres would be: correct its unit"
+        ]
+    return []
+
+
+def _odd_materials(materials: Mapping[str, Material]) -> list[str]:
+    remarks = []
+    for name, one in materials.items():
+        if one.rho < LIGHT or one.rho > HEAVY:
+            unit = "g/cm3" if 0.1 < one.rho < LIGHT else "another unit"
+            remarks.append(
+                f"the density of {name} is {one.rho:.4g} kg/m3, as a value in {unit} without its unit would be: "
+                'write it with its unit, such as "7.86 g/cm3"'
+            )
+        if one.E < SOFT or one.E > HARD:
+            unit = "GPa" if one.E < 2e3 else "MPa" if one.E < SOFT else "another unit"
+            remarks.append(
+                f"Young's modulus of {name} is {one.E:.4g} Pa, as a value in {unit} without its unit would be: "
+                'write it with its unit, such as "210 GPa"'
+            )
+    return remarks
+
+
+def _odd_deflection(scene: Any, part: Any, size: float) -> list[str]:
+    """A remark where a load, alone and with the contact open, bends the part beyond a linear model.
+
+    Static loads by their static deflection; harmonic ones by the resonances in the range of the response, with the
+    modal damping of the scene.
+    """
+    moved: dict[str, tuple[float, str]] = {}
+    system = part.system
+    try:
+        factor = factorise(system.stiffness)
+    except ValueError:  # nothing holds it but the contact
+        return []
+    for name, load in {**scene.loads.static, **scene.loads.harmonic}.items():
+        if name in system.loads:
+            moved[name] = (_largest(part, factor.solve(system.loads[name] * load.amplitude)), "at rest")
+    ratio = scene.damping.modal
+    if ratio:
+        omega, phi = modes(system.stiffness, system.mass, min(WATCHED, system.mass.shape[0]), factor=factor)
+        low, high = (2 * np.pi * f for f in scene.response.frequency)
+        for name, load in scene.loads.harmonic.items():
+            force = system.loads[name] * load.amplitude if name in system.loads else 0.0 * phi[:, 0]
+            for i in np.flatnonzero((omega * load.harmonic >= low) & (omega <= high * load.harmonic) & (omega > 0)):
+                swing = _largest(part, phi[:, i] * (phi[:, i] @ force) / (2 * ratio * omega[i] ** 2))
+                moved[name] = max(
+                    moved.get(name, (0.0, "")), (swing, f"at its resonance of {omega[i] / 6.2832:.4g} Hz")
+                )
+    name, (largest, where) = max(moved.items(), key=lambda item: item[1][0], default=("", (0.0, "")))
+    if largest <= BENT * size:
+        return []
+    return [
+        f"load {name} alone moves the part by {1e3 * largest:.3g} mm on {1e3 * size:.3g} mm {where} while the "
+        "contact is open, more than a linear model describes: check its unit, or keep this in mind"
+    ]
+
+
+def _largest(part: Any, q: np.ndarray) -> float:
+    return float(np.linalg.norm(part.field(q), axis=1).max())
