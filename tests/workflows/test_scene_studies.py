@@ -1,4 +1,4 @@
-"""Studies of any scene: one change at a time, folds in time, supports; on the beam, which none of them was made for."""
+"""Studies of any scene: one change at a time, supports; on the beam, which none of them was made for."""
 
 from __future__ import annotations
 
@@ -69,21 +69,6 @@ def test_a_failed_change_has_a_row_that_says_why() -> None:
     assert [row.values.get("answer") for row in rows] == [0.5, None, 0.2]
     assert rows[1].outcome == "no solution at 400 Hz"
     assert "-60 %" in variation.as_text(rows)
-
-
-def test_folds_of_the_beam_are_found_in_time(capsys: pytest.CaptureFixture[str]) -> None:
-    """A beam pressed on lightly and shaken normally knocks: its response softens through folds."""
-    knocking = (
-        *TINY, "contact.components=['n']", "contact.law=unilateral", "contact.tangential_stiffness=",
-        "contact.friction=", "loads.harmonic.shake.group=static_load", "loads.harmonic.shake.direction=z",
-        "loads.harmonic.shake.value=150 N", "loads.static.press.value=1 kN", "response.direction=z",
-        "response.frequency=['300 Hz', '1500 Hz']", "damping.modal=2 %", "harmonics.kept=[0, 1, 2, 3]",
-    )  # fmt: skip
-    call([*words("folds", "beam", sets=knocking), "--json"])
-    rows = json.loads(capsys.readouterr().out)
-    found = [row for row in rows if row["outcome"] == "converged"]
-    assert found
-    assert all(abs(row["difference"]) < 0.02 for row in found)
 
 
 def test_work_of_a_support_in_closed_form() -> None:
