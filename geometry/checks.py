@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+MOST = 2000  # elements or nodes along one edge of a part
+
 
 def positive(parameters: Any, *names: str, unit: str = "metres") -> None:
     """Refuse parameters that are not finite numbers above zero."""
@@ -23,11 +25,13 @@ def within(parameters: Any, *names: str, least: float, most: float, unit: str) -
 
 
 def whole(parameters: Any, *names: str, least: int) -> None:
-    """Refuse parameters that are not whole numbers of at least `least`."""
+    """Refuse parameters that are not whole numbers from `least` to MOST."""
     for name in names:
         value = getattr(parameters, name)
         if isinstance(value, bool) or not isinstance(value, int) or value < least:
             raise ValueError(f"geometry.{name} is {value!r}: give a whole number of at least {least}")
+        if value > MOST:
+            raise ValueError(f"geometry.{name} is {value}: give at most {MOST}, a mesh of more has no use")
 
 
 def odd(parameters: Any, *names: str, least: int = 3) -> None:

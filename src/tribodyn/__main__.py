@@ -1,6 +1,17 @@
-"""`python -m tribodyn`: the command."""
+"""`python -m tribodyn` and the program `tribodyn`: the command."""
 
-from tribodyn.workflows.command.main import main
+import sys
+
+
+def main() -> None:
+    """Run the command; Ctrl-C while it is still being loaded ends it as quietly as later."""
+    try:
+        from tribodyn.workflows.command.main import main as command
+    except KeyboardInterrupt:
+        print("tribodyn: stopped.", file=sys.stderr)
+        sys.exit(130)
+    command()
+
 
 if __name__ == "__main__":
     main()

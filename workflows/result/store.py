@@ -1,10 +1,14 @@
 """The result file: HDF5 with dimension scales, replaced as a whole at every checkpoint.
 
-Whoever opens the file, at any moment and after any kill, finds one complete checkpoint.
+Whoever opens the file, at any moment and after any kill, finds one complete checkpoint. The HDF5 content follows a user
+block of USER_BLOCK bytes, which every HDF5 reader skips; it holds a checksum of the content. The content is made in
+memory and written by plain file operations, since HDF5 itself does not survive a full disk.
 """
 
 from __future__ import annotations
 
+import hashlib
+import io
 import os
 from collections.abc import Mapping
 from dataclasses import fields
@@ -30,6 +34,8 @@ from tribodyn.workflows.result.result import (
 from tribodyn.workflows.result.whole_file import replacing
 
 FORMAT = "tribodyn result 1"
+USER_BLOCK = 512  # bytes before the HDF5 content, the least that HDF5 allows
+MARK = b"tribodyn result, sha256 of what follows this block: "
 FIELD = {"frf": "response"}  # groups of the file that have another name than the field of a Result
 
 # group -> (type, {array: (dimensions, unit)}); what is not an array is an attribute of the group
@@ -136,8 +142,16 @@ class ResultError(ValueError):
 
 def save(path: Path, result: Result) -> None:
     """Write a result so that `path` holds either the old or the new one, never a part of it."""
-    with replacing(path) as new, h5py.File(new, "w", libver="v110") as file:
+    with h5py.File(path.name, "w", driver="core", backing_store=False, libver="v110") as file:
         _write(file, result)
+        file.flush()
+        content = file.id.get_file_image()
+    head = MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"
+    try:
+        with replacing(path) as new:
+            new.write_bytes(head.ljust(USER_BLOCK, b"\0") + content)
+    except OSError as error:
+        raise ResultError(f'the result cannot be written to "{path}": {error.strerror or error}') from error
 
 
 def set_aside(path: Path) -> Path | None:
@@ -195,11 +209,20 @@ def _scale(file: h5py.File, dimension: str, size: int) -> h5py.Dataset:
 
 
 def load(path: Path) -> Result:
-    """Read a result file; raises ResultError where there is none."""
+    """Read a result file; raises ResultError where there is none, or where it has changed since it was written."""
     try:
-        file = h5py.File(path, "r")
+        data = path.read_bytes()
     except FileNotFoundError:
         raise ResultError(f'there is no result file "{path}"') from None
+    except OSError as error:
+        raise ResultError(f'the result file "{path}" cannot be read: {error.strerror or error}') from None
+    if data.startswith(MARK[:8]):
+        content = data[USER_BLOCK:]
+        if not data.startswith(MARK + hashlib.sha256(content).hexdigest().encode()):
+            raise ResultError(f'"{path}" is damaged, its checksum differs: run its scene again')
+        data = content
+    try:
+        file = h5py.File(io.BytesIO(data), "r")
     except OSError:
         raise ResultError(f'"{path}" is not a result file of tribodyn') from None
     with file:

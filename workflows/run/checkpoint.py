@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+from filelock import FileLock, Timeout
 
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.result import Result
@@ -24,6 +28,25 @@ class Clock:
     def seconds(self) -> float:
         """Seconds so far."""
         return self._before + time.perf_counter() - self._start
+
+
+@contextmanager
+def alone_in(folder: Path | None) -> Iterator[None]:
+    """Keep other runs out of a folder while this one writes into it; raises ValueError where one is at work there."""
+    if folder is None:
+        yield
+        return
+    lock = FileLock(folder / ".lock", timeout=0)
+    try:
+        lock.acquire()
+    except Timeout:
+        raise ValueError(f"another run is writing into {folder}: wait for it, or give another folder") from None
+    except OSError as error:
+        raise ValueError(f"{folder} cannot be written to: {error.strerror or error}") from None
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 @dataclass(frozen=True)

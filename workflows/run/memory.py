@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
+
+FACTOR_BYTES = 15e3  # of a sparse Cholesky factor, for each DOF
 
 
 def forget_peak() -> None:
@@ -24,3 +27,17 @@ def peak() -> float:
 
         unit = 1 if sys.platform == "darwin" else 1024
         return float(unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+
+
+def check(n_dof: int) -> None:
+    """Raise ValueError where the factorisation of a model of so many DOFs does not fit into this machine's memory."""
+    try:
+        machine = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, OSError, ValueError):  # as on Windows
+        return
+    needed = FACTOR_BYTES * n_dof
+    if needed > machine:
+        raise ValueError(
+            f"the mesh has {n_dof} DOFs, whose factorisation needs some {needed / 1e9:.0f} GB, and this machine has "
+            f"{machine / 1e9:.0f} GB: make the mesh coarser"
+        )

@@ -30,7 +30,7 @@ from tribodyn.reduction.damping import modal_damping, rayleigh
 from tribodyn.reduction.held import hold
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ReducedModel
-from tribodyn.workflows.run import bodies, curve, matrix_model, part_reduction, settings
+from tribodyn.workflows.run import bodies, curve, matrix_model, memory, part_reduction, settings
 from tribodyn.workflows.run.contact_surfaces import surface_gap
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.contact import Contact, FaceContact
@@ -69,6 +69,7 @@ def build(file: SceneFile, folder: Path, progress: Progress, chosen: tuple[int, 
     else:
         with progress.stage("mesh"):
             mesh, node_sets = make_mesh(file, folder)
+            memory.check(3 * mesh.doflocs.shape[1])
         with progress.stage("mass and stiffness"):
             part = make_part(file.mesh_scene, mesh, node_sets, file.folder)
         part, repairs = with_surfaces(file.mesh_scene, part, file.folder)

@@ -18,7 +18,7 @@ from tribodyn.workflows.accuracy.budget import with_budget
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import curve, modelling, references, settings, wear_run, worn_responses
-from tribodyn.workflows.run.checkpoint import Clock, Keeper
+from tribodyn.workflows.run.checkpoint import Clock, Keeper, alone_in
 from tribodyn.workflows.run.description import described
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
@@ -36,7 +36,7 @@ def run(file: SceneFile, folder: Path | None, progress: Progress, earlier: Resul
     scene, clock = file.scene, Clock(earlier)
     settings.check_names(scene)
     keep = Keeper(None if folder is None else folder / "result.h5", clock)
-    with threadpool_limits(scene.solver.threads), TemporaryDirectory() as scratch:
+    with alone_in(folder), threadpool_limits(scene.solver.threads), TemporaryDirectory() as scratch:
         model = modelling.build(file, folder or Path(scratch), progress, () if earlier is None else earlier.harmonics)
         result = earlier or described(file, model.part, model.balance, model.choice)
         if scene.wears and result.patch is not None:

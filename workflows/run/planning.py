@@ -18,6 +18,7 @@ from tribodyn.fem.constraints import free_dofs, named
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.craig_bampton import POINT_LOAD
 from tribodyn.workflows.run import matrix_model
+from tribodyn.workflows.run import memory as memory_use
 from tribodyn.workflows.run.modelling import clamps, make_mesh
 from tribodyn.workflows.run.part_reduction import components
 from tribodyn.workflows.run.settings import check_names
@@ -26,7 +27,6 @@ from tribodyn.workflows.scene.own import is_file
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
 
-FACTOR_BYTES = 15e3  # of a sparse Cholesky factor, for each DOF
 FACTOR_SECONDS = 2e-7  # N^1.5 law
 BACK_SUBSTITUTION_SECONDS = 1.5e-7  # for each DOF and right-hand side
 DENSE_SECONDS = 3e-9  # for each cubed coordinate of the reduced model, all eigenvalue problems together
@@ -105,7 +105,7 @@ def plan(file: SceneFile) -> Plan:
     model = masters + (modes if modes is not None else 50) - held
     memory = (
         200e6  # the program itself
-        + FACTOR_BYTES * full
+        + memory_use.FACTOR_BYTES * full
         + 3 * 8.0 * full * model
         + 10 * 8.0 * model**2
         + 8 * 8.0 * contact**2

@@ -380,7 +380,7 @@ class Harmonics(Table):
     kept: Annotated[tuple[Annotated[StrictInt, Field(ge=0)], ...], WrapValidator(_kept)] = (0, 1)
     """Rising harmonic numbers, or "auto": as many as the response needs at the peak of the unworn contact, so that
     what is left out changes it by less than `tolerance`, up to `highest`."""
-    tolerance: Annotated[Number, Field(gt=0, lt=1)] | None = None
+    tolerance: Annotated[Number, Field(gt=0, ge=1e-10, lt=1)] | None = None
     """Relative change allowed by kept = "auto"."""
     highest: Annotated[StrictInt, Field(ge=1)] | None = None
     """Highest harmonic that kept = "auto" may keep; 15 by default."""
@@ -450,7 +450,7 @@ class Pictures(Table):
 class Solver(Table):
     """Tolerances of the solver, and threads of the linear algebra."""
 
-    tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-8
+    tolerance: Annotated[Number, Field(gt=0, ge=1e-13, lt=1)] = 1e-8
     """Newton's tolerance on the contact displacement, relative to its size."""
     krylov: Annotated[Number, Field(gt=0, lt=1)] = 0.1
     """How exactly each Newton direction is solved, at the least."""

@@ -36,6 +36,7 @@ UNITS: dict[str, tuple[Fraction, Dimension, str]] = {
 }
 
 NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*$")
+BEYOND = 1e25  # in SI units: above it products of quantities overflow, and no structure has it
 FACTOR = re.compile(r"(%|[A-Za-z]+)(?:\^?(-?\d))?$")
 
 
@@ -92,8 +93,8 @@ def to_si(value: object, unit: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ValueError(f"{expected}, got {value!r}")
     if not isinstance(value, str):
-        if not math.isfinite(value):
-            raise ValueError(f"{expected}, got {value}")
+        if not abs(value) < BEYOND:
+            raise ValueError(f"{expected}, got {value}, beyond what a structure has")
         return float(value)
     match = NUMBER.match(value)
     if match is None:
@@ -106,10 +107,10 @@ def to_si(value: object, unit: str) -> float:
         raise ValueError(f'{expected}, got "{value}" in which {error}') from None
     if given.dimension != wanted.dimension:
         raise ValueError(f'{expected}, got "{value}" which is {_name(given.dimension)}')
-    try:
-        return float(Fraction(match[1]) * given.factor / wanted.factor)
-    except OverflowError:
-        raise ValueError(f'{expected}, got "{value}" which is not finite') from None
+    exact = Fraction(match[1]) * given.factor / wanted.factor
+    if not abs(exact) < BEYOND:
+        raise ValueError(f'{expected}, got "{value}", beyond what a structure has')
+    return float(exact)
 
 
 EXAMPLES = {
