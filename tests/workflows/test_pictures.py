@@ -15,7 +15,7 @@ from tribodyn.workflows.pictures import plots, render, view
 
 def test_curves_and_maps(tmp_path: Path) -> None:
     written = plots.draw(result(), tmp_path)
-    names = {"frf", "cycles_per_step", "peak", "preload", "depth", "energy", "hysteresis", "patch"}
+    names = {"frf", "cycles_per_step", "peak", "preload", "depth", "energy", "status", "hysteresis", "patch"}
     assert {path.stem for path in written} == names
     for path in written:
         assert_not_blank(path)
@@ -29,7 +29,7 @@ def test_a_response_alone_is_drawn_too(tmp_path: Path) -> None:
 
 def test_renders(tmp_path: Path) -> None:
     written = render.draw(result(), tmp_path)
-    assert {path.stem for path in written} == {"worn_patch", "worn_part"}
+    assert {path.stem for path in written} == {"part", "contact"}
     for path in written:
         assert_not_blank(path)
 

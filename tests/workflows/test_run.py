@@ -91,7 +91,7 @@ def test_loops_enclose_the_energy(finished: Result, tmp_path: Path) -> None:
     assert wear is not None
     assert loops is not None
     balance = modelling.build(read("beam", SMALL), tmp_path, Progress()).balance.with_samples(4096, located=False)
-    fine = fields.hysteresis_loops(balance, wear.rows(), loops.row)
+    fine = fields.hysteresis_loops(balance, [wear.rows()[row] for row in loops.row], loops.row)
     for row, x, force in zip(loops.row, fine.displacement, fine.force, strict=True):
         following = np.roll(x, -1, -1) - np.roll(x, 1, -1)
         area = 0.5 * np.sum(force * following, axis=(1, 2))

@@ -108,8 +108,12 @@ def result_file(path: Path) -> Path:
     return path / "result.h5" if path.is_dir() else path
 
 
-def draw(result: Result, folder: Path) -> tuple[list[Path], str]:
+def draw(
+    result: Result, folder: Path, formats: Sequence[str] = ("png",), dpi: int | None = None
+) -> tuple[list[Path], str]:
     """Draw what the scene of a result wants drawn; curves come first, they need no system libraries.
+
+    formats : of the pictures, "png", "pdf", "svg"; dpi : dots per inch of what has them
 
     Returns the files, and a sentence where nothing can be rendered on this machine
     """
@@ -117,12 +121,12 @@ def draw(result: Result, folder: Path) -> tuple[list[Path], str]:
 
     wanted, missing = scene_file.from_json(result.provenance["scene"]).pictures, ""
     folder.mkdir(parents=True, exist_ok=True)
-    written = plots.draw(result, folder) if wanted.plots else []
+    written = plots.draw(result, folder, formats, dpi) if wanted.plots else []
     if wanted.renders:
         from tribodyn.workflows.pictures import render
 
         try:
-            written += render.draw(result, folder, wanted.deformation_scale, wanted.wear_scale)
+            written += render.draw(result, folder, wanted.deformation_scale, wanted.wear_scale, formats, dpi)
         except render.RenderingUnavailable as reason:
             missing = f"no renders: {reason}"
     return written, missing

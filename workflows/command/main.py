@@ -20,6 +20,8 @@ from tribodyn.workflows.scene import scene_file
 if TYPE_CHECKING:
     from tribodyn.workflows.result.result import Result
 
+Formats = Annotated[tuple[str, ...], Parameter(name="--format", negative=(), consume_multiple=True)]
+
 app = cyclopts.App(
     name="tribodyn",
     help="From geometry to worn surface: vibration, friction and fretting wear of jointed parts.",
@@ -129,7 +131,7 @@ def show(result: Path, *, as_json: Json = False) -> None:
 
 
 @app.command
-def render(result: Path, *, out: Path | None = None) -> None:
+def render(result: Path, *, out: Path | None = None, formats: Formats = ("png",), dpi: int = 200) -> None:
     """Draw the pictures of a result again.
 
     Parameters
@@ -137,12 +139,18 @@ def render(result: Path, *, out: Path | None = None) -> None:
     result
         Folder or file of a result.
     out
-        Folder of the pictures; beside the result by default.
+        Folder of the pictures; beside the result unless told.
+    formats
+        png, pdf or svg, can be repeated.
+    dpi
+        Dots per inch of png.
     """
     from tribodyn.workflows.api import scenes
 
     make_room(out)
-    _draw(scenes.load(result), out or scenes.result_file(result).parent / "pictures")
+    if not 20 <= dpi <= 2400:
+        raise ValueError(f"--dpi {dpi}: give 20 to 2400 dots per inch")
+    _draw(scenes.load(result), out or scenes.result_file(result).parent / "pictures", formats, dpi)
 
 
 @app.command
@@ -215,10 +223,10 @@ def _print_summary(result: Result) -> None:
     print_lines(summary.lines(result))
 
 
-def _draw(result: Result, folder: Path) -> None:
+def _draw(result: Result, folder: Path, formats: Sequence[str] = ("png",), dpi: int | None = None) -> None:
     from tribodyn.workflows.api import scenes
 
-    written, missing = scenes.draw(result, folder)
+    written, missing = scenes.draw(result, folder, formats, dpi)
     if missing:
         print(missing)
     print(*written, sep="\n")

@@ -9,8 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from tribodyn.workflows.pictures import render
-from tribodyn.workflows.pictures.style import INK
-from tribodyn.workflows.pictures.view import BODY, PAPER, SHADE
+from tribodyn.workflows.pictures.shots import SHADE
+from tribodyn.workflows.pictures.style import BODY, INK, PAPER
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#f0e442", "#7f3c8d", "#8c564b", "#17becf")
 MOST = 20  # groups drawn; a colour comes twice beyond ten

@@ -1,68 +1,91 @@
-"""Maps of the contact patch in its own plane: wear depth, contact status and pressure at chosen wear steps."""
+"""Maps of the contact patch in its own plane: wear depth, contact status and pressure in chosen states."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch as Swatch
+from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 
+from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, status_legend
 from tribodyn.workflows.pictures.style import PRESSURE_MAP, STATUS, STYLE, WEAR_MAP
 from tribodyn.workflows.result.result import Patch, Result
+from tribodyn.workflows.result.states import shown_states, state_of
 
 
-def patch_maps(result: Result, rows: np.ndarray | None = None) -> Figure:
-    """Depth after the step, status over the cycle and mean pressure of the step, one column for each chosen step.
+def patch_maps(result: Result, rows: np.ndarray | None = None, scale: Literal["column", "shared"] = "column") -> Figure:
+    """Depth, status over the cycle and mean pressure, one column for each state.
 
-    rows : wear rows to show, those of the result by default
+    rows : of the wear history, or points of a response that does not wear; those of the result unless told
+    scale : whether each map has its own scale, with its range, or all maps of a row share one
     """
-    wear, patch = result.wear, result.patch
-    assert wear is not None
+    patch = result.patch
     assert patch is not None
-    rows = result.shown_rows() if rows is None else rows
-    depth = 1e3 * np.stack([result.depth_after(row) for row in rows])
-    pressure = 1e-6 * wear.normal_force[rows] / patch.area
-    aspect = float(np.clip(np.ptp(patch.flat[:, 1]) / np.ptp(patch.flat[:, 0]), 0.3, 2.0))
+    states = shown_states(result) if rows is None else [state_of(result, int(row)) for row in rows]
+    unit, factor = length_unit(max(float(state.depth.max()) for state in states))
+    fields: dict[str, tuple[str, list[np.ndarray]]] = {}
+    if any(state.depth.max() > 0 for state in states):
+        fields[f"total wear depth / {unit}"] = (WEAR_MAP, [factor * state.depth for state in states])
+    if all(state.pressure is not None for state in states):
+        pressures = [s.pressure for s in states if s.pressure is not None]
+        unit, factor = pressure_unit(max(float(p.max()) for p in pressures))
+        fields[f"mean pressure / {unit}"] = (PRESSURE_MAP, [factor * p for p in pressures])
+    told = all(state.status is not None for state in states)
+    lines = list(fields)[:1] + ["status"] * told + list(fields)[1:]
+    aspect = float(np.clip(np.ptp(patch.flat[:, 1]) / np.ptp(patch.flat[:, 0]), 0.25, 2.0))
     with mpl.rc_context({**STYLE, "axes.grid": False}):
-        figure = Figure(figsize=(2.7 * len(rows) + 2.2, 3 * 2.5 * aspect + 1.4), layout="constrained")
-        grid = figure.subplots(3, len(rows) + 1, squeeze=False, width_ratios=[1.0] * len(rows) + [0.55])
-        maps, sides = grid[:, :-1], grid[:, -1]
-        for column, row in enumerate(rows):
-            maps[0, column].set_title(
-                f"wear step {row + 1}\n{_cycles(result.cycles_after(row))} cycles", fontsize=10, fontweight="normal"
-            )
-            shown = draw_field(maps[0, column], patch, depth[column], WEAR_MAP, depth.max())
-            draw_status(maps[1, column], patch, wear.status[row])
-            pressed = draw_field(maps[2, column], patch, pressure[column], PRESSURE_MAP, pressure.max())
-        for side in sides:
-            side.axis("off")
-        figure.colorbar(shown, cax=sides[0].inset_axes([0, 0, 0.12, 1]), label="total wear depth / mm")
-        figure.colorbar(pressed, cax=sides[2].inset_axes([0, 0, 0.12, 1]), label="mean pressure / MPa")
-        present = [bits for bits in STATUS if bits in wear.status[rows]]
-        swatches = [Swatch(color=STATUS[bits][1], label=STATUS[bits][0]) for bits in present]
-        sides[1].legend(handles=swatches, loc="center left", bbox_to_anchor=(-0.1, 0.5), fontsize=8, handlelength=1)
+        size = (3.1 * len(states) + 0.4, len(lines) * (2.3 * aspect + 0.75) + 0.9)
+        figure = Figure(figsize=size, layout="constrained")
+        grid = figure.subplots(len(lines), len(states), squeeze=False)
+        for line, name in enumerate(lines):
+            for column, (axes, state) in enumerate(zip(grid[line], states, strict=True)):
+                if name == "status" and state.status is not None:
+                    draw_status(axes, patch, state.status)
+                    continue
+                colors, values = fields[name]
+                low, high = _limits(values if scale == "shared" else [values[column]])
+                shown = draw_field(axes, patch, values[column], colors, high, low)
+                bar = figure.colorbar(shown, ax=axes, location="bottom", shrink=0.85, aspect=26)
+                bar.set_label(name if high > low else f"{name}: {low:.3g} everywhere", fontsize=10)
+                bar.ax.tick_params(labelsize=9)
+                bar.locator = MaxNLocator(4) if high > low else mpl.ticker.NullLocator()
+                bar.update_ticks()
+        for axes, state in zip(grid[0], states, strict=True):
+            axes.set_title(state.label, fontsize=11)
         names = [name for name in ("t1", "t2") if name in patch.components] or ["t1", "t2"]
-        for axes in maps.ravel():
-            axes.tick_params(labelleft=axes in maps[:, 0], labelbottom=axes in maps[-1])
-        for axes in maps[-1]:
-            axes.set_xlabel(f"{names[0]} / mm")
-        for axes in maps[:, 0]:
-            axes.set_ylabel(f"{names[-1]} / mm")
+        for axes in grid.ravel():
+            axes.locator_params(nbins=5)
+            axes.tick_params(labelsize=9)
+            axes.label_outer(remove_inner_ticks=False)
+        for axes in grid[-1]:
+            axes.set_xlabel(f"{names[0]} / mm", fontsize=10)
+        for axes in grid[:, 0]:
+            axes.set_ylabel(f"{names[-1]} / mm", fontsize=10)
+        if told:
+            status_legend(figure, {int(b) for s in states if s.status is not None for b in s.status}, patch.components)
+        heading(figure, result, "contact patch")
     return figure
 
 
-def draw_field(axes: Any, patch: Patch, values: np.ndarray, colors: str, largest: float) -> Any:
+def _limits(values: list[np.ndarray]) -> tuple[float, float]:
+    """Lowest and highest value, from zero where the values spread over half of their size."""
+    low, high = min(float(v.min()) for v in values), max(float(v.max()) for v in values)
+    return (0.0 if 0 < low < 0.5 * high else low), high
+
+
+def draw_field(axes: Any, patch: Patch, values: np.ndarray, colors: str, largest: float, smallest: float = 0.0) -> Any:
     """A field with one value for each pair, interpolated between them."""
     x, y = 1e3 * patch.flat.T
     faces = patch.faces
     triangles = np.concatenate([faces[:, [0, i, i + 1]] for i in range(1, faces.shape[1] - 1)])
     axes.set_aspect("equal")
+    top = largest if largest > smallest else smallest + max(abs(smallest), 1e-12)
     return axes.tripcolor(
-        Triangulation(x, y, triangles), values, shading="gouraud", cmap=colors, vmin=0, vmax=max(largest, 1e-12)
+        Triangulation(x, y, triangles), values, shading="gouraud", cmap=colors, vmin=smallest, vmax=top, rasterized=True
     )
 
 
@@ -71,13 +94,5 @@ def draw_status(axes: Any, patch: Patch, status: np.ndarray) -> None:
     corners, pair = patch.shares(1e3 * patch.flat)
     colors = [STATUS[int(bits)][1] for bits in status[pair]]
     axes.add_collection(PolyCollection(list(corners), facecolors=colors, edgecolors=colors, linewidths=0.3))
-    axes.plot(*(1e3 * patch.flat.T), ".", color="white", ms=1.5)
+    axes.autoscale_view()
     axes.set_aspect("equal")
-
-
-def _cycles(count: float) -> str:
-    """A number of cycles as 3.20·10⁶."""
-    if count < 1e4:
-        return f"{count:.0f}"
-    power = int(np.log10(count))
-    return f"{count / 10**power:.2f}$\\cdot$10$^{{{power}}}$"

@@ -2,45 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.wear_history import WearHistory
 from tribodyn.workflows.pictures import maps
-from tribodyn.workflows.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, RED, STYLE, WEAR_MAP
+from tribodyn.workflows.pictures.figures import axes_of, force_unit, heading, length_unit, save, status_name, titled
+from tribodyn.workflows.pictures.style import BLUE, CYCLE, GREEN, GREY, INK, ORANGE, RED, STATUS, STYLE, WEAR_MAP
 from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.states import has_states, state_of
 
 BIFURCATIONS = {"fold": "o", "flip": "s", "Neimark-Sacker": "D"}  # markers
 FAINT = 1e-3  # share of the first preload below which a touch is faint
 
 
-def draw(result: Result, folder: Path) -> list[Path]:
-    """Write every figure that the result has data for as a PNG; returns their paths."""
-    figures: list[tuple[str, Callable[[Result], Figure], bool]] = [
+def draw(result: Result, folder: Path, formats: Sequence[str] = ("png",), dpi: int | None = None) -> list[Path]:
+    """Write every figure that the result has data for; returns their paths."""
+    return [path for name, make in figures(result).items() for path in save(make(result), folder / name, formats, dpi)]
+
+
+def figures(result: Result) -> dict[str, Callable[[Result], Figure]]:
+    """The figures that a result has data for, by name."""
+    worn = result.wear_steps > 0
+    mapped = result.patch is not None and len(result.patch.faces) > 0 and has_states(result)
+    every: list[tuple[str, Callable[[Result], Figure], bool]] = [
         ("frf", frequency_response, result.response is not None or result.wear is not None),
-        ("cycles_per_step", cycles_per_step, result.wear_steps > 0),
-        ("peak", amplitude_against_cycles, result.wear_steps > 0),
-        ("preload", preload_against_cycles, result.wear_steps > 0),
-        ("depth", depth_against_cycles, result.wear_steps > 0),
-        ("energy", energy_against_cycles, result.wear_steps > 0),
+        ("outputs", output_amplitudes, result.response is not None and len(result.response.output_names) > 1),
+        ("cycles_per_step", cycles_per_step, worn),
+        ("peak", amplitude_against_cycles, worn),
+        ("preload", preload_against_cycles, worn),
+        ("depth", depth_against_cycles, worn),
+        ("energy", energy_against_cycles, worn),
+        ("status", status_against_cycles, worn),
         ("hysteresis", hysteresis_loops, result.loops is not None and has_friction(result)),
-        ("patch", maps.patch_maps, result.wear_steps > 0 and result.patch is not None and len(result.patch.faces) > 0),
+        ("normal", normal_loops, result.loops is not None and not has_friction(result)),
+        ("patch", maps.patch_maps, mapped),
     ]
-    written = []
-    for name, function, possible in figures:
-        if possible:
-            with mpl.rc_context(STYLE):
-                path = folder / f"{name}.png"
-                function(result).savefig(path)
-                written.append(path)
-    return written
+    return {name: function for name, function, possible in every if possible}
 
 
 def frequency_response(result: Result) -> Figure:
@@ -69,7 +74,12 @@ def frequency_response(result: Result) -> Figure:
                 colors = mpl.colormaps[WEAR_MAP](wear.cycles[result.worn.row] / shown_cycles(wear))
                 for omega, amplitude, color in zip(result.worn.omega, result.worn.amplitude, colors, strict=True):
                     axes.plot(omega / (2 * np.pi), scale * amplitude, color=color, lw=1.2)
-        axes.set(yscale="log", xlabel="frequency / Hz", ylabel=f"amplitude / {unit}", title="Frequency response")
+        axes.set(
+            yscale="log",
+            xlabel="frequency / Hz",
+            ylabel=f"amplitude / {unit}",
+            title=titled(result, "frequency response"),
+        )
         axes.legend(loc="best", fontsize=9)
     return figure
 
@@ -107,7 +117,8 @@ def cycles_per_step(result: Result) -> Figure:
         count = wear.cycles_in_step[: result.wear_steps]
         unit, scale = _cycles(count.max())
         axes.step(np.arange(1, len(count) + 1), scale * count, where="mid", color=BLUE)
-        axes.set(xlabel="wear step", ylabel=f"cycles in the step{unit}", title="Cycles per wear step")
+        axes.set(xlabel="wear step", ylabel=f"cycles in the step{unit}", title=titled(result, "cycles per wear step"))
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         if count.max() > 30 * count.min():
             axes.set_yscale("log")
         else:
@@ -122,7 +133,7 @@ def amplitude_against_cycles(result: Result) -> Figure:
         scale_cycles = _cycle_axis(lower, wear)
         unit, scale = length_unit(wear.amplitude.max())
         upper.plot(scale_cycles * wear.cycles, scale * wear.amplitude, ".-", color=BLUE, ms=4)
-        upper.set(ylabel=f"amplitude / {unit}", title="Response under wear")
+        upper.set(ylabel=f"amplitude / {unit}", title=titled(result, "response under wear"))
         lower.plot(scale_cycles * wear.cycles, wear.omega / (2 * np.pi), ".-", color=ORANGE, ms=4)
         lower.set(ylabel="frequency / Hz")
     return figure
@@ -135,7 +146,7 @@ def preload_against_cycles(result: Result) -> Figure:
         scale_cycles = _cycle_axis(axes, wear)
         unit, scale = ("kN", 1e-3) if wear.preload.max() >= 1e3 else ("N", 1.0)
         axes.plot(scale_cycles * wear.cycles, scale * wear.preload, ".-", color=BLUE, ms=4)
-        axes.set(ylabel=f"preload / {unit}", title="Contact preload")
+        axes.set(ylabel=f"preload / {unit}", title=titled(result, "preload of the contact"))
         axes.set_ylim(bottom=0)
     return figure
 
@@ -153,7 +164,7 @@ def depth_against_cycles(result: Result) -> Figure:
         axes.plot(x, scale * wear.depth.max(1), color=RED, label="largest")
         axes.plot(x, scale * mean, color=BLUE, label="mean over the area")
         axes.plot(x, scale * wear.depth.min(1), color=GREEN, label="smallest")
-        axes.set(ylabel=f"total wear depth / {unit}", title="Wear depth")
+        axes.set(ylabel=f"total wear depth / {unit}", title=titled(result, "wear depth"))
         axes.legend(loc="best", fontsize=9)
         axes.set_xlabel("")
         _cycle_axis(below, wear)
@@ -177,7 +188,7 @@ def energy_against_cycles(result: Result) -> Figure:
     with axes_of(7.2, 5.6, rows=2, share=False) as (figure, (upper, lower)):
         scale_cycles = _cycle_axis(upper, wear)
         upper.plot(scale_cycles * wear.cycles, wear.energy.sum(1), ".-", color=BLUE, ms=4)
-        upper.set(ylabel="energy per cycle / J", title="Dissipated energy")
+        upper.set(ylabel="energy per cycle / J", title=titled(result, "dissipated energy"))
         spent = np.concatenate([[0.0], np.cumsum(wear.work.sum(1))[:-1]])
         lower.plot(spent * 1e-6, 1e9 * wear.depth @ patch.area, ".-", color=ORANGE, ms=4)
         lower.set(xlabel="accumulated energy / MJ", ylabel="worn volume / mm³")
@@ -189,41 +200,79 @@ def has_friction(result: Result) -> bool:
     return result.patch is not None and any(name != "n" for name in result.patch.components)
 
 
+def status_against_cycles(result: Result) -> Figure:
+    """Share of the patch in each contact status, against cycles."""
+    wear, patch = _wear(result), result.patch
+    assert patch is not None
+    with axes_of() as (figure, axes):
+        scale = _cycle_axis(axes, wear)
+        shares = [100 * (wear.status == bits) @ patch.area / patch.area.sum() for bits in STATUS]
+        present = [k for k, share in enumerate(shares) if share.any()]
+        kinds = [(status_name(bits, patch.components), color) for bits, (_, color) in STATUS.items()]
+        axes.stackplot(
+            scale * wear.cycles, [shares[k] for k in present], labels=[kinds[k][0] for k in present],
+            colors=[kinds[k][1] for k in present], step="mid",
+        )  # fmt: skip
+        axes.set(ylabel="share of the area / %", ylim=(0, 100), title=titled(result, "contact status under wear"))
+        figure.legend(loc="outside lower center", ncols=min(4, len(present)))
+    return figure
+
+
+def output_amplitudes(result: Result) -> Figure:
+    """Amplitude of every observed output over frequency."""
+    frf = result.response
+    assert frf is not None
+    good = np.array([outcome == CONVERGED for outcome in frf.outcome])
+    with axes_of() as (figure, axes):
+        heights = {name: np.where(good, frf.amplitude(name), np.nan) for name in frf.output_names}
+        unit, scale = length_unit(float(np.nanmax(list(heights.values()))))
+        for name, color, style in zip(heights, CYCLE * 3, ["-"] * 6 + ["--"] * 6 + [":"] * 6, strict=False):
+            axes.plot(frf.frequency, scale * heights[name], style, color=color, label=name.replace("_", " "))
+        axes.set(yscale="log", xlabel="frequency / Hz", ylabel=f"amplitude / {unit}", title=titled(result, "outputs"))
+        figure.legend(loc="outside lower center", ncols=4)
+    return figure
+
+
 def hysteresis_loops(result: Result) -> Figure:
-    """Tangential loops at chosen wear steps (columns) of the pairs that dissipate most in one of them (rows)."""
-    loops, patch, wear = result.loops, result.patch, _wear(result)
+    """Tangential loops in chosen states (columns) of the pairs that dissipate most in one of them (rows)."""
+    patch = result.patch
+    assert patch is not None
+    return _loops(result, [c for c, name in enumerate(patch.components) if name != "n"], "hysteresis loops by pair")
+
+
+def normal_loops(result: Result) -> Figure:
+    """Normal force over normal approach in chosen states (columns) of the pairs whose force swings most (rows)."""
+    return _loops(result, [0], "normal force over approach by pair")
+
+
+def _loops(result: Result, components: list[int], what: str) -> Figure:
+    loops, patch = result.loops, result.patch
     assert loops is not None
     assert patch is not None
-    pairs = list(dict.fromkeys(int(np.argmax(wear.energy[row])) for row in loops.row))
-    tangential = [c for c, name in enumerate(patch.components) if name != "n"]
+    states = [state_of(result, int(row)) for row in loops.row]
+    work = np.abs(np.sum(loops.force * np.gradient(loops.displacement, axis=-1), axis=-1))[:, :, components].sum(axis=2)
+    swing = work if components != [0] or len(patch.components) > 1 else np.ptp(loops.force[:, :, 0], axis=-1)
+    pairs = list(dict.fromkeys(int(np.argmax(one)) for one in swing))
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(2.6 * len(loops.row) + 0.4, 2.2 * len(pairs) + 0.5), layout="constrained")
-        grid = figure.subplots(len(pairs), len(loops.row), squeeze=False)
+        figure = Figure(figsize=(2.7 * len(states) + 0.4, 2.3 * len(pairs) + 0.6), layout="constrained")
+        grid = figure.subplots(len(pairs), len(states), squeeze=False)
         for line, pair in enumerate(pairs):
             # the direction in which this pair moves most
-            swing = [np.ptp(loops.displacement[:, pair, c], axis=-1).max() for c in tangential]
-            component = tangential[int(np.argmax(swing))]
-            for column, row in enumerate(loops.row):
+            moves = [np.ptp(loops.displacement[:, pair, c], axis=-1).max() for c in components]
+            component = components[int(np.argmax(moves))]
+            for column, state in enumerate(states):
                 axes = grid[line, column]
                 x, force = loops.displacement[column, pair, component], loops.force[column, pair, component]
                 x = x - (x.max() + x.min()) / 2  # the static offset says nothing about the loop
                 (unit_x, scale_x), (unit_f, scale_f) = length_unit(x.max()), force_unit(np.abs(force).max())
                 axes.plot(scale_x * np.append(x, x[0]), scale_f * np.append(force, force[0]), color=BLUE)
-                axes.set_xlabel(f"{patch.components[component]} / {unit_x}", fontsize=9)
-                axes.set_ylabel(f"pair {pair}: force / {unit_f}", fontsize=9)
+                axes.locator_params(nbins=5)
+                axes.set_xlabel(f"{patch.components[component]} / {unit_x}", fontsize=10)
+                axes.set_ylabel(f"force at pair {pair} / {unit_f}", fontsize=10)
                 if line == 0:
-                    axes.set_title(f"wear step {row + 1}", fontsize=10)
+                    axes.set_title(state.label, fontsize=11)
+        heading(figure, result, what)
     return figure
-
-
-@contextmanager
-def axes_of(
-    width: float = 7.2, height: float = 4.2, rows: int = 1, share: bool = True, columns: int = 1
-) -> Iterator[tuple[Figure, Any]]:
-    """A figure in the common style with its axes: one, or an array where there are several rows or columns."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(width, height), layout="constrained")
-        yield figure, figure.subplots(rows, columns, sharex=share and columns == 1)
 
 
 def _wear(result: Result) -> WearHistory:
@@ -258,20 +307,6 @@ def _largest_amplitude(result: Result) -> float:
     if result.wear is not None and len(result.wear.amplitude):
         found.append(float(result.wear.amplitude.max()))
     return max(found)
-
-
-def length_unit(largest: float) -> tuple[str, float]:
-    """Unit and factor in which lengths [m] of this size read well."""
-    if largest >= 0.5e-3:
-        return "mm", 1e3
-    return ("nm", 1e9) if 0 < largest < 0.5e-6 else ("µm", 1e6)
-
-
-def force_unit(largest: float) -> tuple[str, float]:
-    """Unit and factor in which forces [N] of this size read well."""
-    if largest >= 1e3:
-        return "kN", 1e-3
-    return ("mN", 1e3) if 0 < largest < 1 else ("N", 1.0)
 
 
 def _cycles(largest: float) -> tuple[str, float]:

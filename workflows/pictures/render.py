@@ -1,6 +1,6 @@
-"""Pictures in three dimensions, drawn off-screen with pyvista: the contact patch and the worn, deformed part.
+"""Pictures of the part in three dimensions: vibrating in its states, and its contact opened with what wear did to it.
 
-`check` makes sure that rendering works before pyvista is used.
+`check` makes sure that off-screen rendering works before pyvista is used.
 """
 
 from __future__ import annotations
@@ -8,19 +8,31 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
+from PIL import Image, ImageDraw
 
+from tribodyn.workflows.pictures import opened as book
 from tribodyn.workflows.pictures import render_wheel
 from tribodyn.workflows.pictures import view as drawing
-from tribodyn.workflows.pictures.style import INK, PRESSURE_MAP, WEAR_MAP
-from tribodyn.workflows.pictures.view import BODY, SHADE
-from tribodyn.workflows.result.result import Patch, Result
+from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, save, scale_bar, status_legend
+from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, trimmed
+from tribodyn.workflows.pictures.style import MOTION_MAP, PRESSURE_MAP, RED, STYLE, WEAR_MAP
+from tribodyn.workflows.result.faces import faces_of, worn_off
+from tribodyn.workflows.result.result import PartMesh, Result
+from tribodyn.workflows.result.states import State, has_states, shown_states
 
 SYSTEM_LIBRARIES = "libgl1 libegl1 libgomp1"
 PROBE = "import pyvista as pv; view = pv.Plotter(off_screen=True); view.add_mesh(pv.Sphere()); view.screenshot()"
+SMOOTH = 2  # subdivisions of the faces of curved elements
+WIDTH = 3.4  # inches of a column
+SIZE = (900, 760)  # pixels of a view of the part
 
 
 class RenderingUnavailable(RuntimeError):
@@ -50,114 +62,197 @@ def _choose_window() -> None:
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
 
-def draw(result: Result, folder: Path, deformation: float | None = None, wear: float | None = None) -> list[Path]:
-    """Write every picture that the result has data for as a PNG; returns their paths.
+def draw(
+    result: Result,
+    folder: Path,
+    deformation: float | None = None,
+    wear: float | None = None,
+    formats: Sequence[str] = ("png",),
+    dpi: int | None = None,
+) -> list[Path]:
+    """Write every picture that the result has data for; returns their paths.
 
     deformation, wear : factors by which displacement and depth are exaggerated, chosen by size where None
     Raises  RenderingUnavailable
     """
-    if result.wear is None or result.patch is None or not len(result.patch.faces):
-        return []
-    check()
-    written = [worn_patch(result, folder / "worn_patch.png", wear)]
-    if result.part is None or result.fields is None:
-        return written
+    found = figures(result, deformation, wear)
+    if found:
+        check()
+    return [path for name, make in found.items() for path in save(make(), folder / name, formats, dpi)]
+
+
+def figures(
+    result: Result, deformation: float | None = None, wear: float | None = None
+) -> dict[str, Callable[[], Figure]]:
+    """The pictures that a result has data for, by name; see `draw`."""
+    if result.patch is None or not has_states(result):
+        return {}
+    found: dict[str, Callable[[], Figure]] = {}
+    if result.part is not None and result.fields is not None:
+        found["part"] = partial(part_picture, result, deformation, wear)
+    if len(result.patch.faces):
+        found["contact"] = partial(contact_picture, result, wear)
     wheel = render_wheel.wheel_of(result)
-    if wheel is None:
-        return [*written, worn_part(result, folder / "worn_part.png", deformation, wear)]
-    sector = render_wheel.worn_sector(result, wheel, folder / "worn_sector.png", deformation, wear)
-    return [*written, sector, render_wheel.worn_wheel(result, wheel, folder / "worn_wheel.png", deformation)]
+    if wheel is not None and result.fields is not None:
+        found["wheel"] = partial(render_wheel.wheel_picture, result, wheel, deformation)
+    return found
 
 
-def worn_patch(result: Result, path: Path, wear: float | None = None) -> Path:
-    """The worn surface of body 1 in relief, coloured by depth, status and pressure; one column for each chosen step."""
+def part_picture(result: Result, deformation: float | None = None, wear: float | None = None) -> Figure:
+    """The part in each shown state at its largest swing, coloured by amplitude, one camera for all."""
+    states = [state for state in shown_states(result) if state.field is not None]
+    moving = Moving(result, deformation, wear)
+    images, scales, bars = [], [], []
+    for state in states:
+        amplitude, vibration = moving.amplitude(state), moving.swing(state)
+        scales.append(moving.vibration_scale(vibration))
+        unit, factor = length_unit(float(amplitude.max()))
+        bars.append((factor * float(amplitude.max()), f"vibration amplitude / {unit}"))
+        points = moving.points(state, scales[-1] * vibration)
+        view = moving.view(points, factor * amplitude, (0.0, bars[-1][0]))
+        images.append(moving.marked(shoot(view, moving.camera, SIZE), points))
+    images = trimmed(images)
+    with mpl.rc_context({**STYLE, "axes.grid": False}):
+        tall = WIDTH * images[0].shape[0] / images[0].shape[1]
+        figure = Figure(figsize=(WIDTH * len(states) + 0.2, tall + 1.7), layout="constrained")
+        columns = np.atleast_1d(figure.subplots(1, len(states)))
+        for axes, state, image, scale, (most, label) in zip(columns, states, images, scales, bars, strict=True):
+            axes.imshow(image)
+            axes.axis("off")
+            axes.set_title(f"{state.label}\n{moving.factors(scale)}", fontsize=10)
+            scale_bar(figure, axes, MOTION_MAP, 0.0, most, label)
+        heading(figure, result, "part at its largest swing, its contact outlined")
+    return figure
+
+
+def contact_picture(result: Result, wear: float | None = None) -> Figure:
+    """Both faces of the contact opened like a book, in each shown state: depth in relief, status, mean pressure."""
+    assert result.patch is not None
+    states = shown_states(result)
+    depth = np.stack([state.depth for state in states])
+    wear = wear or drawing.wear_scale(result.patch, depth)
+    contact = book.opened(result)
+    worn, told = bool(depth.max() > 0), [s for s in states if s.status is not None]
+    rows = [name for name, there in (("depth", worn), ("status", bool(told)), ("pressure", True)) if there]
+    with mpl.rc_context({**STYLE, "axes.grid": False}):
+        figure = Figure(figsize=(WIDTH * len(states) + 0.2, 2.9 * len(rows) + 0.7), layout="constrained")
+        grid = figure.subplots(len(rows), len(states), squeeze=False)
+        painted = [[_painted(contact, state, name, wear) for state in states] for name in rows]
+        images = trimmed([shoot(view, contact.camera, (900, 690)) for line in painted for view, _ in line])
+        bars = [bar for line in painted for _, bar in line]
+        for axes, image, bar in zip(grid.ravel(), images, bars, strict=True):
+            axes.axis("off")
+            axes.imshow(image)
+            if bar is not None:
+                scale_bar(figure, axes, *bar)
+        for axes, state in zip(grid[0], states, strict=True):
+            axes.set_title(state.label, fontsize=10)
+        if "status" in rows:
+            present = {int(bits) for s in told if s.status is not None for bits in s.status}
+            status_legend(figure, present, result.patch.components)
+        other = "body 2" if len(contact.faces) > 1 else "ground"
+        told_scale = f", depth in relief × {wear:g}" if worn else ""
+        heading(figure, result, f"opened contact: body 1 in front, {other} behind{told_scale}")
+    return figure
+
+
+def _painted(contact: book.Opened, state: State, name: str, wear: float) -> tuple[View, tuple[Any, ...] | None]:
+    """The opened contact showing one quantity of a state, and the scale bar that goes with it."""
+    if name == "status":
+        none = np.zeros(len(state.depth), int)
+        return contact.view(state.depth, wear, book.Status(none if state.status is None else state.status)), None
+    if name == "depth":
+        unit, factor = length_unit(float(state.depth.max()))
+        values, map_, label = factor * state.depth, WEAR_MAP, f"total wear depth / {unit}"
+    else:
+        pressure = np.zeros(len(state.depth)) if state.pressure is None else state.pressure
+        unit, factor = pressure_unit(float(pressure.max()))
+        values, map_, label = factor * pressure, PRESSURE_MAP, f"mean pressure / {unit}"
+    low, high = float(values.min()), float(values.max())
+    low = 0.0 if low > 0 and low < 0.5 * high else low
+    paint = book.Field(values, (low, high), map_)
+    return contact.view(state.depth, wear, paint), (map_, low, high, label)
+
+
+class Moving:
+    """The worn part of a result in motion, and one camera for all its states.
+
+    deformation, wear : factors of displacement and depth, by size where None
+    """
+
+    def __init__(self, result: Result, deformation: float | None = None, wear: float | None = None):
+        part, patch, fields = result.part, result.patch, result.fields
+        assert part is not None
+        assert patch is not None
+        assert fields is not None
+        self.result, self.part, self.patch, self.deformation = result, part, patch, deformation
+        self.size = float(np.ptp(part.points, axis=0).max())
+        self.faces = faces_of(result)
+        static = drawing.at_rest(fields.displacement, result.harmonics)
+        self.rest_scale = deformation or drawing.deformation_scale(static, self.size)
+        depth = np.stack([state.depth for state in shown_states(result)])
+        self.wear = wear or drawing.wear_scale(patch, depth)
+        kind = _cell_type(part)
+        self.shell = drawing.surface(part.points, part.cells, kind, 0)
+        self.outline = self.shell.extract_feature_edges(30)
+        reach = [part.points + self.rest_scale * s for s in static]
+        for s in (drawing.swing(d, result.harmonics) for d in fields.displacement):
+            reach += [part.points + self.vibration_scale(s) * s, part.points - self.vibration_scale(s) * s]
+        self.camera: Camera = frame(np.concatenate(reach), *drawing.looking(part.points, patch), SIZE[0] / SIZE[1])
+
+    def vibration_scale(self, vibration: np.ndarray) -> float:
+        """The factor that a vibration (n_node, 3) is drawn with."""
+        return self.deformation or drawing.deformation_scale(vibration, self.size)
+
+    def marked(self, image: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """An image of this camera with the outline of the contact, hidden or not; points : (n_node, 3) as drawn."""
+        if not len(self.faces) or not len(self.patch.faces):
+            return image
+        corner = self.patch.faces
+        edges = np.stack([corner, np.roll(corner, -1, axis=1)], axis=-1).reshape(-1, 2)
+        alone, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+        picture = Image.fromarray(image)
+        pen = ImageDraw.Draw(picture)
+        at = [place(self.camera, point, SIZE) for point in points[self.faces[0].nodes]]
+        for i, j in alone[count == 1]:
+            ends = [(at[k][0] * SIZE[0], at[k][1] * SIZE[1]) for k in (i, j)]
+            pen.line(ends, fill=RED, width=4)
+        return np.asarray(picture)
+
+    def factors(self, scale: float) -> str:
+        """What is exaggerated, for a title."""
+        worn = f", depth × {self.wear:g}" if self.result.wear is not None else ""
+        return f"drawn: static × {self.rest_scale:g}, vibration × {scale:g}{worn}"
+
+    def terms(self, state: State) -> np.ndarray:
+        assert self.result.fields is not None
+        assert state.field is not None
+        return np.asarray(self.result.fields.displacement[state.field])
+
+    def swing(self, state: State) -> np.ndarray:
+        return drawing.swing(self.terms(state), self.result.harmonics)
+
+    def amplitude(self, state: State) -> np.ndarray:
+        """(n_node,) largest distance from the mean position over the cycle [m]."""
+        return np.asarray(np.linalg.norm(drawing.cycle(self.terms(state), self.result.harmonics), axis=1).max(axis=1))
+
+    def points(self, state: State, moved: np.ndarray) -> np.ndarray:
+        """(n_node, 3) where wear, rest and a motion (n_node, 3) bring the nodes, as drawn [m]."""
+        rest = self.rest_scale * drawing.at_rest(self.terms(state), self.result.harmonics)
+        return np.asarray(self.part.points + rest + moved + self.wear * worn_off(self.faces, state.depth, len(rest)))
+
+    def view(self, points: np.ndarray, values: np.ndarray, limits: tuple[float, float]) -> View:
+        """The part with its nodes at points (n_node, 3), coloured by values of the nodes."""
+        import pyvista as pv
+
+        grid = pv.UnstructuredGrid({_cell_type(self.part): self.part.cells}, points)
+        grid.point_data["shown"] = values
+        body = grid.extract_surface(nonlinear_subdivision=SMOOTH, algorithm="dataset_surface")
+        layers = [Layer(body, values=np.asarray(body.point_data["shown"]), map=MOTION_MAP, limits=limits)]
+        return View(layers, [self.outline])
+
+
+def _cell_type(part: PartMesh) -> int:
     import pyvista as pv
 
-    history, patch = result.wear, result.patch
-    assert history is not None
-    assert patch is not None
-    rows = result.shown_rows()
-    depth = np.stack([result.depth_after(row) for row in rows])
-    pressure = history.normal_force[rows] / patch.area
-    wear = wear or drawing.wear_scale(patch, depth)
-    flat = np.column_stack([patch.flat, np.zeros(len(patch.area))])
-    sink = -0.2 * float(np.sqrt(patch.area.sum()))  # room for the bars and legends below
-    outline = pv.PolyData(flat, drawing.polygons(patch.faces)).extract_feature_edges(40)
-    view = drawing.plotter((3, len(rows)))
-    for column, row in enumerate(rows):
-        points = flat.copy()
-        points[:, 2] = -wear * 0.5 * depth[column]  # half of the depth belongs to each of the two surfaces
-        relief = pv.PolyData(points, drawing.polygons(patch.faces))
-        for line, (values, largest, label, colors) in enumerate(
-            [
-                (1e3 * depth[column], 1e3 * depth.max(), "total wear depth / mm", WEAR_MAP),
-                (history.status[row], None, "", ""),
-                (1e-6 * pressure[column], 1e-6 * pressure.max(), "mean pressure / MPa", PRESSURE_MAP),
-            ]
-        ):
-            view.subplot(line, column)
-            if largest is None:
-                drawing.add_status(view, patch, points, values)
-            else:
-                drawing.add_field(view, relief, values, largest, label, colors, f"{line} {column}")
-            view.add_mesh(outline, color=INK, line_width=1.5)
-            view.camera.position = np.array([-0.9, -1.3, 1.2])
-            view.camera.up = (0, 0, 1)
-            view.camera.focal_point = (0, 0, 0)
-            view.reset_camera()
-            view.camera.focal_point = np.array(view.camera.focal_point) + [0, 0, sink]
-            view.camera.position = np.array(view.camera.position) + [0, 0, sink]
-        view.subplot(0, column)
-        drawing.title(view, result, row, f"depth on this body \u00d7 {wear:g}")
-    return drawing.save(view, path)
-
-
-def worn_part(result: Result, path: Path, deformation: float | None = None, wear: float | None = None) -> Path:
-    """The part seen from the side of the patch: preloaded, at the phase of largest swing, with its worn surface."""
-    import pyvista as pv
-
-    patch, part, fields = result.patch, result.part, result.fields
-    assert patch is not None
-    assert part is not None
-    assert fields is not None
-    size = float(np.ptp(part.points, axis=0).max())
-    static = drawing.at_rest(fields.displacement, result.harmonics)
-    rest_scale = deformation or drawing.deformation_scale(static, size)
-    depth = np.stack([result.depth_after(row) for row in fields.row])
-    wear = wear or drawing.wear_scale(patch, depth)
-    cell_type = getattr(pv.CellType, part.kind.upper())
-    inward = patch.frames[:, 2]
-    resting = drawing.surface(part.points, part.cells, cell_type, 0).extract_feature_edges(40)
-
-    view = drawing.plotter((1, len(static)))
-    for column, row in enumerate(fields.row):
-        view.subplot(0, column)
-        vibration = drawing.swing(fields.displacement[column], result.harmonics)
-        scale = deformation or drawing.deformation_scale(vibration, size)
-        points = part.points + rest_scale * static[column] + scale * vibration
-        points -= wear * 0.5 * drawing.sunk(part.points, patch, depth[column])  # half of the depth for each surface
-        body = drawing.surface(points, part.cells, cell_type, 2)
-        view.add_mesh(body, color=BODY, **SHADE, smooth_shading=True, split_sharp_edges=True)
-        view.add_mesh(resting, color="#9aa1ab", line_width=1)
-        worn = pv.PolyData(points[patch.nodes] + 2e-3 * size * inward, drawing.polygons(patch.faces))
-        label, most = "total wear depth / mm", 1e3 * depth.max()
-        drawing.add_field(view, worn, 1e3 * depth[column], most, label, WEAR_MAP, f"0 {column}")
-        scales = f"static \u00d7 {rest_scale:g}, vibration \u00d7 {scale:g}, depth on this body \u00d7 {wear:g}"
-        drawing.title(view, result, row, scales)
-        _look_at_patch(view, part.points, patch)
-    return drawing.save(view, path)
-
-
-def _look_at_patch(view: Any, points: np.ndarray, patch: Patch) -> None:
-    """Camera on the side that the patch faces, a little aside, with the normal of the patch pointing down."""
-    centre = points.mean(0)
-    normal = patch.frames[:, 2].mean(0)
-    along = patch.points.mean(0) - centre
-    along -= normal * (along @ normal)
-    along = along / np.linalg.norm(along) if np.linalg.norm(along) > 0 else patch.frames[:, 0].mean(0)
-    aside = np.cross(normal, along)
-    view.camera.focal_point = centre
-    view.camera.position = centre + 2.0 * (0.7 * normal + 0.6 * along + 0.9 * aside) * np.ptp(points, axis=0).max()
-    view.camera.up = -normal
-    view.reset_camera()
-    view.camera.zoom(1.15)
+    return int(getattr(pv.CellType, part.kind.upper()))

@@ -1,4 +1,8 @@
-"""Colours and fonts that all pictures share."""
+"""Colours, fonts and sizes that all pictures share: change them here.
+
+Line and status colours are those of Okabe and Ito (2008),
+maps are viridis and cividis: readable with any colour vision.
+"""
 
 from __future__ import annotations
 
@@ -6,36 +10,46 @@ from typing import Any
 
 from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS
 
-BLUE, ORANGE, GREEN, RED, GREY, INK = "#2f6db3", "#e08214", "#3a923a", "#c03d3e", "#8a8f98", "#22262d"
-WEAR_MAP, PRESSURE_MAP = "viridis", "inferno"
+BLUE, ORANGE, GREEN, RED, GREY, INK = "#0072b2", "#e69f00", "#009e73", "#d55e00", "#7f858e", "#22262d"
+SKY, YELLOW, PALE, PAPER = "#56b4e9", "#f0e442", "#b9bec6", "white"
+BODY, BODY_2, EDGE = "#c9ced6", "#a9b4c4", "#4a515c"
+WEAR_MAP, PRESSURE_MAP, MOTION_MAP = "viridis", "cividis", "viridis"
+CYCLE = (BLUE, ORANGE, GREEN, RED, SKY, GREY)
 
 STATUS = {
     STICKS: ("stick", BLUE),
-    STICKS | SLIPS: ("stick-slip", "#7db8e8"),
+    STICKS | SLIPS: ("stick-slip", SKY),
     SLIPS: ("slip", ORANGE),
     STICKS | SEPARATES: ("stick-separation", GREEN),
-    STICKS | SLIPS | SEPARATES: ("stick-slip-separation", "#a3d492"),
+    STICKS | SLIPS | SEPARATES: ("stick-slip-separation", YELLOW),
     SLIPS | SEPARATES: ("slip-separation", RED),
-    SEPARATES: ("separation", "#b9bec6"),
+    SEPARATES: ("separation", PALE),
 }
 
+FORMATS = ("png", "pdf", "svg")
+DPI = 200
+
 STYLE: dict[str, Any] = {
-    "figure.dpi": 150,
-    "savefig.dpi": 150,
-    "font.size": 10,
+    "figure.dpi": DPI,
+    "savefig.dpi": DPI,
+    "font.family": ["STIXGeneral", "DejaVu Serif"],  # come with matplotlib; look like the text of a paper
+    "mathtext.fontset": "stix",
+    "pdf.fonttype": 42,  # text stays text
+    "svg.fonttype": "path",
+    "font.size": 11,
     "axes.edgecolor": INK,
     "axes.labelcolor": INK,
-    "axes.titlesize": 11,
-    "axes.titleweight": "bold",
+    "axes.titlesize": 12,
     "axes.titlelocation": "left",
     "axes.grid": True,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.axisbelow": True,
     "grid.color": "#dfe2e6",
-    "grid.linewidth": 0.7,
-    "lines.linewidth": 1.7,
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.5,
     "legend.frameon": False,
+    "legend.fontsize": 10,
     "xtick.color": INK,
     "ytick.color": INK,
     "text.color": INK,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from tribodyn.fem.cyclic import rotation
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
 
 SAME_PLACE = 1e-5  # of the size of the patch: two nodes of a closed pair
@@ -19,12 +20,14 @@ class Face:
     nodes : (n_pair,) node of the mesh at each pair
     outward : (n_pair, 3) unit normals out of the body
     share : of the total wear depth that is worn off this side
+    turn : (3, 3) rotation by which the face meets body 1's, points @ turn, where its blade is not body 1's own
     between : a node, and the pairs that it lies in the middle of, where pairs stand at corners only
     """
 
     nodes: np.ndarray
     outward: np.ndarray
     share: float
+    turn: np.ndarray | None = None
     between: tuple[tuple[int, np.ndarray], ...] = ()
 
     def worn_off(self, depth: np.ndarray, n_node: int) -> np.ndarray:
@@ -42,12 +45,23 @@ def faces_of(result: Result) -> tuple[Face, ...]:
     part, patch = result.part, result.patch
     if part is None or patch is None or not len(patch.faces):
         return ()
-    split = float(np.squeeze(np.asarray(result.facts.get("wear_split", 0.5), float)))
+    split = share_of_body_1(result)
     first, second = _nodes_on_both_sides(part, patch)
-    faces = [Face(first, patch.frames[:, 2], split, _between(part, patch, first))]
+    faces = [Face(first, patch.frames[:, 2], split, between=_between(part, patch, first))]
     if second is not None:
-        faces.append(Face(second, -patch.frames[:, 2], 1 - split, _between(part, patch, second)))
+        faces.append(Face(second, -patch.frames[:, 2], 1 - split, between=_between(part, patch, second)))
+    elif "sectors" in result.facts:
+        x, y, z = np.asarray(result.facts["axis"], float)
+        turn = rotation((x, y, z), 2 * np.pi / int(np.squeeze(result.facts["sectors"])))
+        left = patch.moved(part.points, patch.points @ turn.T, -patch.frames @ turn.T)
+        between = _between(part, left, left.nodes)
+        faces.append(Face(left.nodes, left.frames[:, 2], 1 - split, turn, between))
     return tuple(faces)
+
+
+def share_of_body_1(result: Result) -> float:
+    """The share of the total depth that is worn off body 1, half where nothing is said."""
+    return float(np.squeeze(np.asarray(result.facts.get("wear_split", 0.5), float)))
 
 
 def worn_off(faces: tuple[Face, ...], depth: np.ndarray, n_node: int) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tribodyn.hbm.branch import Branch
+from tribodyn.hbm.branch import CONVERGED, Branch
 from tribodyn.hbm.evolution import LOST, LOST_AT_REST
 from tribodyn.hbm.wear_history import WearHistory
 
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PRELOAD_LOST = "preload fell below"  # how hbm.evolution begins the other sentence for a lost contact
+
+
+PEAKS = 3  # of a response that does not wear, shown in pictures
 
 
 @dataclass(frozen=True)
@@ -130,9 +133,9 @@ class ShearBounds:
 
 @dataclass(frozen=True)
 class Fields:
-    """Full displacement of the part at chosen wear steps.
+    """Full displacement of the part in chosen states.
 
-    row : (n_field,) rows of the wear history
+    row : (n_field,) rows of the wear history, points of the response curve where nothing wears
     displacement : (n_field, n_node, 3, n_coeff) Fourier coefficients [m]
     """
 
@@ -142,9 +145,9 @@ class Fields:
 
 @dataclass(frozen=True)
 class Loops:
-    """Periodic contact displacement and force over one cycle, at the same wear steps as the fields.
+    """Periodic contact displacement and force over one cycle, in the same states as the fields.
 
-    row : (n_field,) rows of the wear history
+    row : (n_field,) rows of the wear history, points of the response curve where nothing wears
     displacement, force : (n_field, n_pair, n_component, n_sample) [m], [N]
     """
 
@@ -272,11 +275,16 @@ class Result:
         return maps.patch_maps(self, None if rows is None else np.asarray(rows))
 
     def shown_rows(self) -> np.ndarray:
-        """Wear rows that pictures show: those of the fields, else the first, the middle and the last worn."""
+        """What pictures show: rows of the wear history, or points of the response curve where nothing wears.
+
+        Those of the fields; else the first, the middle and the last row, or the highest peaks of the curve
+        """
         if self.fields is not None:
             return self.fields.row
-        last = max(self.wear_steps - 1, 0)
-        return np.unique([0, last // 2, last])
+        if self.wear is not None and len(self.wear.cycles):
+            last = len(self.wear.cycles) - 1
+            return np.unique([0, last // 2, last])
+        return np.zeros(0, int) if self.response is None else peaks(self.response)
 
     def depth_after(self, row: int) -> np.ndarray:
         """(n_pair,) wear depth when the step of a row is done [m]."""
@@ -287,3 +295,11 @@ class Result:
         """Cycles when the step of a row is done."""
         assert self.wear is not None
         return float(self.wear.cycles[row] + self.wear.cycles_in_step[row])
+
+
+def peaks(frf: Branch, count: int = PEAKS) -> np.ndarray:
+    """Points of the highest local maxima of a curve's first output, by frequency; else the highest point."""
+    height = np.where([o == CONVERGED for o in frf.outcome], frf.amplitude(frf.output_names[0]), -1.0)
+    inner = np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:]) & (height[1:-1] > 0)) + 1
+    best = inner[np.argsort(-height[inner])][:count] if len(inner) else np.array([int(np.argmax(height))])
+    return np.asarray(best[np.argsort(frf.omega[best])])

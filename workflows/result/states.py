@@ -6,12 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tribodyn.hbm.branch import CONVERGED, Branch
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS
 from tribodyn.workflows.result.result import Result
 
-PEAKS = 3  # of a response that does not wear
 CLOSE = 1e-9  # of the largest force: what counts as none, and as being on the friction limit times 1000
 
 
@@ -40,6 +38,11 @@ def shown_states(result: Result) -> list[State]:
     return [state_of(result, int(number)) for number in result.shown_rows()]
 
 
+def has_states(result: Result) -> bool:
+    """Whether anything is known of the contact in some state."""
+    return (result.wear is not None and len(result.wear.cycles) > 0) or result.loops is not None
+
+
 def state_of(result: Result, number: int) -> State:
     """The state of a wear row, or of a point of the response curve where nothing wears."""
     patch = result.patch
@@ -49,7 +52,7 @@ def state_of(result: Result, number: int) -> State:
     if result.wear is not None and len(result.wear.cycles):
         wear = result.wear
         last = number == len(wear.cycles) - 1 and wear.cycles_in_step[number] == 0
-        count = f"{wear.cycles[number]:.3g} cycles"
+        count = f"{counted(float(wear.cycles[number]))} cycles"
         label = "unworn" if number == 0 else f"end, {count}" if last else f"after {count}"
         return State(
             label,
@@ -73,12 +76,12 @@ def state_of(result: Result, number: int) -> State:
     return State(f"{omega / (2 * np.pi):.4g} Hz", number, omega, 0.0, none, status, pressure, field)
 
 
-def peaks(frf: Branch, count: int = PEAKS) -> np.ndarray:
-    """Points of the highest local maxima of a curve's first output, by frequency; else the highest point."""
-    height = np.where([o == CONVERGED for o in frf.outcome], frf.amplitude(frf.output_names[0]), -1.0)
-    inner = np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:]) & (height[1:-1] > 0)) + 1
-    best = inner[np.argsort(-height[inner])][:count] if len(inner) else np.array([int(np.argmax(height))])
-    return np.asarray(best[np.argsort(frf.omega[best])])
+def counted(number: float) -> str:
+    """A count as 950 or 1.95·10⁷."""
+    if number < 1e4:
+        return f"{number:.0f}"
+    digits, power = f"{number:.2e}".split("e")
+    return f"{digits}·10{str(int(power)).translate(str.maketrans('0123456789', '⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
 
 
 def friction_of(result: Result) -> float | None:

@@ -63,7 +63,7 @@ def described(
         facts |= {"sectors": around.sectors, "engine_order": around.engine_order, "axis": np.array(around.axis)}
     if choice is not None:
         facts |= {"harmonics_error": choice.estimate.error, "harmonics_choice": choice.outcome}
-    mesh = part_mesh(part) if part is not None and wears and file.scene.pictures.renders else None
+    mesh = part_mesh(part) if part is not None and file.scene.pictures.renders else None
     return Result(provenance(file), facts, "model built", patch=patch, part=mesh)
 
 

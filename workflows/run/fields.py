@@ -1,8 +1,9 @@
-"""Full displacement of the part and hysteresis loops of the contact, from the rows of a wear history."""
+"""Full displacement of the part and hysteresis loops of the contact, at rows of a wear history or points of a curve."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,39 +15,68 @@ from tribodyn.workflows.result.result import Fields, Loops, Result
 from tribodyn.workflows.scene.schema import Scene
 
 
-def with_shown(scene: Scene, result: Result, balance: HarmonicBalance, part: Part | None) -> Result:
-    """The result of a wear run with the fields and loops that the pictures of the scene show, and no others.
+@dataclass(frozen=True)
+class Solved:
+    """A solved state of the contact: what it shares with a WearRow.
 
-    balance : the unworn problem under the load that the rows of the result come from
+    omega : [rad/s]; depth : (n_pair,) worn off [m]; displacement, force : (n_contact, n_coeff) [m], [N]
     """
-    assert result.wear is not None
-    if not result.wear_steps:
+
+    omega: float
+    depth: np.ndarray
+    displacement: np.ndarray
+    force: np.ndarray
+
+
+States = Sequence[Solved | WearRow]
+
+
+def with_shown(scene: Scene, result: Result, balance: HarmonicBalance, part: Part | None) -> Result:
+    """The result with the fields and loops that its pictures show, and no others.
+
+    balance : the unworn problem under the load that the states of the result come from
+    """
+    result = replace(result, fields=None, loops=None)
+    numbers = result.shown_rows()
+    if not len(numbers):
         return result
-    rows, numbers = result.wear.rows(), replace(result, fields=None).shown_rows()
+    states: list[Solved | WearRow]
+    if result.wear is not None:
+        rows = result.wear.rows()
+        states = [rows[i] for i in numbers]
+    else:
+        assert result.response is not None
+        states = [_of_point(balance, result.response.omega[i], result.response.contact[i]) for i in numbers]
     if scene.pictures.renders and part is not None:
-        result = replace(result, fields=displacement_fields(balance, part, rows, numbers))
-    if scene.pictures.plots and any(c != "n" for contact in scene.joints.values() for c in contact.components):
-        result = replace(result, loops=hysteresis_loops(balance, rows, numbers))
+        result = replace(result, fields=displacement_fields(balance, part, states, numbers))
+    if scene.pictures.plots:
+        result = replace(result, loops=hysteresis_loops(balance, states, numbers))
     return result
 
 
-def displacement_fields(balance: HarmonicBalance, part: Part, rows: list[WearRow], numbers: np.ndarray) -> Fields:
-    """Displacement of every node at chosen rows of a wear history.
+def _of_point(balance: HarmonicBalance, omega: float, x: np.ndarray) -> Solved:
+    """The state of a point of the response of the unworn contact."""
+    n_pair = balance.contact.n_pair
+    state = balance.evaluate(float(omega), x.reshape(n_pair, -1, balance.basis.n_coeff), jacobian=False)
+    return Solved(float(omega), np.zeros(n_pair), x, state.cycle.force.reshape(x.shape))
 
-    balance : the unworn problem under the load that the rows come from; numbers : (n_field,) rows to take
+
+def displacement_fields(balance: HarmonicBalance, part: Part, states: States, numbers: np.ndarray) -> Fields:
+    """Displacement of every node in solved states.
+
+    balance : the unworn problem under the load that the states come from; numbers : (n_field,) rows or points
     """
-    chosen = [rows[i] for i in numbers]
-    found = [part.field(full_displacement(balance, row.displacement, row.force, row.omega)) for row in chosen]
+    found = [part.field(full_displacement(balance, s.displacement, s.force, s.omega)) for s in states]
     return Fields(np.asarray(numbers), np.stack(found))
 
 
-def hysteresis_loops(balance: HarmonicBalance, rows: list[WearRow], numbers: np.ndarray) -> Loops:
-    """Displacement and force of every pair over the cycle at chosen rows of a wear history."""
+def hysteresis_loops(balance: HarmonicBalance, states: States, numbers: np.ndarray) -> Loops:
+    """Displacement and force of every pair over the cycle in solved states."""
     shape = (balance.contact.n_pair, -1, balance.basis.n_coeff)
     displacement, force = [], []
-    for i in numbers:
-        contact = balance.contact.with_gap(balance.contact.gap + rows[i].depth)
-        x, f = contact.history(rows[i].displacement.reshape(shape), balance.basis, balance.memory)
+    for s in states:
+        contact = balance.contact.with_gap(balance.contact.gap + s.depth)
+        x, f = contact.history(s.displacement.reshape(shape), balance.basis, balance.memory)
         displacement.append(x)
         force.append(f)
     return Loops(np.asarray(numbers), np.stack(displacement), np.stack(force))

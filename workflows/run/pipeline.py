@@ -21,6 +21,7 @@ from tribodyn.workflows.run import curve, modelling, references, settings, wear_
 from tribodyn.workflows.run.checkpoint import Clock, Keeper, alone_in
 from tribodyn.workflows.run.description import described
 from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.fields import with_shown
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import Scene
@@ -58,6 +59,8 @@ def run(file: SceneFile, folder: Path | None, progress: Progress, earlier: Resul
         if scene.wears:
             with progress.track("wear") as advance:
                 result = wear_run.wear_down(file, model, result, keep, advance)
+        else:
+            result = with_shown(scene, result, model.balance, model.part)
         if scene.wear is not None and scene.wear.responses and result.wear_steps:
             with progress.track("responses of the worn contact") as advance:
 

@@ -17,8 +17,8 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.travelling_wave import at_sector, left_face
 from tribodyn.reduction.cyclic import nodal_diameters
 from tribodyn.workflows.pictures import render, render_wheel
-from tribodyn.workflows.pictures.view import sunk
 from tribodyn.workflows.result import store, summary
+from tribodyn.workflows.result.faces import faces_of
 from tribodyn.workflows.run import modelling, part_reduction, pipeline, planning
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
@@ -69,7 +69,7 @@ def test_field_of_the_sector_meets_its_neighbour(finished):
     """From the displacement of all nodes: what the right face sees of the left face of the blade behind is x."""
     wear, patch, part, fields = finished.wear, finished.patch, finished.part, finished.fields
     wheel = render_wheel.wheel_of(finished)
-    left = render_wheel.left_patch(patch, part.points, wheel)
+    left = faces_of(finished)[1]
     assert part.points[left.nodes] == pytest.approx(wheel.blade(patch.points, 1), abs=1e-12)
     basis = HarmonicBasis((0, 1))
     for row, field in zip(fields.row, fields.displacement, strict=True):
@@ -100,7 +100,7 @@ def test_forces_on_both_faces_balance_in_the_full_sector(finished, folder):
     model = built(folder)
     wheel, patch, wear = render_wheel.wheel_of(finished), finished.patch, finished.wear
     _, K = assemble(model.part.mesh, part_reduction.material(model_scene()))
-    left = render_wheel.left_patch(patch, finished.part.points, wheel)
+    left = faces_of(finished)[1]
     clamp = named(model.part.node_sets, "clamp")
     row = int(finished.fields.row[0])
     field = finished.fields.displacement[0, ..., 0]
@@ -138,7 +138,7 @@ def test_every_blade_has_its_phase(finished):
 
 def test_pictures(finished, tmp_path):
     written = render.draw(finished, tmp_path)
-    assert {path.stem for path in written} == {"worn_patch", "worn_sector", "worn_wheel"}
+    assert {path.stem for path in written} == {"part", "contact", "wheel"}
     for path in written:
         assert_not_blank(path)
 
@@ -146,7 +146,7 @@ def test_pictures(finished, tmp_path):
 def test_worn_face_sinks_between_its_pairs_too(finished):
     patch, part = finished.patch, finished.part
     depth = 1e-3 + 0.1 * (patch.flat[:, 0] - patch.flat[:, 0].min())
-    moved = sunk(part.points, patch, depth)
+    moved = 2 * faces_of(finished)[0].worn_off(depth, len(part.points))  # half of the depth belongs to each face
     on_face = np.flatnonzero(moved.any(axis=1))
     assert len(on_face) == (2 * 5 - 1) * (2 * 4 - 1)  # all nodes of the second-order face
     flat = (part.points[on_face] - patch.points.mean(0)) @ patch.frames[0, 0]

@@ -1,0 +1,198 @@
+"""The report in a headless browser: no errors, curves answer, the part turns, the slider moves, two widths."""
+
+from __future__ import annotations
+
+import base64
+import os
+import re
+import shutil
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.helpers.synthetic_result import result
+from tribodyn.workflows.pictures import plots
+from tribodyn.workflows.report import page
+from tribodyn.workflows.report.solid import solid
+from tribodyn.workflows.result import faces
+
+selenium = pytest.importorskip("selenium.webdriver")
+CHROMIUM = next(
+    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
+)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A report of two results, without their figures, which other tests look at."""
+    folder = tmp_path_factory.mktemp("report")
+    patch = pytest.MonkeyPatch()
+    patch.setattr(page, "_renders", lambda found: {})
+    patch.setattr(plots, "figures", lambda found: {"preload": plots.preload_against_cycles})
+    first = result()
+    assert first.wear is not None
+    second = replace(first, wear=replace(first.wear, preload=2 * first.wear.preload))
+    path = page.write([("first", first, None), ("second", second, None)], folder / "report.html")
+    patch.undo()
+    return path
+
+
+@pytest.fixture(scope="module")
+def browser(written: Path) -> Iterator[Any]:
+    """A headless Chromium that has opened the report, cut off from any network."""
+    if CHROMIUM is None:
+        if os.environ.get("TRIBODYN_BROWSER") == "required":
+            pytest.fail("no Chromium on this machine: apt-get install chromium chromium-driver")
+        pytest.skip("no Chromium on this machine")
+    options = selenium.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for word in (
+        "--headless=new", "--no-sandbox", "--disable-dev-shm-usage",
+        "--enable-unsafe-swiftshader", "--use-angle=swiftshader",
+        "--window-size=1280,1000", "--host-resolver-rules=MAP * ~NOTFOUND", "--force-device-scale-factor=1",
+    ):  # fmt: skip
+        options.add_argument(word)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = selenium.Chrome(options=options, service=selenium.ChromeService(shutil.which("chromedriver")))
+    driver.set_script_timeout(120)
+    driver.get(written.as_uri())
+    _until(driver, "return window.reportReady === true")
+    yield driver
+    driver.quit()
+
+
+def _until(driver: Any, script: str, seconds: float = 90.0) -> None:
+    end = time.monotonic() + seconds
+    while not driver.execute_script(script):
+        assert time.monotonic() < end, script
+        time.sleep(0.2)
+
+
+def test_the_page_needs_nothing_else(written: Path) -> None:
+    text = written.read_text()
+    assert written.stat().st_size < page.LARGEST
+    own = text[: text.index("<script>")]
+    assert not re.search(r'(src|href)="(?!data:|#)', own)
+    for words in (
+        "Side by side",
+        "+100.00%",
+        "error budget",
+        "SHA-256 of the scene",
+        "tribodyn run beam",
+        "contact lost",
+    ):
+        assert words.lower() in own.lower()
+
+
+def test_no_error_in_the_console(browser: Any) -> None:
+    bad = [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
+    assert not bad
+
+
+def test_a_curve_tells_its_values_and_zooms(browser: Any) -> None:
+    chart = browser.find_element("css selector", '[data-chart="Preload"]')
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", chart)
+    given = result().wear
+    assert given is not None
+    drawn = browser.execute_script("return arguments[0].data.map(t => [t.name, t.x, t.y])", chart)
+    assert [trace[0] for trace in drawn] == ["first", "second"]
+    np.testing.assert_allclose(drawn[0][2], given.preload, rtol=1e-6)
+    np.testing.assert_allclose(drawn[1][2], 2 * given.preload, rtol=1e-6)
+    browser.execute_script(
+        "window.told = null; arguments[0].on('plotly_hover', e => { window.told = e.points[0].y; })", chart
+    )
+    plot = chart.find_element("css selector", ".nsewdrag")
+    actions = selenium.ActionChains(browser)
+    actions.move_to_element_with_offset(plot, -20, -10).move_by_offset(4, 4).perform()
+    places = browser.execute_script(
+        "const g = arguments[0], f = g._fullLayout; return [f.xaxis.c2p(g.data[0].x[4]), f.yaxis.c2p(g.data[0].y[4]),"
+        " f.xaxis._length, f.yaxis._length]", chart,
+    )  # fmt: skip
+    x, y, width, height = places
+    selenium.ActionChains(browser).move_to_element_with_offset(
+        plot, int(x - width / 2), int(y - height / 2)
+    ).move_by_offset(1, 0).perform()
+    _until(browser, "return window.told !== null", 20)
+    assert browser.execute_script("return window.told") == pytest.approx(given.preload[4], rel=1e-6)
+    before = browser.execute_script("return arguments[0]._fullLayout.xaxis.range", chart)
+    selenium.ActionChains(browser).move_to_element(plot).click_and_hold().move_by_offset(90, 40).release().perform()
+    _until(browser, "return true", 1)
+    after = browser.execute_script("return arguments[0]._fullLayout.xaxis.range", chart)
+    assert after[1] - after[0] < 0.7 * (before[1] - before[0])
+
+
+def test_the_part_turns_under_the_mouse(browser: Any) -> None:
+    plot = browser.find_element("css selector", "#part-0 .solid")
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", plot)
+    eye = "return Object.values(arguments[0]._fullLayout.scene._scene.getCamera().eye)"
+    before = browser.execute_script(eye, plot)
+    selenium.ActionChains(browser).move_to_element(plot).click_and_hold().move_by_offset(120, 30).release().perform()
+    time.sleep(0.5)
+    assert np.linalg.norm(np.subtract(browser.execute_script(eye, plot), before)) > 0.1
+
+
+def test_the_slider_shows_the_depth_of_every_state(browser: Any) -> None:
+    section = browser.find_element("css selector", "#part-0")
+    given = result()
+    assert given.wear is not None
+    depths = []
+    for row in (0, 4, 8):
+        browser.execute_script(
+            "const s = arguments[0].querySelector('.state'); s.value = arguments[1];"
+            "s.dispatchEvent(new Event('input'))", section, row,
+        )  # fmt: skip
+        face = "return arguments[0].querySelector('.solid').data.find(t => t.name === 'face 1').intensity"
+        depths.append(browser.execute_script(face, section))
+    np.testing.assert_allclose(depths, 1e6 * given.wear.depth[[0, 4, 8]], rtol=1e-4)
+    browser.execute_script(
+        "const s = arguments[0].querySelector('.field'); s.value = 'status'; s.dispatchEvent(new Event('input'))",
+        section,
+    )
+    assert "slip-separation" in section.find_element("css selector", ".legend").text
+
+
+@pytest.mark.parametrize("width", [400, 1280])
+def test_nothing_is_wider_than_the_window(width: int, browser: Any, tmp_path: Path) -> None:
+    """At the width of a phone and of a desk; set by the protocol, because windows have a least width."""
+    browser.execute_cdp_cmd(
+        "Emulation.setDeviceMetricsOverride",
+        {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600},
+    )
+    time.sleep(0.5)
+    assert browser.execute_script("return document.documentElement.scrollWidth") <= width
+    smallest = browser.execute_script(
+        "return Math.min(...[...document.querySelectorAll('td, p, label')]"
+        ".map(e => parseFloat(getComputedStyle(e).fontSize)))"
+    )
+    assert smallest >= 12
+    browser.save_screenshot(str(tmp_path / "page.png"))
+    assert (tmp_path / "page.png").stat().st_size > 10_000
+    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_it_prints(browser: Any) -> None:
+    printed = browser.execute_cdp_cmd("Page.printToPDF", {"printBackground": True})
+    assert base64.b64decode(printed["data"]).startswith(b"%PDF")
+
+
+def test_worn_vertices_of_the_page_are_those_of_the_part() -> None:
+    given = result()
+    data = solid(given)
+    assert data is not None
+    assert given.part is not None
+    assert given.wear is not None
+    state = data["states"][-1]
+    moved = np.zeros((3, len(data["body"]["xyz"][0])))
+    moved[:] = data["body"]["xyz"]
+    for n, place in zip(*state["moved"], strict=True):
+        moved[:, n] = place
+    there = given.part.points + data["factor"] * faces.worn_off(
+        faces.faces_of(given), given.wear.depth[-1], len(given.part.points)
+    )
+    distance = np.linalg.norm(1e3 * there[:, None] - moved.T[None], axis=2).min(axis=0)
+    assert distance.max() < 1e-3

@@ -1,0 +1,41 @@
+"""Words of the command `tribodyn` that show a result to others: the page that holds everything."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from tribodyn.workflows.command.words import make_room
+
+Results = Annotated[tuple[Path, ...], Parameter(negative=())]
+
+
+def report(*result: Path, out: Path | None = None) -> None:
+    """Write one HTML file that shows results and opens anywhere, without a network.
+
+    Parameters
+    ----------
+    result
+        Folders or files of results; several are shown side by side, with differences from the first.
+    out
+        The .html file; report.html beside the first result unless told.
+    """
+    from tribodyn.workflows.api import scenes
+    from tribodyn.workflows.report import page
+
+    if not result:
+        raise ValueError("report: give the folder or file of a result")
+    make_room(out, (".html",))
+    files = [scenes.result_file(path) for path in result]
+    loaded = [scenes.load(path) for path in result]
+    names = [one.provenance["scene_name"] for one in loaded]
+    if len(set(names)) < len(names):
+        names = [path.parent.name or str(path) for path in files]
+    if len(set(names)) < len(names):
+        names = [str(path) for path in files]
+    print(page.write(list(zip(names, loaded, files, strict=True)), out or files[0].parent / "report.html"))
+
+
+COMMANDS = (report,)

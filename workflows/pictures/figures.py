@@ -1,0 +1,100 @@
+"""What all figures share: axes in the common style, headings with the scene's name, units that read well, files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch as Swatch
+from matplotlib.ticker import MaxNLocator
+
+from tribodyn.hbm.law import SEPARATES
+from tribodyn.workflows.pictures.style import DPI, FORMATS, STATUS, STYLE
+from tribodyn.workflows.result.result import Result
+
+
+@contextmanager
+def axes_of(
+    width: float = 6.4, height: float = 3.9, rows: int = 1, share: bool = True, columns: int = 1
+) -> Iterator[tuple[Figure, Any]]:
+    """A figure in the common style with its axes: one, or an array where there are several rows or columns."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(width, height), layout="constrained")
+        yield figure, figure.subplots(rows, columns, sharex=share and columns == 1)
+
+
+def heading(figure: Figure, result: Result, what: str) -> None:
+    """A title over a figure of several axes."""
+    figure.suptitle(titled(result, what), x=0.01, ha="left", fontsize=12)
+
+
+def titled(result: Result, what: str) -> str:
+    """A title with the name of the scene."""
+    return f"{result.provenance['scene_name'].replace('_', ' ')}: {what}"
+
+
+def save(figure: Figure, stem: Path, formats: Sequence[str] = ("png",), dpi: int | None = None) -> list[Path]:
+    """Write a figure in some formats; returns the paths. Raises ValueError for a format that is not known."""
+    written = []
+    with mpl.rc_context(STYLE):
+        for name in formats:
+            if name not in FORMATS:
+                raise ValueError(f'no picture format "{name}": take one of {", ".join(FORMATS)}')
+            path = stem.with_name(f"{stem.name}.{name}")
+            figure.savefig(path, dpi=dpi or DPI)
+            written.append(path)
+    return written
+
+
+def length_unit(largest: float) -> tuple[str, float]:
+    """Unit and factor in which lengths [m] of this size read well."""
+    if largest >= 0.5e-3:
+        return "mm", 1e3
+    return ("nm", 1e9) if 0 < largest < 0.5e-6 else ("µm", 1e6)
+
+
+def pressure_unit(largest: float) -> tuple[str, float]:
+    """Unit and factor in which pressures [Pa] of this size read well."""
+    return ("MPa", 1e-6) if largest >= 1e5 or largest == 0 else ("kPa", 1e-3) if largest >= 100 else ("Pa", 1.0)
+
+
+def status_name(bits: int, components: Sequence[str]) -> str:
+    """What a status is called; a contact without friction neither sticks nor slips."""
+    if tuple(components) != ("n",):
+        return STATUS[bits][0]
+    return "separation" if bits == SEPARATES else "opens and closes" if bits & SEPARATES else "closed"
+
+
+def status_legend(figure: Figure, present: set[int], components: Sequence[str]) -> None:
+    """A legend of contact states below a figure."""
+    shown = {status_name(bits, components): STATUS[bits][1] for bits in STATUS if bits in present}
+    swatches = [Swatch(facecolor=color, label=name) for name, color in shown.items()]
+    figure.legend(handles=swatches, loc="outside lower center", ncols=min(4, len(swatches)), title="over the cycle")
+
+
+def force_unit(largest: float) -> tuple[str, float]:
+    """Unit and factor in which forces [N] of this size read well."""
+    if largest >= 1e3:
+        return "kN", 1e-3
+    return ("mN", 1e3) if 0 < largest < 1 else ("N", 1.0)
+
+
+def scale_bar(figure: Figure, axes: Any, map_: str, low: float, high: float, label: str) -> None:
+    """A horizontal scale with ticks below a view."""
+    if not high > low:
+        high = low + (abs(low) or 1.0) * 1e-9
+        label += f": {low:.3g} everywhere"
+    bar = figure.colorbar(ScalarMappable(Normalize(low, high), map_), ax=axes, location="bottom", shrink=0.7, aspect=28)
+    bar.set_label(label, fontsize=10)
+    bar.ax.tick_params(labelsize=9)
+    if label.endswith("everywhere"):
+        bar.set_ticks([])
+        return
+    bar.locator = MaxNLocator(4)
+    bar.update_ticks()

@@ -1,0 +1,145 @@
+"""A contact opened like a book: both faces side by side, seen from where they met, in the axes t1, t2, n of the patch.
+
+Body 1 stays; body 2, or the ground where that is not meshed, is turned by half a turn about an edge.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame
+from tribodyn.workflows.pictures.style import BODY, BODY_2, STATUS
+from tribodyn.workflows.result.faces import Face, bodies, faces_of, share_of_body_1
+from tribodyn.workflows.result.result import Patch, Result
+
+MARGIN = 0.35  # of the size of the patch, what is shown around it
+THICK = 0.5  # of its size, how deep the bodies are cut off
+LIFT = 4e-3  # of its size, by which coloured faces lie above their body
+
+
+@dataclass(frozen=True)
+class Opened:
+    """What does not change over a series: where the faces lie and how they are looked at.
+
+    flat : (n_pair, 2) along t1, t2 [m]; size : of the patch [m]; split : share of the depth on body 1
+    along : which of t1, t2 the book opens along, hinge : the place of its hinge there [m]
+    around : lowest and highest t1, t2 of what is shown [m]
+    """
+
+    result: Result
+    faces: tuple[Face, ...]
+    flat: np.ndarray
+    size: float
+    split: float
+    along: int
+    hinge: float
+    around: tuple[np.ndarray, np.ndarray]
+    camera: Camera
+
+    def view(self, depth: np.ndarray, scale: float, paint: Paint) -> View:
+        """Both faces worn by a depth (n_pair,) that is drawn `scale` times as large, and painted."""
+        patch = self.result.patch
+        assert patch is not None
+        layers = []
+        for number, share in enumerate((self.split, 1 - self.split)):
+            face = self.faces[number] if number < len(self.faces) else None
+            block = self._block(face, number == 0, scale * depth)
+            points = np.column_stack([self.flat, (0.0 if face is None else -scale * share) * depth + LIFT * self.size])
+            if number:
+                block.points = self._turned(np.asarray(block.points), -1)
+                points = self._turned(points, 1)
+            layers.append(Layer(block.extract_surface(algorithm="dataset_surface"), color=(BODY, BODY_2)[number]))
+            layers += paint(patch, points)
+        return View(layers, axes=("t1", "t2", "n"))
+
+    def _turned(self, points: np.ndarray, sign: int) -> np.ndarray:
+        """Points of body 2 after it is opened; sign : -1 where their n still points as body 1's does."""
+        moved = points.copy()
+        moved[:, self.along] = 2 * self.hinge - moved[:, self.along]
+        moved[:, 2] *= sign
+        return moved
+
+    def _block(self, face: Face | None, below: bool, depth: np.ndarray) -> Any:
+        """The elements near a face in the axes of the patch, worn, or a plate where no body is meshed."""
+        import pyvista as pv
+
+        patch, part = self.result.patch, self.result.part
+        assert patch is not None
+        sign = -1.0 if below else 1.0
+        (x0, y0), (x1, y1) = self.around
+        if face is None or part is None:
+            return pv.Box((x0, x1, y0, y1, *sorted((0.0, sign * 0.2 * self.size)))).cast_to_unstructured_grid()
+        points = part.points + face.worn_off(depth, len(part.points))
+        points = points if face.turn is None else points @ face.turn
+        local = (points - patch.points.mean(axis=0)) @ patch.frames.mean(axis=0).T
+        body = bodies(part)
+        mine = (body[part.cells] == body[face.nodes[0]]).all(axis=1)
+        low, high = local[part.cells].min(axis=1), local[part.cells].max(axis=1)
+        near = ((high > [x0, y0, -THICK * self.size]) & (low < [x1, y1, THICK * self.size])).all(axis=1)
+        cells = part.cells[mine & near & (sign * (low + high)[:, 2] > -0.2 * self.size)]
+        grid = pv.UnstructuredGrid({getattr(pv.CellType, part.kind.upper()): cells}, local)
+        cut = grid.clip_box((x0, x1, y0, y1, -THICK * self.size, THICK * self.size), invert=False)
+        return cut if cut.n_points else self._block(None, below, depth)
+
+
+class Paint:
+    """Layers that show something on a face whose pairs lie at points (n_pair, 3)."""
+
+    def __call__(self, patch: Patch, points: np.ndarray) -> list[Layer]:
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Field(Paint):
+    """A value for each pair, between two limits of a colour map."""
+
+    values: np.ndarray
+    limits: tuple[float, float]
+    map: str
+
+    def __call__(self, patch: Patch, points: np.ndarray) -> list[Layer]:
+        import pyvista as pv
+
+        faces = np.column_stack([np.full(len(patch.faces), patch.faces.shape[1]), patch.faces]).ravel()
+        return [Layer(pv.PolyData(points, faces), values=self.values, map=self.map, limits=self.limits)]
+
+
+@dataclass(frozen=True)
+class Status(Paint):
+    """The status of each pair on its share of the face."""
+
+    status: np.ndarray
+
+    def __call__(self, patch: Patch, points: np.ndarray) -> list[Layer]:
+        import pyvista as pv
+
+        corners, pair = patch.shares(points)
+        layers = []
+        for bits, (_, color) in STATUS.items():
+            here = corners[self.status[pair] == bits]
+            if len(here):
+                quads = np.column_stack([np.full(len(here), 4), np.arange(4 * len(here)).reshape(-1, 4)]).ravel()
+                layers.append(Layer(pv.PolyData(here.reshape(-1, 3), quads), color, edges=False, flat=True))
+        return layers
+
+
+def opened(result: Result, aspect: float = 1.3) -> Opened:
+    """The opened contact of a result whose contact has faces; aspect : of the view, width over height."""
+    patch, faces = result.patch, faces_of(result)
+    assert patch is not None
+    flat = patch.flat
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    size = float(np.sqrt(np.prod(high - low)))
+    along = int(np.argmin(high - low))  # open along the shorter side
+    around = (low - MARGIN * size, high + MARGIN * size)
+    hinge = float(around[1][along] + 0.1 * size)
+    (x0, y0), (x1, y1) = around
+    corners = np.array([[x, y, z] for x in (x0, x1) for y in (y0, y1) for z in (-0.4 * size, 0)])
+    other = corners.copy()
+    other[:, along] = 2 * hinge - other[:, along]
+    look = np.array([-0.3, -0.8, 1.0]) if along == 1 else np.array([-0.8, -0.3, 1.0])
+    camera = frame(np.concatenate([corners, other]), look, np.array([0.0, 0, 1]), aspect, 1.05)
+    return Opened(result, faces, flat, size, share_of_body_1(result), along, hinge, around, camera)

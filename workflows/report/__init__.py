@@ -1,0 +1,1 @@
+"""One self-contained page for a result, or for several side by side."""

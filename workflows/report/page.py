@@ -1,0 +1,230 @@
+"""The page of one or several results: one HTML file with everything in it, that opens from disk without a network."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import io
+import json
+import re
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+
+from tribodyn.version import __version__
+from tribodyn.workflows.pictures import plots, render
+from tribodyn.workflows.pictures.style import STYLE
+from tribodyn.workflows.report.charts import charts
+from tribodyn.workflows.report.solid import solid
+from tribodyn.workflows.result import summary
+from tribodyn.workflows.result.result import Result
+
+DPI = 110  # of the figures on the page
+LARGEST = 15e6  # bytes of a page
+HERE = Path(__file__).parent
+COMPARED = (
+    ("peak frequency / Hz", "peak_hz"), ("amplitude / m", "peak_m"), ("preload / N", "preload_N"), ("cycles", "cycles"),
+    ("life / cycles", "life_cycles"), ("largest depth / m", "depth_max_m"), ("worn volume / m³", "volume_m3"),
+    ("friction work / J", "energy_J"), ("contact pairs", "contact_pairs"), ("DOFs of the model", "model_dofs"),
+    ("seconds", "seconds"),
+)  # fmt: skip
+
+
+def page(results: Sequence[tuple[str, Result, Path | None]]) -> str:
+    """The HTML of results: name, result and its file, None where it has none.
+
+    Raises  ValueError where plotly is missing
+    """
+    named = [(name, result) for name, result, _ in results]
+    data: dict[str, Any] = {"charts": charts(named), "solids": [solid(result) for _, result in named]}
+    title = ", ".join(name for name, _ in named)
+    parts = [f"<h1>{escape(_title(named[0][1]) if len(named) == 1 else title)}</h1>"]
+    if len(named) > 1:
+        parts.append(_section("Side by side", _comparison(named), "compare"))
+    for number, (name, result, path) in enumerate(results):
+        more = f"{name}: " if len(named) > 1 else ""
+        parts.append(_section(f"{more}verdict", _verdict(result), f"verdict-{number}"))
+        if data["solids"][number] is not None:
+            parts.append(_section(f"{more}worn part", _viewer(number), f"part-{number}"))
+        if number == 0:
+            holders = "".join(map(_chart_holder, data["charts"]))
+            parts.append(_section("Curves", '<div class="grid">' + holders + "</div>", "curves"))
+        parts.append(_section(f"{more}inspection of the part and model", _inspection(result), f"inspection-{number}"))
+        parts.append(_section(f"{more}error budget", _budget(result), f"budget-{number}"))
+        parts.append(_section(f"{more}figures", _figures(result), f"figures-{number}"))
+        parts.append(
+            _section(f"{more}scene", f"<pre>{escape(result.provenance['scene_text'])}</pre>", f"scene-{number}")
+        )
+        parts.append(_section(f"{more}provenance", _provenance(result, path), f"provenance-{number}"))
+    script = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
+    return (HERE / "page.html").read_text(encoding="utf-8").format(
+        title=escape(title), style=(HERE / "page.css").read_text(encoding="utf-8"), body="\n".join(parts),
+        plotly=_plotly(), data=script, script=(HERE / "page.js").read_text(encoding="utf-8"),
+    )  # fmt: skip
+
+
+def write(results: Sequence[tuple[str, Result, Path | None]], path: Path) -> Path:
+    """Write the page of results. Raises ValueError where it becomes too large to pass on."""
+    text = page(results)
+    size = len(text.encode())
+    if size > LARGEST:
+        raise ValueError(f"the report would have {size / 1e6:.0f} MB: report fewer results at once")
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def _plotly() -> str:
+    try:
+        from plotly.offline import get_plotlyjs
+    except ImportError:
+        raise ValueError('a report needs the package plotly: install it with pip install "plotly"') from None
+    return str(get_plotlyjs()).replace("</script", "<\\/script")
+
+
+def _chart_holder(title: str) -> str:
+    name = escape(title)
+    return f'<figure><figcaption>{name}</figcaption><div class="chart" data-chart="{name}"></div></figure>'
+
+
+def _section(title: str, body: str, name: str) -> str:
+    heading = title[:1].upper() + title[1:]
+    return f'<section id="{name}"><h2>{escape(heading)}</h2>\n{body}\n</section>'
+
+
+def _title(result: Result) -> str:
+    found = re.search(r'^title\s*=\s*"([^"]+)"', result.provenance["scene_text"], re.MULTILINE)
+    return found.group(1) if found else result.provenance["scene_name"]
+
+
+def _table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
+    top = f"<thead><tr>{''.join(f'<th>{escape(h)}</th>' for h in head)}</tr></thead>" if head else ""
+    body = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
+    return f'<div class="scroll"><table>{top}<tbody>{body}</tbody></table></div>'
+
+
+def _verdict(result: Result) -> str:
+    numbers = result.summary()
+    mark = "good" if numbers["finished"] else "bad"
+    said = f'<p class="{mark}"><strong>{escape(result.state[:1].upper() + result.state[1:])}.</strong></p>'
+    judged = numbers.get("verdict")
+    if isinstance(judged, Mapping):
+        rows = []
+        for name, item in judged.items():
+            error = item.get("error")
+            stated = "may be stated" if item.get("stated") else "may not be stated"
+            rows.append((
+                name.replace("_", " "), _number(item.get("value")), "not known" if error is None else f"{error:.2g}",
+                str(item.get("dominated_by") or ""), stated, str(item.get("reason") or ""),
+            ))  # fmt: skip
+        head = ("quantity", "value (SI)", "total relative error", "dominated by", "", "why")
+        said += _table(rows, head)
+    return said + _table([(name, value) for name, value in summary.lines(result)])
+
+
+def _number(value: Any) -> str:
+    return "none" if value is None else f"{value:.5g}" if isinstance(value, int | float) else str(value)
+
+
+def _comparison(named: Sequence[tuple[str, Result]]) -> str:
+    """Numbers of all results, with the relative difference from the first."""
+    every = [result.summary() for _, result in named]
+    rows = []
+    for label, key in COMPARED:
+        values = [numbers.get(key) for numbers in every]
+        for position, word in (
+            ((0, "first"), (1, "last")) if any(isinstance(v, list) for v in values) else ((None, ""),)
+        ):
+            picked = [v if position is None or not isinstance(v, list) else v[position] for v in values]
+            if all(v is None for v in picked):
+                continue
+            cells = [_number(picked[0])]
+            for value in picked[1:]:
+                first: Any = picked[0]
+                both = value is not None and first not in (None, 0)
+                cells.append(_number(value) + (f" ({value / first - 1:+.2%})" if both else ""))
+            rows.append((f"{label}{', ' + word if word else ''}", *cells))
+    return _table(rows, ("", *(name for name, _ in named)))
+
+
+def _inspection(result: Result) -> str:
+    names = {
+        "elements": "elements", "nodes": "nodes", "scaled_jacobian": "smallest scaled Jacobian (1 is best)",
+        "full_dofs": "DOFs of the full model", "model_dofs": "DOFs of the reduced model",
+        "retained_modes": "retained modes",
+        "first_omitted_hz": "first omitted mode / Hz", "free_hz": "free modes / Hz", "contact_pairs": "contact pairs",
+        "unknowns": "unknowns of the balance", "harmonics": "harmonics", "compliance_error": "error of the compliance",
+        "factorisation": "factorisation", "sectors": "sectors", "engine_order": "engine order",
+    }  # fmt: skip
+    rows = []
+    for key, label in names.items():
+        if key in result.facts:
+            value = result.facts[key]
+            many = getattr(value, "ndim", 0) > 0
+            text = ", ".join(_number(v) for v in np.asarray(value).tolist()[:6]) if many else _number(value)
+            rows.append((label, text))
+    if result.patch is not None:
+        rows.append(("area of the contact / mm²", f"{1e6 * result.patch.area.sum():.5g}"))
+    return _table(rows)
+
+
+def _budget(result: Result) -> str:
+    entries = result.summary()["error_budget"] or []
+    if not entries:
+        return "<p>No error has been estimated.</p>"
+    rows = [
+        (e["source"], e["quantity"], "not known" if e["error"] is None else f"{e['error']:.2g}", e["by"])
+        for e in entries
+    ]
+    return _table(rows, ("source", "quantity", "relative error", "by"))
+
+
+def _figures(result: Result) -> str:
+    """Every figure as an embedded picture; renders only where this machine can draw them."""
+    made = []
+    for name, make in {**plots.figures(result), **_renders(result)}.items():
+        with mpl.rc_context(STYLE):
+            buffer = io.BytesIO()
+            make(result).savefig(buffer, format="png", dpi=DPI)
+        code = base64.b64encode(buffer.getvalue()).decode()
+        made.append(f'<figure><img alt="{escape(name)}" src="data:image/png;base64,{code}"></figure>')
+    return '<div class="grid">' + "".join(made) + "</div>"
+
+
+def _renders(result: Result) -> dict[str, Any]:
+    found = render.figures(result)
+    if not found:
+        return {}
+    try:
+        render.check()
+    except render.RenderingUnavailable:
+        return {}
+    return {name: (lambda _, make=make: make()) for name, make in found.items()}
+
+
+def _viewer(number: int) -> str:
+    return (
+        f'<div class="viewer" data-solid="{number}"><div class="solid"></div><div class="controls">'
+        '<label>state <input type="range" class="state" min="0" value="0" step="1"></label>'
+        '<output class="label"></output>'
+        '<label>colour <select class="field"></select></label>'
+        '<label class="opener"><input type="checkbox" class="open"> open the contact</label></div>'
+        '<div class="legend"></div></div>'
+    )
+
+
+def _provenance(result: Result, path: Path | None) -> str:
+    given = result.provenance
+    changes = "".join(f" --set {json.dumps(text)}" for text in given.get("overrides", "").split("\n") if text)
+    rows = [("command", f"tribodyn run {given['scene_name']}{changes}")]
+    rows.append(("SHA-256 of the scene", hashlib.sha256(given["scene_text"].encode()).hexdigest()))
+    if path is not None:
+        rows.append((f"SHA-256 of {path.name}", hashlib.sha256(path.read_bytes()).hexdigest()))
+    rows += [
+        (key, given[key]) for key in ("versions", "python", "platform", "seed", "threads", "started") if key in given
+    ]
+    rows.append(("report by", f"tribodyn {__version__}"))
+    return _table(rows)

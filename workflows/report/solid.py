@@ -1,0 +1,116 @@
+"""The worn part as surfaces that a page can turn, with the fields of its contact in every shown wear row."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tribodyn.workflows.pictures.figures import status_name
+from tribodyn.workflows.pictures.style import STATUS
+from tribodyn.workflows.pictures.view import looking, wear_scale
+from tribodyn.workflows.report.charts import plain
+from tribodyn.workflows.result.faces import bodies, faces_of, worn_off
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.states import State, shown_states, state_of
+
+MOST_STATES = 25
+LIFT = 2e-3  # of the patch, by which the colours of a face lie above it
+
+
+def solid(result: Result) -> dict[str, Any] | None:
+    """Vertices, triangles and fields for the page, lengths in mm; None where the result has no faces of a contact.
+
+    body : x, y, z, i, j, k of the surface of the mesh, and which vertices belong to the body that can be moved away
+    faces : for each face i, j, k over the pairs, and the same of every state
+    states : label, for each state moved vertices of the body, positions of the faces, and fields of the pairs
+    """
+    patch, part = result.patch, result.part
+    if patch is None or not len(patch.faces):
+        return None
+    states = _states(result)
+    faces = faces_of(result)
+    size = float(np.sqrt(patch.area.sum()))
+    factor = wear_scale(patch, np.stack([state.depth for state in states]))
+    found: dict[str, Any] = {"factor": factor, "open": plain(1e3 * 0.8 * size * patch.frames[:, 2].mean(axis=0))}
+    nodes = np.zeros(0, int)
+    points = patch.points if part is None else part.points
+    found["extent"] = plain(np.ptp(points, axis=0) / np.ptp(points, axis=0).max())
+    towards, up = looking(points, patch)
+    found["camera"] = [plain(1.9 * towards / np.linalg.norm(towards)), plain(up)]
+    if part is not None:
+        nodes, triangles = _surface(result)
+        body = bodies(part)
+        other = body[nodes] == body[faces[1].nodes[0]] if len(faces) > 1 else np.zeros(len(nodes), bool)
+        alone = len(faces) < 2 or body[faces[0].nodes[0]] == body[faces[1].nodes[0]]
+        found["body"] = {
+            "xyz": plain(1e3 * part.points[nodes].T, 6),
+            "ijk": triangles.T.tolist(),
+            "other": [] if alone else np.flatnonzero(other).tolist(),
+        }
+    corner = patch.faces
+    found["ijk"] = np.concatenate([corner[:, [0, k, k + 1]] for k in range(1, corner.shape[1] - 1)]).T.tolist()
+    normals = [face.outward for face in faces] or [patch.frames[:, 2]]
+    places = [part.points[face.nodes] for face in faces] if part is not None else [patch.points]
+    found["states"] = []
+    for state in states:
+        entry: dict[str, Any] = {"label": state.label, "fields": _fields(result, state)}
+        if part is not None:
+            moved = factor * worn_off(faces, state.depth, len(part.points))[nodes]
+            there = np.flatnonzero(moved.any(axis=1))
+            entry["moved"] = [there.tolist(), plain(1e3 * (part.points[nodes][there] + moved[there]), 6)]
+        shares = [face.share for face in faces] or [0.5]
+        entry["faces"] = [
+            plain(1e3 * (at + (LIFT * size - factor * share * state.depth[:, None]) * normal).T, 6)
+            for at, normal, share in zip(places, normals, shares, strict=True)
+        ]
+        found["states"].append(entry)
+    found["status"] = {int(bits): [status_name(bits, patch.components), color] for bits, (_, color) in STATUS.items()}
+    return found
+
+
+def _states(result: Result) -> list[State]:
+    """Rows of the wear history, evenly chosen where there are many, or the peaks of a response that does not wear."""
+    if result.wear is None or not len(result.wear.cycles):
+        return shown_states(result)
+    last = len(result.wear.cycles) - 1
+    return [state_of(result, int(row)) for row in np.unique(np.linspace(0, last, MOST_STATES).round().astype(int))]
+
+
+def _fields(result: Result, state: State) -> dict[str, list[Any]]:
+    assert result.patch is not None
+    found = {"total wear depth / µm": plain(1e6 * state.depth, 5)}
+    if state.pressure is not None:
+        found["mean pressure / MPa"] = plain(1e-6 * state.pressure, 5)
+    if result.wear is not None and len(result.wear.cycles):
+        found["friction work per cycle and area / J/m²"] = plain(
+            result.wear.energy[state.number] / result.patch.area, 5
+        )
+    if state.status is not None:
+        found["status"] = [int(bits) for bits in state.status]
+    return found
+
+
+def _surface(result: Result) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes of the mesh on its surface, and the triangles (n, 3) over them; every node of a curved face is a corner."""
+    import pyvista as pv
+
+    part = result.part
+    assert part is not None
+    grid = pv.UnstructuredGrid({getattr(pv.CellType, part.kind.upper()): part.cells}, part.points)
+    grid.point_data["node"] = np.arange(len(part.points))
+    shell = grid.extract_surface(nonlinear_subdivision=1, algorithm="dataset_surface").triangulate()
+    shell = shell.compute_normals(consistent_normals=True, auto_orient_normals=True, split_vertices=False)
+    distance_free = np.asarray(shell.point_data["node"], float)
+    near = np.round(distance_free).astype(int)
+    exact = np.linalg.norm(part.points[np.clip(near, 0, len(part.points) - 1)] - shell.points, axis=1)
+    if exact.max() > 1e-6 * np.ptp(part.points, axis=0).max():  # interpolated: look the nodes up by place
+        from scipy.spatial import cKDTree
+
+        near = _nearest_of_same_body(result, np.asarray(shell.points), cKDTree(part.points))
+    nodes, where = np.unique(near, return_inverse=True)
+    return nodes, where[shell.faces.reshape(-1, 4)[:, 1:]]
+
+
+def _nearest_of_same_body(result: Result, points: np.ndarray, tree: Any) -> np.ndarray:
+    return np.asarray(tree.query(points)[1])
