@@ -152,7 +152,8 @@ def declared(name: str) -> tuple[declare.Number, ...]:
 
 def called(law: ModuleType) -> str:
     """Name of a law for sentences."""
-    return law.__name__.rsplit(".", 1)[-1].removeprefix("tribodyn_own_")
+    assert law.__file__ is not None
+    return Path(law.__file__).stem
 
 
 @cache

@@ -51,6 +51,8 @@ def run(
 ) -> None:
     """Run a scene and leave its result and pictures in a folder.
 
+    A scene may name Python files beside it: running somebody's scene runs his code.
+
     Parameters
     ----------
     scene
