@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tribodyn.hbm.outcome import BranchEnd
+
 if TYPE_CHECKING:
     from tribodyn.hbm.newton import Solution
     from tribodyn.hbm.parameter import Parameter
@@ -41,6 +43,11 @@ class Branch:
     folds: tuple[int, ...] = ()
     parameter_name: str = "frequency"
     parameter: np.ndarray = field(default_factory=lambda: np.empty(0))
+
+    @property
+    def ended(self) -> BranchEnd:
+        """Why the branch ends."""
+        return BranchEnd.of(self.end)
 
     @property
     def frequency(self) -> np.ndarray:

@@ -27,6 +27,7 @@ from tribodyn.hbm.evolution import (
     worn_state,
 )
 from tribodyn.hbm.operating_point import point_of
+from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.preload_at_rest import PreloadAtRest
 from tribodyn.hbm.wear_history import LIFE_SHARE, WearHistory, WearRow, history, rows_to_go_on
 from tribodyn.hbm.wearing import WearingBalance, WornState
@@ -71,7 +72,7 @@ def evolve(
     else:
         state = assess(problem, np.zeros_like(problem.area), 0.0, None)
     at_rest = PreloadAtRest(problem)
-    end = f"stopped after {max_steps} wear steps"
+    end = WearEnd.STEPS_DONE.say(f" {max_steps} wear steps")
     while len(rows) < max_steps and state is not None:
         state = at_rest.of(state)
         reason = reason_to_stop(problem, state, first_preload(problem, rows, state), first_at_rest(rows, state))
@@ -160,7 +161,7 @@ def _leap(
             return _Taken(row, replace(after, solves=0))
         failure = after.failure
     failed = row_of(problem, state, 0.0, nothing, nothing, 0.0, plan)
-    return _Taken(failed, None, failure or "no wear step is small enough for the tolerance")
+    return _Taken(failed, None, failure or WearEnd.NO_STEP.say())
 
 
 def _event(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) -> float:

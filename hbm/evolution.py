@@ -12,11 +12,9 @@ from tribodyn.hbm import newton, wear_law
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.law import SEPARATES
 from tribodyn.hbm.operating_point import OperatingPoint, Site
+from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear_history import WearRow
 from tribodyn.hbm.wear_law import JointWear
-
-LOST = "contact lost at every pair"
-LOST_AT_REST = "preload at rest fell below"  # the beginning of its sentence
 
 
 @dataclass(frozen=True)
@@ -114,7 +112,8 @@ class WearState:
         """Sentence on the first duty that did not converge, empty where all did."""
         for point in self.points:
             if not point.solution.converged:
-                return f"solve failed at {point.state.omega / (2 * np.pi):.6g} Hz: {point.solution.outcome}"
+                hertz = point.state.omega / (2 * np.pi)
+                return WearEnd.SOLVE_FAILED.say(f" at {hertz:.6g} Hz: {point.solution.outcome}")
         return self.failure_at_rest
 
     @property
@@ -202,14 +201,14 @@ def reason_to_stop(
         return state.failure
     share = problem.lost_below_at_rest
     if share is not None and state.preload_at_rest <= share * first_at_rest:
-        return f"{LOST_AT_REST} {share:.3g} of its first value"
+        return WearEnd.LOST_AT_REST.say(f" {share:.3g} of its first value")
     if state.separated:
-        return LOST
+        return WearEnd.LOST.say()
     preload = problem.preload(state.points[0].state)
     if preload < problem.lost_below * first_preload:
-        return f"preload fell below {problem.lost_below:.3g} of its first value"
+        return WearEnd.PRELOAD_LOST.say(f" {problem.lost_below:.3g} of its first value")
     if state.rate.max() <= 0.0:
-        return "no pair slips any more: wear has stopped"
+        return WearEnd.NO_SLIP.say()
     return ""
 
 

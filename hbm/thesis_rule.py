@@ -10,6 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tribodyn.hbm.evolution import WearProblem, assess, first_at_rest, first_preload, reason_to_stop, row_of, state_of
+from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.preload_at_rest import PreloadAtRest
 from tribodyn.hbm.wear_history import WearHistory, WearRow, history, rows_to_go_on
 
@@ -35,7 +36,7 @@ def evolve(
     depth = rows[-1].depth + rows[-1].worn if rows else np.zeros_like(problem.area)
     cycles = rows[-1].cycles + rows[-1].cycles_in_step if rows else 0.0
     at_rest = PreloadAtRest(problem)
-    end = f"stopped after {max_steps} wear steps"
+    end = WearEnd.STEPS_DONE.say(f" {max_steps} wear steps")
     while len(rows) < max_steps:
         state = at_rest.of(assess(problem, depth, cycles, before))
         reason = reason_to_stop(problem, state, first_preload(problem, rows, state), first_at_rest(rows, state))

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tribodyn.hbm.outcome import WearEnd
+
 if TYPE_CHECKING:
     from tribodyn.hbm.balance import HarmonicBalance
     from tribodyn.hbm.operating_point import OperatingPoint
@@ -147,6 +149,11 @@ class WearHistory:
     def frequency(self) -> np.ndarray:
         """(n_row,) frequency of the cycle [Hz]."""
         return self.omega / (2 * np.pi)
+
+    @property
+    def ended(self) -> WearEnd:
+        """Why the run ended."""
+        return WearEnd.of(self.end)
 
     @property
     def displacement(self) -> np.ndarray:

@@ -9,9 +9,10 @@ from scipy.optimize import root
 from tests.helpers.pressed_body import N_PAIR, wear_problem
 from tribodyn.hbm import error_controlled_rule, thesis_rule
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.evolution import LOST_AT_REST, WearProblem
+from tribodyn.hbm.evolution import WearProblem
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear_history import WearHistory
 
 
@@ -49,7 +50,7 @@ def test_a_run_ends_where_the_preload_at_rest_is_lost(problem: WearProblem, rule
     found = worn(problem, rule)
     rest = found.preload_at_rest
     assert rest is not None
-    assert found.end == f"{LOST_AT_REST} 0.4 of its first value"
+    assert found.end == f"{WearEnd.LOST_AT_REST.say()} 0.4 of its first value"
     assert rest[-1] <= 0.4 * rest[0] < rest[-2]
     assert found.cycles_in_step[-1] == 0.0
     for row in (0, len(rest) // 3):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tribodyn.hbm.branch import CONVERGED, Branch
-from tribodyn.hbm.evolution import LOST
+from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear_history import WearHistory
 from tribodyn.workflows.result.result import (
     CurveStability,
@@ -94,7 +94,7 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
         work=cycles_in_step[:, None] * energy,
         duty_omega=omega_row[:, None],
         duty_displacement=displacement[:, None],
-        end=LOST,
+        end=WearEnd.LOST.say(),
     )
     rows = np.array([0, n_row // 2, n_row - 1])
     shape = (part.points[:, 0] / LENGTH) ** 2
@@ -109,7 +109,7 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
             "seconds": 12.5, "delta_max_m": 5e-3, "unknowns": 9 * n_pair, "model_dofs": 3 * n_pair + 17,
             "harmonics": np.arange(2),
         },
-        state=f"complete: {LOST}",
+        state=f"complete: {WearEnd.LOST.say()}",
         patch=where,
         part=part,
         references=References(omega, np.abs(resonance(415, 0.01)), np.abs(resonance(530, 0.01))),

@@ -11,6 +11,7 @@ from tribodyn.hbm import error_controlled_rule, thesis_rule
 from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.evolution import Duty, WearProblem
 from tribodyn.hbm.operating_point import AtFrequency
+from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.step_error import UNKNOWN, step_error
 from tribodyn.hbm.wear_history import LIFE_SHARE, WearHistory
 from tribodyn.hbm.wear_law import JointWear
@@ -70,7 +71,7 @@ def _judged(
     body: Body, problem: WearProblem, worn: WearHistory, faster: float = 1.0, tolerance: float | None = None
 ) -> Verdict:
     """Conservation and monotony, then worn volume beside the reference, within what the run says of its own error."""
-    if worn.end.startswith("solve failed"):
+    if worn.ended is WearEnd.SOLVE_FAILED:
         return Verdict(REFUSED, worn.end)
     if not all(np.all(np.isfinite(a)) for a in (worn.depth, worn.worn, worn.cycles, worn.work, worn.preload)):
         return Verdict(WRONG, "a number is not finite")

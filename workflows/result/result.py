@@ -10,15 +10,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tribodyn.hbm.branch import CONVERGED, Branch
-from tribodyn.hbm.evolution import LOST, LOST_AT_REST
 from tribodyn.hbm.wear_history import WearHistory
 
 if TYPE_CHECKING:
     import pyvista as pv
     from matplotlib.figure import Figure
-
-PRELOAD_LOST = "preload fell below"  # how hbm.evolution begins the other sentence for a lost contact
-
 
 PEAKS = 3  # of a response that does not wear, shown in pictures
 
@@ -209,7 +205,7 @@ class Result:
     @property
     def contact_lost(self) -> bool:
         """Whether wear went on until every pair was separated."""
-        return self.wear is not None and self.wear.end.startswith((LOST, PRELOAD_LOST, LOST_AT_REST))
+        return self.wear is not None and self.wear.ended.lost
 
     def summary(self) -> dict[str, Any]:
         """The numbers of the result as plain data, see result.summary: what `tribodyn show --json` prints."""

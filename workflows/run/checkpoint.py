@@ -11,6 +11,7 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
+from tribodyn.hbm.outcome import WearEnd
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.scene import scene_file
@@ -83,7 +84,7 @@ def is_complete(result: Result, scene: Scene) -> bool:
     if not result.state.startswith("complete") or not scene.wears:
         return result.state.startswith("complete")
     assert scene.wear is not None
-    stopped = result.wear is None or result.wear.end.startswith("stopped after")
+    stopped = result.wear is None or result.wear.ended is WearEnd.STEPS_DONE
     return not stopped or result.wear_steps >= scene.wear.max_steps
 
 

@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.branch import CONVERGED, Branch
+from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.workflows.accuracy import verdict
 from tribodyn.workflows.accuracy.budget import with_budget
 from tribodyn.workflows.result import store
@@ -101,5 +102,5 @@ def follow_response(scene: Scene, balance: HarmonicBalance, advance: Callable[[f
 
 def check_branch(branch: Branch | None) -> None:
     """Raise SolveFailed where a response curve did not come to its end."""
-    if branch is not None and (branch.outcome[-1] != CONVERGED or branch.end.startswith("ended at")):
+    if branch is not None and (branch.outcome[-1] != CONVERGED or branch.ended is BranchEnd.ENDED):
         raise SolveFailed(f"the frequency response {branch.end}")
