@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tribodyn.hbm import newton
-from tribodyn.workflows.run import modelling
+from tribodyn.geometry import blocks
+from tribodyn.hbm import law, newton
+from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
@@ -102,3 +104,92 @@ def test_what_cannot_be_is_one_sentence(tmp_path: Path, change: tuple[str, str],
 def test_a_body_without_its_material_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=r"either \[bodies.NAME\] with \[materials.NAME\]"):
         scene_file.parse(BLOCKS + '[geometry]\npart = "beam"\n', "scene.toml", (), tmp_path)
+
+
+BAR = f"""
+[scene]
+title = "A beam on its patch"
+[geometry]
+mesh = "bar.msh"
+fixed = ["clamp"]
+[material]
+{STEEL}
+[loads.static.press]
+group = "tip"
+direction = "-z"
+value = "2 kN"
+[loads.harmonic.shake]
+group = "tip"
+direction = "y"
+value = "1 kN"
+[response]
+group = "tip"
+direction = "y"
+frequency = ["700 Hz", "900 Hz"]
+[reduction]
+modes = 5
+[damping]
+modal = "1 %"
+[solver]
+tolerance = 1e-12
+"""
+LAW = 't1 = "x"\nfriction = 0.4\n'
+
+
+def bar(folder: Path) -> None:
+    """A beam whose patch is one face, and the same patch cut into three."""
+    x = np.linspace(0, 0.2, 9)
+    across, up = np.linspace(0, 0.02, 3), np.linspace(0, 0.02, 2)
+    parts = [blocks.Block(x[:6], across, up, "bar", {"u-": "clamp"})]
+    parts += [blocks.Block(x[i : i + 2], across, up, "bar", {"w-": f"patch_{i}"}) for i in (5, 6, 7)]
+    made = blocks.body(parts, points={"tip": (0.2, 0.01, 0.02)})
+    whole = np.concatenate([made.surfaces[f"patch_{i}"] for i in (5, 6, 7)])
+    blocks.write(folder / "bar.msh", replace(made, surfaces={**made.surfaces, "patch": whole}))
+
+
+def solved(text: str, folder: Path, *overrides: str) -> np.ndarray:
+    """Coefficients of the first output at 800 Hz."""
+    balance = built(text, folder, *overrides).balance
+    omega = 2 * np.pi * 800.0
+    options = newton.NewtonOptions(tolerance=1e-12, krylov=1e-6)
+    found = newton.solve(balance, omega, balance.stuck(omega), options)
+    assert found.converged
+    assert (found.state.cycle.status != law.STICKS).any()
+    return balance.outputs(found.state)[0]
+
+
+def test_a_face_split_into_named_contacts_equals_the_one_contact(tmp_path: Path) -> None:
+    bar(tmp_path)
+    shares = {"tangential_stiffness": 3e7, "normal_stiffness": 4e7}
+
+    def table(head: str, faces: str, part: float) -> str:
+        stiffness = "".join(f"{name} = {value * part}\n" for name, value in shares.items())
+        return f"[{head}]\n{faces}\n{LAW}{stiffness}"
+
+    one = solved(BAR + table("contact", 'group = "patch"', 1.0), tmp_path)
+    names = [table(f"contacts.c{i}", f'first = "patch_{i}"\nsecond = "ground"', 1 / 3) for i in (5, 6, 7)]
+    split = solved(BAR + "".join(names), tmp_path)
+    assert np.abs(split - one).max() < 1e-12 * np.abs(one).max()
+
+
+def test_a_part_without_contact_has_its_linear_response(tmp_path: Path) -> None:
+    bar(tmp_path)
+    file = scene_file.parse(BAR, "scene.toml", ("pictures.renders=false", "pictures.plots=false"), tmp_path)
+    result = pipeline.run(file, tmp_path, Progress())
+    assert result.state == "complete"
+    assert result.facts["contact_pairs"] == 0
+    assert result.references is not None
+    assert result.response is not None
+    peak = np.abs(result.response.outputs[:, 0, 2]).max()
+    assert peak > 0
+    assert np.isfinite(peak)
+
+
+def test_a_free_structure_is_the_limit_of_one_on_weak_springs(tmp_path: Path) -> None:
+    bar(tmp_path)
+    free = BAR.replace('fixed = ["clamp"]\n', "") + '[contact]\ngroup = "patch"\n' + LAW
+    free += "tangential_stiffness = 3e7\nnormal_stiffness = 4e7\n"
+    springs = "".join(f'[springs.{a}]\ngroup = "clamp"\ndirection = "{a}"\nstiffness = "1 N/m"\n' for a in "xyz")
+    free = free.replace('group = "tip"\ndirection = "-z"', 'group = "patch_6"\ndirection = "-z"')
+    free = free.replace('value = "1 kN"', 'value = "200 N"')
+    assert solved(free + springs, tmp_path) == pytest.approx(solved(free, tmp_path), rel=1e-6, abs=1e-12)

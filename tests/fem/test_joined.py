@@ -1,0 +1,175 @@
+"""Ties, couplings, lumped masses, temperature and orthotropic materials against closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import skfem
+
+from tribodyn.fem.assembly import Assembly, Body
+from tribodyn.fem.constraints import Clamp
+from tribodyn.fem.couplings import DistributedCoupling, RigidCoupling, Tie
+from tribodyn.fem.elasticity import assemble
+from tribodyn.fem.factor import factorise
+from tribodyn.fem.loads import Moment, NodalForce
+from tribodyn.fem.material import Material, Orthotropic
+from tribodyn.fem.modes import modes
+from tribodyn.fem.part import Part, build
+from tribodyn.fem.springs import Mass
+from tribodyn.fem.thermal import Heating
+
+STEEL = Material(210e9, 0.3, 7860.0, 12e-6)
+L = np.linspace
+
+
+def block(x, y, z, tets=False):
+    """A block with its six faces named, as mesh and node sets."""
+    grid = skfem.MeshTet if tets else skfem.MeshHex
+    mesh = (skfem.MeshTet2 if tets else skfem.MeshHex2).from_mesh(grid.init_tensor(x, y, z))
+    faces = {}
+    for axis, line, letter in ((0, x, "x"), (1, y, "y"), (2, z, "z")):
+        for at, side in ((line[0], "min"), (line[-1], "max")):
+            inside = np.abs(mesh.p[axis][mesh.facets] - at).max(axis=0) < 1e-9
+            faces[f"{letter}_{side}"] = np.flatnonzero(inside)
+    sets = {name: np.unique(mesh.dofs.get_facet_dofs(facets).flatten()) for name, facets in faces.items()}
+    return mesh.with_boundaries(faces), sets
+
+
+def two(x_1, x_2, n_1=(3, 3), n_2=(4, 4), tets=False, materials=(STEEL, STEEL), points=None):
+    """Two blocks of section 1 x 1 that meet where the first ends."""
+    one = block(x_1, L(0, 1, n_1[0]), L(0, 1, n_1[1]))
+    other = block(x_2, L(0, 1, n_2[0]), L(0, 1, n_2[1]), tets)
+    return Assembly([Body("a", *one, materials[0]), Body("b", *other, materials[1])], points)
+
+
+def part(of, clamps=(), loads=None, outputs=None, **more) -> Part:
+    return build(of, of.node_sets, of.material, clamps, [], loads or {}, outputs or {}, **more)
+
+
+def static(of: Part, load: str) -> np.ndarray:
+    return of.field(factorise(of.system.stiffness).solve(of.system.loads[load]))
+
+
+@pytest.mark.parametrize("tets", [False, True])
+def test_a_tie_of_different_meshes_carries_a_bar_in_tension_exactly(tets):
+    bar = two(L(0, 2, 3), L(2, 5, 4), tets=tets, materials=(replace(STEEL, nu=0.0), replace(STEEL, nu=0.0)))
+    pull = {"pull": NodalForce("b.x_max", (1, 0, 0), "area")}
+    tied = part(bar, [Clamp("a.x_min")], pull, constraints=[Tie("ties.t", "a.x_max", "b.x_min")])
+    u = static(tied, "pull")
+    expected = np.zeros_like(u)
+    expected[:, 0] = tied.points[:, 0] / STEEL.E
+    assert np.abs(u - expected).max() < 1e-11 * np.abs(expected).max()
+
+
+def frequencies(n: int) -> tuple[float, float]:
+    """Second mode in bending of two clamped, tied blocks against that of one piece, both of about n elements."""
+    bar = two(L(0, 2, n + 1), L(2, 5, n + 2), (n + 1, n + 1), (n + 2, n + 2))
+    tied = part(bar, [Clamp("a.x_min")], constraints=[Tie("ties.t", "a.x_max", "b.x_min")])
+    mesh, sets = block(L(0, 5, 2 * n + 2), L(0, 1, n + 2), L(0, 1, n + 2))
+    whole = build(mesh, sets, STEEL, [Clamp("x_min")], [], {}, {})
+    return tuple(modes(of.system.stiffness, of.system.mass, 3)[0][2] for of in (tied, whole))
+
+
+def test_a_tie_converges_with_the_mesh_like_the_one_piece_mesh():
+    fine, best = frequencies(4)
+    errors = [abs(frequencies(n)[0] / best - 1) for n in (1, 2)]
+    assert errors[0] / errors[1] > 2**2.5  # 3.1, measured; corners at the clamp keep both meshes from order 4
+    assert errors[1] < 8e-3
+    assert abs(fine / best - 1) < 3e-4
+
+
+def test_faces_that_a_tie_cannot_join_are_one_sentence():
+    bar = two(L(0, 2, 3), L(4, 5, 3))
+    with pytest.raises(ValueError, match=r"ties.t: the two tied faces do not meet: they are about 2.* m apart"):
+        part(bar, constraints=[Tie("ties.t", "a.x_max", "b.x_min")])
+    bar = two(L(0, 2, 3), L(2, 5, 3))
+    with pytest.raises(ValueError, match=r"ties\.t moves nodes that are clamped"):
+        part(bar, [Clamp("a.x_max")], constraints=[Tie("ties.t", "a.x_max", "b.x_min")])
+    twice = [Tie("ties.t", "a.x_max", "b.x_min"), Tie("ties.s", "a.x_max", "b.x_min")]
+    with pytest.raises(ValueError, match=r"ties\.s and ties\.t both move the same nodes"):
+        part(bar, constraints=twice)
+
+
+@pytest.mark.parametrize("kind", [RigidCoupling, DistributedCoupling])
+def test_a_point_bends_and_twists_the_face_that_it_carries(kind):
+    beam, sets = block(L(0, 10, 11), L(0, 1, 3), L(0, 1, 3))
+    bar = Assembly([Body("a", beam, sets, STEEL)], {"tip": (10.0, 0.5, 0.5)})
+    loads = {"force": NodalForce("tip", (0, 0, 1)), "moment": Moment("tip", (0, 1, 0))}
+    of = part(bar, [Clamp("a.x_min")], loads, constraints=[kind("tip", "a.x_max")])
+    inertia = 1 / 12
+    node, turn = bar.points["tip"]
+    assert static(of, "force")[node, 2] == pytest.approx(10**3 / (3 * STEEL.E * inertia), rel=0.02)
+    bent = static(of, "moment")
+    assert bent[turn, 1] == pytest.approx(10 / (STEEL.E * inertia), rel=0.02)
+    assert bent[node, 2] == pytest.approx(-(10**2) / (2 * STEEL.E * inertia), rel=0.02)
+    assert static(of, "force")[turn, 1] == pytest.approx(bent[node, 2], rel=1e-9)  # Maxwell and Betti
+
+
+def test_a_heavy_point_swings_on_the_bar_that_carries_it():
+    beam, sets = block(L(0, 10, 11), L(0, 1, 2), L(0, 1, 2))
+    light = Material(210e9, 0.3, 1e-3)
+    bar = Assembly([Body("a", beam, sets, light)], {"tip": (10.0, 0.5, 0.5)})
+    of = part(bar, [Clamp("a.x_min")], constraints=[RigidCoupling("tip", "a.x_max")], masses=[Mass("tip", 100.0)])
+    omega = modes(of.system.stiffness, of.system.mass, 2)[0]
+    assert omega == pytest.approx([np.sqrt(3 * 210e9 / 12 / 10**3 / 100.0)] * 2, rel=0.02)
+
+
+def test_a_heated_bar_between_walls_and_a_free_one():
+    along = [  # they expand along the bar alone, and do not contract across
+        Orthotropic((E,) * 3, (0.0,) * 3, (E / 2,) * 3, 1000.0, expansion=(alpha, 0.0, 0.0))
+        for E, alpha in ((210e9, 12e-6), (70e9, 23e-6))
+    ]
+    bar = two(L(0, 2, 3), L(2, 5, 3), materials=along)
+    heat = {"heat": Heating(bar.material)}
+    tie = [Tie("ties.t", "a.x_max", "b.x_min")]
+    free = part(bar, [Clamp("a.x_min")], heat, constraints=tie)
+    u = static(free, "heat")
+    side = bar.node_sets["b.x_max"]
+    assert u[side, 0].mean() == pytest.approx(2 * 12e-6 + 3 * 23e-6, rel=1e-9)
+    walls = part(bar, [Clamp("a.x_min"), Clamp("b.x_max", "x")], heat, constraints=tie)
+    q = factorise(walls.system.stiffness).solve(walls.system.loads["heat"])
+    meeting = walls.field(q)[bar.node_sets["b.x_min"], 0].mean()
+    # one force in both: (alpha L)_1 + (alpha L)_2 = F (L / E A)_1 + F (L / E A)_2
+    force = (2 * 12e-6 + 3 * 23e-6) / (2 / 210e9 + 3 / 70e9)
+    assert meeting == pytest.approx(2 * 12e-6 - force * 2 / 210e9, rel=1e-9)
+
+
+def crystal(**more):
+    numbers = {"young": (120e9, 80e9, 60e9), "poisson": (0.3, 0.25, 0.2), "shear": (40e9, 30e9, 20e9), "rho": 5000.0}
+    return Orthotropic(**numbers, **more)
+
+
+def test_an_orthotropic_bar_and_its_turned_axes():
+    mesh, sets = block(L(0, 3, 4), L(0, 1, 2), L(0, 1, 2))
+    modulus = {}
+    for first, second, E in (((1, 0, 0), (0, 1, 0), 120e9), ((0, 1, 0), (1, 0, 0), 80e9), ((0, 1, 0), (0, 0, 1), 60e9)):
+        held = [Clamp(f"{axis}_min", axis) for axis in "xyz"]
+        pull = {"pull": NodalForce("x_max", (1, 0, 0), "area")}
+        of = build(mesh, sets, crystal(axes=(first, second)), held, [], pull, {})
+        modulus[E] = 3 / static(of, "pull")[sets["x_max"], 0].mean()
+    assert list(modulus.values()) == pytest.approx(list(modulus), rel=1e-9)
+
+
+def test_turning_material_and_mesh_alike_changes_no_frequency():
+    mesh, sets = block(L(0, 3, 4), L(0, 1, 2), L(0, 1.5, 2))
+    angle = 0.7
+    c, s = np.cos(angle), np.sin(angle)
+    R = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    turned = replace(mesh, doflocs=R @ mesh.doflocs)
+    axes = np.array([[0.6, 0.5, 0.2], [-0.3, 0.9, 0.1]])
+    found = []
+    for of, directions in ((mesh, axes), (turned, axes @ R.T)):
+        M, K = assemble(of, crystal(axes=directions))
+        free = np.setdiff1d(np.arange(K.shape[0]), (sets["x_min"][:, None] * 3 + np.arange(3)).ravel())
+        found.append(modes(K[free][:, free], M[free][:, free], 6)[0])
+    assert found[0] == pytest.approx(found[1], rel=1e-9)
+
+
+def test_an_isotropic_material_is_the_special_case():
+    mesh, _ = block(L(0, 3, 4), L(0, 1, 2), L(0, 1.5, 2), tets=True)
+    G = STEEL.E / (2 * (1 + STEEL.nu))
+    same = Orthotropic((STEEL.E,) * 3, (STEEL.nu,) * 3, (G,) * 3, STEEL.rho, ((1, 2, 3), (0, 1, 1)))
+    for one, other in zip(assemble(mesh, STEEL), assemble(mesh, same), strict=True):
+        assert abs(one - other).max() < 1e-11 * abs(one).max()
