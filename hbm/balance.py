@@ -141,7 +141,7 @@ class HarmonicBalance:
     def stuck(self, omega: float) -> np.ndarray:
         """The same as a first guess x (n_pair, n_component, n_coeff) [m]."""
         x = self.x_lin(omega)
-        return x.reshape(self.contact.n_pair, -1, x.shape[-1])
+        return x.reshape(self.contact.n_pair, len(self.contact.components), x.shape[-1])
 
     def evaluate(self, omega: float, x: np.ndarray, jacobian: bool = True) -> State:
         """The balance at x (n_pair, n_component, n_coeff)."""

@@ -111,7 +111,7 @@ class AtPeak:
         scan = adaptive.Options(SCAN_TOLERANCE, step, min(5 * step, COARSEST), 1e-3 * step, newton=self.newton)
         branch = adaptive.follow(balance, self.start, self.stop, scan)
         best = self._highest_maximum(branch)
-        x = branch.contact[best].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
+        x = branch.contact[best].reshape(balance.contact.n_pair, len(balance.contact.components), balance.basis.n_coeff)
         near = branch.omega[max(best - 1, 0) : best + 2]
         width = float(np.ptp(near)) / max(len(near) - 1, 1)
         found = self._refine(balance, branch.omega[best], x, 0.5 * width)

@@ -121,7 +121,7 @@ value = "2 kN"
 [loads.harmonic.shake]
 group = "tip"
 direction = "y"
-value = "1 kN"
+value = "900 N"
 [response]
 group = "tip"
 direction = "y"
@@ -147,14 +147,14 @@ def bar(folder: Path) -> None:
     blocks.write(folder / "bar.msh", replace(made, surfaces={**made.surfaces, "patch": whole}))
 
 
-def solved(text: str, folder: Path, *overrides: str) -> np.ndarray:
-    """Coefficients of the first output at 800 Hz."""
+def solved(text: str, folder: Path, *overrides: str, slips: bool = True) -> np.ndarray:
+    """Coefficients of the first output at 300 Hz."""
     balance = built(text, folder, *overrides).balance
-    omega = 2 * np.pi * 800.0
+    omega = 2 * np.pi * 300.0
     options = newton.NewtonOptions(tolerance=1e-12, krylov=1e-6)
     found = newton.solve(balance, omega, balance.stuck(omega), options)
     assert found.converged
-    assert (found.state.cycle.status != law.STICKS).any()
+    assert (found.state.cycle.status != law.STICKS).any() == slips
     return balance.outputs(found.state)[0]
 
 
@@ -180,16 +180,18 @@ def test_a_part_without_contact_has_its_linear_response(tmp_path: Path) -> None:
     assert result.facts["contact_pairs"] == 0
     assert result.references is not None
     assert result.response is not None
-    peak = np.abs(result.response.outputs[:, 0, 2]).max()
-    assert peak > 0
-    assert np.isfinite(peak)
+    found = result.response.amplitude("response")
+    assert found[0] == pytest.approx(result.references.free[0], rel=1e-6)
+    assert found[-1] == pytest.approx(result.references.free[-1], rel=1e-6)
 
 
 def test_a_free_structure_is_the_limit_of_one_on_weak_springs(tmp_path: Path) -> None:
     bar(tmp_path)
     free = BAR.replace('fixed = ["clamp"]\n', "") + '[contact]\ngroup = "patch"\n' + LAW
     free += "tangential_stiffness = 3e7\nnormal_stiffness = 4e7\n"
+    free = free.replace('value = "900 N"', 'value = "200 N"')
     springs = "".join(f'[springs.{a}]\ngroup = "clamp"\ndirection = "{a}"\nstiffness = "1 N/m"\n' for a in "xyz")
     free = free.replace('group = "tip"\ndirection = "-z"', 'group = "patch_6"\ndirection = "-z"')
-    free = free.replace('value = "1 kN"', 'value = "200 N"')
-    assert solved(free + springs, tmp_path) == pytest.approx(solved(free, tmp_path), rel=1e-6, abs=1e-12)
+    # without damping, as modal damping counts the springs too
+    none, weak = (solved(text, tmp_path, "damping=", slips=False) for text in (free, free + springs))
+    assert np.abs(weak - none).max() < 1e-6 * np.abs(none).max()

@@ -94,7 +94,10 @@ def _of_response(balance: HarmonicBalance, result: Result) -> Iterator[Entry]:
     height = np.where(good, frf.amplitude(frf.output_names[0]), -1.0)
     best = int(np.argmax(height))
     omega = float(frf.omega[best])
-    x = frf.contact[best].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
+    if not balance.contact.n_pair:  # a linear response
+        yield Entry("points", "peak amplitude", _missed(frf.omega, height, best), "estimate: parabola")
+        return
+    x = frf.contact[best].reshape(balance.contact.n_pair, len(balance.contact.components), balance.basis.n_coeff)
     state = balance.evaluate(omega, x)
     yield Entry("newton, krylov", "response at the peak", _newton_error(balance, state), "estimate: one more step")
     yield Entry("samples", "response at the peak", sampling_error(balance, omega, x), "estimate: located, finer")

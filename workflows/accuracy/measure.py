@@ -98,7 +98,7 @@ def _peak(file: SceneFile, model: modelling.Model, refined: bool) -> OperatingPo
     pipeline.check_branch(branch)
     height = branch.amplitude(settings.OUTPUT)
     best = int(np.argmax(np.where([outcome == CONVERGED for outcome in branch.outcome], height, -1.0)))
-    x = branch.contact[best].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
+    x = branch.contact[best].reshape(balance.contact.n_pair, len(balance.contact.components), balance.basis.n_coeff)
     omega = float(branch.omega[best])
     if refined:
         return site.next(balance, omega, x)

@@ -275,6 +275,9 @@ def make_joints(scene: Scene, reduced: ReducedModel) -> list[Joint]:
             contact.components, springs[pairs][:, seen], gap=interface.gap[pairs], **contact.numbers
         )
         found.append(Joint(name, contact.law_name, parameters, pairs))
+    if not found:  # a structure that touches nothing: a joint of no pairs
+        nothing = law.ContactParameters.of(interface.components, springs, gap=interface.gap, friction=0.0)
+        found.append(Joint("none", "jenkins", nothing))
     return found
 
 

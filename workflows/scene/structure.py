@@ -275,6 +275,8 @@ class StructureScene(MeshScene):
             raise ValueError("expected either [bodies.NAME] with [materials.NAME], or [geometry] with [material]")
         if self.wear is not None and not self.joints:
             raise ValueError("contact is missing: [wear] needs [contact] or [contacts.NAME]")
+        if not self.joints and self.response.method != "natural":
+            raise ValueError('response.method: without contact the response is linear: give "natural"')
         if self.contact is not None and self.contacts:
             raise ValueError("expected either [contact] or [contacts.NAME], and not both")
         for name, body in self.bodies.items():
