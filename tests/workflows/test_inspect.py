@@ -44,8 +44,8 @@ def test_units_that_slipped_are_remarked(capsys, tmp_path):
     assert "30 m long, as a mesh in millimetres read in metres" in out
     bar = foreign_files.write(foreign_files.bricks(tmp_path), tmp_path / "bar.inp", "")
     remarks = " ".join(inspection.inspect(str(bar), material=Material(210.0, 0.3, 7.86)).remarks)
-    assert "the density of body is 7.86 kg/m3, as a value in g/cm3" in remarks
-    assert "Young's modulus of body is 210 Pa, as a value in GPa" in remarks
+    assert "the density of BAR is 7.86 kg/m3, as a value in g/cm3" in remarks
+    assert "Young's modulus of BAR is 210 Pa, as a value in GPa" in remarks
     assert "in MPa" in " ".join(inspection.inspect(str(bar), material=Material(210e3, 0.3, 7860)).remarks)
     assert inspection.inspect(str(bar), material=Material(210e9, 0.3, 7860)).remarks == ()
 
