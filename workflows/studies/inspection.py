@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from tribodyn.fem.assembly import Assembly
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.factor import factorise
 from tribodyn.fem.material import Material
 from tribodyn.fem.modes import modes
 from tribodyn.geometry.facts import area, facts
 from tribodyn.geometry.sources import read as sources
-from tribodyn.workflows.run import modelling
+from tribodyn.workflows.run import modelling, part_reduction
 from tribodyn.workflows.scene import scene_file
 
 LARGE, SMALL = 20.0, 1e-4  # [m], sizes beyond which the unit of length is doubted
@@ -161,7 +162,7 @@ def _free_frequencies(solids: Sequence[Solid], count: int) -> tuple[float, ...]:
 def _of_scene(file: scene_file.SceneFile, n_modes: int) -> Inspection:
     with TemporaryDirectory() as folder:
         mesh, node_sets = modelling.make_mesh(file, Path(folder))
-    part = modelling.make_part(file.part_scene, mesh, node_sets)
+        part = modelling.make_part(file.mesh_scene, mesh, node_sets, file.folder)
     found = of_part(file, part)
     if n_modes:
         system = part.system
@@ -172,9 +173,9 @@ def _of_scene(file: scene_file.SceneFile, n_modes: int) -> Inspection:
 
 def of_part(file: scene_file.SceneFile, part: Any) -> Inspection:
     """The facts of a part of a scene that is assembled already."""
-    scene = file.part_scene
-    material = Material(scene.material.young, scene.material.poisson, scene.material.density)
-    found = measured([Solid(file.name, part.mesh, part.node_sets, material)])
+    scene = file.mesh_scene
+    solids = _solids(file, part)
+    found = measured(solids)
     gap = np.asarray(part.interface.gap)
     gaps = {
         name: {"least_m": float(gap[pairs].min()), "largest_m": float(gap[pairs].max())}
@@ -183,10 +184,25 @@ def of_part(file: scene_file.SceneFile, part: Any) -> Inspection:
     }
     remarks = [
         *_odd_sizes(found.size, "scale the mesh to metres"),
-        *_odd_materials({"the part": material}),
+        *_odd_materials({one.name: one.material for one in solids if one.material is not None}),
         *_odd_deflection(scene, part, float(np.linalg.norm(found.size))),
     ]
     return replace(found, gaps=gaps, remarks=tuple(remarks))
+
+
+def _solids(file: scene_file.SceneFile, part: Any) -> list[Solid]:
+    """The bodies of a part; of those of several materials only the mesh is measured."""
+    if isinstance(part.mesh, Assembly):
+        return [
+            Solid(body.name or file.name, body.mesh, body.node_sets, _isotropic(body.material))
+            for body in part.mesh.bodies
+        ]
+    own = part_reduction.material(file.mesh_scene, part.mesh)
+    return [Solid(file.name, part.mesh, part.node_sets, _isotropic(own))]
+
+
+def _isotropic(material: Any) -> Material | None:
+    return material if isinstance(material, Material) else None
 
 
 def measured(solids: Sequence[Solid], said: Iterable[str] = (), unused: Iterable[str] = ()) -> Inspection:
