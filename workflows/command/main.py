@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -35,7 +35,16 @@ for command in found.commands():
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command and leave with its exit code, see workflows.exits."""
-    exits.guard(lambda: app(arguments, exit_on_error=False, print_error=False))
+    exits.guard(lambda: _run(arguments))
+
+
+def _run(arguments: Sequence[str] | None) -> None:
+    try:
+        app(arguments, exit_on_error=False, print_error=False)
+    except cyclopts.UnknownCommandError as error:  # it names eight of them at the most
+        asked = str(error).partition(" Available commands:")[0].rstrip(". ")
+        known = ", ".join(sorted(word for word in app if not word.startswith("-")))
+        raise ValueError(f"{asked}{'' if asked.endswith('?') else '.'} Available commands: {known}") from None
 
 
 @app.command
@@ -48,6 +57,8 @@ def run(
     out: Path | None = None,
     resume: Flag = False,
     pictures: Annotated[bool, Parameter(negative="--no-pictures")] = True,
+    quiet: Flag = False,
+    log: Path | None = None,
 ) -> None:
     """Run a scene and leave its result and pictures in a folder.
 
@@ -69,6 +80,10 @@ def run(
         Resume an unfinished result in the folder.
     pictures
         Draw curves, maps and renders when done.
+    quiet
+        Print nothing but what goes wrong.
+    log
+        File to which every line of progress is added, with its time.
     """
     from tribodyn.workflows.accuracy.accuracy import tuned
     from tribodyn.workflows.api import scenes
@@ -76,7 +91,7 @@ def run(
     from tribodyn.workflows.run.progress import console_progress
 
     make_room(out)
-    progress = console_progress()
+    progress = console_progress(quiet, log)
     if accuracy is None:
         file = scene_file.read(scene, overrides)
     else:
@@ -90,10 +105,11 @@ def run(
         raise KeyboardInterrupt(_kept(path, scene, file.overrides)) from None
     except SolveFailed as failure:
         raise SolveFailed(f"{failure}; what was computed before is kept in {path}") from None
-    _print_summary(result)
+    if not quiet:
+        _print_summary(result)
     progress.say(f"result: {path}")
     if pictures:
-        _draw(result, folder / "pictures")
+        _draw(result, folder / "pictures", tell=progress.say)
 
 
 def _kept(path: Path, scene: str, overrides: Sequence[str]) -> str:
@@ -225,13 +241,18 @@ def _print_summary(result: Result) -> None:
     print_lines(summary.lines(result))
 
 
-def _draw(result: Result, folder: Path, formats: Sequence[str] = ("png",), dpi: int | None = None) -> None:
+def _draw(
+    result: Result,
+    folder: Path,
+    formats: Sequence[str] = ("png",),
+    dpi: int | None = None,
+    tell: Callable[[str], None] = print,
+) -> None:
     from tribodyn.workflows.api import scenes
 
     written, missing = scenes.draw(result, folder, formats, dpi)
-    if missing:
-        print(missing)
-    print(*written, sep="\n")
+    for line in (*([missing] if missing else []), *map(str, written)):
+        tell(line)
 
 
 if __name__ == "__main__":

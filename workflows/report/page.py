@@ -60,9 +60,24 @@ def page(results: Sequence[tuple[str, Result, Path | None]]) -> str:
             _section(f"{more}scene", f"<pre>{escape(result.provenance['scene_text'])}</pre>", f"scene-{number}")
         )
         parts.append(_section(f"{more}provenance", _provenance(result, path), f"provenance-{number}"))
+    return _html(title, "\n".join(parts), data)
+
+
+def part_alone(result: Result) -> str:
+    """A page of the worn part alone, empty where it has no faces to show or plotly is missing."""
+    found = solid(result)
+    if found is None:
+        return ""
+    try:
+        return _html(result.provenance["scene_name"], _viewer(0), {"charts": {}, "solids": [found]})
+    except ValueError:
+        return ""
+
+
+def _html(title: str, body: str, data: dict[str, Any]) -> str:
     script = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
     return (HERE / "page.html").read_text(encoding="utf-8").format(
-        title=escape(title), style=(HERE / "page.css").read_text(encoding="utf-8"), body="\n".join(parts),
+        title=escape(title), style=(HERE / "page.css").read_text(encoding="utf-8"), body=body,
         plotly=_plotly(), data=script, script=(HERE / "page.js").read_text(encoding="utf-8"),
     )  # fmt: skip
 

@@ -225,6 +225,12 @@ class Result:
 
         return mesh_fields.patch_fields(self, row)
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows of the result: its state, its numbers, its response, and its part to turn."""
+        from tribodyn.workflows.report import notebook
+
+        return notebook.shown(self)
+
     def plot_response(self) -> Figure:
         """Response between its linear references, and the path of the peak under wear."""
         from tribodyn.workflows.pictures import plots

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import datetime
+from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -15,10 +19,10 @@ FORESEEN = 0.02  # share of the work from which on the time left is told: the fi
 
 
 class Progress:
-    """Reports stages and long work on a console; a quiet one reports nothing."""
+    """Reports stages and long work on a console, and in a log file; without both it reports nothing."""
 
-    def __init__(self, console: Console | None = None):
-        self._console = console
+    def __init__(self, console: Console | None = None, log: Path | None = None):
+        self._console, self._log = console, log
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -32,7 +36,7 @@ class Progress:
         """Long work: yields a function to call with the share that is done and a note."""
         start = time.perf_counter()
         if self._console is None:
-            yield lambda share, note: None
+            yield self._lines(name, start) if self._log else lambda share, note: None
         elif self._console.is_terminal:
             columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
             left = (TextColumn("left"), TimeRemainingColumn(), TextColumn("{task.fields[note]}"))
@@ -44,15 +48,17 @@ class Progress:
         self.say(f"{name}: {time.perf_counter() - start:.1f} s")
 
     def _lines(self, name: str, start: float) -> Callable[[float, str], None]:
-        last = start
+        last, before = start, compiled()
 
         def advance(share: float, note: str) -> None:
             nonlocal last
-            now = time.perf_counter()
+            now, compiling = time.perf_counter(), compiled() - before
             if now - last >= NOTE_EVERY and share > 0:
                 last = now
-                left = f", {(now - start) * (1 / min(share, 1.0) - 1):.0f} s left" if share >= FORESEEN else ""
-                self.say(f"{name}: {min(share, 1.0):.0%}{left}; {note}".rstrip("; "))
+                steady = max(now - start - compiling, 0.0)
+                left = f", {steady * (1 / min(share, 1.0) - 1):.0f} s left" if share >= FORESEEN else ""
+                apart = f" (compiled for {compiling:.0f} s, once)" if compiling >= 1 else ""
+                self.say(f"{name}: {min(share, 1.0):.0%}{left}{apart}; {note}".rstrip("; "))
 
         return advance
 
@@ -60,6 +66,9 @@ class Progress:
         """One line."""
         if self._console is not None:
             self._console.print(text, highlight=False)
+        if self._log is not None:
+            with self._log.open("a", encoding="utf-8") as file:
+                file.write(f"{datetime.now().astimezone().isoformat(timespec='seconds')} {text}\n")
 
 
 Callback = Callable[[str, float | None], None]
@@ -85,6 +94,31 @@ class CallbackProgress(Progress):
         self._callback(text, None)
 
 
-def console_progress() -> Progress:
-    """Progress on standard output; standard error is kept for what goes wrong."""
-    return Progress(Console())
+def compiled() -> float:
+    """Seconds that numba has compiled in this process since this was first asked, 0 where numba is not in use."""
+    global _timer
+    if "numba" not in sys.modules:
+        return 0.0
+    if _timer is None:
+        from numba.core import event
+
+        _timer = event.TimingListener()
+        event.register("numba:compile", _timer)
+    return float(_timer.duration) if _timer.done else 0.0
+
+
+_timer: Any = None
+
+
+def console_progress(quiet: bool = False, log: Path | None = None) -> Progress:
+    """Progress on standard output, none of it where quiet; standard error is kept for what goes wrong.
+
+    log : file to add every line to; raises ValueError where it cannot be written
+    """
+    if log is not None:
+        try:
+            log.parent.mkdir(parents=True, exist_ok=True)
+            log.open("a").close()
+        except OSError as error:
+            raise ValueError(f"--log {log}: cannot be written, {str(error.strerror).lower()}") from None
+    return Progress(None if quiet else Console(), log)

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from tribodyn.hbm import error_controlled_rule, thesis_rule
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.evolution import WearProblem
@@ -39,7 +41,9 @@ def wear_down(
         rows.append(row)
         keep(replace(result, wear=history(rows, "unfinished"), state=f"unfinished: {len(rows)} wear steps are done"))
         done = float(patch.area @ (row.depth + row.worn)) / to_wear if to_wear > 0 else 0.0
-        advance(done, f"step {len(rows)}, {row.cycles + row.cycles_in_step:.3g} cycles, {row.preload:.4g} N")
+        deepest, hertz = 1e3 * float((row.depth + row.worn).max()), row.omega / (2 * np.pi)
+        told = f"{row.cycles + row.cycles_in_step:.3g} cycles, peak {hertz:.4g} Hz and {1e3 * row.amplitude:.3g} mm"
+        advance(done, f"step {len(rows)}, {told}, preload {row.preload:.4g} N, depth {deepest:.3g} mm")
 
     problem = wear_problem(scene, file.folder, model.balance, wear.lost_below, wear.end_at == "at_rest")
     limit = settings.step_limit(scene, patch.free_deflection, patch.area)

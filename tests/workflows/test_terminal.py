@@ -1,0 +1,76 @@
+"""What a user sees while a run goes on: quiet runs, log files, the time left without compiling, every command named."""
+
+from __future__ import annotations
+
+import re
+import time
+from pathlib import Path
+
+import numba
+import pytest
+from rich.console import Console
+
+from tests.helpers.synthetic_result import result
+from tribodyn.workflows.command import main as cli
+from tribodyn.workflows.command.found import commands
+from tribodyn.workflows.run import progress
+
+
+def test_an_unknown_command_is_answered_with_all_of_them(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["fly"])
+    said = capsys.readouterr().err
+    assert stop.value.code == 2
+    for name in ("run", "list", "show", "render", "verify", "plan", *(c.__name__.rstrip("_") for c in commands())):
+        assert re.search(rf"\b{name.replace('_', '-')}\b", said), name
+
+
+def test_quiet_prints_nothing_and_the_log_has_every_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(progress, "NOTE_EVERY", 0.0)
+    told = progress.console_progress(quiet=True, log=tmp_path / "logs" / "run.log")
+    told.say("a sentence")
+    with told.stage("mesh"):
+        pass
+    with told.track("wear") as advance:
+        advance(0.5, "step 1")
+    assert capsys.readouterr().out == ""
+    lines = (tmp_path / "logs" / "run.log").read_text().splitlines()
+    assert [re.sub(r"^\S+ ", "", line)[:10] for line in lines] == [
+        "a sentence",
+        "mesh: 0.0 ",
+        "wear: 50%,",
+        "wear: 0.0 ",
+    ]
+    with pytest.raises(ValueError, match=r"--log .* cannot be written"):
+        progress.console_progress(log=tmp_path)
+
+
+def test_compiling_does_not_count_for_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progress, "NOTE_EVERY", 0.0)
+    console = Console(record=True, force_terminal=False, width=200)
+    with progress.Progress(console).track("work") as advance:
+        start = progress.compiled()
+
+        @numba.njit
+        def kernel(x: float) -> float:
+            return sum([x * i for i in range(10)])
+
+        kernel(1.0)
+        spent = progress.compiled() - start
+        time.sleep(0.3)
+        advance(0.1, "")
+    assert spent > 0
+    said = console.export_text()
+    left = float(re.search(r"10%, (\d+) s left", said).group(1))  # type: ignore[union-attr]
+    assert left <= 9 * 0.3 + 2  # the kernel's seconds are not in it
+    assert ("compiled for" in said) == (spent >= 1)
+
+
+def test_a_notebook_shows_numbers_response_and_part() -> None:
+    html = result()._repr_html_()
+    assert "preload" in html
+    assert 'src="data:image/png;base64,' in html
+    assert "<iframe" in html
+    assert "mesh3d" in html
