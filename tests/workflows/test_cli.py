@@ -233,7 +233,7 @@ def test_render_draws_the_pictures_of_a_result(capsys: pytest.CaptureFixture[str
     code, out, _ = leave(["render", str(tmp_path)], capsys)
     assert code == 0
     assert (tmp_path / "pictures" / "frf.png").is_file()
-    assert "worn_part.png" in out or "no renders: " in out
+    assert "part.png" in out or "no renders: " in out
 
 
 @pytest.mark.parametrize(
