@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -14,8 +14,8 @@ from tribodyn.fem.contact import facing_halves, ground_contact, join, no_contact
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
-from tribodyn.fem.loads import Load, NodalForce
-from tribodyn.fem.springs import Mass, Spring
+from tribodyn.fem.loads import Load
+from tribodyn.fem.springs import Mass
 from tribodyn.fem.system import SecondOrderSystem
 
 
@@ -78,6 +78,12 @@ class Contact:
             )  # fmt: skip
         except ValueError as trouble:
             raise type(trouble)(f"contact of '{self.face}' and '{self.opposite}': {trouble}") from None
+
+
+class Stiff(Protocol):
+    """What adds stiffness (3 n_node, 3 n_node) [N/m]: a spring, a bolt."""
+
+    def matrix(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> csr_matrix: ...
 
 
 @dataclass(frozen=True)
@@ -143,9 +149,9 @@ def build(
     clamps: Sequence[Clamp],
     contacts: Sequence[Contact],
     loads: Mapping[str, Load],
-    outputs: Mapping[str, NodalForce],
+    outputs: Mapping[str, Load],
     order: int | None = None,
-    springs: Sequence[Spring] = (),
+    springs: Sequence[Stiff] = (),
     held: Sequence[NoMeanRotation] = (),
     constraints: Sequence[Constraint] = (),
     masses: Sequence[Mass] = (),
@@ -183,7 +189,7 @@ def build(
         mass=part.restricted(M),
         stiffness=part.restricted(K),
         loads={name: part.force(load.vector(mesh, node_sets, M)) for name, load in loads.items()},
-        outputs={name: part.force(output.vector(mesh, node_sets)) for name, output in outputs.items()},
+        outputs={name: part.force(output.vector(mesh, node_sets, M)) for name, output in outputs.items()},
     )
     held_rows = np.array([part.force(row) for row in rows]).reshape(len(held), len(free))
     return replace(part, system=system, interface=replace(interface, B=part.rows(interface.B)), held=held_rows)

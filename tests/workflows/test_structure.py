@@ -195,3 +195,73 @@ def test_a_free_structure_is_the_limit_of_one_on_weak_springs(tmp_path: Path) ->
     # without damping, as modal damping counts the springs too
     none, weak = (solved(text, tmp_path, "damping=", slips=False) for text in (free, free + springs))
     assert np.abs(weak - none).max() < 1e-6 * np.abs(none).max()
+
+
+STACK = """
+[scene]
+title = "Two bars that a bolt holds together"
+[materials.plain]
+young = "200 GPa"
+poisson = 0.0
+density = "7860 kg/m3"
+[bodies.a]
+part = "block"
+length = "30 mm"
+width = "20 mm"
+height = "20 mm"
+n_length = 2
+material = "plain"
+fixed = ["x_min"]
+[bodies.b]
+part = "block"
+length = "50 mm"
+width = "20 mm"
+height = "20 mm"
+n_length = 2
+n_width = 3
+translation = ["30 mm", "0 mm", "0 mm"]
+material = "plain"
+[contacts.joint]
+first = "a.x_max"
+second = "b.x_min"
+t1 = "y"
+tangential_stiffness = "100 N/um"
+normal_stiffness = "500 N/um"
+friction = 0.3
+[bolts.m8]
+first = "a.x_min"
+second = "b.x_max"
+preload = "5 kN"
+stiffness = "90 N/um"
+[loads.harmonic.shake]
+group = "b.x_max"
+direction = "y"
+value = "1 N"
+[response]
+group = "b.x_max"
+direction = "x"
+frequency = ["1 kHz", "2 kHz"]
+[reduction]
+modes = 5
+"""
+PULL = '[loads.static.pull]\ngroup = "b.x_max"\ndirection = "x"\nvalue = "2 kN"\n'
+CLAMPED = (0.03 + 0.05) / (200e9 * 0.02**2) + 1 / 500e6  # compliance of bars and joint [m/N]
+
+
+@pytest.mark.parametrize("state", ["locked", "constant"])
+def test_a_bolt_has_its_preload_and_the_right_stiffness_along_it(tmp_path: Path, state: str) -> None:
+    k = 90e6 if state == "locked" else 0.0
+    for load, pulled in (("", 0.0), (PULL, 2000.0)):
+        balance = built(STACK + load, tmp_path, f"bolts.m8.state={state}").balance
+        omega = 2 * np.pi * 1e3
+        found = newton.solve(balance, omega, balance.stuck(omega), newton.NewtonOptions(tolerance=1e-12))
+        assert found.converged
+        elongation = balance.outputs(found.state)[balance.compliance.output_names.index("bolts.m8"), 0]
+        force = balance.excitation.loads[0, "m8"].real + k * elongation
+        assert force == pytest.approx(5000.0 + pulled * k * CLAMPED / (1 + k * CLAMPED), rel=1e-8)
+        assert balance.preload(found.state) == pytest.approx(force - pulled, rel=1e-8)
+
+
+def test_a_bolt_that_crosses_nothing_is_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"bolts\.m8 crosses nothing"):
+        built(STACK.replace('second = "b.x_max"\npreload', 'second = "a.x_min"\npreload'), tmp_path)

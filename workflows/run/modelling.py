@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from tribodyn.fem import part as fem_part
+from tribodyn.fem.bolts import Elongation
 from tribodyn.fem.constraints import Clamp, NoMeanRotation
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.interface import COMPONENTS
@@ -30,7 +32,7 @@ from tribodyn.reduction.damping import modal_damping, rayleigh
 from tribodyn.reduction.held import hold
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ReducedModel
-from tribodyn.workflows.run import bodies, curve, matrix_model, memory, part_reduction, settings
+from tribodyn.workflows.run import bodies, curve, matrix_model, memory, part_reduction, settings, tightening
 from tribodyn.workflows.run.contact_surfaces import surface_gap
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.contact import Contact, FaceContact
@@ -102,6 +104,8 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
     }
     if scene.wheel is not None and scene.wheel.speed:
         loads[CENTRIFUGAL] = Centrifugal(scene.wheel.axis)
+    rods = tightening.rods(scene, mesh, node_sets) if isinstance(scene, StructureScene) else {}
+    loads |= rods
     geometry = scene.geometry if isinstance(scene, PartScene | StructureScene) else None
     turning = None if geometry is None else geometry.no_turning
     return fem_part.build(
@@ -114,8 +118,9 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
         {
             name: NodalForce(output.group, output.direction)
             for name, output in {settings.OUTPUT: scene.response, **scene.response.others}.items()
-        },
-        springs=springs(scene),
+        }
+        | {tightening.output(name): Elongation(rod) for name, rod in rods.items()},
+        springs=[*springs(scene), *(rod for rod in rods.values() if rod.stiffness)],
         held=[] if turning is None else [NoMeanRotation(turning)],
         constraints=bodies.constraints(scene) if isinstance(scene, StructureScene) else (),
         masses=bodies.masses(scene) if isinstance(scene, StructureScene) else (),
@@ -243,12 +248,27 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
     harmonics, gap = scene.harmonics, reduced.interface.gap
     joints = make_joints(scene, reduced)
 
+    turned: dict[str, float] = {}
+    top = settings.response_range(scene)[1]
+    if isinstance(scene, StructureScene) and scene.bolts and part is not None:
+        shanks = tightening.rods(scene, part.mesh, part.node_sets)
+
+        def alone(loads: Mapping[str, float]) -> HarmonicBalance:
+            bolts = Excitation({(0, name): complex(force) for name, force in loads.items()}, None)
+            return HarmonicBalance.of(reduced, joints, HarmonicBasis((0, 1), harmonics.samples), bolts, top)
+
+        stiffness = {name: rod.stiffness for name, rod in shanks.items()}
+        turned = tightening.tightened(scene, stiffness, alone, top)
+
     def balance(kept: tuple[int, ...]) -> HarmonicBalance:
         basis = HarmonicBasis(kept, harmonics.samples, harmonics.transitions)
         if not basis.has_static and np.any(np.abs(gap) > NO_GAP):
             raise ValueError("the contact has gaps, which act in harmonic 0: keep it in harmonics.kept")
         base = ground_motion(scene, part, basis) if isinstance(scene, MeshScene) and part is not None else None
-        return HarmonicBalance.of(reduced, joints, basis, excite(scene, base), settings.response_range(scene)[1])
+        excitation = excite(scene, base)
+        if turned:
+            excitation = replace(excitation, loads={**excitation.loads, **{(0, n): P for n, P in turned.items()}})
+        return HarmonicBalance.of(reduced, joints, basis, excitation, top)
 
     choice = None
     if harmonics.automatic and not chosen:
