@@ -61,7 +61,7 @@ def test_the_coarser_mesh_tells_the_error_of_this_one(small: td.Result) -> None:
 
 def test_a_part_that_nobody_measured_leaves_the_error_unknown() -> None:
     parts = [Contribution("modes", "energy", 0.01, "estimate"), Contribution("mesh", "energy", None, "no mesh")]
-    said = verdict._statement("energy", 1.0, parts, (), (), "", td.Result({}, {}, ""))
+    said = verdict._statement("energy", 1.0, parts, (), "", td.Result({}, {}, ""))
     assert said.error is None
     assert said.stated
     assert "mesh: no mesh" in said.reason

@@ -32,7 +32,8 @@ from tribodyn.workflows.scene.schema import PartScene
 CLIMB = (3, 5, 7, 9)  # highest harmonics that the estimate climbs through: each start is near enough for Newton
 FURTHER = 6  # harmonics beyond the kept ones that it looks at, where more than CLIMB are kept
 COARSER = 2 / 3  # of the elements along every edge of a part
-STATES = (0.0, 0.5, 0.9)  # shares of the life at which states are looked at: unworn, middle, late
+# shares of the life at which states are looked at: more of the late ones, where the peak moves fast
+STATES = (0.0, 0.25, 0.5, 0.65, 0.8, 0.9)
 STEPS, STEPS_PER_HARMONIC = 256, 32  # time steps per period; per period of the highest harmonic kept
 PERIODS = 60
 DRIFT = 1e-4  # of the vibration over one period: periodic enough for differences above a tenth of a per cent
@@ -88,7 +89,7 @@ class InTime:
 
 
 def states(file: SceneFile, balance: HarmonicBalance, result: Result) -> list[State]:
-    """First, middle and late state of the wear run, or the peak of the response of a scene that does not wear."""
+    """States of the wear run from the unworn to a late one, or the peak of the response of a scene that does not wear."""
     scene = file.scene
     basis = HarmonicBasis(result.harmonics, balance.basis.n_samples)
     wear = result.wear

@@ -468,7 +468,7 @@ class VerdictOptions(Table):
     mesh: StrictBool = True
     """Solve the unworn contact on a coarser mesh."""
     in_time: StrictBool = False
-    """Integrate the first, the middle and the last state in time."""
+    """Integrate the unworn, the middle and the late state in time, which takes longest."""
 
 
 class Scene(Table):
