@@ -75,7 +75,8 @@ def evolve(
     end = WearEnd.STEPS_DONE.say(f" {max_steps} wear steps")
     while len(rows) < max_steps and state is not None:
         state = at_rest.of(state)
-        reason = reason_to_stop(problem, state, first_preload(problem, rows, state), first_at_rest(rows, state))
+        first = (first_preload(problem, rows, state), first_at_rest(rows, state))
+        reason = reason_to_stop(problem, state, *first, rows, tolerance.share * tolerance.scale)
         if reason:
             nothing = np.zeros_like(problem.area)
             rows.append(row_of(problem, state, 0.0, nothing, nothing, 0.0, np.zeros(1 + len(state.points))))

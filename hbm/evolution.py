@@ -16,6 +16,9 @@ from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear_history import WearRow
 from tribodyn.hbm.wear_law import JointWear
 
+FADING = 1e-3  # share of the first friction work per cycle below which wear may have faded out
+ENDURANCE = 1e12  # cycles: thirty years at 1 kHz, longer than any machine runs
+
 
 @dataclass(frozen=True)
 class Duty:
@@ -191,11 +194,18 @@ def _carry(before: HarmonicBalance, omega: float, x: np.ndarray, opening: np.nda
 
 
 def reason_to_stop(
-    problem: WearProblem, state: WearState, first_preload: float, first_at_rest: float = float("nan")
+    problem: WearProblem,
+    state: WearState,
+    first_preload: float,
+    first_at_rest: float = float("nan"),
+    rows: Sequence[WearRow] = (),
+    step_depth: float = 0.0,
 ) -> str:
     """Why a run ends at a state, as a sentence; empty where it goes on.
 
     first_preload, first_at_rest : of the unworn contact, vibrating and at rest [N]
+    rows : taken before; step_depth : a depth that is worth wearing [m]: wear has faded out where the deepest pair needs
+        more than ENDURANCE cycles for it
     """
     if state.failure:
         return state.failure
@@ -207,8 +217,12 @@ def reason_to_stop(
     preload = problem.preload(state.points[0].state)
     if preload < problem.lost_below * first_preload:
         return WearEnd.PRELOAD_LOST.say(f" {problem.lost_below:.3g} of its first value")
+    left = f", the contact survives with {state.depth.max():.4g} m worn at most and {preload:.4g} N of preload left"
     if state.rate.max() <= 0.0:
-        return WearEnd.NO_SLIP.say()
+        return WearEnd.NO_LOSS.say() if state.work.max() > 0.0 else WearEnd.NO_SLIP.say(left)
+    fading = rows and state.work.sum() < FADING * rows[0].energy.sum()
+    if fading and state.rate.max() * ENDURANCE < step_depth:
+        return WearEnd.FADED.say(left)
     return ""
 
 

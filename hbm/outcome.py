@@ -41,6 +41,8 @@ class WearEnd(End):
     PRELOAD_LOST = "preload fell below"
     LOST_AT_REST = "preload at rest fell below"
     NO_SLIP = "no pair slips any more: wear has stopped"
+    FADED = "wear has faded out"
+    NO_LOSS = "the wear law takes nothing off where pairs slip"
     STEPS_DONE = "stopped after"
     SOLVE_FAILED = "solve failed"
     NO_STEP = "no wear step is small enough for the tolerance"
@@ -50,3 +52,13 @@ class WearEnd(End):
     def lost(self) -> bool:
         """Whether the contact is lost."""
         return self in (WearEnd.LOST, WearEnd.PRELOAD_LOST, WearEnd.LOST_AT_REST)
+
+    @property
+    def survived(self) -> bool:
+        """Whether wear has ended by itself while the contact still holds (shakedown)."""
+        return self in (WearEnd.NO_SLIP, WearEnd.FADED)
+
+    @property
+    def failed(self) -> bool:
+        """Whether the run ended where it could not be continued, not where it was to end."""
+        return self in (WearEnd.SOLVE_FAILED, WearEnd.NO_STEP)

@@ -15,6 +15,7 @@ from tribodyn.hbm.evolution import Duty, WearProblem, assess
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.law import SEPARATES
 from tribodyn.hbm.operating_point import AtFrequency, AtPeak, BesidePeak, Correction, OperatingPoint
+from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear_events import events
 from tribodyn.hbm.wear_history import WearHistory, cycles_to_preload
 from tribodyn.hbm.wear_law import JointWear
@@ -310,3 +311,20 @@ def test_the_forces_of_a_faint_contact_are_solved_too(problem: WearProblem) -> N
     assert found.converged
     missed = np.linalg.norm(found.state.cycle.force - exact.state.cycle.force)
     assert missed < 1e-3 * np.linalg.norm(exact.state.cycle.force)
+
+
+def test_a_contact_that_outlives_its_wear_is_told_with_what_is_left() -> None:
+    """Pressed hard and shaken so little that slip shakes down: wear ends by itself, or fades, while preload remains."""
+    problem = wear_problem(mission=(Duty(AtFrequency("tip", 420.0), load=0.2),))
+    for worn in (
+        thesis_rule.evolve(problem, 1e-6, max_steps=400),
+        error_controlled_rule.evolve(problem, error_controlled_rule.Tolerance(0.05, 2e-4), max_steps=200),
+    ):
+        assert worn.ended.survived, worn.end
+        assert "N of preload left" in worn.end
+        assert worn.preload[-1] > 0.4 * worn.preload[0]
+
+
+def test_a_law_that_takes_nothing_off_is_not_called_a_contact_at_rest() -> None:
+    worn = thesis_rule.evolve(wear_problem(wear=JointWear.of("energy", coefficient=0.0)), 5e-7)
+    assert worn.ended is WearEnd.NO_LOSS

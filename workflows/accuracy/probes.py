@@ -89,7 +89,7 @@ class InTime:
 
 
 def states(file: SceneFile, balance: HarmonicBalance, result: Result) -> list[State]:
-    """States of the wear run from the unworn to a late one, or the peak of the response of a scene that does not wear."""
+    """States of a wear run, from unworn to late; the peak of the response where nothing wears."""
     scene = file.scene
     basis = HarmonicBasis(result.harmonics, balance.basis.n_samples)
     wear = result.wear

@@ -249,7 +249,7 @@ def _statement(
     largest = max(known, key=lambda part: part.error or 0.0, default=None)
     dominated = largest.source if largest is not None else None
     if name in ("peak_frequency", "depth"):
-        concerned: Sequence[tuple[State, InTime]] = ()  # time integration at a given frequency and depth tells nothing about these
+        concerned: Sequence[tuple[State, InTime]] = ()  # a motion at a given frequency tells nothing about these
     else:
         concerned = checks if name == "life" else checks[:1]
     trouble = ""
@@ -286,6 +286,8 @@ def _absent(name: str, result: Result) -> str:
         return "no state was solved"
     if result.wear is None or not result.wear_steps:
         return "nothing was worn"
+    if result.wear.ended.survived and name == "life":
+        return f"no life ends here: {result.wear.end}"
     return f"the preload has not fallen to {100 * LIFE_SHARE:g} %: {result.wear.end}"
 
 

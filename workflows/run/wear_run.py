@@ -11,7 +11,6 @@ import numpy as np
 from tribodyn.hbm import error_controlled_rule, thesis_rule
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.evolution import WearProblem
-from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear_history import WearHistory, WearRow, history, rows_to_go_on
 from tribodyn.hbm.wear_law import JointWear
 from tribodyn.workflows.result.result import Result
@@ -49,7 +48,7 @@ def wear_down(
     limit = settings.step_limit(scene, patch.free_deflection, patch.area)
     worn = evolve(problem, wear, limit, wear.max_steps, on_row, result.wear)
     result = with_shown(scene, replace(result, wear=worn), model.balance.with_load(problem.mission[0].load), model.part)
-    if worn.ended is WearEnd.SOLVE_FAILED:
+    if worn.ended.failed:
         keep(replace(result, state=worn.end))
         raise SolveFailed(f"wear step {len(worn.cycles)}: {worn.end}")
     return result
