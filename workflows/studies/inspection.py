@@ -97,13 +97,6 @@ class Inspection:
         lines += [("not used", clause) for clause in self.unused]
         return lines + [("look again", sentence) for sentence in self.remarks]
 
-    def short(self) -> str:
-        """One line for the head of a run."""
-        size = " x ".join(f"{1e3 * x:.4g}" for x in self.size)
-        mass = "" if self.mass is None else f", {self.mass:.4g} kg"
-        count = f"{len(self.bodies)} bodies" if len(self.bodies) > 1 else "one body"
-        return f"{count}, {size} mm{mass}, worst element {self.worst['scaled_jacobian']:.2g}"
-
 
 def inspect(
     what: str,
