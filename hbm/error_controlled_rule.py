@@ -29,6 +29,7 @@ from tribodyn.hbm.evolution import (
 from tribodyn.hbm.operating_point import point_of
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.preload_at_rest import PreloadAtRest
+from tribodyn.hbm.threads import single
 from tribodyn.hbm.wear_history import LIFE_SHARE, WearHistory, WearRow, history, rows_to_go_on
 from tribodyn.hbm.wearing import WearingBalance, WornState
 
@@ -50,6 +51,7 @@ class Tolerance:
     scale: float
 
 
+@single
 def evolve(
     problem: WearProblem,
     tolerance: Tolerance,
@@ -141,9 +143,7 @@ def _step(problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Se
     return _Taken(row, replace(second, solves=0))
 
 
-def _leap(
-    problem: WearProblem, state: WearState, stride: float, failure: str, rows: Sequence[WearRow]
-) -> _Taken:
+def _leap(problem: WearProblem, state: WearState, stride: float, failure: str, rows: Sequence[WearRow]) -> _Taken:
     """An explicit step over the end of a branch, behind which the site is looked for as at the start.
 
     The response folds, or the tracked peak merges with a valley: no solution follows on the one here. A step that did

@@ -22,6 +22,7 @@ from tribodyn.hbm.continuation._curve import CurvePoint
 from tribodyn.hbm.continuation._stepper import Options, Stepper
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.parameter import FREQUENCY, Parameter
+from tribodyn.hbm.threads import single
 
 WIDTH = 0.1  # frequency that counts as one, relative
 DIFFERENCE = 1e-4  # step along the surface by which the scalar is differentiated
@@ -96,6 +97,7 @@ class _Fold:
         return Direction(self.solution.state.flat, self.solution.state.omega)
 
 
+@single
 def track_fold(
     path: Parameter,
     start: float,

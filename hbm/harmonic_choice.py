@@ -19,6 +19,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import arc_length
 from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.threads import single
 
 ACCURACY = 1e-3  # of the linear solves behind the estimate
 QUIET = 1e-2  # an output that vibrates less than this share of the liveliest one is measured against that share
@@ -78,6 +79,7 @@ class NotSolved(RuntimeError):
     """The balance has no solution to estimate the error of; the message says where and why."""
 
 
+@single
 def choose(balance: HarmonicBalance, omega: Sequence[float], options: Options | None = None) -> HarmonicChoice:
     """Choose harmonics for a problem, at frequencies where the choice matters, such as about a resonance.
 
@@ -147,9 +149,7 @@ def widened(balance: HarmonicBalance, highest: int) -> HarmonicBalance:
     return wide.with_load(balance.load_factor)
 
 
-def estimate(
-    wide: HarmonicBalance, kept: tuple[int, ...], omega: float, x: np.ndarray, split: bool = True
-) -> Estimate:
+def estimate(wide: HarmonicBalance, kept: tuple[int, ...], omega: float, x: np.ndarray, split: bool = True) -> Estimate:
     """What the harmonics of a wide balance would change in a solution with some of them.
 
     wide : from `widened`; kept : harmonics of the solution x (n_pair, n_component, n_coeff) [m] at omega [rad/s]

@@ -9,6 +9,7 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, Linearisation, State
 from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.threads import single
 
 VANISHING = 1e-6  # size of x, relative to the start, below which a solution counts as zero
 RAMP_STEPS = 12  # Newton steps in one step of the load ramp
@@ -80,6 +81,7 @@ def relative_residual(state: State, x_lin: np.ndarray, least: float = 0.0) -> fl
     return float(np.linalg.norm(state.residual) / scale) if scale > 0 else float(state.residual.any())
 
 
+@single
 def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOptions | None = None) -> Solution:
     """Solve the balance at one frequency.
 
@@ -177,6 +179,7 @@ def _search(
     return best, best_error
 
 
+@single
 def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None) -> Solution:
     """Solve without a neighbouring solution: from the stuck response, else by raising the vibration load in steps.
 

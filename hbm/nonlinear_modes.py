@@ -13,12 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.free_vibration import FreeVibration, Point
 from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.threads import single
 
 EASY, HARD = 3, 7  # Newton steps up to which the next step grows, and from which it shrinks
 EMPHASIS = 5.0  # of the logarithm of frequency and of the damping ratio beside that of the amplitude, in arc length
@@ -78,6 +78,7 @@ class Backbone:
 _Solved = tuple[Point, str, int]
 
 
+@single
 def backbone(
     balance: HarmonicBalance,
     start: float,
@@ -96,11 +97,10 @@ def backbone(
     options = options or Options()
     if not (start > 0 and stop > 0 and start != stop):
         raise ValueError(f"the amplitudes of a backbone must be > 0 and differ, not {start} and {stop}")
-    with threadpool_limits(1):
-        problem = FreeVibration(balance, mode, output)
-        a, goal = np.log(np.array([start, stop]) / problem.per_amplitude)
-        solved, end = _walk(problem, float(a), float(goal), options)
-        return _result(problem, solved, end)
+    problem = FreeVibration(balance, mode, output)
+    a, goal = np.log(np.array([start, stop]) / problem.per_amplitude)
+    solved, end = _walk(problem, float(a), float(goal), options)
+    return _result(problem, solved, end)
 
 
 def _walk(problem: FreeVibration, start: float, goal: float, options: Options) -> tuple[list[_Solved], str]:

@@ -25,6 +25,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.branch import amplitude
 from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.threads import single
 
 FAR = 1e4  # times the largest travel of a slider that the unloaded cycle allows
 LINEAR = 1e-9  # deviation of the vibrating force of a stuck pair from its spring, relative to the largest
@@ -73,6 +74,7 @@ class ResponseBounds:
         return float(value[self.converged].min()), float(value[self.converged].max())
 
 
+@single
 def response_bounds(
     balance: HarmonicBalance,
     omega: float,

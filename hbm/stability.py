@@ -25,6 +25,7 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.branch import CONVERGED, Branch
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.parameter import Parameter
+from tribodyn.hbm.threads import single
 
 MARGIN = 1e-6  # real parts up to this times omega count as zero
 FEWEST_MODES, MOST_MODES = 20, 30  # friction makes modes far above the excitation flutter, too
@@ -99,6 +100,7 @@ class BranchStability:
     bifurcations: tuple[Bifurcation, ...]
 
 
+@single
 def stability(
     balance: HarmonicBalance, state: State, method: str = "hill", n_modes: int | None = None, top: int | None = None
 ) -> Stability:
@@ -122,6 +124,7 @@ def stability(
     return Stability(state.omega, _sorted(_hill(balance, state, n_modes, top), state.omega), method)
 
 
+@single
 def mark(
     problem: HarmonicBalance | Parameter, branch: Branch, method: str = "hill", n_modes: int | None = None
 ) -> BranchStability:

@@ -12,9 +12,11 @@ import numpy as np
 from tribodyn.hbm.evolution import WearProblem, assess, first_at_rest, first_preload, reason_to_stop, row_of, state_of
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.preload_at_rest import PreloadAtRest
+from tribodyn.hbm.threads import single
 from tribodyn.hbm.wear_history import WearHistory, WearRow, history, rows_to_go_on
 
 
+@single
 def evolve(
     problem: WearProblem,
     step_depth: float,

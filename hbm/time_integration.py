@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sla
-from threadpoolctl import threadpool_limits
 
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton, time_step
@@ -22,6 +21,7 @@ from tribodyn.hbm.anderson import Anderson
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.threads import single
 from tribodyn.hbm.time_step import Moving, Record
 
 RESOLVED = 1.0  # omega h of a mode from which on its inertia is left out
@@ -295,6 +295,7 @@ class _StateVector:
         return self._stepper.moving(z, memory.reshape(self._shape), near.x, near.f)
 
 
+@single
 def integrate(
     balance: HarmonicBalance,
     omega: float,
@@ -310,10 +311,9 @@ def integrate(
     Raises  ValueError for models with no equation of motion in time; IntegrationFailed
     """
     options = options or Options()
-    with threadpool_limits(1):
-        stepper = TimeStepper(balance, omega, options)
-        motion = stepper.start_from(start) if start is not None else _rest(stepper)
-        return _to_periodic(stepper, motion, options, with_slopes)
+    stepper = TimeStepper(balance, omega, options)
+    motion = stepper.start_from(start) if start is not None else _rest(stepper)
+    return _to_periodic(stepper, motion, options, with_slopes)
 
 
 def _rest(stepper: TimeStepper) -> Moving:

@@ -9,6 +9,7 @@ import numpy as np
 from tribodyn.hbm import time_integration
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.threads import single
 from tribodyn.hbm.time_integration import Options, PeriodicMotion
 
 ENERGY_FLOOR = 1e-6  # of (largest force x travel, summed over pairs), below which energies do not differ
@@ -52,6 +53,7 @@ class Verification:
         return max(abs(v) for v in (*self.amplitude.values(), self.energy, self.preload))
 
 
+@single
 def verify(balance: HarmonicBalance, state: State, options: Options | None = None) -> Verification:
     """Integrate in time from a balance state to the periodic motion nearby and compare.
 

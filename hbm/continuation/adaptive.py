@@ -20,6 +20,7 @@ from tribodyn.hbm.continuation.arc_length import solve_along_load
 from tribodyn.hbm.continuation.natural import DEGREE, extrapolate
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.parameter import Parameter
+from tribodyn.hbm.threads import single
 
 KINK = 0.3  # least share of the miss of extrapolation that counts as error of interpolation, as next to a kink
 JUMP = 1e3  # error estimate in the shortest step, relative to the tolerance, beyond which the response has jumped
@@ -53,6 +54,7 @@ class Options:
             )
 
 
+@single
 def follow(
     problem: HarmonicBalance | Parameter,
     start: float,

@@ -23,6 +23,7 @@ from tribodyn.hbm.continuation._curve import CurvePoint, Segment
 from tribodyn.hbm.continuation._stepper import Options, Stepper
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.parameter import Parameter
+from tribodyn.hbm.threads import single
 
 __all__ = ["Options", "follow", "solve_along_load"]
 
@@ -31,6 +32,7 @@ MAX_JUMPS = 20
 REWINDS = 4  # times that a walk which came back onto its own way goes back to where it went wrong
 
 
+@single
 def follow(
     problem: HarmonicBalance | Parameter,
     start: float,
@@ -72,6 +74,7 @@ def follow(
     return builder.finish(end + walk.gaps)
 
 
+@single
 def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None) -> Solution:
     """Solve at one frequency [rad/s] without a neighbouring solution, also where the curve in the load has folds.
 

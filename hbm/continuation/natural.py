@@ -17,6 +17,7 @@ from tribodyn.hbm.branch import CONVERGED, Branch, BranchBuilder
 from tribodyn.hbm.continuation import arc_length
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.parameter import Parameter
+from tribodyn.hbm.threads import single
 
 DEGREE = 2  # of the extrapolating polynomial
 APART = 0.5  # least distance of its points, in steps
@@ -39,6 +40,7 @@ class Options:
             )
 
 
+@single
 def follow(
     problem: HarmonicBalance | Parameter,
     start: float,

@@ -13,7 +13,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
-from tribodyn.hbm.time_integration import Options
+from tribodyn.hbm.time_integration import Options, TimeStepper
 from tribodyn.reduction.model import ReducedModel
 
 OMEGA = 300.0
@@ -150,6 +150,17 @@ def test_stuck_contact_is_the_linear_response():
     theirs = balance.outputs(solution.state)
     assert np.abs(ours - theirs).max() < 2e-5 * np.abs(theirs).max()
     assert np.all(np.abs(motion.energy) < 1e-9 * np.abs(motion.force).max() * np.ptp(motion.x))
+
+
+def test_modes_that_the_steps_do_not_resolve_follow_statically():
+    balance = random_balance(friction=1e6, shaker=3.0)
+    solution = newton.solve_from_rest(balance, OMEGA)
+    stepper = TimeStepper(balance, OMEGA, Options(steps=64))
+    assert stepper.n_dynamic < balance.model.system.n_dof
+    motion = time_integration.integrate(balance, OMEGA, solution.state, Options(steps=64))
+    ours = motion.coefficients(motion.outputs, balance.basis)
+    theirs = balance.outputs(solution.state)
+    assert np.abs(ours - theirs).max() < 1e-2 * np.abs(theirs).max()
 
 
 def test_mixing_and_patience_find_the_same_motion_from_rest_and_from_the_balance():

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm import newton, stability
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.branch import CONVERGED, amplitude
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
+from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time_integration import Options
 from tribodyn.hbm.verify import Verification, verify
 from tribodyn.hbm.wear_history import WearRow
@@ -140,7 +140,7 @@ def compare(
     """
     start = time.perf_counter()
     file = rebuilt(result, overrides)
-    with TemporaryDirectory() as folder, threadpool_limits(file.scene.solver.threads):
+    with TemporaryDirectory() as folder, limited(file.scene.solver.threads):
         unworn = modelling.build(file, Path(folder), progress, result.harmonics).balance
         balance, omega, x = _start(result, file.scene, unworn, at, row)
         target = omega if at is None else at

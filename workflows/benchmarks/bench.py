@@ -16,7 +16,6 @@ from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
@@ -24,6 +23,7 @@ from tribodyn.hbm.continuation import natural
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.reference import DenseBalance
+from tribodyn.hbm.threads import limited
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
@@ -77,7 +77,7 @@ def run(quick: bool, say: Callable[[str], None]) -> list[Row]:
     rows = []
     for harmonics, threads, windows in plans:
         say(f"harmonics {harmonics}, {threads} thread{'s' if threads > 1 else ''}")
-        with threadpool_limits(threads):
+        with limited(threads):
             rows.append(_measure(problem(harmonics), harmonics, threads, windows))
     return rows
 
@@ -85,7 +85,7 @@ def run(quick: bool, say: Callable[[str], None]) -> list[Row]:
 def _problem() -> Callable[[str], HarmonicBalance]:
     """The beam scene's balance for chosen harmonics; mesh and reduction are made once."""
     file = scene_file.read("beam", ())
-    with TemporaryDirectory() as folder, threadpool_limits(1):
+    with TemporaryDirectory() as folder, limited(1):
         model = modelling.build(file, Path(folder), Progress())
     reduced, unworn = model.reduced, model.balance
 

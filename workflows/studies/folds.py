@@ -8,11 +8,11 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm.branch import CONVERGED, Branch
 from tribodyn.hbm.continuation import arc_length
 from tribodyn.hbm.folds_in_time import FoldInTime, fold_in_time
+from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time_integration import IntegrationFailed
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
@@ -52,7 +52,7 @@ def find(file: SceneFile, progress: Progress, bracket: float = 0.02) -> FoldsFou
     if getattr(file.scene, "prescribed", None) or getattr(file.scene, "wheel", None):
         raise ValueError(f"{file.name} has a [wheel] or [prescribed] nodes: its folds cannot be looked for in time")
     low, high = settings.response_range(file.scene)
-    with TemporaryDirectory() as folder, threadpool_limits(file.scene.solver.threads):
+    with TemporaryDirectory() as folder, limited(file.scene.solver.threads):
         balance = modelling.build(file, Path(folder), progress).balance
         with progress.stage("frequency response"):
             options = arc_length.Options(newton=settings.newton_options(file.scene))

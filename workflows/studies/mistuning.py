@@ -14,9 +14,9 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm.branch import Branch, amplitude
+from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import INK, WEAR_MAP
 from tribodyn.workflows.run.settings import OUTPUT
@@ -88,7 +88,7 @@ def respond(
     stiffness : factor for each sector; drawn with `spread` and `seed` by default
     Raises  SceneError for a scene without [wheel], ValueError for factors that cannot be, SolveFailed
     """
-    with threadpool_limits(file.scene.solver.threads):
+    with limited(file.scene.solver.threads):
         wheel = wheels.build(file)
         n = wheel.n_sectors
         factors = deviations(n, spread, seed) if stiffness is None else checked(stiffness, n)

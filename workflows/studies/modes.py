@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.nonlinear_modes import Backbone, Options, backbone
+from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
 from tribodyn.workflows.run import modelling, settings
@@ -27,7 +27,7 @@ def follow(file: SceneFile, start: float, stop: float, mode: int, points: int, p
     mode : number of the mode about the static equilibrium, from 0; points : on an easy way
     Raises  ValueError for what cannot be; SolveFailed where not even the first point is found
     """
-    with TemporaryDirectory() as folder, threadpool_limits(file.scene.solver.threads):
+    with TemporaryDirectory() as folder, limited(file.scene.solver.threads):
         balance = modelling.build(file, Path(folder), progress).balance
         with progress.stage("backbone"):
             options = Options(points, newton=settings.newton_options(file.scene))

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm import parameter
 from tribodyn.hbm.balance import HarmonicBalance
@@ -23,6 +22,7 @@ from tribodyn.hbm.continuation import arc_length
 from tribodyn.hbm.folds import FoldOptions, track_fold
 from tribodyn.hbm.operating_point import OperatingPoint
 from tribodyn.hbm.parameter import Parameter
+from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
 from tribodyn.workflows.result import store
@@ -89,7 +89,7 @@ def follow(
         raise ValueError(f"--points: a line needs at least 2, not {points}")
     if (against == "wear") != (worn is not None):
         raise ValueError('--worn: give the folder of a worn result with --against "wear", and only there')
-    with TemporaryDirectory() as folder, threadpool_limits(file.scene.solver.threads):
+    with TemporaryDirectory() as folder, limited(file.scene.solver.threads):
         balance = modelling.build(file, Path(folder), progress).balance
         path = _path(balance, against, _depth(worn, balance))
         if fold is None:

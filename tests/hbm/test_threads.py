@@ -1,0 +1,68 @@
+"""Threads: every entry of the solver takes one by itself, gives back what it found, and minds who asks for more."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from threadpoolctl import ThreadpoolController, threadpool_limits
+
+from tests.helpers.verification_models import oscillator
+from tribodyn.hbm import newton, threads
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation import adaptive, arc_length, natural
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
+from tribodyn.hbm.law import ContactParameters
+
+OMEGA = 100.0
+
+
+def balance() -> HarmonicBalance:
+    parameters = ContactParameters.of(("t1", "n"), [[1e4, 1e4]], friction=0.3)
+    excitation = Excitation.of({"normal": 50.0}, {1: {"force": 10.0}})
+    joint = Joint("joint", "jenkins", parameters)
+    return HarmonicBalance.of(oscillator(1.0, 1e4, 0.02), joint, HarmonicBasis((0, 1), 64), excitation, 200.0)
+
+
+def counts() -> set[int]:
+    return {pool["num_threads"] for pool in ThreadpoolController().info() if pool["user_api"] == "blas"}
+
+
+ENTRIES = {
+    "newton": lambda b: newton.solve(b, OMEGA, b.stuck(OMEGA)),
+    "from rest": lambda b: newton.solve_from_rest(b, OMEGA),
+    "natural": lambda b: natural.follow(b, OMEGA, 1.1 * OMEGA, natural.Options(3)),
+    "adaptive": lambda b: adaptive.follow(b, OMEGA, 1.1 * OMEGA),
+    "arc length": lambda b: arc_length.follow(b, OMEGA, 1.1 * OMEGA),
+}
+
+
+@pytest.mark.parametrize("entry", ENTRIES)
+def test_an_entry_called_from_python_takes_one_thread_and_gives_the_others_back(entry, monkeypatch):
+    seen = []
+    evaluate = HarmonicBalance.evaluate
+
+    def watched(self, omega: float, x: np.ndarray, jacobian: bool = True):
+        seen.append(counts())
+        return evaluate(self, omega, x, jacobian)
+
+    monkeypatch.setattr(HarmonicBalance, "evaluate", watched)
+    with threadpool_limits(2, "blas"):
+        before = counts()
+        ENTRIES[entry](balance())
+        assert counts() == before
+    assert seen
+    assert all(count == {1} for count in seen)
+
+
+def test_who_asks_for_two_threads_has_two_and_the_limit_ends_with_its_context():
+    inside = threads.single(counts)
+    with threadpool_limits(1, "blas"):
+        with threads.limited(2):
+            assert inside() == {2}
+            with threads.limited(1):
+                assert inside() == {1}
+            assert inside() == {2}
+        assert counts() == {1}
+        assert inside() == {1}
