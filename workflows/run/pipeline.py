@@ -8,12 +8,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.branch import CONVERGED, Branch
 from tribodyn.hbm.outcome import BranchEnd
+from tribodyn.hbm.threads import limited
 from tribodyn.workflows.accuracy import verdict
 from tribodyn.workflows.accuracy.budget import with_budget
 from tribodyn.workflows.result import store
@@ -38,7 +38,7 @@ def run(file: SceneFile, folder: Path | None, progress: Progress, earlier: Resul
     scene, clock = file.scene, Clock(earlier)
     settings.check_names(scene)
     keep = Keeper(None if folder is None else folder / "result.h5", clock)
-    with alone_in(folder), threadpool_limits(scene.solver.threads), TemporaryDirectory() as scratch:
+    with alone_in(folder), limited(scene.solver.threads), TemporaryDirectory() as scratch:
         model = modelling.build(file, folder or Path(scratch), progress, () if earlier is None else earlier.harmonics)
         result = earlier or described(file, model.part, model.balance, model.choice)
         if scene.wears and result.patch is not None:
