@@ -19,7 +19,7 @@ from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.modes import modes
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.linear import linear_modes
-from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.model import ModelInfo, ReducedModel
 from tribodyn.reduction.truncation import frequency_error
 
 POINT_LOAD = 30  # a load or output on more DOFs than this is distributed: projected, but it makes no masters
@@ -79,22 +79,24 @@ def craig_bampton(
         {name: basis.T @ row for name, row in system.outputs.items()},
     )
     model = ReducedModel(reduced, replace(interface, B=np.asarray(interface.B @ basis)), basis)
-    info: dict[str, object] = {
-        "masters": m,
-        "n_full": system.n_dof,
-        "n_masters": n_m,
-        "n_modes": len(omega),
-        "factorisation": factor.name,
-        "first_omitted_frequency": omitted / (2 * np.pi),
-    }
-    states = {"free": None} if contact_stiffness is None else {"free": None, "stuck": contact_stiffness}
-    for state, springs in states.items():
+    info = ModelInfo(
+        masters=m,
+        n_full=system.n_dof,
+        n_masters=n_m,
+        n_modes=len(omega),
+        factorisation=factor.name,
+        first_omitted_frequency=omitted / (2 * np.pi),
+    )
+    for springs in (None,) if contact_stiffness is None else (None, contact_stiffness):
         frequency, q = linear_modes(model, springs, min(REPORTED_MODES, reduced.n_dof))
         w = 2 * np.pi * frequency
         # K R q vanishes at the slaves but for the modal part, as K_ss psi + K_sm = 0; springs act on masters only
         residual = K_ss @ (phi @ q[n_m:]) - (M @ (basis @ q))[s] * w**2
-        info[f"{state}_frequency"] = frequency
-        info[f"{state}_frequency_error"] = frequency_error(factor, residual, w, omitted)
+        error = frequency_error(factor, residual, w, omitted)
+        if springs is None:
+            info = replace(info, free_frequency=frequency, free_frequency_error=error)
+        else:
+            info = replace(info, stuck_frequency=frequency, stuck_frequency_error=error)
     return replace(model, info=info)
 
 

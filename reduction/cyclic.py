@@ -8,7 +8,7 @@ Source  Tamatam 2021, eq. 3.12 to 3.22
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -21,7 +21,7 @@ from tribodyn.fem.hermitian import hermitian_modes
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.craig_bampton import POINT_LOAD, REPORTED_MODES, craig_bampton
 from tribodyn.reduction.linear import stuck_stiffness
-from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.model import ModelInfo, ReducedModel
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class ReducedSector:
 
     sector: Sector
     basis: np.ndarray
-    info: Mapping[str, object] = field(default_factory=dict)
+    info: ModelInfo = field(default_factory=ModelInfo)
 
 
 def reduce_sector(sector: Sector, n_modes: int | None = None, cutoff: float | None = None) -> ReducedSector:
@@ -43,7 +43,7 @@ def reduce_sector(sector: Sector, n_modes: int | None = None, cutoff: float | No
     both = replace(sector.interface, B=vstack([sector.interface.B, sector.left], format="csr"))
     seams = np.concatenate([sector.seam_right.ravel(), sector.seam_left.ravel()])
     model = craig_bampton(sector.system, both, n_modes, cutoff, extra_masters=seams.tolist())
-    masters = np.asarray(model.info["masters"])
+    masters = model.info.master_dofs
     right, left = np.split(np.asarray(model.interface.B), 2)
     small = replace(
         sector,
@@ -93,7 +93,7 @@ def travelling_wave(reduced: ReducedSector, engine_order: int, cutoff: float | N
 
     system, B = per_harmonic(1)
     omega, _ = hermitian_modes(system.stiffness, system.mass, min(REPORTED_MODES, system.n_dof))
-    info = {**_shared_info(reduced), "engine_order": engine_order, "free_frequency": omega / (2 * np.pi)}
+    info = replace(_shared_info(reduced), engine_order=engine_order, free_frequency=omega / (2 * np.pi))
     interface = replace(reduced.sector.interface, B=B)
     return ReducedModel(system, interface, None, info, per_harmonic, harmonic_basis)
 
@@ -108,10 +108,16 @@ def wheel_model(reduced: ReducedSector, stiffness: Sequence[float] | None = None
     return ReducedModel(system, interface, None, _shared_info(reduced))
 
 
-def _shared_info(reduced: ReducedSector) -> dict[str, object]:
+def _shared_info(reduced: ReducedSector) -> ModelInfo:
     """Facts that hold for any model of the wheel; frequencies of a sector that is joined to nothing do not."""
-    kept = ("masters", "n_full", "n_masters", "n_modes", "factorisation", "first_omitted_frequency")
-    return {"n_sectors": reduced.sector.n_sectors, **{name: reduced.info[name] for name in kept}}
+    return replace(
+        reduced.info,
+        n_sectors=reduced.sector.n_sectors,
+        free_frequency=None,
+        free_frequency_error=None,
+        stuck_frequency=None,
+        stuck_frequency_error=None,
+    )
 
 
 class _Indices:

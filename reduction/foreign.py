@@ -40,7 +40,7 @@ from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction import abaqus_matrix, harwell_boeing, matrix_files
 from tribodyn.reduction.abaqus_matrix import Labels
-from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.model import ModelInfo, ReducedModel
 
 NAMES = {"mass": "M", "stiffness": "K", "damping": "C"}
 """Variables looked for in a file that holds all matrices."""
@@ -217,9 +217,7 @@ def from_arrays(mass: Any, stiffness: Any, damping: Any = None, labels: Labels |
     Raises  ValueError: not square, not symmetric, not finite, sizes that differ
     """
     given = {"mass": mass, "stiffness": stiffness, "damping": damping}
-    matrices = {
-        part: matrix_files.real(value, f"{part} matrix") for part, value in given.items() if value is not None
-    }
+    matrices = {part: matrix_files.real(value, f"{part} matrix") for part, value in given.items() if value is not None}
     return _checked(matrices, labels)
 
 
@@ -309,7 +307,7 @@ def reduced_model(system: SecondOrderSystem, interface: ContactInterface) -> Red
         ),
         interface=ContactInterface(**{**vars(interface), "B": dense(interface.B)}),
         basis=None,
-        info={"source": "matrices from files", "n_dof": system.n_dof},
+        info=ModelInfo(n_full=system.n_dof, source="matrices from files"),
     )
 
 

@@ -29,4 +29,4 @@ def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:
     N = null_space(held / np.linalg.norm(held, axis=1, keepdims=True))
     held_model = projected(model, N)
     frequency, _ = linear_modes(held_model, n=min(REPORTED_MODES, N.shape[1]))
-    return replace(held_model, info={**held_model.info, "free_frequency": frequency})
+    return replace(held_model, info=replace(held_model.info, free_frequency=frequency))

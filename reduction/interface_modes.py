@@ -39,7 +39,7 @@ def interface_modes(
     """
     if model.per_harmonic is not None:
         raise ValueError("interface modes need a model that is the same for all harmonics: leave interface_modes out")
-    masters = np.asarray(model.info["masters"], dtype=int)
+    masters = model.info.master_dofs
     kept = np.unique(np.asarray([] if keep is None else keep, dtype=int))
     if not np.all(np.isin(kept, masters)):
         raise ValueError("interface modes: only DOFs that are masters of the reduction can be kept")
@@ -64,10 +64,15 @@ def interface_modes(
     basis[np.ix_(b, len(a) + np.arange(n_contact))] = contact
     basis[np.arange(n_m, n), np.arange(len(a) + n_contact, basis.shape[1])] = 1.0
     omitted = float(omega[n_modes]) / (2 * np.pi) if n_modes < len(b) else np.inf
-    facts = {"masters": masters[a], "n_masters": len(a)}
-    facts |= {"n_interface_modes": n_modes, "interface_omitted_frequency": omitted}
     fewer = projected(model, basis)
-    return replace(fewer, info={**fewer.info, **facts})
+    info = replace(
+        fewer.info,
+        masters=masters[a],
+        n_masters=len(a),
+        n_interface_modes=n_modes,
+        interface_omitted_frequency=omitted,
+    )
+    return replace(fewer, info=info)
 
 
 def _static_shapes(K: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:

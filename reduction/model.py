@@ -15,13 +15,53 @@ Damping = Callable[[SecondOrderSystem, np.ndarray], np.ndarray | None]
 
 
 @dataclass(frozen=True)
+class ModelInfo:
+    """What is known of a reduced model besides its matrices; None is what does not apply to it.
+
+    masters : (n_masters,) DOFs of the full system that stay coordinates, ascending; n_modes : other coordinates
+    n_full : DOFs of the full system; factorisation : name of its solver; source : of matrices that came as they are
+    first_omitted_frequency : of the fixed-interface modes, inf where all are kept [Hz]
+    free_frequency, stuck_frequency : (n,) of the model with contacts open, and closed and sticking [Hz]
+    free_frequency_error, stuck_frequency_error : (n,) their estimated relative errors by truncation
+    n_interface_modes, interface_omitted_frequency : modes of the boundary, and the first one left out [Hz]
+    n_sectors, engine_order : of a wheel
+    joints : joint -> its pairs; reaction : what prescribed coordinates need, see `prescribed.prescribe`
+    """
+
+    masters: np.ndarray | None = None
+    n_full: int | None = None
+    n_masters: int | None = None
+    n_modes: int | None = None
+    factorisation: str | None = None
+    source: str | None = None
+    first_omitted_frequency: float | None = None
+    free_frequency: np.ndarray | None = None
+    free_frequency_error: np.ndarray | None = None
+    stuck_frequency: np.ndarray | None = None
+    stuck_frequency_error: np.ndarray | None = None
+    n_interface_modes: int | None = None
+    interface_omitted_frequency: float | None = None
+    n_sectors: int | None = None
+    engine_order: int | None = None
+    joints: Mapping[str, slice] = field(default_factory=dict)
+    reaction: StaticReaction | None = None
+
+    @property
+    def master_dofs(self) -> np.ndarray:
+        """DOFs of the full system that stay coordinates; raises ValueError for a model that knows none."""
+        if self.masters is None:
+            raise ValueError("this model does not know which DOFs its coordinates are: reduce the full matrices")
+        return self.masters
+
+
+@dataclass(frozen=True)
 class ReducedModel:
     """A small system with its contact interface, and the way back to the full field.
 
     system : dense, n coordinates; contact and accessory DOFs first, then modal coordinates
     interface : in reduced coordinates, B is dense (n_pair * n_component, n)
     basis : (n_full, n) with q_full = basis @ q, or None where there is no full model (matrices from a file)
-    info : facts for reports, such as the number of masters, modes, the truncation frequency and solver names
+    info : what is known besides, such as the masters, the truncation frequency and the solver
     per_harmonic : harmonic -> (system, B) where a harmonic sees another system than `system`
         (cyclic harmonic index, displacement prescribed in harmonic 0); complex Hermitian where cyclic
     harmonic_basis : harmonic -> (n_full, n) basis where the coordinates of a harmonic are its own
@@ -30,7 +70,7 @@ class ReducedModel:
     system: SecondOrderSystem
     interface: ContactInterface
     basis: np.ndarray | None = None
-    info: Mapping[str, object] = field(default_factory=dict)
+    info: ModelInfo = field(default_factory=ModelInfo)
     per_harmonic: Callable[[int], tuple[SecondOrderSystem, np.ndarray]] | None = None
     harmonic_basis: Callable[[int], np.ndarray] | None = None
 
@@ -68,3 +108,32 @@ class ReducedModel:
             return damped(system, B), B
 
         return replace(self, system=first, per_harmonic=per_harmonic)
+
+
+@dataclass(frozen=True)
+class StaticReaction:
+    """The static force that keeps prescribed coordinates where they are.
+
+    dofs : (k,) coordinates of the reduced model; shape : (k,) their displacement per unit height [m/m]
+    psi : (n, k) static shapes of unit displacements of each; stiffness : (k, k) psi^T K psi [N/m]
+    support : (k,) springs in the model that act about the prescribed position [N/m]
+    """
+
+    dofs: np.ndarray
+    shape: np.ndarray
+    psi: np.ndarray
+    stiffness: np.ndarray
+    support: np.ndarray
+    model: ReducedModel
+
+    def force(self, height: float, contact_force: np.ndarray, loads: Mapping[str, float] | None = None) -> np.ndarray:
+        """Force on each prescribed coordinate (k,) [N], along its displacement.
+
+        height : [m]; contact_force : (n_pair, n_component) static part of the contact force [N]
+        loads : other static loads by name [N]
+        Source  Tamatam 2021, eq. 5.4a after eq. 5.4b is solved for X_u
+        """
+        load = -np.asarray(self.model.interface.B).T @ np.ravel(contact_force)
+        for name, value in (loads or {}).items():
+            load = load + value * self.model.system.loads[name]
+        return (self.stiffness @ self.shape - self.support * self.shape) * height - self.psi.T @ load

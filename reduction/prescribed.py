@@ -11,44 +11,14 @@ so that every system stays symmetric and a height is an amplitude like a force i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.linalg as sla
 
 from tribodyn.fem.constraints import partition
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.reduction.model import ReducedModel
-
-
-@dataclass(frozen=True)
-class StaticReaction:
-    """The static force that keeps prescribed coordinates where they are.
-
-    dofs : (k,) coordinates of the reduced model; shape : (k,) their displacement per unit height [m/m]
-    psi : (n, k) static shapes of unit displacements of each; stiffness : (k, k) psi^T K psi [N/m]
-    support : (k,) springs in the model that act about the prescribed position [N/m]
-    """
-
-    dofs: np.ndarray
-    shape: np.ndarray
-    psi: np.ndarray
-    stiffness: np.ndarray
-    support: np.ndarray
-    model: ReducedModel
-
-    def force(self, height: float, contact_force: np.ndarray, loads: Mapping[str, float] | None = None) -> np.ndarray:
-        """Force on each prescribed coordinate (k,) [N], along its displacement.
-
-        height : [m]; contact_force : (n_pair, n_component) static part of the contact force [N]
-        loads : other static loads by name [N]
-        Source  Tamatam 2021, eq. 5.4a after eq. 5.4b is solved for X_u
-        """
-        load = -np.asarray(self.model.interface.B).T @ np.ravel(contact_force)
-        for name, value in (loads or {}).items():
-            load = load + value * self.model.system.loads[name]
-        return (self.stiffness @ self.shape - self.support * self.shape) * height - self.psi.T @ load
+from tribodyn.reduction.model import ReducedModel, StaticReaction
 
 
 def prescribe(

@@ -9,13 +9,11 @@ import numpy as np
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.model import ReducedModel
 
-STALE = ("free_frequency_error", "stuck_frequency", "stuck_frequency_error")
-
 
 def projected(model: ReducedModel, basis: np.ndarray) -> ReducedModel:
     """The model in coordinates p, q = basis @ p, with basis (n, n_p) real; matrices are made symmetric to rounding.
 
-    Its facts about frequencies of the model before are left out, but for the free ones
+    What its info says of frequencies of the model before is left out, but for the free ones
     """
     s = model.system
     system = SecondOrderSystem(
@@ -27,8 +25,8 @@ def projected(model: ReducedModel, basis: np.ndarray) -> ReducedModel:
     )
     interface = replace(model.interface, B=np.asarray(model.interface.B) @ basis)
     full = None if model.basis is None else model.basis @ basis
-    facts = {name: fact for name, fact in model.info.items() if name not in STALE}
-    return replace(model, system=system, interface=interface, basis=full, info=facts)
+    info = replace(model.info, free_frequency_error=None, stuck_frequency=None, stuck_frequency_error=None)
+    return replace(model, system=system, interface=interface, basis=full, info=info)
 
 
 def _congruent(basis: np.ndarray, matrix: np.ndarray) -> np.ndarray:

@@ -10,23 +10,24 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.model import ModelInfo, ReducedModel
 
 FORMAT = "tribodyn reduced model"
 VERSION = 2
-DATA = (str, bool, int, float, np.generic, np.ndarray)
+INFO = tuple(item.name for item in fields(ModelInfo) if item.name not in ("joints", "reaction"))  # what is data
 
 
 def save(model: ReducedModel, path: str | Path, harmonics: Sequence[int] = ()) -> None:
-    """Write a model; the file appears complete or not at all. Facts of its info that are no data stay behind.
+    """Write a model; the file appears complete or not at all. Joints and reaction of its info stay behind.
 
     harmonics : those to store of a model whose harmonics see different systems, such as a travelling wave
     Raises  ValueError for such a model without harmonics
@@ -54,8 +55,7 @@ def _write_model(file: h5py.File, model: ReducedModel, harmonics: Sequence[int])
     _write(file.create_group("interface"), fields)
     file["interface"].attrs["components"] = list(interface.components)
     _write(file, {"basis": model.basis})
-    facts = {name: fact for name, fact in model.info.items() if isinstance(fact, DATA)}
-    _write(file.create_group("info"), facts)
+    _write(file.create_group("info"), {name: getattr(model.info, name) for name in INFO})
 
 
 def load(path: str | Path) -> ReducedModel:
@@ -80,9 +80,14 @@ def load(path: str | Path) -> ReducedModel:
             _read_system(file["system"]),
             ContactInterface(components=tuple(file["interface"].attrs["components"]), **interface),
             file["basis"][()] if "basis" in file else None,
-            _read(file["info"]),
+            _info(_read(file["info"])),
         )
         return _with_harmonics(file, model) if "harmonics" in file else model
+
+
+def _info(stored: Mapping[str, Any]) -> ModelInfo:
+    plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in stored.items()}
+    return ModelInfo(**{name: value for name, value in plain.items() if name in INFO})
 
 
 def _write_harmonics(file: h5py.File, model: ReducedModel, harmonics: Sequence[int]) -> None:

@@ -55,9 +55,9 @@ def main() -> None:
         "memory": balance.memory.size,
         "systems": len(balance.compliance.groups),
         "coordinates": balance.model.system.n_dof,
-        "masters": balance.model.info["n_masters"],
-        "modes": balance.model.info["n_modes"],
-        "delta_max": result.facts.get("delta_max_m"),
+        "masters": balance.model.info.n_masters,
+        "modes": balance.model.info.n_modes,
+        "delta_max": result.facts.delta_max_m,
     }
     print(json.dumps(told))
 

@@ -7,6 +7,7 @@ import numpy as np
 from tribodyn.hbm.branch import CONVERGED, Branch
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear_history import WearHistory
+from tribodyn.workflows.result.facts import Facts, Stage
 from tribodyn.workflows.result.result import (
     CurveStability,
     Fields,
@@ -105,11 +106,8 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
     loops = Loops(rows, loop_x, np.clip(1e8 * loop_x, -4e2, 4e2))
     return Result(
         provenance={"scene_name": "beam", "scene_text": file.text, "scene": file.scene.model_dump_json()},
-        facts={
-            "seconds": 12.5, "delta_max_m": 5e-3, "unknowns": 9 * n_pair, "model_dofs": 3 * n_pair + 17,
-            "harmonics": np.arange(2),
-        },
-        state=f"complete: {WearEnd.LOST.say()}",
+        facts=Facts(seconds=12.5, delta_max_m=5e-3, unknowns=9 * n_pair, model_dofs=3 * n_pair + 17, harmonics=(0, 1)),
+        stage=Stage.COMPLETE,
         patch=where,
         part=part,
         references=References(omega, np.abs(resonance(415, 0.01)), np.abs(resonance(530, 0.01))),

@@ -161,6 +161,6 @@ def test_wave_survives_its_file(reduced, tmp_path):
         assert np.array_equal(model.reconstruct(q, h), back.reconstruct(q, h))
     assert back.at_harmonic(0)[0] is back.at_harmonic(2)[0]  # engine order 4 of 8: even harmonics are in phase
     assert back.at_harmonic(1)[0] is back.at_harmonic(3)[0]
-    assert back.info["engine_order"] == 4
+    assert back.info.engine_order == 4
     with pytest.raises(ValueError, match="harmonic 5 of this model is not in its file, which holds 0, 1, 2, 3"):
         back.at_harmonic(5)

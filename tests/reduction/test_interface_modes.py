@@ -30,7 +30,7 @@ def full() -> ReducedModel:
 
 @pytest.mark.parametrize("n_keep", [0, 4])
 def test_all_modes_lose_nothing(full: ReducedModel, n_keep: int) -> None:
-    masters = np.asarray(full.info["masters"])
+    masters = full.info.master_dofs
     reduced = interface_modes(full, len(masters) - n_keep, masters[len(masters) - n_keep :])
     assert reduced.system.n_dof == full.system.n_dof
     springs = full.interface.stiffness(470e6, 583e6)
@@ -44,19 +44,19 @@ def test_all_modes_lose_nothing(full: ReducedModel, n_keep: int) -> None:
 
 
 def test_frequencies_converge_from_above(full: ReducedModel) -> None:
-    masters = np.asarray(full.info["masters"])
+    masters = full.info.master_dofs
     exact = linear_modes(full, None, 4)[0]
     errors = [linear_modes(interface_modes(full, n), None, 4)[0] / exact - 1 for n in (6, 15, 40, 80)]
     assert all(np.all(error > -1e-9) for error in errors)
     assert all(np.all(after <= before + 1e-9) for before, after in pairwise(errors))
     assert errors[1].max() < 1e-3
-    omitted = [interface_modes(full, n).info["interface_omitted_frequency"] for n in (6, 15, len(masters))]
+    omitted = [interface_modes(full, n).info.interface_omitted_frequency for n in (6, 15, len(masters))]
     assert omitted == sorted(omitted)
     assert omitted[-1] == np.inf
 
 
 def test_kept_dofs_are_displacements(full: ReducedModel) -> None:
-    keep = np.asarray(full.info["masters"])[[1, 5]]
+    keep = full.info.master_dofs[[1, 5]]
     reduced = interface_modes(full, 10, keep)
     q = np.zeros(reduced.system.n_dof)
     q[1] = 1.0
@@ -72,11 +72,11 @@ def test_a_displacement_can_be_prescribed_after_the_interface_is_reduced() -> No
     loose = np.flatnonzero(np.asarray(abs(part.interface.B).sum(axis=0)).ravel() == 0)
     held = loose[[5, 50, 51]]
     full = craig_bampton(part.system, part.interface, 8, None, held)
-    n_contact = len(np.asarray(full.info["masters"])) - len(held)
+    n_contact = len(full.info.master_dofs) - len(held)
     springs = np.ravel(part.interface.stiffness(470e6, 583e6))
 
     def answers(model: ReducedModel) -> tuple[np.ndarray, ...]:
-        places = np.searchsorted(np.asarray(model.info["masters"]), held)
+        places = np.searchsorted(model.info.master_dofs, held)
         made, reaction = prescribe(model, places, "height")
         assert made.per_harmonic is not None
         moved = []
@@ -99,7 +99,7 @@ def test_a_displacement_can_be_prescribed_after_the_interface_is_reduced() -> No
 
 
 def test_what_cannot_be_is_refused(full: ReducedModel) -> None:
-    masters = np.asarray(full.info["masters"])
+    masters = full.info.master_dofs
     slave = np.setdiff1d(np.arange(len(masters) + 1), masters)[:1]
     with pytest.raises(ValueError, match="ask for 1 to"):
         interface_modes(full, len(masters) + 1)

@@ -70,7 +70,7 @@ def test_reduced_model_needs_half_the_masters(part):
     both = craig_bampton(part.system, part.interface, n_modes=25)
     system, interface, _ = relative(part.system, part.interface)
     half = craig_bampton(system, interface, n_modes=25)
-    assert (both.info["n_masters"], half.info["n_masters"]) == (152, 77)
+    assert (both.info.n_masters, half.info.n_masters) == (152, 77)
     assert set(np.unique(half.interface.B)) == {0.0, 1.0}
     np.testing.assert_array_equal(half.interface.B.sum(axis=1), 1.0)
     for springs in (None, CONTACT):

@@ -15,6 +15,7 @@ from tribodyn.workflows.accuracy.measure import measure
 from tribodyn.workflows.accuracy.trade_table import Row, Trade
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.result import store
+from tribodyn.workflows.result.facts import BudgetEntry, Facts, Stage
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import pipeline
 from tribodyn.workflows.run.progress import Progress
@@ -369,11 +370,11 @@ def test_the_budget_of_a_run(tmp_path: Path) -> None:
     words = ["run", "beam", *set_of(SMALL), "--set", "wear.max_steps=2", "--no-pictures", "--out", str(tmp_path)]
     cli.app(words, result_action="return_value")
     result = store.load(tmp_path / "result.h5")
-    found = {entry["source"]: entry for entry in budget.of_result(result)}
+    found = {entry.source: entry for entry in result.budget}
     assert {"modes", "harmonics", "samples", "newton, krylov", "points", "wear steps", "compliance"} <= set(found)
-    assert found["newton, krylov"]["error"] < 1e-5
-    assert found["samples"]["error"] < 1e-4
-    assert 0 < found["points"]["error"] < 0.05
+    assert found["newton, krylov"].error < 1e-5
+    assert found["samples"].error < 1e-4
+    assert 0 < found["points"].error < 0.05
     shown = dict(budget.lines(result))
     assert "estimate" in shown["  harmonics"]
 
@@ -421,16 +422,15 @@ def test_where_one_step_tells_nothing_of_the_harmonics_the_trade_does(tmp_path: 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(budget.accuracy, "table_of", lambda _: table)
         file = scene_file.read("leaf_seal", ('response.frequency=["120 Hz", "180 Hz"]',))
-        entries = budget.of_result(pipeline.run(file, tmp_path, Progress()))
-    found = {entry["quantity"]: entry for entry in entries if entry["source"] == "harmonics"}
-    assert {entry["by"] for entry in found.values()} == {"trade: kept=[0, 1]"}
+        entries = pipeline.run(file, tmp_path, Progress()).budget
+    found = {entry.quantity: entry for entry in entries if entry.source == "harmonics"}
+    assert {entry.by for entry in found.values()} == {"trade: kept=[0, 1]"}
     # one harmonic overstates the peak by a quarter, as time integration finds too (tribodyn leaf accuracy)
-    assert found["amplitude"]["error"] == pytest.approx(0.24, abs=0.01)
+    assert found["amplitude"].error == pytest.approx(0.24, abs=0.01)
 
 
 def test_the_budget_says_where_no_life_can_be_stated() -> None:
-    entries = [{"source": "wear steps", "quantity": "life", "error": 0.8, "by": "estimate"}]
-    result = Result({}, {budget.FACT: json.dumps(entries)}, "complete")
+    result = Result({}, Facts(), Stage.COMPLETE, (BudgetEntry("wear steps", "life", 0.8, "estimate"),))
     assert "no life can be stated" in dict(budget.lines(result))["  wear steps"]
     assert replace(made_up("a", 1, 0.1), outcome="solve failed").worst == np.inf
 

@@ -17,6 +17,7 @@ from tests.helpers.command import leave
 from tests.helpers.synthetic_result import result
 from tribodyn.workflows.command import exits
 from tribodyn.workflows.result import store, summary
+from tribodyn.workflows.result.facts import Stage
 
 ROOT = Path(__file__).parents[2]
 
@@ -221,7 +222,7 @@ def test_separation_is_told_only_where_contact_was_lost() -> None:
 
 
 def test_a_result_before_any_solve_has_a_summary() -> None:
-    numbers = summary.summary(replace(result(), wear=None, response=None, state="model built"))
+    numbers = summary.summary(replace(result(), wear=None, response=None, stage=Stage.BUILT))
     assert numbers["depth_max_m"] is None
     assert numbers["peak_hz"] is None
     assert numbers["finished"] is False

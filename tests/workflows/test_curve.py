@@ -38,12 +38,12 @@ def test_harmonics_are_chosen_and_told(folder: Path, capsys: pytest.CaptureFixtu
     assert max(kept) <= 9
     assert result.response is not None
     assert result.response.response.shape[2] == 2 * len(kept) - 1
-    assert 0 < float(result.facts["harmonics_error"]) <= 0.02
+    assert 0 < result.facts.harmonics_error <= 0.02
     code, out, _ = leave(["show", str(folder), "--json"], capsys)
     numbers = json.loads(out)
     assert code == 0
     assert numbers["harmonics"] == list(kept)
-    assert numbers["harmonics_error"] == result.facts["harmonics_error"]
+    assert numbers["harmonics_error"] == result.facts.harmonics_error
     assert "estimated truncation error" in leave(["show", str(folder)], capsys)[1]
     # the estimate is that of the balance which was solved, at the peak
     file = read(str(folder / "own.toml"), [*QUICK, *overrides])
@@ -51,7 +51,7 @@ def test_harmonics_are_chosen_and_told(folder: Path, capsys: pytest.CaptureFixtu
     assert balance.basis.harmonics == kept
     peak = settings.peak_of(file.scene).first(balance).state
     own = estimate(widened(balance, 9), kept, peak.omega, peak.x, split=False).error
-    assert own == pytest.approx(float(result.facts["harmonics_error"]), rel=0.3)
+    assert own == pytest.approx(result.facts.harmonics_error, rel=0.3)
     assert from_json(result.provenance["scene"]) == file.scene
 
 

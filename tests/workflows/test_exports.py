@@ -188,7 +188,7 @@ def test_reduced_matrices_are_those_of_the_run(small: Result, tmp_path: Path) ->
         np.testing.assert_allclose(read.mass.toarray(), wanted["M"], rtol=1e-12, atol=1e-12 * np.abs(wanted["M"]).max())
     assert npz.damping is not None
     free = np.sort(np.linalg.eigvals(np.linalg.solve(npz.mass.toarray(), npz.stiffness.toarray())).real)
-    np.testing.assert_allclose(np.sqrt(free[:2]) / (2 * np.pi), np.asarray(small.facts["free_hz"])[:2], rtol=1e-6)
+    np.testing.assert_allclose(np.sqrt(free[:2]) / (2 * np.pi), small.facts.free_hz[:2], rtol=1e-6)
     assert (tmp_path / "abaqus" / "reduced.inp") in written
     assert "STIFFNESS=K, MASS=M, VISCOUS DAMPING=C" in (tmp_path / "abaqus" / "reduced.inp").read_text()
 
@@ -203,7 +203,7 @@ def test_both_faces_of_a_contact_inside_the_mesh() -> None:
     both = replace(
         part, points=np.concatenate([below, part.points]), cells=np.concatenate([part.cells, part.cells + len(below)])
     )
-    first, second = faces.faces_of(replace(given, part=both, facts={**given.facts, "wear_split": 0.25}))
+    first, second = faces.faces_of(replace(given, part=both, facts=replace(given.facts, wear_split=0.25)))
     np.testing.assert_array_equal(first.nodes, patch.nodes + len(below))
     np.testing.assert_allclose(both.points[second.nodes], patch.points)
     assert (second.nodes < len(below)).all()

@@ -158,7 +158,7 @@ def test_the_static_part_is_there_where_a_static_load_is_and_nowhere_else(tmp_pa
     result = pipeline.run(file, tmp_path, Progress())
     assert result.response is not None
     assert result.response.contact.shape == (4, 6, 4)
-    assert result.facts["unknowns"] == 6 * 4
+    assert result.facts.unknowns == 6 * 4
     # without x_0 every coefficient vibrates
     everything = np.linalg.norm(result.response.response[:, 0], axis=1).max()
     assert summary.summary(result)["peak_m"] == [everything, everything]

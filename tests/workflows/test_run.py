@@ -16,6 +16,7 @@ import pytest
 from tests.helpers.killed_runs import go_on
 from tribodyn.workflows.pictures import plots
 from tribodyn.workflows.result import store
+from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.summary import summary
 from tribodyn.workflows.run import checkpoint, fields, modelling, pipeline
@@ -63,7 +64,7 @@ def test_the_run_ends_with_contact_lost(finished: Result) -> None:
     assert finished.wear is not None
     assert finished.wear.preload[0] > 1e3
     assert finished.wear.preload[-1] == 0.0
-    assert finished.wear.depth[-1].max() > float(finished.facts["delta_max_m"])
+    assert finished.wear.depth[-1].max() > finished.facts.delta_max_m
 
 
 def test_worn_volume_is_coefficient_times_energy(finished: Result) -> None:
@@ -106,7 +107,7 @@ def test_references_peak_where_the_modes_are(finished: Result) -> None:
     assert references is not None
     hertz = references.omega / (2 * np.pi)
     spacing = hertz[1] - hertz[0]
-    free = np.asarray(finished.facts["free_hz"])[0]
+    free = finished.facts.free_hz[0]
     assert hertz[np.argmax(references.free)] == pytest.approx(free, abs=2 * spacing)
     assert finished.wear is not None
     # without contact the peak is the free one, 1 % damping: amplitudes agree where the grid of 5 Hz allows
@@ -138,13 +139,13 @@ def test_a_run_killed_again_and_again_at_its_last_row_keeps_one_of_it(
     assert finished.wear is not None
     kept: list[Result] = []
     monkeypatch.setattr(store, "save", lambda path, state: kept.append(state))
-    earlier = replace(finished, state="unfinished", wear=replace(finished.wear, end="unfinished"))
+    earlier = replace(finished, stage=Stage.WEARING, wear=replace(finished.wear, end="unfinished"))
     for _ in range(2):
         kept.clear()
         resumed = pipeline.run(read("beam", SMALL), tmp_path, Progress(), earlier)
         assert_same_wear(resumed, finished)
-        earlier = next(state for state in kept if state.state.startswith("unfinished: "))
-        assert_same_wear(replace(earlier, state=finished.state), finished)
+        earlier = next(state for state in kept if state.stage is Stage.WEARING)
+        assert_same_wear(replace(earlier, stage=finished.stage), finished)
 
 
 @pytest.mark.parametrize("rule", ["thesis", "error_controlled"])
@@ -162,7 +163,7 @@ def test_ten_kills_at_random_moments_change_no_bit(rule: str, tmp_path: Path) ->
     while kills < 10:
         process = server.Process(target=go_on, args=(path.parent, overrides))
         process.start()
-        process.join(rng.uniform(0.0, 0.5 * float(whole.facts["seconds"])))
+        process.join(rng.uniform(0.0, 0.5 * whole.facts.seconds))
         if process.is_alive():
             process.kill()
             process.join()
@@ -266,7 +267,7 @@ def test_curves_of_the_worn_contact_walk_to_the_free_one(finished: Result, tmp_p
     assert len(worn.row) == 3
     assert worn.row[-1] == len(finished.wear.cycles) - 1
     peaks = worn.omega[np.arange(3), np.nanargmax(worn.amplitude, axis=1)] / (2 * np.pi)
-    assert peaks[-1] == pytest.approx(np.atleast_1d(finished.facts["free_hz"])[0], rel=0.05)
+    assert peaks[-1] == pytest.approx(finished.facts.free_hz[0], rel=0.05)
     assert np.all(np.diff(peaks) <= 0)
     assert summary(result)["surface_volumes_m3"] == pytest.approx([0.5 * summary(result)["volume_m3"]] * 2)
     drawn = {path.name for path in plots.draw(result, tmp_path)}

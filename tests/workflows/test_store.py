@@ -15,17 +15,21 @@ import numpy as np
 import pytest
 
 from tests.helpers.synthetic_result import result
+from tribodyn.hbm.outcome import WearEnd
 from tribodyn.workflows.result import store
+from tribodyn.workflows.result.facts import Around, BudgetEntry, Stage
 
 WRITER = """
 import sys
 from dataclasses import replace
 from pathlib import Path
 from tests.helpers.synthetic_result import result
+from tribodyn.hbm.outcome import WearEnd
 from tribodyn.workflows.result import store
+from tribodyn.workflows.result.facts import Around, BudgetEntry, Stage
 full = result(60)
 for n in range(10**6):
-    store.save(Path(sys.argv[1]), replace(full, state=f"checkpoint {n}"))
+    store.save(Path(sys.argv[1]), replace(full, verdict=f"checkpoint {n}"))
 """
 
 
@@ -76,7 +80,7 @@ def test_a_kill_at_any_moment_leaves_a_whole_checkpoint(tmp_path: Path, delay: f
             assert writer.poll() is None
             time.sleep(0.01)
         for _ in range(5):  # a reader never meets a part of a file either
-            assert store.load(path).state.startswith("checkpoint")
+            assert store.load(path).verdict.startswith("checkpoint")
         time.sleep(delay)
     finally:
         writer.send_signal(signal.SIGKILL)
@@ -93,3 +97,26 @@ def test_what_is_no_result_is_said_in_a_sentence(tmp_path: Path, content: object
         h5py.File(path, "w").close()
     with pytest.raises(store.ResultError, match=r"x\.h5"):
         store.load(path)
+
+
+@pytest.mark.parametrize("stage", list(Stage))
+@pytest.mark.parametrize("end", [WearEnd.SOLVE_FAILED.say(": why"), WearEnd.NO_STEP.say()])
+def test_the_stage_of_a_run_is_read_back_from_its_sentence(tmp_path: Path, stage: Stage, end: str) -> None:
+    from dataclasses import replace
+
+    made = result()
+    assert made.wear is not None
+    written = replace(made, stage=stage, wear=replace(made.wear, end=end))
+    store.save(tmp_path / "result.h5", written)
+    read = store.load(tmp_path / "result.h5")
+    assert (read.stage, read.state, read.finished) == (stage, written.state, stage is Stage.COMPLETE)
+
+
+def test_facts_of_a_wheel_and_the_budget_come_back(tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    facts = replace(result().facts, around=Around(40, 3, np.array([1.0, 0.0, 0.0])), free_hz=np.array([12.5]))
+    budget = (BudgetEntry("modes", "free frequencies", None, "nobody knows"), BudgetEntry("samples", "x", 1e-3, "y"))
+    written = replace(result(), facts=facts, budget=budget)
+    store.save(tmp_path / "result.h5", written)
+    assert same(written, store.load(tmp_path / "result.h5"))

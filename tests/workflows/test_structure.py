@@ -177,7 +177,7 @@ def test_a_part_without_contact_has_its_linear_response(tmp_path: Path) -> None:
     file = scene_file.parse(BAR, "scene.toml", ("pictures.renders=false", "pictures.plots=false"), tmp_path)
     result = pipeline.run(file, tmp_path, Progress())
     assert result.state == "complete"
-    assert result.facts["contact_pairs"] == 0
+    assert result.facts.contact_pairs == 0
     assert result.references is not None
     assert result.response is not None
     found = result.response.amplitude("response")

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,31 +15,17 @@ from tribodyn.hbm.sampling import sampling_error
 from tribodyn.hbm.step_error import UNKNOWN, step_error
 from tribodyn.workflows.accuracy import accuracy
 from tribodyn.workflows.accuracy.trade_table import NAMES, QUANTITIES, Trade
+from tribodyn.workflows.result.facts import BudgetEntry
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile, read
 
-FACT = "error_budget"  # where the facts of a result keep it
 # knobs that an estimator covers; Newton's is of the residual, whatever Krylov left of it
 ESTIMATED = ("modes", "harmonics", "samples", "newton", "krylov", "points", "wear")
 SAME, COARSER = "", "as with the coarser "  # how the setting of a knob stands to the scene's
 LOOK = 5  # harmonics beyond the kept ones that the estimate looks at, at the least
 
 
-@dataclass(frozen=True)
-class Entry:
-    """What one discretisation contributes.
-
-    source : such as "harmonics"; quantity : what is off; error : relative, None where nobody knows
-    by : "estimate", or "trade" with the setting that was measured
-    """
-
-    source: str
-    quantity: str
-    error: float | None
-    by: str
-
-
-def budget(file: SceneFile, balance: HarmonicBalance, result: Result) -> list[Entry]:
+def budget(file: SceneFile, balance: HarmonicBalance, result: Result) -> list[BudgetEntry]:
     """The budget of a result with its response, and with its wear where there is any."""
     entries = [*_of_reduction(balance, file), *_of_response(balance, result), *_of_wear(file, result)]
     unknown = {entry.source for entry in entries if entry.error is None}
@@ -50,43 +35,37 @@ def budget(file: SceneFile, balance: HarmonicBalance, result: Result) -> list[En
 
 
 def with_budget(file: SceneFile, balance: HarmonicBalance, result: Result) -> Result:
-    """The result with its budget among its facts."""
-    text = json.dumps([asdict(entry) for entry in budget(file, balance, result)])
-    return replace(result, facts={**result.facts, FACT: text})
-
-
-def of_result(result: Result) -> list[dict[str, Any]]:
-    """The budget that a result keeps, empty where it has none."""
-    return list(json.loads(str(result.facts.get(FACT, "[]"))))
+    """The result with its budget."""
+    return replace(result, budget=tuple(budget(file, balance, result)))
 
 
 def lines(result: Result) -> list[tuple[str, str]]:
     """The budget as pairs of a name and a readable value, the largest contribution first."""
-    entries = sorted(of_result(result), key=lambda e: -1.0 if e["error"] is None else -e["error"])
+    entries = sorted(result.budget, key=lambda e: -1.0 if e.error is None else -e.error)
     shown = []
     for entry in entries:
-        if entry["error"] is None:
-            value = f"unknown: {entry['by']}"
-        elif entry["source"] == "wear steps" and entry["error"] >= UNKNOWN:
-            value = f"above {UNKNOWN:.0%} of {entry['quantity']}: no {entry['quantity']} can be stated ({entry['by']})"
+        if entry.error is None:
+            value = f"unknown: {entry.by}"
+        elif entry.source == "wear steps" and entry.error >= UNKNOWN:
+            value = f"above {UNKNOWN:.0%} of {entry.quantity}: no {entry.quantity} can be stated ({entry.by})"
         else:
-            value = f"{entry['error']:.1e} of {entry['quantity']} ({entry['by']})"
-        shown.append((f"  {entry['source']}", value))
+            value = f"{entry.error:.1e} of {entry.quantity} ({entry.by})"
+        shown.append((f"  {entry.source}", value))
     return [("error budget", ""), *shown] if shown else []
 
 
-def _of_reduction(balance: HarmonicBalance, file: SceneFile) -> Iterator[Entry]:
+def _of_reduction(balance: HarmonicBalance, file: SceneFile) -> Iterator[BudgetEntry]:
     info = balance.model.info
-    if "free_frequency_error" in info:
-        frequency, error = (np.asarray(info[f"free_frequency{name}"]) for name in ("", "_error"))
+    frequency, error = info.free_frequency, info.free_frequency_error
+    if frequency is not None and error is not None:
         inside = (frequency <= file.scene.response.frequency[1]) & np.isfinite(error)
         if inside.any():
             worst = float(error[inside].max())
-            yield Entry("modes", "free frequencies", worst, "estimate: omitted modes")
-    yield Entry("compliance", "displacement", float(balance.compliance.error), "estimate: direct solve")
+            yield BudgetEntry("modes", "free frequencies", worst, "estimate: omitted modes")
+    yield BudgetEntry("compliance", "displacement", float(balance.compliance.error), "estimate: direct solve")
 
 
-def _of_response(balance: HarmonicBalance, result: Result) -> Iterator[Entry]:
+def _of_response(balance: HarmonicBalance, result: Result) -> Iterator[BudgetEntry]:
     frf = result.response
     if frf is None:
         return
@@ -95,12 +74,12 @@ def _of_response(balance: HarmonicBalance, result: Result) -> Iterator[Entry]:
     best = int(np.argmax(height))
     omega = float(frf.omega[best])
     if not balance.contact.n_pair:  # a linear response
-        yield Entry("points", "peak amplitude", _missed(frf.omega, height, best), "estimate: parabola")
+        yield BudgetEntry("points", "peak amplitude", _missed(frf.omega, height, best), "estimate: parabola")
         return
     x = frf.contact[best].reshape(balance.contact.n_pair, len(balance.contact.components), balance.basis.n_coeff)
-    state = balance.evaluate(omega, x)
-    yield Entry("newton, krylov", "response at the peak", _newton_error(balance, state), "estimate: one more step")
-    yield Entry("samples", "response at the peak", sampling_error(balance, omega, x), "estimate: located, finer")
+    state, at_peak = balance.evaluate(omega, x), "response at the peak"
+    yield BudgetEntry("newton, krylov", at_peak, _newton_error(balance, state), "estimate: one more step")
+    yield BudgetEntry("samples", at_peak, sampling_error(balance, omega, x), "estimate: located, finer")
     top = max(balance.basis.harmonics)
     error: float | None = None
     try:
@@ -111,10 +90,10 @@ def _of_response(balance: HarmonicBalance, result: Result) -> Iterator[Entry]:
         how = str(refusal)
     if error is not None and error >= UNKNOWN:  # as at a fold, where a step at the same frequency leads anywhere
         error, how = None, f"one step with more harmonics moves it by more than {UNKNOWN:.0%}"
-    yield Entry("harmonics", "response at the peak", error, how)
-    yield Entry("points", "peak amplitude", _missed(frf.omega, height, best), "estimate: parabola")
+    yield BudgetEntry("harmonics", at_peak, error, how)
+    yield BudgetEntry("points", "peak amplitude", _missed(frf.omega, height, best), "estimate: parabola")
     if result.bounds is not None and good.any():
-        yield Entry("load path", "amplitude", float(np.nanmax(result.bounds.spread)), "bounds of residual shear")
+        yield BudgetEntry("load path", "amplitude", float(np.nanmax(result.bounds.spread)), "bounds of residual shear")
 
 
 def _newton_error(balance: HarmonicBalance, state: State) -> float:
@@ -137,23 +116,23 @@ def _missed(omega: np.ndarray, height: np.ndarray, best: int) -> float:
     return float(-(slope**2) / (4 * curvature) / height[best]) if curvature < 0 else 0.0
 
 
-def _of_wear(file: SceneFile, result: Result) -> Iterator[Entry]:
+def _of_wear(file: SceneFile, result: Result) -> Iterator[BudgetEntry]:
     wear = file.scene.wear
     if wear is None or result.wear is None or not result.wear_steps:
         return
     controlled = wear.rule == "error_controlled"
     found = step_error(result.wear, wear.tolerance if controlled else None)
     by = "estimate: the rule's own" if controlled else "estimate: change of the rate over a step"
-    yield Entry("wear steps", "life", found.cycles, by)
-    yield Entry("wear steps", "depth", found.depth, by)
+    yield BudgetEntry("wear steps", "life", found.cycles, by)
+    yield BudgetEntry("wear steps", "depth", found.depth, by)
 
 
-def _of_trade(file: SceneFile, estimated: Sequence[str]) -> Iterator[Entry]:
+def _of_trade(file: SceneFile, estimated: Sequence[str]) -> Iterator[BudgetEntry]:
     """What the trade has measured of the knobs that no estimator covers here."""
     try:
         trade = accuracy.table_of(file)
     except ValueError as missing:
-        yield Entry("mesh, grid", "", None, str(missing))
+        yield BudgetEntry("mesh, grid", "", None, str(missing))
         return
     for knob in trade.knobs:
         rows = trade.of(knob)
@@ -162,13 +141,14 @@ def _of_trade(file: SceneFile, estimated: Sequence[str]) -> Iterator[Entry]:
         known = [(r, how) for r in rows if (how := _compared(file, r.overrides)) is not None]
         name = knob.replace("_", " ")
         if not known:
-            yield Entry(name, "", None, f"the trade has finer settings alone, {rows[0].setting} to {rows[-1].setting}")
+            why = f"the trade has finer settings alone, {rows[0].setting} to {rows[-1].setting}"
+            yield BudgetEntry(name, "", None, why)
             continue
         row, how = next(((r, how) for r, how in known if how == SAME), known[-1])
         for quantity, label in zip(QUANTITIES, NAMES, strict=True):
             error = _off(trade, knob, row.setting, quantity)
             if error:  # none is left where a knob stands at what it tends to
-                yield Entry(name, label, error, f"trade: {how}{row.setting}")
+                yield BudgetEntry(name, label, error, f"trade: {how}{row.setting}")
 
 
 def _off(trade: Trade, knob: str, setting: str, quantity: str) -> float | None:

@@ -18,7 +18,7 @@ import numpy as np
 from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.operating_point import NoPeak
 from tribodyn.hbm.wear_history import LIFE_SHARE, cycles_to_preload
-from tribodyn.workflows.accuracy import budget, probes
+from tribodyn.workflows.accuracy import probes
 from tribodyn.workflows.accuracy.probes import Answers, InTime, State, relative
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run.modelling import Model
@@ -104,8 +104,10 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress) -> 
         finer = list(probes.each(seen, probes.with_more_harmonics)) if left() else [None] * len(seen)
         parts += _of_harmonics(result, seen, finer, values["life"], "lost with more harmonics" if left() else skipped)
     with progress.stage("verdict: mesh"):
-        parts += list(_of_mesh(file, result, seen, skipped if not left() else "")) if wanted.mesh else _unknown(
-            "mesh and contact grid", "verdict.mesh is false"
+        parts += (
+            list(_of_mesh(file, result, seen, skipped if not left() else ""))
+            if wanted.mesh
+            else _unknown("mesh and contact grid", "verdict.mesh is false")
         )
     checks: list[tuple[State, InTime]] = []
     refusal = ""
@@ -139,17 +141,17 @@ def _values(result: Result, seen: Sequence[State]) -> dict[str, float | None]:
 
 def _of_budget(result: Result) -> Iterator[Contribution]:
     """What the error budget has estimated: modes, Newton, samples, wear steps."""
-    for entry in budget.of_result(result):
-        source, error, how = entry["source"], entry["error"], entry["by"]
-        if error is None or not str(how).startswith("estimate") or source == "harmonics":
+    for entry in result.budget:
+        source, error, how = entry.source, entry.error, entry.by
+        if error is None or not how.startswith("estimate") or source == "harmonics":
             continue
-        if entry["quantity"] == "free frequencies":
+        if entry.quantity == "free frequencies":
             yield Contribution(source, "peak_frequency", error, how)
-        elif entry["quantity"] == "response at the peak":
+        elif entry.quantity == "response at the peak":
             for quantity in (*RESPONSE, "life"):
                 yield Contribution(source, quantity, error, how)
-        elif entry["quantity"] in ("life", "depth"):
-            yield Contribution(source, entry["quantity"], error, how)
+        elif entry.quantity in ("life", "depth"):
+            yield Contribution(source, entry.quantity, error, how)
         elif source == "points" and not result.wear_steps:
             yield Contribution(source, "amplitude", error, how)
 
@@ -208,9 +210,9 @@ def _of_mesh(file: SceneFile, result: Result, seen: Sequence[State], skipped: st
     ours, how = Answers.of(seen[0].balance, seen[0].here), "a coarser mesh"
     for quantity, a, b in _pairs(coarse, ours):
         yield Contribution(source, quantity, relative(a, b), how)
-    reach = result.facts.get("delta_max_m")
+    reach = result.facts.delta_max_m
     if result.wear_steps and reach is not None:
-        depth = relative(deepest, float(np.asarray(reach)))
+        depth = relative(deepest, reach)
         yield Contribution(source, "depth", depth, how)
         yield Contribution(source, "life", depth + relative(coarse.energy, ours.energy), how)
 

@@ -48,7 +48,8 @@ def write_mat(result: Result, folder: Path) -> list[Path]:
     content: dict[str, Any] = {
         name: {key: _plain(column) for key, column in table.items()} for name, table in tables(result).items()
     }
-    facts = {key: value for key, value in result.facts.items() if len(key) <= 31}
+    facts: dict[str, Any] = {key: value for key, value in result.facts.table().items() if len(key) <= 31}
+    facts["error_budget"] = [{k: np.nan if v is None else v for k, v in vars(e).items()} for e in result.budget]
     content |= {"facts": facts, "provenance": dict(result.provenance), "state": result.state}
     path = folder / "result.mat"
     savemat(path, content, long_field_names=True, oned_as="column")

@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.workflows.result.faces import faces_of, share_of_body_1, worn_off
+from tribodyn.workflows.result.faces import faces_of, worn_off
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import State, instant_status, over_a_cycle, shown_states, state_of
 
@@ -123,7 +123,7 @@ def contact_surface(result: Result, state: State) -> Any:
     patch = result.patch
     assert patch is not None
     faces = np.column_stack([np.full(len(patch.faces), patch.faces.shape[1]), patch.faces]).ravel()
-    split = share_of_body_1(result)
+    split = result.facts.share_of_body_1
     surface = pv.PolyData(patch.points - split * state.depth[:, None] * patch.frames[:, 2], faces)
     fields: dict[str, np.ndarray] = {"depth": state.depth, "area": patch.area, "gap": patch.gap + state.depth}
     if state.pressure is not None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame
 from tribodyn.workflows.pictures.style import BODY, BODY_2, STATUS
-from tribodyn.workflows.result.faces import Face, bodies, faces_of, share_of_body_1
+from tribodyn.workflows.result.faces import Face, bodies, faces_of
 from tribodyn.workflows.result.result import Patch, Result
 
 MARGIN = 0.35  # of the size of the patch, what is shown around it
@@ -142,4 +142,4 @@ def opened(result: Result, aspect: float = 1.3) -> Opened:
     other[:, along] = 2 * hinge - other[:, along]
     look = np.array([-0.3, -0.8, 1.0]) if along == 1 else np.array([-0.8, -0.3, 1.0])
     camera = frame(np.concatenate([corners, other]), look, np.array([0.0, 0, 1]), aspect, 1.05)
-    return Opened(result, faces, flat, size, share_of_body_1(result), along, hinge, around, camera)
+    return Opened(result, faces, flat, size, result.facts.share_of_body_1, along, hinge, around, camera)

@@ -67,10 +67,8 @@ class _Shell:
 
 def wheel_of(result: Result) -> Wheel | None:
     """The wheel of a result, None where its part stands alone."""
-    if "sectors" not in result.facts:
-        return None
-    facts = result.facts
-    return Wheel(int(str(facts["sectors"])), int(str(facts["engine_order"])), np.asarray(facts["axis"]))
+    around = result.facts.around
+    return None if around is None else Wheel(around.sectors, around.engine_order, around.axis)
 
 
 def wheel_picture(result: Result, wheel: Wheel, deformation: float | None = None) -> Figure:

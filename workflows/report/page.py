@@ -174,10 +174,10 @@ def _inspection(result: Result) -> str:
         "unknowns": "unknowns of the balance", "harmonics": "harmonics", "compliance_error": "error of the compliance",
         "factorisation": "factorisation", "sectors": "sectors", "engine_order": "engine order",
     }  # fmt: skip
-    rows = []
+    rows, table = [], result.facts.table()
     for key, label in names.items():
-        if key in result.facts:
-            value = result.facts[key]
+        value = table.get(key)
+        if value is not None:
             many = getattr(value, "ndim", 0) > 0
             text = ", ".join(_number(v) for v in np.asarray(value).tolist()[:6]) if many else _number(value)
             rows.append((label, text))

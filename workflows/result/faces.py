@@ -45,23 +45,18 @@ def faces_of(result: Result) -> tuple[Face, ...]:
     part, patch = result.part, result.patch
     if part is None or patch is None or not len(patch.faces):
         return ()
-    split = share_of_body_1(result)
+    split = result.facts.share_of_body_1
     first, second = _nodes_on_both_sides(part, patch)
     faces = [Face(first, patch.frames[:, 2], split, between=_between(part, patch, first))]
     if second is not None:
         faces.append(Face(second, -patch.frames[:, 2], 1 - split, between=_between(part, patch, second)))
-    elif "sectors" in result.facts:
-        x, y, z = np.asarray(result.facts["axis"], float)
-        turn = rotation((x, y, z), 2 * np.pi / int(np.squeeze(result.facts["sectors"])))
+    elif (around := result.facts.around) is not None:
+        x, y, z = around.axis
+        turn = rotation((x, y, z), 2 * np.pi / around.sectors)
         left = patch.moved(part.points, patch.points @ turn.T, -patch.frames @ turn.T)
         between = _between(part, left, left.nodes)
         faces.append(Face(left.nodes, left.frames[:, 2], 1 - split, turn, between))
     return tuple(faces)
-
-
-def share_of_body_1(result: Result) -> float:
-    """The share of the total depth that is worn off body 1, half where nothing is said."""
-    return float(np.squeeze(np.asarray(result.facts.get("wear_split", 0.5), float)))
 
 
 def worn_off(faces: tuple[Face, ...], depth: np.ndarray, n_node: int) -> np.ndarray:

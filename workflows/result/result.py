@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from tribodyn.hbm.branch import CONVERGED, Branch
 from tribodyn.hbm.wear_history import WearHistory
+from tribodyn.workflows.result.facts import BudgetEntry, Facts, Stage
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -171,15 +172,17 @@ class Result:
     """A run, finished or not: plain data, and methods that read or draw it and import what they need when called.
 
     provenance : scene text and overrides, versions, seed, start time, threads
-    facts : what was modelled and how long it took: sizes, solver names, delta_max_m, seconds, ...
-    state : sentence that says how far the run came
+    facts : what was modelled and how long it took
+    stage : how far the run came; `state` is its sentence
+    budget : what each discretisation contributes to the error, empty before it is known
     verdict : JSON text of accuracy.verdict.Verdict, empty where none was asked for
     response : curve of the unworn contact; stability, bounds : of it, where the scene asks for them
     """
 
     provenance: Mapping[str, str]
-    facts: Mapping[str, str | int | float | np.ndarray]
-    state: str
+    facts: Facts
+    stage: Stage
+    budget: tuple[BudgetEntry, ...] = ()
     patch: Patch | None = None
     part: PartMesh | None = None
     references: References | None = None
@@ -193,9 +196,25 @@ class Result:
     verdict: str = ""
 
     @property
+    def state(self) -> str:
+        """Sentence that says how far the run came."""
+        if self.stage is Stage.WEARING and self.wear is not None:
+            return f"{self.stage.value}: {len(self.wear.cycles)} wear steps are done"
+        if self.stage is Stage.FAILED and self.wear is not None:
+            return self.wear.end
+        if self.stage is Stage.COMPLETE and self.wear is not None:
+            return f"{self.stage.value}: {self.wear.end}"
+        return self.stage.value
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run computed everything that its scene asked for."""
+        return self.stage is Stage.COMPLETE
+
+    @property
     def harmonics(self) -> tuple[int, ...]:
         """Harmonics that it was computed with."""
-        return tuple(int(h) for h in np.atleast_1d(self.facts["harmonics"]))
+        return self.facts.harmonics
 
     @property
     def wear_steps(self) -> int:

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import hashlib
 import io
+import json
 import os
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ import numpy as np
 
 from tribodyn.hbm.branch import Branch
 from tribodyn.hbm.wear_history import WearHistory
+from tribodyn.workflows.result.facts import BudgetEntry, Facts, Stage
 from tribodyn.workflows.result.result import (
     CurveStability,
     Fields,
@@ -37,6 +39,8 @@ FORMAT = "tribodyn result 1"
 USER_BLOCK = 512  # bytes before the HDF5 content, the least that HDF5 allows
 MARK = b"tribodyn result, sha256 of what follows this block: "
 FIELD = {"frf": "response"}  # groups of the file that have another name than the field of a Result
+
+BUDGET = "error_budget"  # attribute of the group facts that holds the entries of the budget as JSON
 
 # group -> (type, {array: (dimensions, unit)}); what is not an array is an attribute of the group
 SCHEMA: dict[str, tuple[type, dict[str, tuple[tuple[str, ...], str]]]] = {
@@ -167,9 +171,12 @@ def _write(file: h5py.File, result: Result) -> None:
     file.attrs["format"] = FORMAT
     file.attrs["state"] = result.state
     file.attrs["verdict"] = result.verdict
-    for name in ("provenance", "facts"):
+    facts = result.facts.table()
+    if result.budget:
+        facts[BUDGET] = json.dumps([asdict(entry) for entry in result.budget])
+    for name, table in (("provenance", result.provenance), ("facts", facts)):
         group = file.create_group(name)
-        for key, value in getattr(result, name).items():
+        for key, value in table.items():
             group.attrs[key] = value
     for name, (_, arrays) in SCHEMA.items():
         part = getattr(result, FIELD.get(name, name))
@@ -234,12 +241,14 @@ def load(path: Path) -> Result:
                 for name, (kind, arrays) in SCHEMA.items()
                 if name in file
             }
-        except KeyError:
+            facts, stage = _attributes(file["facts"].attrs), Stage.of(str(file.attrs["state"]))
+        except (KeyError, ValueError):
             raise ResultError(f'"{path}" was written by another version of tribodyn: run its scene again') from None
         return Result(
             provenance=_attributes(file["provenance"].attrs),
-            facts=_attributes(file["facts"].attrs),
-            state=str(file.attrs["state"]),
+            facts=Facts.of(facts),
+            stage=stage,
+            budget=tuple(BudgetEntry(**entry) for entry in json.loads(facts.get(BUDGET, "[]"))),
             verdict=str(file.attrs.get("verdict", "")),
             **parts,
         )

@@ -33,17 +33,16 @@ def summary(result: Result) -> dict[str, Any]:
     stable_peak_hz, stable_peak_m : the highest point of the curve that is
     seconds : of computing, interrupted runs included
     verdict : quantity -> value, error, dominated_by, stated, reason, see workflows.accuracy.verdict; None without
-    error_budget : what each discretisation contributes, see workflows.budget.Entry
+    error_budget : what each discretisation contributes, see result.facts.BudgetEntry
     """
-    numbers: dict[str, Any] = {"state": result.state, "finished": result.state.startswith("complete")}
-    numbers |= {"seconds": result.facts.get("seconds"), "wear_steps": result.wear_steps}
+    numbers: dict[str, Any] = {"state": result.state, "finished": result.finished}
+    numbers |= {"seconds": result.facts.seconds, "wear_steps": result.wear_steps}
     numbers |= _wear(result) | _peak(result) | _stable_peak(result)
     for name in ("full_dofs", "model_dofs", "contact_pairs", "unknowns", "delta_max_m"):
-        numbers[name] = result.facts.get(name)
+        numbers[name] = getattr(result.facts, name)
     numbers |= _curve(result)
-    free = result.facts.get("free_hz")
-    numbers["free_hz"] = None if free is None else [float(hertz) for hertz in np.atleast_1d(free)]
-    numbers["error_budget"] = budget.of_result(result)
+    numbers["free_hz"] = result.facts.free_hz.tolist()
+    numbers["error_budget"] = [vars(entry) for entry in result.budget]
     numbers["verdict"] = verdict.record(result.verdict)
     return {name: plain(value) for name, value in numbers.items()}
 
@@ -55,7 +54,7 @@ def _wear(result: Result) -> dict[str, Any]:
     if wear is None or patch is None or not len(wear.cycles):
         return dict.fromkeys(names)
     depth, cycles = result.depth_after(-1), result.cycles_after(-1)
-    volume, split = float(depth @ patch.area), float(np.squeeze(result.facts.get("wear_split", 0.5)))
+    volume, split = float(depth @ patch.area), result.facts.share_of_body_1
     basis = HarmonicBasis(result.harmonics, max(EVENT_SAMPLES, 2 * result.harmonics[-1] + 1))
     when = events(wear, patch.components, patch.gap, basis)
     return {
@@ -109,10 +108,10 @@ def _stable_peak(result: Result) -> dict[str, Any]:
 
 
 def _curve(result: Result) -> dict[str, Any]:
-    harmonics, frf = result.facts.get("harmonics"), result.response
+    frf = result.response
     numbers: dict[str, Any] = {
-        "harmonics": None if harmonics is None else [int(h) for h in np.atleast_1d(harmonics)],
-        "harmonics_error": result.facts.get("harmonics_error"),
+        "harmonics": list(result.harmonics),
+        "harmonics_error": result.facts.harmonics_error,
         "response_end": None if frf is None else frf.end,
         "folds_hz": [] if frf is None else [float(frf.frequency[i]) for i in frf.folds],
         "unstable_points": None,
@@ -149,8 +148,9 @@ def lines(result: Result) -> list[tuple[str, str]]:
         ("model", _sizes(numbers["full_dofs"], numbers["model_dofs"])),
         ("contact", f"{numbers['contact_pairs']} node pairs, {numbers['unknowns']} unknowns"),
     ]
-    if "sectors" in result.facts:
-        shown.append(("wheel", "{sectors} sectors, engine order {engine_order}".format(**result.facts)))
+    around = result.facts.around
+    if around is not None:
+        shown.append(("wheel", f"{around.sectors} sectors, engine order {around.engine_order}"))
     if numbers["free_hz"]:
         shown.append(("free modes", ", ".join(f"{hertz:.2f}" for hertz in numbers["free_hz"][:4]) + " Hz"))
     if numbers["delta_max_m"] is not None:
@@ -164,7 +164,7 @@ def lines(result: Result) -> list[tuple[str, str]]:
         hertz, height = numbers["stable_peak_hz"], numbers["stable_peak_m"]
         below = "no point is stable" if hertz is None else f"the highest that is: {hertz:.5g} Hz, {1e3 * height:.5g} mm"
         shown.append(("", f"this peak is unstable, no vibration stays at it; {below}"))
-    if numbers["harmonics"] is not None:
+    if numbers["harmonics"]:
         error = numbers["harmonics_error"]
         chosen = "" if error is None else f", chosen: estimated truncation error {error:.1e}"
         shown.append(("harmonics", ", ".join(map(str, numbers["harmonics"])) + chosen))

@@ -23,7 +23,7 @@ class Clock:
     """Seconds of computing, those of an interrupted run included."""
 
     def __init__(self, earlier: Result | None):
-        self._before = 0.0 if earlier is None else float(earlier.facts["seconds"])
+        self._before = 0.0 if earlier is None else earlier.facts.seconds
         self._start = time.perf_counter()
 
     def seconds(self) -> float:
@@ -59,7 +59,7 @@ class Keeper:
 
     def __call__(self, result: Result) -> Result:
         """Write a result with the seconds it took, and give it back."""
-        timed = replace(result, facts={**result.facts, "seconds": self.clock.seconds()})
+        timed = replace(result, facts=replace(result.facts, seconds=self.clock.seconds()))
         if self.path is not None:
             store.save(self.path, timed)
         return timed
@@ -81,8 +81,8 @@ def earlier(path: Path, file: SceneFile) -> Result | None:
 
 def is_complete(result: Result, scene: Scene) -> bool:
     """Whether a result holds everything that a scene of the same problem asks for."""
-    if not result.state.startswith("complete") or not scene.wears:
-        return result.state.startswith("complete")
+    if not result.finished or not scene.wears:
+        return result.finished
     assert scene.wear is not None
     stopped = result.wear is None or result.wear.ended is WearEnd.STEPS_DONE
     return not stopped or result.wear_steps >= scene.wear.max_steps

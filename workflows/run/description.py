@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -15,6 +16,7 @@ from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.harmonic_choice import HarmonicChoice
 from tribodyn.version import package_version
+from tribodyn.workflows.result.facts import Around, Facts, Stage
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
 from tribodyn.workflows.run.references import delta_max, free_deflection
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -34,37 +36,34 @@ def described(
     wears = file.scene.wear is not None
     free = free_deflection(balance) if wears else np.full(i.n_pair, np.nan)
     patch = Patch(i.components, nodes, i.points, i.frames, i.area, i.gap, i.faces, free)
-    facts: dict[str, str | int | float | np.ndarray] = {
-        "full_dofs": int(str(reduced.info["n_full"])),
-        "model_dofs": reduced.system.n_dof,
-        "free_hz": np.asarray(reduced.info["free_frequency"]),
-        "contact_pairs": i.n_pair,
-        "harmonics": np.array(balance.basis.harmonics),
-        "unknowns": balance.n_unknown,
-        "compliance_error": balance.compliance.error,
-    }
+    facts = Facts(
+        full_dofs=reduced.info.n_full or reduced.system.n_dof,
+        model_dofs=reduced.system.n_dof,
+        contact_pairs=i.n_pair,
+        unknowns=balance.n_unknown,
+        harmonics=tuple(balance.basis.harmonics),
+        free_hz=np.zeros(0) if reduced.info.free_frequency is None else reduced.info.free_frequency,
+        compliance_error=balance.compliance.error,
+        interface_modes=reduced.info.n_interface_modes,
+    )
     if part is not None:
-        facts |= {
-            "elements": int(part.mesh.nelements),
-            "nodes": len(part.points),
-            "scaled_jacobian": min(mesh_reader.quality(piece.mesh).scaled_jacobian for piece in pieces(part.mesh)),
-        }
-    if "factorisation" in reduced.info:  # reduced here, not as the matrices came
-        facts |= {
-            "retained_modes": int(str(reduced.info["n_modes"])),
-            "first_omitted_hz": float(str(reduced.info["first_omitted_frequency"])),
-            "factorisation": str(reduced.info["factorisation"]),
-        }
-    if "n_interface_modes" in reduced.info:
-        facts |= {"interface_modes": int(str(reduced.info["n_interface_modes"]))}
+        worst = min(mesh_reader.quality(piece.mesh).scaled_jacobian for piece in pieces(part.mesh))
+        facts = replace(facts, elements=int(part.mesh.nelements), nodes=len(part.points), scaled_jacobian=worst)
+    if reduced.info.factorisation is not None:  # reduced here, not as the matrices came
+        facts = replace(
+            facts,
+            retained_modes=reduced.info.n_modes,
+            first_omitted_hz=reduced.info.first_omitted_frequency,
+            factorisation=reduced.info.factorisation,
+        )
     if file.scene.wear is not None:
-        facts |= {"delta_max_m": delta_max(file.scene, free, i.area), "wear_split": file.scene.wear.split}
-    if isinstance(file.scene, MeshScene) and (around := file.scene.wheel) is not None:
-        facts |= {"sectors": around.sectors, "engine_order": around.engine_order, "axis": np.array(around.axis)}
+        facts = replace(facts, delta_max_m=delta_max(file.scene, free, i.area), wear_split=file.scene.wear.split)
+    if isinstance(file.scene, MeshScene) and (wheel := file.scene.wheel) is not None:
+        facts = replace(facts, around=Around(wheel.sectors, wheel.engine_order, np.array(wheel.axis)))
     if choice is not None:
-        facts |= {"harmonics_error": choice.estimate.error, "harmonics_choice": choice.outcome}
+        facts = replace(facts, harmonics_error=choice.estimate.error, harmonics_choice=choice.outcome)
     mesh = part_mesh(part) if part is not None and file.scene.pictures.renders else None
-    return Result(provenance(file), facts, "model built", patch=patch, part=mesh)
+    return Result(provenance(file), facts, Stage.BUILT, patch=patch, part=mesh)
 
 
 def provenance(file: SceneFile) -> dict[str, str]:

@@ -171,7 +171,7 @@ def make_load(load: StaticLoad, mesh: Any, material: Any, folder: Path) -> Load:
 def reduce_part(scene: MeshScene, part: Part) -> ReducedModel:
     """The part on its contact and load nodes and a few modes, damped and held as the scene says."""
     reduced = hold(part_reduction.reduce(scene, part), part.held)
-    reduced = damped(scene, replace(reduced, info={**reduced.info, "joints": dict(part.joints)}))
+    reduced = damped(scene, replace(reduced, info=replace(reduced.info, joints=dict(part.joints))))
     return part_reduction.with_prescribed(scene, part, reduced)
 
 
@@ -213,9 +213,7 @@ def joint_pairs(scene: Scene, reduced: ReducedModel) -> dict[str, slice]:
     """Pairs of every joint; all of them where there is one."""
     if len(scene.joints) == 1:
         return {name: slice(0, reduced.interface.n_pair) for name in scene.joints}
-    found = reduced.info.get("joints", {})
-    assert isinstance(found, dict)
-    return found
+    return dict(reduced.info.joints)
 
 
 def joint_stiffness(scene: Scene, contact: Contact) -> tuple[float, float]:

@@ -19,13 +19,12 @@ from tribodyn.fem.springs import Spring
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.cyclic import ReducedSector, reduce_sector, travelling_wave
 from tribodyn.reduction.interface_modes import interface_modes
-from tribodyn.reduction.model import ReducedModel
-from tribodyn.reduction.prescribed import StaticReaction, prescribe
+from tribodyn.reduction.model import ReducedModel, StaticReaction
+from tribodyn.reduction.prescribed import prescribe
 from tribodyn.reduction.relative import relative
 from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
 
 SEAM = ("cyclic_right", "cyclic_left")  # what a part calls the faces where its wheel is one piece
-REACTION = "reaction"  # where the facts of a model keep its StaticReaction
 
 
 def material(scene: MeshScene, mesh: Any = None) -> Any:
@@ -68,7 +67,7 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
     extra = np.concatenate([[], *held]).astype(int)
     reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, extra)
     if wanted.interface_modes is not None:
-        masters = np.asarray(reduced.info["masters"])
+        masters = reduced.info.master_dofs
         touched = np.flatnonzero(np.abs(np.asarray(reduced.interface.B)[:, : len(masters)]).max(axis=0))
         keep = np.union1d(np.delete(masters, touched), extra)
         if wanted.interface_keep is not None:
@@ -127,14 +126,13 @@ def with_prescribed(scene: MeshScene, part: Part, reduced: ReducedModel) -> Redu
         for spring in (scene.springs[spring] for spring in given.springs):
             matrix = Spring(spring.group, spring.direction, spring.stiffness).matrix(part.mesh, part.node_sets)
             support += matrix.diagonal()[part.free[dofs]]
-        masters = np.searchsorted(np.asarray(reduced.info["masters"]), dofs)
+        masters = np.searchsorted(reduced.info.master_dofs, dofs)
         reduced, reaction = prescribe(reduced, masters, name, support=support)
-        reduced = replace(reduced, info={**reduced.info, REACTION: reaction})
+        reduced = replace(reduced, info=replace(reduced.info, reaction=reaction))
     return reduced
 
 
 def reaction_of(reduced: ReducedModel) -> StaticReaction:
     """What gives the static force at the prescribed nodes of a model that `with_prescribed` made."""
-    reaction = reduced.info[REACTION]
-    assert isinstance(reaction, StaticReaction)
-    return reaction
+    assert reduced.info.reaction is not None
+    return reduced.info.reaction

@@ -17,6 +17,7 @@ from tribodyn.hbm.threads import limited
 from tribodyn.workflows.accuracy import verdict
 from tribodyn.workflows.accuracy.budget import with_budget
 from tribodyn.workflows.result import store
+from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import curve, modelling, references, settings, wear_run, worn_responses
 from tribodyn.workflows.run.checkpoint import Clock, Keeper, alone_in
@@ -54,7 +55,7 @@ def run(file: SceneFile, folder: Path | None, progress: Progress, earlier: Resul
             with progress.stage("linear references"):
                 low, high = scene.response.references or scene.response.frequency
                 linear = references.linear_references(model.balance, settings.OUTPUT, 2 * np.pi * low, 2 * np.pi * high)
-            result = keep(replace(result, response=frf, references=linear, state="response computed"))
+            result = keep(replace(result, response=frf, references=linear, stage=Stage.RESPONSE))
         check_branch(result.response)
         result = keep(judged(scene, model.balance, result, progress))
         if scene.wears:
@@ -75,8 +76,7 @@ def run(file: SceneFile, folder: Path | None, progress: Progress, earlier: Resul
             result = with_budget(file, model.balance, result)
         if scene.verdict.enabled:
             result = replace(result, verdict=verdict.judge(file, model, result, progress).dumped())
-        state = "complete" if result.wear is None else f"complete: {result.wear.end}"
-        return keep(replace(result, state=state))
+        return keep(replace(result, stage=Stage.COMPLETE))
 
 
 def judged(scene: Scene, balance: HarmonicBalance, result: Result, progress: Progress) -> Result:

@@ -84,7 +84,8 @@ def plan(file: SceneFile) -> Plan:
     elements = nodes = held = 0
     if isinstance(scene, MatrixScene):
         reduced = matrix_model.make(scene, file.folder)
-        full, pairs, masters = int(str(reduced.info["n_full"])), reduced.interface.n_pair, reduced.system.n_dof
+        pairs, masters = reduced.interface.n_pair, reduced.system.n_dof
+        full = reduced.info.n_full or masters
         modes: int | None = 0
     else:
         part = file.part_scene.geometry.part
@@ -111,9 +112,7 @@ def plan(file: SceneFile) -> Plan:
         + 8 * 8.0 * contact**2
         + 4 * 8.0 * pairs * (n_component * basis.n_coeff) ** 2
     )
-    reduction = (
-        FACTOR_SECONDS * full**1.5 + BACK_SUBSTITUTION_SECONDS * full * model + 4 * DENSE_SECONDS * model**3
-    )
+    reduction = FACTOR_SECONDS * full**1.5 + BACK_SUBSTITUTION_SECONDS * full * model + 4 * DENSE_SECONDS * model**3
     steps, solves = _wear(scene)
     return Plan(
         elements=elements,

@@ -13,6 +13,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.evolution import WearProblem
 from tribodyn.hbm.wear_history import WearHistory, WearRow, history, rows_to_go_on
 from tribodyn.hbm.wear_law import JointWear
+from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.checkpoint import Keeper
@@ -38,7 +39,7 @@ def wear_down(
 
     def on_row(row: WearRow) -> None:
         rows.append(row)
-        keep(replace(result, wear=history(rows, "unfinished"), state=f"unfinished: {len(rows)} wear steps are done"))
+        keep(replace(result, wear=history(rows, "unfinished"), stage=Stage.WEARING))
         done = float(patch.area @ (row.depth + row.worn)) / to_wear if to_wear > 0 else 0.0
         deepest, hertz = 1e3 * float((row.depth + row.worn).max()), row.omega / (2 * np.pi)
         told = f"{row.cycles + row.cycles_in_step:.3g} cycles, peak {hertz:.4g} Hz and {1e3 * row.amplitude:.3g} mm"
@@ -49,7 +50,7 @@ def wear_down(
     worn = evolve(problem, wear, limit, wear.max_steps, on_row, result.wear)
     result = with_shown(scene, replace(result, wear=worn), model.balance.with_load(problem.mission[0].load), model.part)
     if worn.ended.failed:
-        keep(replace(result, state=worn.end))
+        keep(replace(result, stage=Stage.FAILED))
         raise SolveFailed(f"wear step {len(worn.cycles)}: {worn.end}")
     return result
 

@@ -19,6 +19,7 @@ from tribodyn.reduction.cyclic import nodal_diameters
 from tribodyn.workflows.pictures import render, render_wheel
 from tribodyn.workflows.result import store, summary
 from tribodyn.workflows.result.faces import faces_of
+from tribodyn.workflows.result.facts import Facts
 from tribodyn.workflows.run import modelling, part_reduction, pipeline, planning
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
@@ -45,14 +46,14 @@ def test_wear_goes_on_until_the_blades_are_free(finished):
     assert patch.area.sum() == pytest.approx(20e-3 * 30e-3)
     assert wear.depth[-1] @ patch.area == pytest.approx(2e-15 * wear.work.sum(), rel=1e-12)
     # delta_max is that of one face; both close, and what is left is the swing of free blades
-    delta = float(finished.facts["delta_max_m"])
+    delta = finished.facts.delta_max_m
     assert delta == pytest.approx(0.5 * patch.free_deflection @ patch.area / patch.area.sum())
     assert delta == pytest.approx(2.7e-3, rel=0.05)
     assert 2 * delta < wear.depth[-1].max() < 4 * delta
     # wear of shrouds lowers the frequency and raises the response, to those of the free blade
     hertz = wear.omega / (2 * np.pi)
     assert hertz[0] > 1.5 * hertz[-1]
-    assert hertz[-1] == pytest.approx(np.asarray(finished.facts["free_hz"])[0], rel=1e-3)
+    assert hertz[-1] == pytest.approx(finished.facts.free_hz[0], rel=1e-3)
     assert wear.amplitude[-1] > 10 * wear.amplitude[0]
     assert wear.amplitude[-1] == pytest.approx(finished.references.free.max(), rel=0.1)  # on a grid of 0.6 Hz
 
@@ -62,7 +63,7 @@ def test_result_is_kept_and_told(finished, folder):
     assert render_wheel.wheel_of(loaded).n_sectors == 40
     told = dict(summary.lines(loaded))
     assert told["wheel"] == "40 sectors, engine order 1"
-    assert render_wheel.wheel_of(replace(loaded, facts={})) is None
+    assert render_wheel.wheel_of(replace(loaded, facts=Facts())) is None
 
 
 def test_field_of_the_sector_meets_its_neighbour(finished):
@@ -183,7 +184,7 @@ def test_spinning_wheel_is_stiffer_and_presses_harder(folder):
     still, spun = built(folder), built(folder, "wheel.speed=6000 rpm")
     assert "centrifugal" in spun.reduced.system.loads
     assert spun.balance.excitation.loads[0, "centrifugal"] == pytest.approx((2 * np.pi * 100) ** 2)
-    free = [model.reduced.info["free_frequency"][0] for model in (still, spun)]
+    free = [model.reduced.info.free_frequency[0] for model in (still, spun)]
     assert 1.05 * free[0] < free[1] < 2 * free[0]
     assert "centrifugal" not in still.reduced.system.loads
 

@@ -1,0 +1,114 @@
+"""What a result says of its model in single numbers, and how far its run came."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+
+from tribodyn.hbm.outcome import End, WearEnd
+
+
+class Stage(End):
+    """How far a run came; where it failed, the sentence is that of the end of its wear."""
+
+    BUILT = "model built"
+    RESPONSE = "response computed"
+    WEARING = "unfinished"
+    FAILED = "failed"
+    COMPLETE = "complete"
+
+    @classmethod
+    def of(cls, sentence: str) -> Stage:
+        """The stage that a sentence tells; raises ValueError for one that tells none."""
+        failed = any(sentence.startswith(end.value) for end in WearEnd if end.failed)
+        return cls.FAILED if failed else super().of(sentence)
+
+
+@dataclass(frozen=True)
+class Around:
+    """The wheel that the part is one sector of: number of sectors, engine order, and (3,) axis."""
+
+    sectors: int
+    engine_order: int
+    axis: np.ndarray
+
+
+@dataclass(frozen=True)
+class BudgetEntry:
+    """What one discretisation contributes to the error of a result.
+
+    source : such as "harmonics"; quantity : what is off; error : relative, None where nobody knows
+    by : "estimate", or "trade" with the setting that was measured
+    """
+
+    source: str
+    quantity: str
+    error: float | None
+    by: str
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What was modelled and how long it took; None is what does not apply to a model.
+
+    full_dofs, model_dofs : before and after the reduction; contact_pairs; unknowns : of a balance solve
+    harmonics : kept ones; free_hz : (n,) natural frequencies with the contact absent [Hz]
+    seconds : of computing, interrupted runs included
+    compliance_error : relative, of the dynamic compliance of the contact
+    elements, nodes, scaled_jacobian : of the mesh, the last is the smallest one, 1 is best
+    retained_modes, first_omitted_hz, factorisation : of a reduction by Craig and Bampton
+    interface_modes : characteristic constraint modes that stand for the masters
+    delta_max_m : depth at which the static loads can close the contact no longer; wear_split : share of body 1
+    around : the wheel of a part that is a sector
+    harmonics_error, harmonics_choice : estimated truncation error of chosen harmonics, and how they were chosen
+    """
+
+    full_dofs: int = 0
+    model_dofs: int = 0
+    contact_pairs: int = 0
+    unknowns: int = 0
+    harmonics: tuple[int, ...] = ()
+    free_hz: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    seconds: float = 0.0
+    compliance_error: float | None = None
+    elements: int | None = None
+    nodes: int | None = None
+    scaled_jacobian: float | None = None
+    retained_modes: int | None = None
+    first_omitted_hz: float | None = None
+    factorisation: str | None = None
+    interface_modes: int | None = None
+    delta_max_m: float | None = None
+    wear_split: float | None = None
+    around: Around | None = None
+    harmonics_error: float | None = None
+    harmonics_choice: str | None = None
+
+    @property
+    def share_of_body_1(self) -> float:
+        """The share of the total depth that is worn off body 1, half where nothing is said."""
+        return 0.5 if self.wear_split is None else self.wear_split
+
+    def table(self) -> dict[str, Any]:
+        """name -> value of all that applies, those of the wheel among them: what a result file and exports keep."""
+        found = {item.name: getattr(self, item.name) for item in fields(self) if item.name != "around"}
+        found["harmonics"] = np.array(self.harmonics, dtype=np.int64)
+        if self.around is not None:
+            found |= vars(self.around)
+        return {name: value for name, value in found.items() if value is not None}
+
+    @classmethod
+    def of(cls, table: Mapping[str, Any]) -> Facts:
+        """The facts that a table as of `table` tells; what else is in it is passed over."""
+        plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in table.items()}
+        known = {item.name: plain[item.name] for item in fields(cls) if item.name in plain}
+        if "harmonics" in known:
+            known["harmonics"] = tuple(int(h) for h in np.atleast_1d(known["harmonics"]))
+        if "free_hz" in known:
+            known["free_hz"] = np.atleast_1d(known["free_hz"])
+        if "sectors" in plain:
+            known["around"] = Around(plain["sectors"], plain["engine_order"], np.asarray(plain["axis"], float))
+        return cls(**known)
