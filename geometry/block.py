@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
+
+import numpy as np
 
 from tribodyn.geometry import blocks, checks, grid
 
@@ -14,7 +17,7 @@ class Parameters:
 
     length, width, height : of the block [m]
     n_length, n_width, n_height : elements along x, y, z
-    grading : middle over outer element length along x and y; above 1 is finer towards the edges
+    pad_start, pad_end : a strip across the block from here to there along x, such as a bolt needs [m]; none where equal
     """
 
     length: float = 0.1
@@ -23,27 +26,43 @@ class Parameters:
     n_length: int = 8
     n_width: int = 2
     n_height: int = 1
-    grading: float = 1.0
+    pad_start: float = 0.0
+    pad_end: float = 0.0
 
     def __post_init__(self) -> None:
         checks.positive(self, "length", "width", "height")
-        checks.positive(self, "grading", unit="a ratio, 1 is uniform")
         checks.whole(self, "n_length", "n_width", "n_height", least=1)
+        if not 0 <= self.pad_start <= self.pad_end <= self.length:
+            raise ValueError(
+                f"geometry.pad_end is {self.pad_end}: give a strip from geometry.pad_start ({self.pad_start}) to "
+                f"at most geometry.length ({self.length})"
+            )
 
 
 def build(parameters: Parameters, path: str | Path) -> None:
     """Write the mesh.
 
-    Groups: volume "block"; surfaces "x_min", "x_max", "y_min", "y_max", "z_min", "z_max"; point "centre_top", the
-    middle of the face z_max, where a node lies whatever the number of elements
+    Groups: volume "block"; surfaces "x_min", "x_max", "y_min", "y_max", "z_min", "z_max", and of a strip "pad_min"
+    below and "pad_max" above
     """
     p = parameters
-    names = {"u-": "x_min", "u+": "x_max", "v-": "y_min", "v+": "y_max", "w-": "z_min", "w+": "z_max"}
-    block = blocks.Block(
-        grid.towards_ends(0.0, p.length, p.n_length, p.grading),
-        grid.towards_ends(0.0, p.width, p.n_width, p.grading),
-        grid.towards_ends(0.0, p.height, p.n_height),
-        "block",
-        names,
-    )
-    blocks.write(path, blocks.body([block], points={"centre_top": (p.length / 2, p.width / 2, p.height)}))
+    across, up = grid.towards_ends(0.0, p.width, p.n_width), grid.towards_ends(0.0, p.height, p.n_height)
+    padded = p.pad_end > p.pad_start
+    ends = sorted({0.0, p.length, *((p.pad_start, p.pad_end) if padded else ())})
+    parts = []
+    for start, end in pairwise(ends):
+        x = grid.towards_ends(start, end, max(round(p.n_length * (end - start) / p.length), 1))
+        kind = "pad" if padded and start == p.pad_start else "z"
+        sides = {"v-": "y_min", "v+": "y_max", "w-": f"{kind}_min", "w+": f"{kind}_max"}
+        sides |= {"u-": "x_min"} if start == 0.0 else {}
+        sides |= {"u+": "x_max"} if end == p.length else {}
+        parts.append(blocks.Block(x, across, up, "block", sides))
+    made = blocks.body(parts)
+    if padded:
+        empty = np.empty((0, 9), dtype=int)
+        whole = {
+            f"z_{side}": np.concatenate([made.surfaces.get(f"z_{side}", empty), made.surfaces[f"pad_{side}"]])
+            for side in ("min", "max")
+        }
+        made = replace(made, surfaces={**made.surfaces, **whole})
+    blocks.write(path, made)

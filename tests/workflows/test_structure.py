@@ -265,3 +265,12 @@ def test_a_bolt_has_its_preload_and_the_right_stiffness_along_it(tmp_path: Path,
 def test_a_bolt_that_crosses_nothing_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"bolts\.m8 crosses nothing"):
         built(STACK.replace('second = "b.x_max"\npreload', 'second = "a.x_min"\npreload'), tmp_path)
+
+
+def test_what_a_bolt_clamps_carries_its_force_on_small_faces_too(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "docs/howto/several-bodies.md").read_text(encoding="utf-8")
+    balance = built(text.split("```toml lap.toml\n")[1].split("```")[0], tmp_path).balance.with_load(0.0)
+    omega = 2 * np.pi * 4e3
+    found = newton.solve(balance, omega, balance.stuck(omega), newton.NewtonOptions(tolerance=1e-10))
+    assert found.converged
+    assert balance.preload(found.state) == pytest.approx(1000.0, rel=1e-6)

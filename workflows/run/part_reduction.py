@@ -25,6 +25,7 @@ from tribodyn.reduction.relative import relative
 from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
 
 SEAM = ("cyclic_right", "cyclic_left")  # what a part calls the faces where its wheel is one piece
+BOLTS = "bolts."  # begins the names of outputs that are elongations of bolts
 
 
 def material(scene: MeshScene, mesh: Any = None) -> Any:
@@ -64,7 +65,9 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
         raise ValueError("prescribed: a part whose turning is held cannot have prescribed nodes; hold it by springs")
     if wanted.relative:
         system, interface, back = relative(system, interface)
-    extra = np.concatenate([[], *held]).astype(int)
+    # a shank sees the whole static shape of the faces that it pulls at, which no few modes have
+    shanks = [np.flatnonzero(row) for name, row in part.system.outputs.items() if name.startswith(BOLTS)]
+    extra = np.concatenate([[], *held, *shanks]).astype(int)
     reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, extra)
     if wanted.interface_modes is not None:
         masters = reduced.info.master_dofs

@@ -16,6 +16,7 @@ from tribodyn.fem.material import Material
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.workflows.run import bodies
+from tribodyn.workflows.run.part_reduction import BOLTS
 from tribodyn.workflows.scene.structure import StructureScene
 
 REACHED = 1e-10  # relative error of a preload
@@ -24,7 +25,7 @@ TURNS = 40
 
 def output(name: str) -> str:
     """Name of the elongation of a bolt among the outputs."""
-    return f"bolts.{name}"
+    return f"{BOLTS}{name}"
 
 
 def rods(scene: StructureScene, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> dict[str, Bolt]:
