@@ -438,5 +438,22 @@ def test_the_budget_says_where_no_life_can_be_stated() -> None:
 def test_tables_that_come_with_the_program_can_be_read() -> None:
     for path in scene_file.CASES.glob("*/*.trade.json"):
         trade = trade_table.load(path)
-        assert trade.scene == path.stem
+        assert trade.scene == path.name.removesuffix(".trade.json")
         assert trade.rows
+
+
+@pytest.mark.parametrize("name", ["beam", "blade", "leaf_seal", "rig"])
+def test_tables_that_come_with_the_program_are_of_their_scenes(name: str) -> None:
+    file = scene_file.read(name)
+    assert accuracy.table_of(file, accuracy.beside(file)).scene == name
+
+
+def test_the_key_of_a_table_is_made_of_what_the_scene_says_other_than_by_default() -> None:
+    """A default written out, a knob or a picture is the same scene; a number that moves the answers is another one."""
+    key = trade_table.key_of(scene_file.read("beam"))
+    assert key.startswith(f"{trade_table.KEY_VERSION}-")
+    for same in ("response.bounds=false", "harmonics.samples=256", "wear.max_steps=3", "pictures.plots=false"):
+        assert trade_table.key_of(scene_file.read("beam", (same,))) == key
+    for other in ("response.bounds=true", "loads.harmonic.shake.value='1 N'"):
+        assert trade_table.key_of(scene_file.read("beam", (other,))) != key
+    assert trade_table.key_of(scene_file.read("beam", ("wear=",))) != key

@@ -18,6 +18,7 @@ from tribodyn.workflows.result.whole_file import replacing
 from tribodyn.workflows.scene.scene_file import SceneFile
 
 FORMAT = "tribodyn trade 2"
+KEY_VERSION = 2  # of the defaults and meanings of the schema that keys of tables rest on
 QUANTITIES = ("peak_hz", "peak_m", "energy_J", "preload_N", "depth_m", "life_cycles")
 NAMES = ("peak frequency", "amplitude", "energy", "preload", "depth", "life")
 
@@ -91,18 +92,24 @@ def known_of(rows: Iterable[Row], quantity: str) -> list[tuple[float, float]]:
 
 
 def key_of(file: SceneFile) -> str:
-    """A short name of everything in a scene that its trade depends on; the knobs themselves are not among it."""
-    said = file.scene.model_dump(mode="json", exclude={"scene": True, "pictures": True, "solver": True})
-    if (said.get("wear") or {}).get("end_at") == "vibrating":
-        del said["wear"]["end_at"]  # a key that tables made before it was there do not know; this is what they measured
-    said["contact"].setdefault("friction", None)  # tables made when every law had this number say so of all scenes
+    """A short name of everything in a scene that its trade depends on; the knobs themselves are not among it.
+
+    It is made of what the scene says other than by default, so that a key of the schema that comes later leaves the
+    names of older scenes as they are. Where a default changes its value or a key its meaning, KEY_VERSION goes up.
+    """
+    said = file.scene.model_dump(
+        mode="json", exclude_defaults=True, exclude={"scene": True, "pictures": True, "solver": True}
+    )
     own = {text.partition("=")[0] for k in study_of(file).knobs for s in k.settings for text in s.overrides}
     for key in {*KNOB_KEYS, *own}:
         section, _, last = key.partition(".")
-        for table in (said.get(section), (said.get(section) or {}).get("parameters")):
-            if isinstance(table, dict):
-                table.pop(last, None)
-    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()[:16]
+        if getattr(file.scene, section, None) is None:
+            continue
+        table = said.setdefault(section, {})  # a table with knobs alone is the same as one at its defaults
+        for place in (table, table.get("parameters")):
+            if isinstance(place, dict):
+                place.pop(last, None)
+    return f"{KEY_VERSION}-{hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()[:16]}"
 
 
 # set by knobs that any scene may have, so that they do not make another scene

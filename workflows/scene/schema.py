@@ -14,14 +14,12 @@ from typing import Annotated, Any, Generic, Literal, Self, TypeVar
 from pydantic import (
     Field,
     PrivateAttr,
-    SerializerFunctionWrapHandler,
     StrictBool,
     StrictInt,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
     WrapValidator,
     field_serializer,
-    model_serializer,
     model_validator,
 )
 
@@ -160,10 +158,6 @@ class Prescribed(Table):
 
 
 KINDS = ("value", "pressure", "moment", "acceleration", "base_acceleration", "speed", "temperature")
-LATER = (
-    "opposite", "shared", "moment", "acceleration", "base_acceleration", "speed", "point", "temperature", "bodies",
-    "field",
-)  # fmt: skip
 
 
 class StaticLoad(Table):
@@ -217,15 +211,6 @@ class StaticLoad(Table):
         if self.bodies and given[0] != "temperature":
             raise ValueError("expected bodies only with temperature")
         return self
-
-    @model_serializer(mode="wrap")
-    def _without_none(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """A force that is no couple is told as ever, so that results and tables made before are of the same scene."""
-        said: dict[str, Any] = write(self)
-        for name in LATER:
-            if said.get(name) == type(self).model_fields[name].default:
-                said.pop(name)
-        return said
 
     @property
     def amplitude(self) -> float:
