@@ -28,7 +28,7 @@ SAFETY = 0.5  # share of the tolerance that the harmonics left out may use up wh
 
 
 @dataclass(frozen=True)
-class Options:
+class ChoiceOptions:
     """How harmonics are chosen.
 
     tolerance : of the response of each output, relative to its vibration
@@ -80,7 +80,7 @@ class NotSolved(RuntimeError):
 
 
 @single
-def choose(balance: HarmonicBalance, omega: Sequence[float], options: Options | None = None) -> HarmonicChoice:
+def choose(balance: HarmonicBalance, omega: Sequence[float], options: ChoiceOptions | None = None) -> HarmonicChoice:
     """Choose harmonics for a problem, at frequencies where the choice matters, such as about a resonance.
 
     balance : the problem; its own harmonics play no part beyond those that carry loads, its samples are kept
@@ -88,7 +88,7 @@ def choose(balance: HarmonicBalance, omega: Sequence[float], options: Options | 
     Returns the choice, also where the tolerance is not met with the harmonics allowed: `outcome` says so
     Raises  NotSolved; ValueError where the samples are too few for the highest harmonic of the estimate
     """
-    options = options or Options()
+    options = options or ChoiceOptions()
     wide = widened(balance, options.highest)
     loaded = {h for (h, _), value in balance.excitation.loads.items() if value != 0}
     if balance.basis.has_static:
@@ -195,7 +195,7 @@ class _Trial:
         kept: tuple[int, ...],
         omega: Sequence[float],
         before: _Trial | None,
-        options: Options,
+        options: ChoiceOptions,
         shrinking: bool = False,
     ) -> _Trial:
         """Solve and estimate, from the solutions of another set where there is one; raises NotSolved.
@@ -233,7 +233,7 @@ class _Trial:
         """The largest estimated error."""
         return self.worst.error
 
-    def wanted(self, options: Options) -> set[int]:
+    def wanted(self, options: ChoiceOptions) -> set[int]:
         """Harmonics to take in: the fewest that leave the shares of the others below the tolerance everywhere."""
         wanted: dict[int, float] = {}
         for found in self.estimates:

@@ -26,7 +26,7 @@ CORNER = 1e-2  # of the longest step, below which any turn is taken as a corner 
 
 
 @dataclass(frozen=True)
-class Options:
+class BackboneOptions:
     """n_points : amplitudes on an easy way, equidistant in the logarithm: this sets the longest step
 
     min_step : shortest step, as a fraction of the longest; max_points : points after which to end
@@ -85,7 +85,7 @@ def backbone(
     stop: float,
     mode: int = 0,
     output: str | None = None,
-    options: Options | None = None,
+    options: BackboneOptions | None = None,
 ) -> Backbone:
     """Follow one nonlinear mode from a small to a large amplitude (or back).
 
@@ -94,7 +94,7 @@ def backbone(
     mode : number of the reference mode, from 0, among the modes about the static equilibrium
     Raises  ValueError for models whose harmonics see different systems, unknown outputs, no static equilibrium
     """
-    options = options or Options()
+    options = options or BackboneOptions()
     if not (start > 0 and stop > 0 and start != stop):
         raise ValueError(f"the amplitudes of a backbone must be > 0 and differ, not {start} and {stop}")
     problem = FreeVibration(balance, mode, output)
@@ -103,7 +103,7 @@ def backbone(
     return _result(problem, solved, end)
 
 
-def _walk(problem: FreeVibration, start: float, goal: float, options: Options) -> tuple[list[_Solved], str]:
+def _walk(problem: FreeVibration, start: float, goal: float, options: BackboneOptions) -> tuple[list[_Solved], str]:
     """Points from the logarithm of the amplitude `start` to `goal`, and how the walk ends."""
     first = problem.first_guess(np.exp(start))
     fixed = np.zeros(len(first.coordinates))

@@ -10,7 +10,7 @@ import pytest
 from tests.helpers.continuation_models import Duffing, Lifting, rubbing_mass, rubbing_pairs
 from tribodyn.hbm import harmonic_choice, newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.harmonic_choice import NotSolved, Options, choose, widened
+from tribodyn.hbm.harmonic_choice import ChoiceOptions, NotSolved, choose, widened
 
 
 def friction() -> tuple[HarmonicBalance, list[float]]:
@@ -40,7 +40,7 @@ def true_error(
 def test_estimate_is_the_true_change_and_the_choice_meets_the_tolerance():
     for balance, omega in (friction(), pairs(), (Lifting().balance(n_samples=256), [0.7, 1.8])):
         for tolerance in (5e-2, 1e-2):
-            choice = choose(balance, omega, Options(tolerance=tolerance, highest=13))
+            choice = choose(balance, omega, ChoiceOptions(tolerance=tolerance, highest=13))
             error = true_error(balance, choice.harmonics, omega, list(choice.x), 16)
             np.testing.assert_allclose(choice.estimate.error, error, rtol=0.25)
             assert error < 1.25 * tolerance, choice.outcome
@@ -54,7 +54,7 @@ def test_estimate_is_the_true_change_and_the_choice_meets_the_tolerance():
 def test_the_set_is_the_smallest_that_brute_force_finds():
     balance, omega = friction()
     tolerance, candidates = 2e-3, (2, 3, 4, 5, 6, 7)
-    choice = choose(balance, omega, Options(tolerance=tolerance, highest=7))
+    choice = choose(balance, omega, ChoiceOptions(tolerance=tolerance, highest=7))
     full = widened(balance, 7)
     enough = []
     for n in range(len(choice.harmonics)):
@@ -71,7 +71,7 @@ def test_the_set_is_the_smallest_that_brute_force_finds():
 
 def test_a_symmetric_problem_needs_odd_harmonics_only():
     duffing = Duffing().balance(n_samples=256)
-    choice = choose(duffing, [0.4, 0.9], Options(tolerance=1e-4))
+    choice = choose(duffing, [0.4, 0.9], ChoiceOptions(tolerance=1e-4))
     assert choice.harmonics == (1, 3, 5, 7) or choice.harmonics == (1, 3, 5)
     assert max(choice.estimate.shares[h] for h in (0, 2, 4, 6)) < 1e-10
 
@@ -105,10 +105,10 @@ def test_fewer_harmonics_share_the_linear_side():
 
 def test_it_says_what_it_could_not_do():
     balance, omega = friction()
-    short = choose(balance, omega, Options(tolerance=1e-6, highest=3))
+    short = choose(balance, omega, ChoiceOptions(tolerance=1e-6, highest=3))
     assert "above the tolerance" in short.outcome
     assert short.outcome.endswith("allow harmonics above 3")
     with pytest.raises(NotSolved, match="harmonics cannot be chosen: no solution at"):
-        choose(balance, omega, Options(newton=newton.NewtonOptions(max_steps=0)))
+        choose(balance, omega, ChoiceOptions(newton=newton.NewtonOptions(max_steps=0)))
     with pytest.raises(ValueError, match="time samples cannot carry"):
-        choose(balance, omega, Options(highest=100))
+        choose(balance, omega, ChoiceOptions(highest=100))

@@ -16,7 +16,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
-from tribodyn.hbm.nonlinear_modes import Options, backbone
+from tribodyn.hbm.nonlinear_modes import BackboneOptions, backbone
 from tribodyn.reduction.model import ReducedModel
 
 MASS, STIFFNESS, RATIO = 1.3, 4.0e4, 0.01
@@ -91,14 +91,14 @@ def structure(ratio: float, friction: float = 0.3) -> HarmonicBalance:
     parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(3e6, 5e6), friction=friction)
     basis = HarmonicBasis((0, 1, 2, 3), 512, "located")  # the normal spring then does no work, not even by sampling
     excitation = Excitation.of({"static": 30.0})
-    return HarmonicBalance.of(
-        model, Joint("contact", "jenkins", parameters), basis, excitation, 600.0).with_gap(np.full(3, -5e-5)
+    return HarmonicBalance.of(model, Joint("contact", "jenkins", parameters), basis, excitation, 600.0).with_gap(
+        np.full(3, -5e-5)
     )
 
 
 def test_small_amplitude_is_the_linear_mode_and_the_backbone_goes_on():
     balance = structure(ratio=0.01)
-    found = backbone(balance, 1e-9, 3e-5, mode=1, options=Options(n_points=25))
+    found = backbone(balance, 1e-9, 3e-5, mode=1, options=BackboneOptions(n_points=25))
     system, b = balance.model.system, np.asarray(balance.model.interface.B)
     stuck = system.stiffness + b.T @ (balance.contact.stiffness.ravel()[:, None] * b)
     lam, phi = sla.eigh(stuck, system.mass)
@@ -113,7 +113,7 @@ def test_small_amplitude_is_the_linear_mode_and_the_backbone_goes_on():
 def test_damping_is_the_energy_lost_and_a_force_along_the_added_term_holds_the_motion():
     """Forced in phase with its own added term, the structure vibrates in the nonlinear mode: K, M, C and f_c agree."""
     balance = structure(ratio=0.0)
-    found = backbone(balance, 1e-8, 2e-5, mode=0, options=Options(n_points=12))
+    found = backbone(balance, 1e-8, 2e-5, mode=0, options=BackboneOptions(n_points=12))
     i = -1
     omega, zeta = found.omega[i], found.damping[i]
     system, basis = balance.model.system, balance.basis
@@ -139,9 +139,7 @@ def test_damping_is_the_energy_lost_and_a_force_along_the_added_term_holds_the_m
     forced_model = ReducedModel(
         type(system)(system.mass, system.stiffness, None, load_vectors, system.outputs), balance.model.interface
     )
-    forced = HarmonicBalance.of(
-        forced_model, balance.contact.joints, basis, Excitation(loads), 600.0
-    )
+    forced = HarmonicBalance.of(forced_model, balance.contact.joints, basis, Excitation(loads), 600.0)
     forced_state = forced.evaluate(omega, x)
     assert newton.relative_residual(forced_state, forced.x_lin(omega)) < 1e-6
 

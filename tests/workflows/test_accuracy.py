@@ -12,7 +12,7 @@ import pytest
 from tribodyn.workflows.accuracy import accuracy, budget, converge, knob_trade, knobs, trade_table
 from tribodyn.workflows.accuracy.limit import limit_of
 from tribodyn.workflows.accuracy.measure import measure
-from tribodyn.workflows.accuracy.trade_table import Row, Trade
+from tribodyn.workflows.accuracy.trade_table import Trade, TradeRow
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.facts import BudgetEntry, Facts, Stage
@@ -40,7 +40,7 @@ def shipped_trade(name: str) -> Path:
 def dear_by_size(trade: Trade) -> Trade:
     """The trade as of a clock by which each finer setting takes half as long again: so machines choose alike."""
 
-    def rank(row: Row) -> int:
+    def rank(row: TradeRow) -> int:
         return sum(other.size < row.size or np.isnan(row.size) for other in trade.of(row.knob) if other is not row)
 
     return replace(trade, base_seconds=1.0, rows=tuple(replace(row, share=1.5 ** rank(row)) for row in trade.rows))
@@ -283,12 +283,12 @@ def test_every_setting_of_every_knob_is_a_scene() -> None:
                     scene_file.read(scene, (*ladder.base, *setting.overrides, *placement))
 
 
-def made_up(knob: str, cost: float, error: float) -> Row:
+def made_up(knob: str, cost: float, error: float) -> TradeRow:
     values: dict[str, float | None] = {**dict.fromkeys(trade_table.QUANTITIES), "peak_m": 1 + error}
     errors: dict[str, float | None] = {**dict.fromkeys(trade_table.QUANTITIES), "peak_m": error}
     label = f"{knob}={cost:g}"
     doubts = {name: None if e is None else 0.0 for name, e in errors.items()}
-    return Row(knob, label, cost, (label,), values, errors, doubts, cost, cost / 4, 0.0, "converged", True)
+    return TradeRow(knob, label, cost, (label,), values, errors, doubts, cost, cost / 4, 0.0, "converged", True)
 
 
 def test_the_cheapest_combination_is_found() -> None:
@@ -345,10 +345,10 @@ def test_grids_of_the_beam(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert (tmp_path / "converge_beam_contact_grid.png").stat().st_size > 10_000
 
 
-def grid_row(n: int, worst: float, own: bool = False) -> converge.Row:
+def grid_row(n: int, worst: float, own: bool = False) -> converge.GridRow:
     none = dict.fromkeys(trade_table.QUANTITIES)
     one = {**none, "peak_m": worst}
-    return converge.Row(n, f"n={n}", own, n * n, {**none, "peak_m": 1.0}, one, one, 0.1, 1.0, "converged")
+    return converge.GridRow(n, f"n={n}", own, n * n, {**none, "peak_m": 1.0}, one, one, 0.1, 1.0, "converged")
 
 
 def test_the_grid_that_is_needed_is_the_first_from_which_all_are_good() -> None:
@@ -382,7 +382,7 @@ def test_the_budget_of_a_run(tmp_path: Path) -> None:
 def test_what_no_estimator_covers_is_known_from_the_trade() -> None:
     """A grid that was not measured itself has the error of the next coarser one."""
 
-    def traded(knob: str, size: float, error: float, *overrides: str) -> Row:
+    def traded(knob: str, size: float, error: float, *overrides: str) -> TradeRow:
         return replace(made_up(knob, size, error), overrides=overrides)
 
     rows = [traded("contact_grid", n, 0.1 / n, f"geometry.n_patch={n}") for n in (3, 5, 9)]

@@ -31,7 +31,7 @@ def test_small_sizes_converge_and_memory_is_their_own(
 
 
 def test_the_slope_is_the_exponent() -> None:
-    row = scaling.Row(5, 75, 92, 1.0, 0.1, 1.0, 40, 40, 200, 1e-9, 10**9)
+    row = scaling.SizeCost(5, 75, 92, 1.0, 0.1, 1.0, 40, 40, 200, 1e-9, 10**9)
     rows = [replace(row, contact_dofs=n, response_seconds=3e-4 * n**1.25) for n in (75, 243, 507, 2883)]
     assert scaling.slope(rows) == pytest.approx(1.25, rel=1e-12)
     assert "power of 1.25" in scaling.as_text(rows)

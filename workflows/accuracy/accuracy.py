@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.hbm.branch import CONVERGED
-from tribodyn.workflows.accuracy.trade_table import NAMES, QUANTITIES, Row, Trade, key_of, load
+from tribodyn.workflows.accuracy.trade_table import NAMES, QUANTITIES, Trade, TradeRow, key_of, load
 from tribodyn.workflows.scene.scene_file import SceneFile, read
 from tribodyn.workflows.scene.units import to_si
 
@@ -37,7 +37,7 @@ class Choice:
     given : knobs left out; missed : why some quantities are not promised, if there are any
     """
 
-    rows: tuple[Row, ...]
+    rows: tuple[TradeRow, ...]
     errors: dict[str, float]
     seconds: float
     given: tuple[str, ...] = ()
@@ -103,9 +103,7 @@ def _quoted(name: str) -> str:
     return f'"{name}"' if name else "nothing"
 
 
-def choose(
-    trade: Trade, wanted: float, quantities: Sequence[str] = QUANTITIES, given: Sequence[str] = ()
-) -> Choice:
+def choose(trade: Trade, wanted: float, quantities: Sequence[str] = QUANTITIES, given: Sequence[str] = ()) -> Choice:
     """The cheapest settings whose errors add up to less than the wanted one, in every quantity.
 
     wanted : relative error, above 0; quantities : that matter, out of trade_table.QUANTITIES
@@ -131,7 +129,7 @@ def choose(
     def seconds(places: dict[str, int]) -> float:
         return trade.base_seconds * float(np.prod([ladders[k][i].share for k, i in places.items()]))
 
-    def worst(rows: Sequence[Row], place: int) -> float:
+    def worst(rows: Sequence[TradeRow], place: int) -> float:
         return max(error_of(rows, place, q) for q in asked)
 
     place = {k: min(range(len(rows)), key=lambda i, rows=rows: worst(rows, i)) for k, rows in ladders.items()}  # type: ignore[misc]
@@ -160,7 +158,7 @@ def choose_most(trade: Trade, wanted: float, quantities: Sequence[str], given: S
 
 
 def _refusal(
-    scene: str, wanted: float, errors: dict[str, float], ladders: dict[str, list[Row]], place: dict[str, int]
+    scene: str, wanted: float, errors: dict[str, float], ladders: dict[str, list[TradeRow]], place: dict[str, int]
 ) -> Refused:
     """Which knob is to blame for which quantity."""
     quantity = max(errors, key=lambda q: errors[q])
@@ -184,7 +182,7 @@ def _name(quantity: str) -> str:
     return NAMES[QUANTITIES.index(quantity)]
 
 
-def _usable(rows: Sequence[Row], asked: Sequence[str]) -> list[Row]:
+def _usable(rows: Sequence[TradeRow], asked: Sequence[str]) -> list[TradeRow]:
     """Settings of a knob for which all was measured that is asked and that the knob has a say in.
 
     None of a knob that is another model, or that has no say in anything that is asked.
@@ -195,14 +193,14 @@ def _usable(rows: Sequence[Row], asked: Sequence[str]) -> list[Row]:
     return [row for row in good if all(row.values[q] is not None for q in said)] if said else []
 
 
-def _judged_by(rows: Sequence[Row], quantity: str) -> str:
+def _judged_by(rows: Sequence[TradeRow], quantity: str) -> str:
     """The quantity itself; of depth and life of a knob that was not worn its energy, as life goes with the work."""
     if quantity in OF_WEAR and all(row.values[quantity] is None for row in rows):
         return "energy_J"
     return quantity
 
 
-def error_of(rows: Sequence[Row], place: int, quantity: str) -> float:
+def error_of(rows: Sequence[TradeRow], place: int, quantity: str) -> float:
     """Error of a setting, with what is doubtful about the limit of its knob; 0 where the knob has no say in it.
 
     A knob whose settings were not worn is judged by its energy: life is in proportion to the work per cycle.

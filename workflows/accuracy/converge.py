@@ -35,7 +35,7 @@ MOST_SHOWN = 0.98  # share of the nodes whose difference is within the colours o
 
 
 @dataclass(frozen=True)
-class Row:
+class GridRow:
     """One grid.
 
     size : nodes along the patch; setting : its overrides; own : whether the scene has this grid
@@ -62,11 +62,11 @@ class Study:
 
     scene: str
     ladder: str
-    rows: tuple[Row, ...]
+    rows: tuple[GridRow, ...]
     limits: dict[str, Limit]
     measured: tuple[Measured, ...]
 
-    def needed(self, quantity: str, wanted: float = WANTED) -> Row | None:
+    def needed(self, quantity: str, wanted: float = WANTED) -> GridRow | None:
         """The coarsest grid from which on every grid is within the wanted error, however its nodes are placed."""
         found = None
         for row in reversed(self.rows):
@@ -112,7 +112,7 @@ def _climb(scene: str, ladder: Ladder, base: tuple[str, ...], most: float, say: 
         raise RuntimeError(f"{ladder.name}: no grid has an answer, the finest says: {measured[-1][0].outcome}")
     own = scene_file.read(scene, base).scene
     rows = tuple(
-        Row(
+        GridRow(
             size=setting.size,
             setting=setting.label,
             own=scene_file.read(scene, (*base, *setting.overrides)).scene == own,
@@ -215,7 +215,7 @@ def _name(quantity: str) -> str:
     return NAMES[QUANTITIES.index(quantity)]
 
 
-def _cell(row: Row, quantity: str) -> str:
+def _cell(row: GridRow, quantity: str) -> str:
     value, error, worst = row.values[quantity], row.errors[quantity], row.worst[quantity]
     if value is None or error is None or worst is None:
         return ""
@@ -226,11 +226,11 @@ def _order(end: Limit) -> str:
     return "scattered" if np.isnan(end.order) else f"order {end.order:.1f}"
 
 
-def _grid(row: Row | None) -> str:
+def _grid(row: GridRow | None) -> str:
     return "a finer grid than these" if row is None else f"{row.setting} ({row.pairs} pairs) or finer"
 
 
-def _judgement(row: Row, quantities: Sequence[str]) -> str:
+def _judgement(row: GridRow, quantities: Sequence[str]) -> str:
     """What the grid of the scene is good for."""
     known = {q: worst for q in quantities if (worst := row.worst[q]) is not None}
     errors = ", ".join(f"{_name(q)} {100 * worst:.2g} %" for q, worst in known.items())

@@ -10,7 +10,7 @@ from tribodyn.hbm.branch import CONVERGED
 from tribodyn.workflows.accuracy.knobs import Knob, Setting, chosen, knobs_of, study_of
 from tribodyn.workflows.accuracy.limit import limit_of
 from tribodyn.workflows.accuracy.measure import Measured, measure
-from tribodyn.workflows.accuracy.trade_table import NAMES, QUANTITIES, Row, Trade, key_of, known_of, plain
+from tribodyn.workflows.accuracy.trade_table import NAMES, QUANTITIES, Trade, TradeRow, key_of, known_of, plain
 from tribodyn.workflows.scene import scene_file
 
 BASE = "base"
@@ -78,7 +78,7 @@ def _rows_of(
     base: tuple[str, ...],
     meter: Meter,
     say: Callable[[str], None],
-) -> list[Row]:
+) -> list[TradeRow]:
     found = []
     for setting in settings:
         file = scene_file.read(scene, (*base, *setting.overrides))
@@ -92,9 +92,9 @@ def _rows_of(
     return judged(found)
 
 
-def _row(knob: Knob, setting: Setting, measured: Measured) -> Row:
+def _row(knob: Knob, setting: Setting, measured: Measured) -> TradeRow:
     unknown: dict[str, float | None] = dict.fromkeys(QUANTITIES)
-    return Row(
+    return TradeRow(
         knob=knob.name,
         setting=setting.label,
         size=setting.size,
@@ -110,16 +110,16 @@ def _row(knob: Knob, setting: Setting, measured: Measured) -> Row:
     )
 
 
-def judged(rows: Sequence[Row]) -> list[Row]:
+def judged(rows: Sequence[TradeRow]) -> list[TradeRow]:
     """The rows of a knob with their errors, and with what is doubtful about the limit that these are relative to."""
     known = {name: known_of(rows, name) for name in QUANTITIES}
     limits = {name: limit_of(*zip(*points, strict=True)) for name, points in known.items() if points}
 
-    def error(row: Row, name: str) -> float | None:
+    def error(row: TradeRow, name: str) -> float | None:
         value = row.values[name]
         return None if value is None or name not in limits else value / limits[name].value - 1
 
-    def doubt(row: Row, name: str) -> float | None:
+    def doubt(row: TradeRow, name: str) -> float | None:
         return None if row.values[name] is None or name not in limits else limits[name].doubt
 
     return [
@@ -151,7 +151,7 @@ def as_text(trade: Trade) -> str:
     return "\n".join(lines)
 
 
-def _cell(row: Row, quantity: str) -> str:
+def _cell(row: TradeRow, quantity: str) -> str:
     error, doubt = row.errors[quantity], row.doubts[quantity]
     if error is None or doubt is None:
         return ""
@@ -159,5 +159,5 @@ def _cell(row: Row, quantity: str) -> str:
     return f"{known} ~{100 * doubt:.2g} %" if doubt else f"{known} %"
 
 
-def _failure(row: Row) -> str:
+def _failure(row: TradeRow) -> str:
     return "" if row.outcome == CONVERGED else f"  {row.outcome}"

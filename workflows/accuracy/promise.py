@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from tribodyn.hbm.branch import CONVERGED
 from tribodyn.workflows.accuracy.accuracy import OF_WEAR, Choice, parsed, table_of, tuned
@@ -51,9 +51,7 @@ class Check:
         return all(line.kept for line in self.lines)
 
 
-def check(
-    scene: str, overrides: Sequence[str], accuracy: str, table: Path | None, say: Callable[[str], None]
-) -> Check:
+def check(scene: str, overrides: Sequence[str], accuracy: str, table: Path | None, say: Callable[[str], None]) -> Check:
     """Run the settings that an accuracy chooses, as `run` would, and the scene with all knobs finer at once.
 
     accuracy : as workflows.accuracy.parsed reads it; table : the trade to go by, the scene's own where None
@@ -125,7 +123,6 @@ def as_text(found: Check) -> str:
     return "\n".join([*rows, "promise kept" if found.kept else "promise broken"])
 
 
-def as_json(found: Check) -> str:
+def as_record(found: Check) -> dict[str, Any]:
     """The check for machines."""
-    said = asdict(found) | {"lines": [{**asdict(line), "kept": line.kept} for line in found.lines]}
-    return json.dumps(said, indent=2)
+    return asdict(found) | {"lines": [{**asdict(line), "kept": line.kept} for line in found.lines]}

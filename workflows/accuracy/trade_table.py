@@ -24,7 +24,7 @@ NAMES = ("peak frequency", "amplitude", "energy", "preload", "depth", "life")
 
 
 @dataclass(frozen=True)
-class Row:
+class TradeRow:
     """One setting of a knob.
 
     size : of the setting, larger is finer, nan where it is exact; overrides : of the scene
@@ -66,14 +66,14 @@ class Trade:
     key: str
     base: tuple[str, ...]
     base_seconds: float
-    rows: tuple[Row, ...]
+    rows: tuple[TradeRow, ...]
 
     @property
     def knobs(self) -> tuple[str, ...]:
         """Names of the knobs, in order."""
         return tuple(dict.fromkeys(row.knob for row in self.rows))
 
-    def of(self, knob: str) -> tuple[Row, ...]:
+    def of(self, knob: str) -> tuple[TradeRow, ...]:
         """Rows of a knob, the finest last."""
         return tuple(row for row in self.rows if row.knob == knob)
 
@@ -84,7 +84,7 @@ class Trade:
         return order if np.isfinite(order) else None
 
 
-def known_of(rows: Iterable[Row], quantity: str) -> list[tuple[float, float]]:
+def known_of(rows: Iterable[TradeRow], quantity: str) -> list[tuple[float, float]]:
     """Size and value of the rows that say a quantity, from coarse to fine."""
     return [
         (row.size, value) for row in rows if row.outcome == CONVERGED and (value := row.values[quantity]) is not None
@@ -138,7 +138,10 @@ def load(path: Path) -> Trade:
     if not isinstance(said, dict) or said.get("format") != FORMAT:
         raise ValueError(f'"{path}" is no trade table of this version: make it again with tribodyn trade SCENE')
     rows = [
-        Row(**{f.name: row[f.name] for f in fields(Row)} | {"overrides": tuple(row["overrides"]), "size": _size(row)})
+        TradeRow(
+            **{f.name: row[f.name] for f in fields(TradeRow)}
+            | {"overrides": tuple(row["overrides"]), "size": _size(row)}
+        )
         for row in said["rows"]
     ]
     return Trade(said["scene"], said["key"], tuple(said["base"]), said["base_seconds"], tuple(rows))

@@ -233,7 +233,7 @@ class Balance:
     ) -> modes.Backbone:
         """Frequency and damping of a nonlinear mode between two amplitudes [m] of an output; static loads act."""
         return modes.backbone(
-            self.problem, start, stop, mode, self._output(output), modes.Options(points, newton=self.newton)
+            self.problem, start, stop, mode, self._output(output), modes.BackboneOptions(points, newton=self.newton)
         )
 
     def integrate(self, frequency: float, start: Cycle | None = None, **options: Any) -> time.PeriodicMotion:

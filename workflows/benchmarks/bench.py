@@ -37,7 +37,7 @@ THESIS_SHARES = {  # contact, balance, inversion in % of one core, tables 7.1 an
 
 
 @dataclass(frozen=True)
-class Row:
+class Timing:
     """One line of the benchmark.
 
     harmonics : such as "0+3", 0 to 3; unknowns : of the dense algorithm, and of ours at the contact
@@ -67,7 +67,7 @@ class Row:
     thesis_seconds: float | None
 
 
-def run(quick: bool, say: Callable[[str], None]) -> list[Row]:
+def run(quick: bool, say: Callable[[str], None]) -> list[Timing]:
     """The table: 0+1 and 0+3 on one thread when quick, else 0+1, 0+3, 0+5 on one and two threads."""
     plans = [("0+1", 1, (6, 4)), ("0+3", 1, (2, 2))]
     if not quick:
@@ -97,7 +97,7 @@ def _problem() -> Callable[[str], HarmonicBalance]:
     return of
 
 
-def _measure(balance: HarmonicBalance, harmonics: str, threads: int, windows: tuple[int, int]) -> Row:
+def _measure(balance: HarmonicBalance, harmonics: str, threads: int, windows: tuple[int, int]) -> Timing:
     low, high = settings.response_range(scene_file.read("beam", ()).scene)
     options = natural.Options(POINTS, newton=NewtonOptions(TOLERANCE))
     natural.follow(balance, high, high * 0.999, replace(options, n_points=2))  # compiles outside the clock
@@ -130,7 +130,7 @@ def _measure(balance: HarmonicBalance, harmonics: str, threads: int, windows: tu
         polished = dense.solve(last, q[-1], 1e-12, max_steps=6).x
         difference = float(np.maximum(difference, np.abs(polished - exact).max() / np.abs(exact).max()))
     p = dense.profile
-    return Row(
+    return Timing(
         harmonics=harmonics,
         threads=threads,
         points=len(branch.omega),
@@ -177,12 +177,12 @@ def _shares(stats: pstats.Stats) -> dict[str, float]:
     return shares | {"balance": 1.0 - sum(shares.values())}
 
 
-def as_records(rows: list[Row]) -> list[dict[str, object]]:
+def as_records(rows: list[Timing]) -> list[dict[str, object]]:
     """The rows for JSON."""
     return [asdict(row) for row in rows]
 
 
-def as_text(rows: list[Row]) -> str:
+def as_text(rows: list[Timing]) -> str:
     """The rows for people, the thesis's figures beside ours."""
     lines = [
         "harmonics threads   points   seconds  Newton    ratio  largest difference  thesis 1 core   "

@@ -31,7 +31,7 @@ UNITS = (1e-6, 1e-3, 1e3, 1e6)
 
 
 @dataclass(frozen=True)
-class Row:
+class Trial:
     """One cell: what was varied on which model, at which setting, and what came out.
 
     outcome : "converged", "refused" or "wrong"; reason : the check, the refusal or what is wrong
@@ -50,7 +50,7 @@ class Row:
 Cell = tuple[str, str, str, Callable[[], Verdict]]  # model, what is varied, setting, how to judge it
 
 
-def run(quick: bool, say: Callable[[str], None]) -> tuple[Row, ...]:
+def run(quick: bool, say: Callable[[str], None]) -> tuple[Trial, ...]:
     """Every cell of the table; quick: smaller models and every third cell."""
     rows = []
     with threadpool_limits(1):
@@ -60,7 +60,7 @@ def run(quick: bool, say: Callable[[str], None]) -> tuple[Row, ...]:
             clock = process_time()
             verdict = outcome_of(judge)
             spent = process_time() - clock
-            rows.append(Row(model, varied, setting, verdict.outcome, verdict.reason, verdict.deviation, spent))
+            rows.append(Trial(model, varied, setting, verdict.outcome, verdict.reason, verdict.deviation, spent))
             if len(rows) % 50 == 0:
                 say(f"{len(rows)} cells, {Counter(row.outcome for row in rows)[WRONG]} wrong")
     return tuple(rows)
@@ -238,13 +238,13 @@ def _must_refuse(body: Body, changes: dict[str, Any]) -> Verdict:
     return verdict
 
 
-def counts(rows: tuple[Row, ...]) -> dict[str, int]:
+def counts(rows: tuple[Trial, ...]) -> dict[str, int]:
     """Cells by outcome."""
     found = Counter(row.outcome for row in rows)
     return {outcome: found[outcome] for outcome in (CONVERGED, REFUSED, WRONG)}
 
 
-def as_records(rows: tuple[Row, ...]) -> list[dict[str, object]]:
+def as_records(rows: tuple[Trial, ...]) -> list[dict[str, object]]:
     """The rows for JSON; what is not a number is None."""
     return [
         {
@@ -259,7 +259,7 @@ def as_records(rows: tuple[Row, ...]) -> list[dict[str, object]]:
     ]
 
 
-def as_text(rows: tuple[Row, ...]) -> str:
+def as_text(rows: tuple[Trial, ...]) -> str:
     """One line for each model and thing varied, the refusals with their sentences, and what is wrong."""
     lines = [f"{'model':38} {'varied':32} {'cells':>5} {'converged':>9} {'refused':>7} {'wrong':>5}  largest deviation"]
     for model, varied in dict.fromkeys((row.model, row.varied) for row in rows):

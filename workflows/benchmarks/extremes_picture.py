@@ -8,14 +8,14 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from tribodyn.hbm.branch import CONVERGED
-from tribodyn.workflows.benchmarks.extremes import Row, counts
+from tribodyn.workflows.benchmarks.extremes import Trial, counts
 from tribodyn.workflows.benchmarks.extremes_judge import REFUSED, WRONG
 from tribodyn.workflows.pictures.style import BLUE, ORANGE, RED, STYLE
 
 COLOUR = {CONVERGED: BLUE, REFUSED: ORANGE, WRONG: RED}
 
 
-def picture(rows: Sequence[Row]) -> Figure:
+def picture(rows: Sequence[Trial]) -> Figure:
     """Cells from the first to the last setting of each line, coloured by their outcome."""
     lines = list(dict.fromkeys((row.model, row.varied) for row in rows))
     with mpl.rc_context(STYLE):

@@ -30,7 +30,7 @@ HARMONICS, SAMPLES, POINTS = [0, 1, 2, 3], 100, 40
 
 
 @dataclass(frozen=True)
-class Row:
+class SizeCost:
     """One size of the contact.
 
     n_patch : nodes along each side; contact_dofs : of all pairs; model_dofs : of the reduced model
@@ -52,7 +52,7 @@ class Row:
     peak_bytes: float
 
 
-def run(sizes: Sequence[int], say: Callable[[str], None]) -> list[Row]:
+def run(sizes: Sequence[int], say: Callable[[str], None]) -> list[SizeCost]:
     """Measure every size, the smallest first."""
     rows = []
     for n_patch in sorted(sizes):
@@ -62,7 +62,7 @@ def run(sizes: Sequence[int], say: Callable[[str], None]) -> list[Row]:
     return rows
 
 
-def measure(n_patch: int, points: int = POINTS) -> Row:
+def measure(n_patch: int, points: int = POINTS) -> SizeCost:
     """One response curve of the beam scene with n_patch x n_patch contact nodes, on one thread."""
     changes = [f"geometry.n_patch={n_patch}", f"harmonics.kept={HARMONICS}", f"harmonics.samples={SAMPLES}"]
     file = scene_file.read("beam", changes)
@@ -81,7 +81,7 @@ def measure(n_patch: int, points: int = POINTS) -> Row:
         clock.append(time.process_time())
         branch = natural.follow(balance, high, low, options)
         clock.append(time.process_time())
-    return Row(
+    return SizeCost(
         n_patch=n_patch,
         contact_dofs=balance.compliance.n_contact,
         model_dofs=reduced.system.n_dof,
@@ -96,18 +96,18 @@ def measure(n_patch: int, points: int = POINTS) -> Row:
     )
 
 
-def slope(rows: Sequence[Row]) -> float:
+def slope(rows: Sequence[SizeCost]) -> float:
     """Exponent p of seconds of the response ~ contact_dofs ** p, least squares in the logarithms."""
     x, y = np.log([[row.contact_dofs, row.response_seconds] for row in rows]).T
     return float(np.polyfit(x, y, 1)[0])
 
 
-def as_records(rows: Sequence[Row]) -> dict[str, object]:
+def as_records(rows: Sequence[SizeCost]) -> dict[str, object]:
     """The rows and the slope for JSON."""
     return {"rows": [asdict(row) for row in rows], "slope": slope(rows)}
 
 
-def as_text(rows: Sequence[Row]) -> str:
+def as_text(rows: Sequence[SizeCost]) -> str:
     """The rows for people."""
     lines = ["  nodes  contact DOFs  reduction   set-up  response  converged  Newton  memory   compliance error"]
     lines += [
@@ -120,7 +120,7 @@ def as_text(rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
-def picture(rows: Sequence[Row]) -> Figure:
+def picture(rows: Sequence[SizeCost]) -> Figure:
     """Seconds of the response and peak memory against contact DOFs, both axes logarithmic."""
     size = np.array([row.contact_dofs for row in rows], float)
     seconds = np.array([row.response_seconds for row in rows])

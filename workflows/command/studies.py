@@ -91,19 +91,18 @@ def trade(
     """
     if most < 1:
         raise ValueError(f"--most {most}: a knob needs one setting at least")
-    from tribodyn.workflows.accuracy import accuracy, knob_trade, promise, trade_picture, trade_table
-    from tribodyn.workflows.accuracy import trade as wear_step
+    from tribodyn.workflows.accuracy import accuracy, knob_trade, promise, trade_picture, trade_table, wear_steps
 
     if knob == ("wear_step",):
         make_room(out, PICTURE)
-        table = wear_step.wear_step(scene, aside, overrides)
+        table = wear_steps.compare(scene, aside, overrides)
         if out is not None:
-            wear_step.picture(table).savefig(out)
-        print(json.dumps(wear_step.as_records(table), indent=2) if as_json else wear_step.as_text(table))
+            wear_steps.picture(table).savefig(out)
+        print(json.dumps(wear_steps.as_records(table), indent=2) if as_json else wear_steps.as_text(table))
         return
     if check is not None:
         kept = promise.check(scene, overrides, check, out, aside)
-        print(promise.as_json(kept) if as_json else promise.as_text(kept))
+        print(json.dumps(promise.as_record(kept), indent=2) if as_json else promise.as_text(kept))
         if not kept.kept:
             sys.exit(1)
         return
@@ -150,9 +149,7 @@ def converge(
         print(study.as_text(found), *pictures, sep="\n")
 
 
-def extremes(
-    *, quick: Flag = False, out: Path = Path("extremes.png"), as_json: Json = False
-) -> None:
+def extremes(*, quick: Flag = False, out: Path = Path("extremes.png"), as_json: Json = False) -> None:
     """Try the solver at its numerical extremes: each cell converged and checked, or refused with a sentence.
 
     Parameters

@@ -27,7 +27,7 @@ def choose_harmonics(
     peak : where the resonance is looked for, with the harmonics of the balance at first
     Raises  harmonic_choice.NotSolved
     """
-    options = harmonic_choice.Options(tolerance, highest, newton=newton)
+    options = harmonic_choice.ChoiceOptions(tolerance, highest, newton=newton)
     before = 0.0
     for _ in range(CHOICES):
         point = peak.first(balance)

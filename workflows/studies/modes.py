@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.hbm.branch import CONVERGED
-from tribodyn.hbm.nonlinear_modes import Backbone, Options, backbone
+from tribodyn.hbm.nonlinear_modes import Backbone, BackboneOptions, backbone
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
@@ -30,7 +30,7 @@ def follow(file: SceneFile, start: float, stop: float, mode: int, points: int, p
     with TemporaryDirectory() as folder, limited(file.scene.solver.threads):
         balance = modelling.build(file, Path(folder), progress).balance
         with progress.stage("backbone"):
-            options = Options(points, newton=settings.newton_options(file.scene))
+            options = BackboneOptions(points, newton=settings.newton_options(file.scene))
             found = backbone(balance, start, stop, mode, settings.OUTPUT, options)
     if CONVERGED not in found.outcome:
         raise SolveFailed(f"the backbone {found.end}")

@@ -47,7 +47,7 @@ published numbers as far as a test could miss them."""
 
 
 @dataclass(frozen=True)
-class Row:
+class Life:
     """The rig with one change.
 
     change : overrides, joined by "; ", none for the scene; height : of the platform at the published preload [m]
@@ -66,7 +66,7 @@ class Row:
     outcome: str
 
 
-def run(scene: str, overrides: Sequence[str], changes: Sequence[str], tell: Callable[[str], None]) -> list[Row]:
+def run(scene: str, overrides: Sequence[str], changes: Sequence[str], tell: Callable[[str], None]) -> list[Life]:
     """A scene of the rig with `overrides`, and with each of the changes beside.
 
     scene : name or path; changes : each one or several overrides, joined by ";", CHANGES where empty
@@ -81,18 +81,18 @@ def run(scene: str, overrides: Sequence[str], changes: Sequence[str], tell: Call
     return rows
 
 
-def _row(change: str, file: SceneFile, tell: Callable[[str], None]) -> Row:
+def _row(change: str, file: SceneFile, tell: Callable[[str], None]) -> Life:
     try:
         rig = _pressed(Rig.of(file))
         cycle = rig.cycle()
         worn = wear_down(rig, 0.0, tell)
     except NoSolution as error:
-        return Row(change, *(None,) * 6, outcome=str(error))
+        return Life(change, *(None,) * 6, outcome=str(error))
     if not worn.lost:
-        return Row(change, rig.height, cycle.energy, 2 * cycle.slip, None, None, None, worn.end)
+        return Life(change, rig.height, cycle.energy, 2 * cycle.slip, None, None, None, worn.end)
     depth = worn.volume[-1] / worn.area.sum()
     lost = float(worn.history.cycles[-1]), float(worn.spent[-1]), float(depth)
-    return Row(change, rig.height, cycle.energy, 2 * cycle.slip, *lost, LOST)
+    return Life(change, rig.height, cycle.energy, 2 * cycle.slip, *lost, LOST)
 
 
 def _pressed(rig: Rig) -> Rig:
@@ -106,10 +106,10 @@ def _pressed(rig: Rig) -> Rig:
     return rig.with_height(found.named()["platform"])
 
 
-def as_text(rows: Sequence[Row]) -> str:
+def as_text(rows: Sequence[Life]) -> str:
     """A table, below the experiment; lives and works of changes with their difference from the scene's."""
     scene, (energy, sliding) = rows[0], TABLE_5_3[70.0]
-    measured = Row("experiment at 70 N", None, energy, sliding, LIFE_MEASURED, WORK, None, LOST)
+    measured = Life("experiment at 70 N", None, energy, sliding, LIFE_MEASURED, WORK, None, LOST)
     lines = [" million cycles  friction work, kJ  depth, um  uJ a cycle  sliding, um  platform, um  change"]
     for row in (measured, *rows):
         numbers = (
@@ -136,6 +136,6 @@ def _beside(value: float | None, other: float | None, factor: float, changed: bo
     return f"{value * factor:.4g} ({100 * (value / other - 1):+.0f} %)"
 
 
-def as_records(rows: Sequence[Row]) -> list[dict[str, object]]:
+def as_records(rows: Sequence[Life]) -> list[dict[str, object]]:
     """For machines, SI units."""
     return [asdict(row) for row in rows]

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from tribodyn.workflows.accuracy import trade
+from tribodyn.workflows.accuracy import wear_steps
 from tribodyn.workflows.command import main as cli
 
 SMALL = (
@@ -21,16 +21,16 @@ SMALL = (
 
 
 @pytest.fixture(scope="module")
-def table() -> trade.Table:
+def table() -> wear_steps.WearStepTable:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(trade, "THESIS_STEPS", (0.4, 0.2))
-        patch.setattr(trade, "FINER_STEPS", (0.05,))
-        patch.setattr(trade, "REFERENCE_TOLERANCES", (0.06, 0.02))
-        patch.setattr(trade, "TOLERANCES", (0.3,))
-        return trade.wear_step("beam", lambda _: None, SMALL)
+        patch.setattr(wear_steps, "THESIS_STEPS", (0.4, 0.2))
+        patch.setattr(wear_steps, "FINER_STEPS", (0.05,))
+        patch.setattr(wear_steps, "REFERENCE_TOLERANCES", (0.06, 0.02))
+        patch.setattr(wear_steps, "TOLERANCES", (0.3,))
+        return wear_steps.compare("beam", lambda _: None, SMALL)
 
 
-def test_errors_fall_with_the_step(table: trade.Table) -> None:
+def test_errors_fall_with_the_step(table: wear_steps.WearStepTable) -> None:
     thesis = [row for row in table.rows if row.rule == "thesis"]
     assert [row.step for row in thesis] == [0.4, 0.2, 0.05]
     errors = [abs(row.life_error or 0.0) for row in thesis]
@@ -39,16 +39,16 @@ def test_errors_fall_with_the_step(table: trade.Table) -> None:
     assert all(row.wear_steps <= row.hbm_solves for row in table.rows)
 
 
-def test_finer_steps_cost_more(table: trade.Table) -> None:
+def test_finer_steps_cost_more(table: wear_steps.WearStepTable) -> None:
     steps = [row.wear_steps for row in table.rows if row.rule == "thesis"]
     assert steps == sorted(steps)
 
 
-def test_text_and_records_hold_every_row(table: trade.Table) -> None:
-    text = trade.as_text(table)
+def test_text_and_records_hold_every_row(table: wear_steps.WearStepTable) -> None:
+    text = wear_steps.as_text(table)
     assert text.count("thesis  ") >= 2
     assert "extrapolated" in text
-    records = json.loads(json.dumps(trade.as_records(table)))
+    records = json.loads(json.dumps(wear_steps.as_records(table)))
     keys = {"rule", "step", "hbm_solves", "wear_steps", "seconds"}
     keys |= {"depth_m", "depth_error", "life_cycles", "life_error"}
     assert all(keys <= set(record) for record in records)
@@ -58,9 +58,9 @@ def test_roughness_of_a_plane_is_nothing_and_of_a_spike_is_its_share() -> None:
     x = np.array([0.0, 0.1, 0.3, 0.6, 1.0])
     points = np.array([[a, b, 0.0] for a in x for b in x])
     plane = 1.0 + points @ [0.2, 0.3, 0.0]
-    assert trade.roughness(points, plane) < 1e-14
+    assert wear_steps.roughness(points, plane) < 1e-14
     plane[12] += 0.5
-    assert trade.roughness(points, plane) == pytest.approx(0.5 / plane.max(), rel=1e-12)
+    assert wear_steps.roughness(points, plane) == pytest.approx(0.5 / plane.max(), rel=1e-12)
 
 
 def test_a_scene_without_wear_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

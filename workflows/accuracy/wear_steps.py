@@ -31,7 +31,7 @@ REFERENCE_TOLERANCES = (0.003, 0.001)
 
 
 @dataclass(frozen=True)
-class Row:
+class WearStepRow:
     """One setting: what it cost and how far it is from the reference.
 
     seconds : of one processor
@@ -54,7 +54,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Table:
+class WearStepTable:
     """Rows with their reference, which two finer runs of the error-controlled rule extrapolate.
 
     depth_uncertainty, life_uncertainty : relative difference of the reference to the finest run
@@ -62,14 +62,14 @@ class Table:
     """
 
     scene: str
-    rows: tuple[Row, ...]
-    reference: Row
+    rows: tuple[WearStepRow, ...]
+    reference: WearStepRow
     depth_uncertainty: float
     life_uncertainty: float
     published: dict[float, WearStep] = field(default_factory=dict)
 
 
-def wear_step(scene: str, say: Callable[[str], None], overrides: tuple[str, ...] = ()) -> Table:
+def compare(scene: str, say: Callable[[str], None], overrides: tuple[str, ...] = ()) -> WearStepTable:
     """Table 4.2 of the thesis with life added, the error-controlled rule beside it.
 
     Raises  ValueError for a scene without wear
@@ -88,10 +88,10 @@ def wear_step(scene: str, say: Callable[[str], None], overrides: tuple[str, ...]
     life = fine[1].life_cycles + beyond * (fine[1].life_cycles - fine[0].life_cycles)
     reference = replace(fine[1], depth_m=depth, life_cycles=life, step=0.0)
 
-    def judged(row: Row) -> Row:
+    def judged(row: WearStepRow) -> WearStepRow:
         return replace(row, depth_error=row.depth_m / depth - 1, life_error=row.life_cycles / life - 1)
 
-    return Table(
+    return WearStepTable(
         file.name,
         tuple(judged(row) for row in (*rows, *fine)),
         reference,
@@ -108,7 +108,7 @@ def _problem(file: scene_file.SceneFile) -> tuple[WearProblem, float]:
     return problem, delta_max(file.scene, free_deflection(model.balance), problem.area)
 
 
-def _measure(problem: WearProblem, delta: float, rule: str, step: float, say: Callable[[str], None]) -> Row:
+def _measure(problem: WearProblem, delta: float, rule: str, step: float, say: Callable[[str], None]) -> WearStepRow:
     clock = process_time()
     if rule == "thesis":
         worn = thesis_rule.evolve(problem, step * delta)
@@ -117,7 +117,7 @@ def _measure(problem: WearProblem, delta: float, rule: str, step: float, say: Ca
     seconds = process_time() - clock
     life = cycles_to_preload(worn)
     say(f"{rule} {step:g}: {len(worn.cycles)} wear steps, {seconds:.1f} s, {worn.end}")
-    return Row(
+    return WearStepRow(
         rule=rule,
         step=step,
         hbm_solves=int(worn.solves.sum()),
@@ -159,12 +159,12 @@ def roughness(points: np.ndarray, depth: np.ndarray) -> float:
     return worst / float(depth.max()) if depth.max() > 0 else 0.0
 
 
-def as_records(table: Table) -> list[dict[str, object]]:
+def as_records(table: WearStepTable) -> list[dict[str, object]]:
     """The rows for JSON."""
     return [asdict(row) for row in table.rows]
 
 
-def picture(table: Table) -> Figure:
+def picture(table: WearStepTable) -> Figure:
     """Work and precision of both rules: error in life and in depth against balance solves."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9, 3.8), layout="constrained")
@@ -187,7 +187,7 @@ def picture(table: Table) -> Figure:
     return figure
 
 
-def as_text(table: Table) -> str:
+def as_text(table: WearStepTable) -> str:
     """The table for people, the published one beside it."""
     lines = [
         "rule               step   steps (thesis)  solves  seconds (thesis)   depth mm (thesis)  error    life 1e6  "
@@ -217,7 +217,7 @@ def as_text(table: Table) -> str:
     return "\n".join(lines)
 
 
-def _times(table: Table, row: Row) -> str:
+def _times(table: WearStepTable, row: WearStepRow) -> str:
     """How many more solves the thesis's rule takes to the life error of a row, by the rows that were measured."""
     assert row.life_error is not None
     errors = {r.hbm_solves: abs(r.life_error) for r in table.rows if r.rule == "thesis" and r.life_error is not None}
