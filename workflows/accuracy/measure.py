@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from time import process_time
 
 import numpy as np
@@ -48,8 +46,8 @@ def measure(file: SceneFile, wears: bool = True, refined: bool = True) -> Measur
     values: dict[str, float | None] = dict.fromkeys(QUANTITIES)
     clock = process_time()
     memory.forget_peak()
-    with TemporaryDirectory() as folder, threadpool_limits(1):
-        model = modelling.build(file, Path(folder), Progress())
+    with threadpool_limits(1):
+        model = modelling.build(file, None, Progress())
         balance, interface = model.balance, model.reduced.interface
         depth = energy = np.zeros(interface.n_pair)
         outcome = CONVERGED

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -178,8 +176,7 @@ def on_coarser_mesh(file: SceneFile, harmonics: tuple[int, ...]) -> tuple[Answer
     other = coarser(file)
     if other is None:
         return None
-    with TemporaryDirectory() as folder:
-        model = modelling.build(other, Path(folder), Progress(), harmonics)
+    model = modelling.build(other, None, Progress(), harmonics)
     scene, balance = other.scene, model.balance
     site, load = scene_peak(other), 1.0
     if scene.wear is not None:
@@ -226,4 +223,3 @@ def each(seen: list[State], look: Callable[[State], Answers | None]) -> Iterator
             yield look(state)
         except (ValueError, RuntimeError):
             yield None
-

@@ -6,7 +6,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -140,8 +139,8 @@ def compare(
     """
     start = time.perf_counter()
     file = rebuilt(result, overrides)
-    with TemporaryDirectory() as folder, limited(file.scene.solver.threads):
-        unworn = modelling.build(file, Path(folder), progress, result.harmonics).balance
+    with limited(file.scene.solver.threads):
+        unworn = modelling.build(file, None, progress, result.harmonics).balance
         balance, omega, x = _start(result, file.scene, unworn, at, row)
         target = omega if at is None else at
         if not 0 < target <= balance.omega_max:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from time import process_time
 
 import matplotlib as mpl
@@ -102,8 +100,8 @@ def compare(scene: str, say: Callable[[str], None], overrides: tuple[str, ...] =
 
 
 def _problem(file: scene_file.SceneFile) -> tuple[WearProblem, float]:
-    with TemporaryDirectory() as folder, threadpool_limits(1):
-        model = modelling.build(file, Path(folder), Progress())
+    with threadpool_limits(1):
+        model = modelling.build(file, None, Progress())
     problem = wear_run.wear_problem(file.scene, file.folder, model.balance, LIFE_SHARE)
     return problem, delta_max(file.scene, free_deflection(model.balance), problem.area)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -58,8 +57,7 @@ def plan(source: Source, overrides: Overrides = ()) -> planning.Plan:
 
 def build(source: Source, overrides: Overrides = (), *, progress: Report = None) -> Model:
     """The nonlinear problem of a scene, reduced and ready to be solved, with the part that it was made from."""
-    with TemporaryDirectory() as folder:
-        return modelling.build(read_scene(source, overrides), Path(folder), reporter(progress))
+    return modelling.build(read_scene(source, overrides), None, reporter(progress))
 
 
 def run(

@@ -12,7 +12,6 @@ import pstats
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
 
 import numpy as np
@@ -85,8 +84,8 @@ def run(quick: bool, say: Callable[[str], None]) -> list[Timing]:
 def _problem() -> Callable[[str], HarmonicBalance]:
     """The beam scene's balance for chosen harmonics; mesh and reduction are made once."""
     file = scene_file.read("beam", ())
-    with TemporaryDirectory() as folder, limited(1):
-        model = modelling.build(file, Path(folder), Progress())
+    with limited(1):
+        model = modelling.build(file, None, Progress())
     reduced, unworn = model.reduced, model.balance
 
     def of(harmonics: str) -> HarmonicBalance:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 
 from tribodyn.workflows.export.library import library
 from tribodyn.workflows.export.tables import tables, terms
+from tribodyn.workflows.result.columns import write_columns
 from tribodyn.workflows.result.result import Result
 
 GENERAL, TIME, FRF = 0, 1, 4  # function types of dataset 58
@@ -22,10 +22,7 @@ def write_csv(result: Result, folder: Path) -> list[Path]:
     written = []
     for name, table in tables(result).items():
         path = folder / f"{name}.csv"
-        with path.open("w", newline="", encoding="utf-8") as file:
-            lines = csv.writer(file)
-            lines.writerow(table)
-            lines.writerows(zip(*(column.tolist() for column in table.values()), strict=True))
+        write_columns(table, path)
         written.append(path)
     return written
 

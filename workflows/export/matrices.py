@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -24,8 +23,7 @@ def reduced_model(result: Result) -> ReducedModel:
     """
     from tribodyn.workflows.accuracy.verification import rebuilt
 
-    with TemporaryDirectory() as folder:
-        return modelling.build(rebuilt(result), Path(folder), Progress(), result.harmonics).reduced
+    return modelling.build(rebuilt(result), None, Progress(), result.harmonics).reduced
 
 
 def arrays(model: ReducedModel, harmonic: int = 1) -> dict[str, np.ndarray]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -58,11 +59,15 @@ class Model:
     choice: HarmonicChoice | None = None
 
 
-def build(file: SceneFile, folder: Path, progress: Progress, chosen: tuple[int, ...] = ()) -> Model:
-    """The nonlinear problem of a scene, stage by stage; a mesh that is made is kept in `folder`.
+def build(file: SceneFile, folder: Path | None, progress: Progress, chosen: tuple[int, ...] = ()) -> Model:
+    """The nonlinear problem of a scene, stage by stage.
 
+    folder : where a mesh that is made is kept, None keeps none
     chosen : harmonics of an earlier run, for a scene that leaves the choice
     """
+    if folder is None:
+        with TemporaryDirectory() as scratch:
+            return build(file, Path(scratch), progress, chosen)
     scene = file.scene
     part = None
     if isinstance(scene, MatrixScene):

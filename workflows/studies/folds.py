@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -52,8 +50,8 @@ def find(file: SceneFile, progress: Progress, bracket: float = 0.02) -> FoldsFou
     if getattr(file.scene, "prescribed", None) or getattr(file.scene, "wheel", None):
         raise ValueError(f"{file.name} has a [wheel] or [prescribed] nodes: its folds cannot be looked for in time")
     low, high = settings.response_range(file.scene)
-    with TemporaryDirectory() as folder, limited(file.scene.solver.threads):
-        balance = modelling.build(file, Path(folder), progress).balance
+    with limited(file.scene.solver.threads):
+        balance = modelling.build(file, None, progress).balance
         with progress.stage("frequency response"):
             options = arc_length.Options(newton=settings.newton_options(file.scene))
             branch = arc_length.follow(balance, low, high, options)

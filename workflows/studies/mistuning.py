@@ -6,7 +6,6 @@ contacts to one real model of the whole wheel. Memory and time grow with the num
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +18,7 @@ from tribodyn.hbm.branch import Branch, amplitude
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import INK, WEAR_MAP
+from tribodyn.workflows.result.columns import write_columns
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.studies import wheel as wheels
@@ -101,10 +101,8 @@ def respond(
 
 def write(found: Mistuned, path: Path) -> None:
     """Amplitude of every sector over frequency as comma-separated values."""
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        table = csv.writer(stream)
-        table.writerow(["frequency_Hz", *(f"sector_{n}_m" for n in range(len(found.stiffness)))])
-        table.writerows(np.column_stack([found.branch.frequency, found.heights]).tolist())
+    heights = {f"sector_{n}_m": column for n, column in enumerate(found.heights.T)}
+    write_columns({"frequency_Hz": found.branch.frequency, **heights}, path)
 
 
 def picture(found: Mistuned) -> Figure:

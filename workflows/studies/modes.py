@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -15,6 +13,7 @@ from tribodyn.hbm.nonlinear_modes import Backbone, BackboneOptions, backbone
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
+from tribodyn.workflows.result.columns import write_columns
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
@@ -27,8 +26,8 @@ def follow(file: SceneFile, start: float, stop: float, mode: int, points: int, p
     mode : number of the mode about the static equilibrium, from 0; points : on an easy way
     Raises  ValueError for what cannot be; SolveFailed where not even the first point is found
     """
-    with TemporaryDirectory() as folder, limited(file.scene.solver.threads):
-        balance = modelling.build(file, Path(folder), progress).balance
+    with limited(file.scene.solver.threads):
+        balance = modelling.build(file, None, progress).balance
         with progress.stage("backbone"):
             options = BackboneOptions(points, newton=settings.newton_options(file.scene))
             found = backbone(balance, start, stop, mode, settings.OUTPUT, options)
@@ -53,10 +52,7 @@ def record(found: Backbone) -> dict[str, Any]:
 def write(found: Backbone, path: Path) -> None:
     """The converged points as comma-separated values."""
     columns = {name: value for name, value in record(found).items() if isinstance(value, list)}
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(columns)
-        writer.writerows(zip(*columns.values(), strict=True))
+    write_columns(columns, path)
 
 
 def picture(found: Backbone) -> Figure:

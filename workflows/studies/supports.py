@@ -7,7 +7,6 @@ response that is already computed.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ import numpy as np
 from tribodyn.hbm.branch import Branch
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear.impact import loading_work
+from tribodyn.workflows.result.columns import write_columns
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.schema import PartScene, Scene
@@ -139,9 +139,6 @@ def record(found: list[SupportWear]) -> list[dict[str, Any]]:
 
 def write(found: list[SupportWear], path: Path) -> None:
     """Work and depth per cycle of every support over frequency as comma-separated values."""
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        table = csv.writer(stream)
-        names = [one.support.name for one in found]
-        table.writerow(["frequency_Hz", *(f"{n}_work_J" for n in names), *(f"{n}_depth_m_per_cycle" for n in names)])
-        columns = [found[0].frequency, *(one.work for one in found), *(one.depth for one in found)]
-        table.writerows(np.column_stack(columns).tolist())
+    work = {f"{one.support.name}_work_J": one.work for one in found}
+    depth = {f"{one.support.name}_depth_m_per_cycle": one.depth for one in found}
+    write_columns({"frequency_Hz": found[0].frequency, **work, **depth}, path)

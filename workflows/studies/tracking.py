@@ -6,11 +6,9 @@ arc length once, then followed along its own line (hbm.folds), round the cusps w
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -26,6 +24,7 @@ from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
 from tribodyn.workflows.result import store
+from tribodyn.workflows.result.columns import write_columns
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
@@ -89,8 +88,8 @@ def follow(
         raise ValueError(f"--points: a line needs at least 2, not {points}")
     if (against == "wear") != (worn is not None):
         raise ValueError('--worn: give the folder of a worn result with --against "wear", and only there')
-    with TemporaryDirectory() as folder, limited(file.scene.solver.threads):
-        balance = modelling.build(file, Path(folder), progress).balance
+    with limited(file.scene.solver.threads):
+        balance = modelling.build(file, None, progress).balance
         path = _path(balance, against, _depth(worn, balance))
         if fold is None:
             with progress.track("peaks") as advance:
@@ -152,8 +151,7 @@ def _fold(file: SceneFile, path: Parameter, start: float, stop: float, number: i
     branch = arc_length.follow(path.make(start), high, low, arc_length.Options(newton=newton))
     if not 1 <= number <= len(branch.folds):
         raise ValueError(
-            f"--fold: there are {len(branch.folds)} folds at {path.say(start)}, not {number}; "
-            f"the response {branch.end}"
+            f"--fold: there are {len(branch.folds)} folds at {path.say(start)}, not {number}; the response {branch.end}"
         )
     at = sorted(branch.folds, key=lambda i: -branch.omega[i])[number - 1]
     balance = path.make(start)
@@ -166,10 +164,7 @@ def _fold(file: SceneFile, path: Parameter, start: float, stop: float, number: i
 
 def write(track: Track, path: Path) -> None:
     """The line as comma-separated values."""
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(("value", "frequency_hz", "amplitude_m"))
-        writer.writerows(zip(track.value, track.frequency, track.amplitude, strict=True))
+    write_columns({"value": track.value, "frequency_hz": track.frequency, "amplitude_m": track.amplitude}, path)
 
 
 def picture(track: Track) -> Figure:
