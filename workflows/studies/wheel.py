@@ -16,6 +16,7 @@ from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.branch import Branch
 from tribodyn.hbm.continuation import adaptive
+from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.travelling_wave import on_wheel
 from tribodyn.reduction.cyclic import ReducedSector, nodal_diameters, travelling_wave, wheel_model
 from tribodyn.workflows.run import modelling, part_reduction
@@ -100,7 +101,7 @@ def follow(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: 
     """
     low, high = (2 * np.pi * hertz for hertz in frequency)
     branch = adaptive.follow(balance, low, high, adaptive.Options(tolerance=tolerance, max_points=MAX_POINTS))
-    if not branch.end.startswith("reached"):
+    if branch.ended is not BranchEnd.REACHED:
         raise SolveFailed(f"the frequency response {branch.end}")
     return branch
 

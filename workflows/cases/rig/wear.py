@@ -85,7 +85,7 @@ def wear_down(rig: Rig, shift: float, tell: Callable[[str], None]) -> RigWear:
     balance = rig.model().balance
     history = wear(rig.file, balance)
     name = f"mating height {shift * 1e6:+.3g} um"
-    if history.end.startswith("solve failed"):
+    if history.ended.failed:
         raise NoSolution(f"{name}, wear step {len(history.cycles)}: {history.end}")
     rest = history.preload_at_rest
     assert rest is not None
