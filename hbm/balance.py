@@ -8,9 +8,10 @@ Source  design of tribodyn; x_lin and G in hbm.compliance; f_c from a contact la
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
@@ -94,6 +95,11 @@ class HarmonicBalance:
         """Number of unknowns: pairs x components x harmonic coefficients."""
         return self.contact.stiffness.size * self.basis.n_coeff
 
+    @property
+    def reference_stiffness(self) -> np.ndarray:
+        """(n_contact,) stuck springs that the departure g is measured from [N/m]."""
+        return self.compliance.k
+
     def with_gap(self, gap: np.ndarray) -> HarmonicBalance:
         """The same problem with another gap (n_pair,) [m], as wear makes it; everything linear is shared."""
         return replace(self, contact=self.contact.with_gap(np.asarray(gap, float)))
@@ -147,12 +153,12 @@ class HarmonicBalance:
         """The balance at x (n_pair, n_component, n_coeff)."""
         cycle = self.contact.cycle(x, self.basis, self.memory, jacobian)
         flat = x.reshape(-1, x.shape[2])
-        g = self.compliance.k[:, None] * flat - cycle.force.reshape(flat.shape)
+        g = self.reference_stiffness[:, None] * flat - cycle.force.reshape(flat.shape)
         return State(omega, x, cycle, g, flat - self.x_lin(omega) - self.at(omega).apply(g))
 
     def linearise(self, state: State) -> Linearisation:
         """d R / d x at a state whose contact derivative was asked for."""
-        return Linearisation(self, state)
+        return Linearisation(self.at(state.omega), self.reference_stiffness, state.x, state.cycle)
 
     def frequency_slope(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """d / d omega at fixed x of R (n_contact, n_coeff) and of the outputs (n_output, n_coeff)."""
@@ -210,27 +216,38 @@ class HarmonicBalance:
         return self.contact.history(state.x, self.basis, self.memory)
 
 
+class LinearSide(Protocol):
+    """The linear side of a balance at its frequency or frequencies, G; see `CompliancePoint`."""
+
+    def apply(self, g: np.ndarray) -> np.ndarray: ...
+
+    def jacobian_product(self, rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]: ...
+
+    def coarse_part(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]: ...
+
+
 class Linearisation:
     """I - G dg/dx, with dg/dx block diagonal over pairs and zero where a pair stays stuck and closed.
 
     active : pairs with a derivative; rows : their contact rows
     """
 
-    def __init__(self, balance: HarmonicBalance, state: State):
-        jac = state.cycle.jacobian
+    def __init__(self, point: LinearSide, stiffness: np.ndarray, x: np.ndarray, cycle: ContactCycle):
+        """G, the stuck springs (n_contact,) [N/m], and the contact cycle at x with its derivative."""
+        jac = cycle.jacobian
         if jac is None:
             raise ValueError("linearise needs a state evaluated with its contact derivative")
         n_pair, m, _ = jac.shape
-        n_coeff = state.x.shape[2]
+        n_coeff = x.shape[2]
         n_comp = m // n_coeff
         dg = -jac
-        k = balance.compliance.k.reshape(n_pair, n_comp)
+        k = stiffness.reshape(n_pair, n_comp)
         dg[:, np.arange(m), np.arange(m)] += np.repeat(k, n_coeff, axis=1)
         self.active = np.flatnonzero(np.abs(dg).max(axis=(1, 2)) > 1e-14 * k.max(axis=1))
         self.rows = (self.active[:, None] * n_comp + np.arange(n_comp)).ravel()
         self._dg = np.ascontiguousarray(dg[self.active])
         self._shape = (n_pair * n_comp, n_coeff)
-        self._point = balance.at(state.omega)
+        self._point = point
         self._product = self._point.jacobian_product(self.rows)
 
     def departure_slope(self, direction: np.ndarray) -> np.ndarray:

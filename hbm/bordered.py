@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tribodyn.hbm.balance import Linearisation, State
-from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.krylov import gmres
 from tribodyn.hbm.newton import NewtonOptions, Solution, relative_residual
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.parameter import Parameter
 
 

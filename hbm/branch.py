@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import BranchEnd
-
-if TYPE_CHECKING:
-    from tribodyn.hbm.newton import Solution
-    from tribodyn.hbm.parameter import Parameter
-
-CONVERGED = "converged"
+from tribodyn.hbm.parameter import Parameter
 
 
 @dataclass(frozen=True)

@@ -26,12 +26,12 @@ from tribodyn.hbm.evolution import (
     state_of,
     worn_state,
 )
-from tribodyn.hbm.operating_point import point_of
+from tribodyn.hbm.operating_point import OperatingPoint
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.preload_at_rest import PreloadAtRest
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.wear_history import LIFE_SHARE, WearHistory, WearRow, history, rows_to_go_on
-from tribodyn.hbm.wearing import WearingBalance, WornState
+from tribodyn.hbm.wearing import WearingBalance
 
 GAMMA = 1 - 1 / np.sqrt(2)
 GROWTH = (0.2, 3.0)  # limits of the ratio of one step to the one before
@@ -224,13 +224,13 @@ def _stage(
         solution = newton.solve(balance, tuple(omega), x, duties[0].site.newton)
         solves, rounds = solves + len(duties), rounds + 1
         worn_at = solution.state
-        assert isinstance(worn_at, WornState)
         depth = worn_at.depth
         points, corrections = [], []
         for w, duty, part in zip(omega, duties, balance.parts(solution.state.x), strict=True):
             worn = problem.at_depth(depth).with_load(duty.load)
             state = worn.evaluate(float(w), part)
-            points.append(point_of(duty.site, worn, replace(solution, state=state), 0))
+            reached = newton.Solution(state, solution.outcome, solution.steps, solution.products, solution.history)
+            points.append(OperatingPoint.of(worn, reached, duty.site.output, 0))
             if solution.converged:
                 corrections.append(duty.site.correct(worn, state))
         solves += sum(c.solves for c in corrections)
@@ -243,8 +243,8 @@ def _stage(
         if settled and np.all(np.abs(after - omega) <= accuracy * omega):
             return found
         if rounds > MAX_CORRECTIONS:
-            lost = replace(solution, outcome=f"the site of a duty was not found in {MAX_CORRECTIONS} solves")
-            return replace(found, points=tuple(replace(p, solution=replace(lost, state=p.state)) for p in points))
+            lost = f"the site of a duty was not found in {MAX_CORRECTIONS} solves"
+            return replace(found, points=tuple(replace(p, solution=replace(p.solution, outcome=lost)) for p in points))
         x = solution.state.x + balance.follow(worn_at, after - omega)
         omega, gain = after, turned
 

@@ -12,7 +12,7 @@ from tribodyn.hbm import newton, wear_law
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.law import SEPARATES
 from tribodyn.hbm.operating_point import OperatingPoint, Site
-from tribodyn.hbm.outcome import WearEnd
+from tribodyn.hbm.outcome import CONVERGED, WearEnd
 from tribodyn.hbm.wear_history import WearRow
 from tribodyn.hbm.wear_law import JointWear
 
@@ -249,7 +249,7 @@ def state_of(problem: WearProblem, row: WearRow) -> WearState:
         balance = problem.at_depth(row.depth).with_load(duty.load)
         x = row.duty_displacement[i].reshape(len(row.depth), -1, balance.basis.n_coeff)
         state = balance.evaluate(float(row.duty_omega[i]), x)
-        outcome = newton.Solution(state, newton.CONVERGED, 0, 0, ())
+        outcome = newton.Solution(state, CONVERGED, 0, 0, ())
         points.append(OperatingPoint(outcome, row.amplitude, balance.outputs(state), 0))
     return worn_state(problem, row.depth, row.cycles, points, row.solves)
 

@@ -17,10 +17,11 @@ import numpy as np
 from tribodyn.hbm import bordered
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.bordered import BorderFailed, Direction, Metric
-from tribodyn.hbm.branch import CONVERGED, amplitude
+from tribodyn.hbm.branch import amplitude
 from tribodyn.hbm.continuation._curve import CurvePoint
 from tribodyn.hbm.continuation._stepper import Options, Stepper
 from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.parameter import FREQUENCY, Parameter
 from tribodyn.hbm.threads import single
 

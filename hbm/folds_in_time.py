@@ -15,7 +15,8 @@ import numpy as np
 
 from tribodyn.hbm import newton, stability, time_integration
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.branch import CONVERGED, Branch
+from tribodyn.hbm.branch import Branch
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.time_integration import Options, PeriodicMotion
 
 SEARCH = Options(steps=512, tolerance=1e-7, max_periods=400)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, Linearisation, State
-from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.law import ContactCycle
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
 
 VANISHING = 1e-6  # size of x, relative to the start, below which a solution counts as zero
@@ -18,22 +19,41 @@ EASIER = "more damping, a softer contact, fewer harmonics or a larger static loa
 FINEST = 1e-12  # residual over the displacement that is asked for at most
 
 
-class _Springs(Protocol):
-    @property
-    def k(self) -> np.ndarray: ...
-
-
-class Balance(Protocol):
-    """What Newton's method solves; omega is whatever the balance takes for its frequency."""
+class Evaluation(Protocol):
+    """A balance evaluated at one x; the fields are those of `State`, without the frequency."""
 
     @property
-    def compliance(self) -> _Springs: ...
+    def x(self) -> np.ndarray: ...
 
-    def x_lin(self, omega: Any) -> np.ndarray: ...
+    @property
+    def cycle(self) -> ContactCycle: ...
 
-    def evaluate(self, omega: Any, x: np.ndarray) -> State: ...
+    @property
+    def g(self) -> np.ndarray: ...
 
-    def linearise(self, state: State) -> Linearisation: ...
+    @property
+    def residual(self) -> np.ndarray: ...
+
+
+Frequency = TypeVar("Frequency", contravariant=True)
+Evaluated = TypeVar("Evaluated", bound=Evaluation)
+EvaluatedThere = TypeVar("EvaluatedThere", bound=Evaluation, covariant=True)
+
+
+class Balance(Protocol[Frequency, Evaluated]):
+    """What Newton's method solves: R(x) = 0 at a frequency, or at one for each of several duties.
+
+    reference_stiffness : (n_contact,) stuck springs that the departure g is measured from [N/m]
+    """
+
+    @property
+    def reference_stiffness(self) -> np.ndarray: ...
+
+    def x_lin(self, omega: Frequency) -> np.ndarray: ...
+
+    def evaluate(self, omega: Frequency, x: np.ndarray) -> Evaluated: ...
+
+    def linearise(self, state: Evaluated) -> Linearisation: ...
 
 
 @dataclass(frozen=True)
@@ -43,7 +63,7 @@ class NewtonOptions:
     tolerance : of the residual over the displacement; max_steps : Newton steps; max_products : per direction
     krylov : largest relative residual of a direction; the forcing term asks for less where Newton is fast
     shortest : share of a Newton step that is tried
-    slowest : residual over that of two steps before from which on the solve is given up; 1 goes on while it falls
+    slowest : residual over that of two steps before from which on the solve is given up; 1 continues while it falls
     """
 
     tolerance: float = 1e-8
@@ -55,7 +75,7 @@ class NewtonOptions:
 
 
 @dataclass(frozen=True)
-class Solution:
+class Solved(Generic[EvaluatedThere]):
     """Where Newton ended.
 
     outcome : "converged" or a sentence
@@ -63,7 +83,7 @@ class Solution:
     history : relative residual after each step, the start first
     """
 
-    state: State
+    state: EvaluatedThere
     outcome: str
     steps: int
     products: int
@@ -75,20 +95,26 @@ class Solution:
         return self.outcome == CONVERGED
 
 
-def relative_residual(state: State, x_lin: np.ndarray, least: float = 0.0) -> float:
+Solution = Solved[State]
+"""Where Newton ended on a `HarmonicBalance`."""
+
+
+def relative_residual(state: Evaluation, x_lin: np.ndarray, least: float = 0.0) -> float:
     """|R| / max(|x|, |x_lin|, least), Euclidean, 1 where only these vanish; invariant to the units."""
     scale = max(float(np.linalg.norm(state.x)), float(np.linalg.norm(x_lin)), least)
     return float(np.linalg.norm(state.residual) / scale) if scale > 0 else float(state.residual.any())
 
 
 @single
-def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOptions | None = None) -> Solution:
+def solve(
+    balance: Balance[Frequency, Evaluated], omega: Frequency, start: np.ndarray, options: NewtonOptions | None = None
+) -> Solved[Evaluated]:
     """Solve the balance at one frequency.
 
     omega : [rad/s]; start : (n_pair, n_component, n_coeff) first guess [m]
-    Returns a Solution; its state is the best met, also where it did not converge. Where a contact barely touches while
-    it swings far, a residual small beside x is not small beside the stretch of its springs: Newton then goes on until
-    it is, as far as rounding lets it
+    Returns where Newton ended; its state is the best met, also where it did not converge. Where a contact barely
+    touches while it swings far, a residual small beside x is not small beside the stretch of its springs: Newton then
+    continues until it is, as far as rounding lets it
     Source  inexact Newton with the forcing term of Eisenstat and Walker 1996, choice 2
     """
     options = options or NewtonOptions()
@@ -102,9 +128,9 @@ def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOption
     for step in range(1, options.max_steps + 1):
         wanted = min(options.tolerance, _finer(balance, state, x_lin, least))
         if error <= wanted:
-            return Solution(state, CONVERGED, step - 1, products, tuple(history))
+            return Solved(state, CONVERGED, step - 1, products, tuple(history))
         if not np.isfinite(error):
-            return Solution(state, "the residual is not a finite number", step - 1, products, tuple(history))
+            return Solved(state, "the residual is not a finite number", step - 1, products, tuple(history))
         linear = balance.linearise(state)
         target = max(min(forcing, options.krylov), 0.3 * wanted / error, 1e-12)
         try:
@@ -121,24 +147,24 @@ def solve(balance: Balance, omega: Any, start: np.ndarray, options: NewtonOption
                 direction = np.linalg.solve(linear.dense(), -state.residual.ravel()).reshape(state.residual.shape)
             except np.linalg.LinAlgError:  # nothing holds the contact in some direction
                 why = f"singular Jacobian at relative residual {error:.1e}"
-                return Solution(state, why, step, products, tuple(history))
+                return Solved(state, why, step, products, tuple(history))
         state, new_error = _search(balance, omega, state, direction, error, x_lin, least, options.shortest)
         history.append(new_error)
         if new_error >= error * (1 - 1e-10):
             if new_error <= options.tolerance:
                 break
-            return Solution(state, f"no descent from relative residual {error:.1e}", step, products, tuple(history))
+            return Solved(state, f"no descent from relative residual {error:.1e}", step, products, tuple(history))
         forcing = 0.5 * (new_error / error) ** 1.5
         error = new_error
         if step > 1 and error > max(options.slowest * history[-3], options.tolerance):
-            return Solution(state, f"slow descent at relative residual {error:.1e}", step, products, tuple(history))
+            return Solved(state, f"slow descent at relative residual {error:.1e}", step, products, tuple(history))
     outcome = CONVERGED if error <= options.tolerance else f"not converged in {options.max_steps} steps: {error:.1e}"
-    return Solution(state, outcome, len(history) - 1, products, tuple(history))
+    return Solved(state, outcome, len(history) - 1, products, tuple(history))
 
 
-def _finer(balance: Balance, state: State, x_lin: np.ndarray, least: float) -> float:
+def _finer(balance: Balance[Frequency, Evaluated], state: Evaluated, x_lin: np.ndarray, least: float) -> float:
     """The relative residual that leaves the contact forces FORCE_ACCURACY; infinite where nothing touches or moves."""
-    k = balance.compliance.k[:, None]
+    k = balance.reference_stiffness[:, None]
     stretch = np.divide(state.cycle.force.reshape(state.g.shape), k, out=np.zeros_like(state.g), where=k > 0)
     size = float(np.linalg.norm(stretch))
     scale = max(float(np.linalg.norm(state.x)), float(np.linalg.norm(x_lin)), least)
@@ -148,15 +174,15 @@ def _finer(balance: Balance, state: State, x_lin: np.ndarray, least: float) -> f
 
 
 def _search(
-    balance: Balance,
-    omega: Any,
-    state: State,
+    balance: Balance[Frequency, Evaluated],
+    omega: Frequency,
+    state: Evaluated,
     direction: np.ndarray,
     error: float,
     x_lin: np.ndarray,
     least: float,
     shortest: float,
-) -> tuple[State, float]:
+) -> tuple[Evaluated, float]:
     """Backtrack until the residual falls; the derivative has kinks, so the best trial is kept if none falls enough.
 
     Source  parabola through |R|^2, its slope and the last trial, Kelley 1995, 8.3.1

@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.free_vibration import FreeVibration, Point
 from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
 
 EASY, HARD = 3, 7  # Newton steps up to which the next step grows, and from which it shrinks

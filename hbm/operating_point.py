@@ -12,9 +12,10 @@ import numpy as np
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.branch import CONVERGED, Branch, amplitude
+from tribodyn.hbm.branch import Branch, amplitude
 from tribodyn.hbm.continuation import adaptive, arc_length
 from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.outcome import CONVERGED
 
 SCAN_TOLERANCE = 0.03  # of the response between the points of the first search
 COARSEST = 0.05  # longest step of the first search, share of its range
@@ -35,6 +36,13 @@ class OperatingPoint:
     amplitude: float
     response: np.ndarray
     solves: int
+
+    @classmethod
+    def of(cls, balance: HarmonicBalance, solution: Solution, output: str, solves: int) -> OperatingPoint:
+        """A solution with the amplitude of an output."""
+        response = balance.outputs(solution.state)
+        row = balance.compliance.output_names.index(output)
+        return cls(solution, float(amplitude(response[row])), response, solves)
 
     @property
     def state(self) -> State:
@@ -64,7 +72,7 @@ class AtFrequency:
 
     def first(self, balance: HarmonicBalance) -> OperatingPoint:
         """Solve without a neighbour, where need be along the folded curve of solutions over the load."""
-        return _point(balance, arc_length.solve_along_load(balance, self.omega, self.newton), self.output, 1)
+        return OperatingPoint.of(balance, arc_length.solve_along_load(balance, self.omega, self.newton), self.output, 1)
 
     def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
         """Solve from a neighbouring x; `omega` is the neighbour's and ignored here.
@@ -74,7 +82,7 @@ class AtFrequency:
         solution, solves = newton.solve(balance, self.omega, x, self.newton), 1
         if not solution.converged:
             solution, solves = arc_length.solve_along_load(balance, self.omega, self.newton), 2
-        return _point(balance, solution, self.output, solves)
+        return OperatingPoint.of(balance, solution, self.output, solves)
 
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
         """The distance of a state to the fixed frequency."""
@@ -157,7 +165,7 @@ class AtPeak:
         here = solve(omega, x)
         solves = 1
         if not here.solution.converged:
-            return _point(balance, here.solution, self.output, solves)
+            return OperatingPoint.of(balance, here.solution, self.output, solves)
         resolution = self.tolerance * omega
         uphill = other = None  # the latest points on either side of the zero, once it is bracketed
         climbed: bool | None = None  # whether the last point inside the bracket replaced `uphill`
@@ -204,7 +212,7 @@ class AtPeak:
                 f"the resonance peak of {self.output} has moved beyond {hertz:.5g} Hz, the highest frequency that is "
                 "modelled: extend response.frequency"
             )
-        return _point(balance, best.solution, self.output, solves)
+        return OperatingPoint.of(balance, best.solution, self.output, solves)
 
 
 def _range(branch: Branch) -> str:
@@ -224,6 +232,11 @@ class BesidePeak:
 
     peak: AtPeak
     ratio: float
+
+    @property
+    def output(self) -> str:
+        """Name of the output whose peak is tracked."""
+        return self.peak.output
 
     @property
     def newton(self) -> NewtonOptions:
@@ -256,7 +269,7 @@ class BesidePeak:
     def _beside(self, balance: HarmonicBalance, peak: OperatingPoint) -> OperatingPoint:
         omega = peak.state.omega
         solution, solves = self._walk(balance, omega, self.ratio * omega, peak.state.x)
-        return _point(balance, solution, self.peak.output, peak.solves + solves)
+        return OperatingPoint.of(balance, solution, self.peak.output, peak.solves + solves)
 
     def _walk(self, balance: HarmonicBalance, start: float, stop: float, x: np.ndarray) -> tuple[Solution, int]:
         """Natural steps of half a per cent from one frequency to another."""
@@ -298,17 +311,6 @@ class _Slope:
 
     def predict(self, omega: float) -> np.ndarray:
         return self.solution.state.x + (omega - self.omega) * self.dx
-
-
-def point_of(site: Site, balance: HarmonicBalance, solution: Solution, solves: int) -> OperatingPoint:
-    """A solution as the operating point of a site."""
-    return _point(balance, solution, site.peak.output if isinstance(site, BesidePeak) else site.output, solves)
-
-
-def _point(balance: HarmonicBalance, solution: Solution, output: str, solves: int) -> OperatingPoint:
-    response = balance.outputs(solution.state)
-    row = balance.compliance.output_names.index(output)
-    return OperatingPoint(solution, float(amplitude(response[row])), response, solves)
 
 
 Site = AtFrequency | AtPeak | BesidePeak

@@ -8,6 +8,9 @@ from __future__ import annotations
 from enum import Enum
 from typing import Self
 
+CONVERGED = "converged"
+"""The outcome of a solve that reached its tolerance; any other outcome is a sentence on what went wrong."""
+
 
 class End(Enum):
     """An end; its value is how its sentence begins, and no value begins like another one of its kind."""

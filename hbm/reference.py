@@ -14,8 +14,8 @@ import numpy as np
 from scipy.sparse import csr_matrix, kron
 
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.law import ContactCycle
+from tribodyn.hbm.outcome import CONVERGED
 
 
 @dataclass

@@ -22,8 +22,9 @@ import numpy as np
 
 from tribodyn.hbm import floquet, parameter
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.branch import CONVERGED, Branch
+from tribodyn.hbm.branch import Branch
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.parameter import Parameter
 from tribodyn.hbm.threads import single
 

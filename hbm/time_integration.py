@@ -19,8 +19,8 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton, time_step
 from tribodyn.hbm.anderson import Anderson
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.time_step import Moving, Record
 

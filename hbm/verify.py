@@ -8,7 +8,7 @@ import numpy as np
 
 from tribodyn.hbm import time_integration
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.time_integration import Options, PeriodicMotion
 

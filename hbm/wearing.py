@@ -1,4 +1,4 @@
-"""Duties whose gaps wear while they are solved: one implicit wear stage is one harmonic balance solve.
+"""The implicit wear stage: one harmonic balance solve of all duties, the gaps wearing along.
 
 A pair wears by its own friction work alone, so the implicit stage
 
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tribodyn.hbm.balance import HarmonicBalance, Linearisation, State
+from tribodyn.hbm.balance import HarmonicBalance, Linearisation
 from tribodyn.hbm.compliance import CompliancePoint
 from tribodyn.hbm.law import ContactCycle
 
@@ -25,20 +25,18 @@ ROUNDING = 4e-16
 
 
 @dataclass(frozen=True)
-class WornState(State):
-    """A state with the wear depth that goes with its x.
+class WornState:
+    """The stage evaluated at one x, over the duties of a pair, then its components; see `WearingBalance`.
 
-    depth : (n_pair,) [m]
+    omegas : of the duties [rad/s]; x, cycle, g, residual : as of a `State`; depth : (n_pair,) that goes with x [m]
     """
 
+    omegas: tuple[float, ...]
+    x: np.ndarray
+    cycle: ContactCycle
+    g: np.ndarray
+    residual: np.ndarray
     depth: np.ndarray
-
-
-@dataclass(frozen=True)
-class _Springs:
-    """The stuck springs of all duties, as the linearised balance reads them."""
-
-    k: np.ndarray
 
 
 class _Points:
@@ -88,14 +86,15 @@ class _Points:
 
 
 class WearingBalance:
-    """The balances of a mission with one worn contact, of which every pair wears by its work over `cycles`.
+    """The balances of a mission over one worn contact, of which every pair wears by its work over `cycles`.
 
     balances : one per duty, over the same contact and with the gap before any wear; shares : of the cycles
     base : (n_pair,) depth at no work [m]; cycles : that the stage stands for
     gain : (n_pair,) depth per friction work [m/J]
     guess : (n_pair,) depth to look from [m]; each search starts where the last one ended
-    x and State run over the duties of a pair, then its components: (n_pair, n_duty * n_component, n_coeff); frequencies
-    are a tuple, one per duty.
+    x runs over the duties of a pair, then its components: (n_pair, n_duty * n_component, n_coeff); frequencies are a
+    tuple, one per duty. `hbm.newton` solves it as any `newton.Balance`.
+    reference_stiffness : (n_pair * n_duty * n_component,) stuck springs [N/m]
     """
 
     def __init__(
@@ -111,8 +110,8 @@ class WearingBalance:
         self._guess = np.maximum(guess, base)
         first = balances[0]
         self._n_component = len(first.contact.components)
-        spread = first.compliance.k.reshape(-1, 1, self._n_component)
-        self.compliance = _Springs(np.repeat(spread, len(balances), axis=1).ravel())
+        spread = first.reference_stiffness.reshape(-1, 1, self._n_component)
+        self.reference_stiffness = np.repeat(spread, len(balances), axis=1).ravel()
         self._normal = first.contact.components.index("n") if "n" in first.contact.components else None
 
     def at(self, omegas: tuple[float, ...]) -> _Points:
@@ -128,26 +127,25 @@ class WearingBalance:
         """x of every duty from the joined one."""
         return [np.ascontiguousarray(part) for part in np.split(x, len(self.balances), axis=1)]
 
-    def evaluate(self, omega: tuple[float, ...], x: np.ndarray) -> WornState:
+    def evaluate(self, omegas: tuple[float, ...], x: np.ndarray) -> WornState:
         """The balance at x, every pair at the depth that its own work wears."""
         depth, cycle = self._wear_along(x)
         flat = x.reshape(-1, x.shape[2])
-        g = self.compliance.k[:, None] * flat - cycle.force.reshape(flat.shape)
-        residual = flat - self.x_lin(omega) - self.at(omega).apply(g)
-        return WornState(omega, x, cycle, g, residual, depth)  # type: ignore[arg-type]
+        g = self.reference_stiffness[:, None] * flat - cycle.force.reshape(flat.shape)
+        residual = flat - self.x_lin(omegas) - self.at(omegas).apply(g)
+        return WornState(omegas, x, cycle, g, residual, depth)
 
-    def linearise(self, state: State) -> Linearisation:
+    def linearise(self, state: WornState) -> Linearisation:
         """d R / d x at a state."""
-        return Linearisation(self, state)  # type: ignore[arg-type]
+        return Linearisation(self.at(state.omegas), self.reference_stiffness, state.x, state.cycle)
 
     def follow(self, state: WornState, moves: np.ndarray) -> np.ndarray:
         """First-order change of x when the duties' frequencies move by `moves` [rad/s], the depths following."""
-        omegas: tuple[float, ...] = state.omega  # type: ignore[assignment]
         spread = []
-        for balance, omega, part, move in zip(self.balances, omegas, self.parts(state.x), moves, strict=True):
+        for balance, omega, part, move in zip(self.balances, state.omegas, self.parts(state.x), moves, strict=True):
             there = balance.with_gap(balance.contact.gap + state.depth)
             spread.append(move * there.frequency_slope(there.evaluate(omega, part))[0])
-        moved, _, _ = self.linearise(state).solve(-self.at(omegas).join(spread), 1e-4)
+        moved, _, _ = self.linearise(state).solve(-self.at(state.omegas).join(spread), 1e-4)
         return moved.reshape(state.x.shape)
 
     def _wear_along(self, x: np.ndarray) -> tuple[np.ndarray, ContactCycle]:

@@ -9,8 +9,8 @@ import numpy as np
 
 from tribodyn.hbm import bordered
 from tribodyn.hbm.bordered import BorderFailed, Direction, Metric
-from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.parameter import Parameter
 
 KINK_ANGLE = 0.75  # turn between neighbouring points beyond which they lie on either side of a kink [rad]

@@ -13,9 +13,10 @@ import numpy as np
 
 from tribodyn.hbm import newton, parameter
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.branch import CONVERGED, Branch, BranchBuilder
+from tribodyn.hbm.branch import Branch, BranchBuilder
 from tribodyn.hbm.continuation import arc_length
 from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.parameter import Parameter
 from tribodyn.hbm.threads import single
 

@@ -30,12 +30,12 @@ from tests.helpers.random_problems import (
 from tribodyn.hbm import error_controlled_rule, newton, thesis_rule
 from tribodyn.hbm.aft import CycleNotPeriodic
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.continuation import arc_length, natural
 from tribodyn.hbm.evolution import Duty, WearProblem
 from tribodyn.hbm.expansion import SingularStuckSystem, UndampedResonance
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.operating_point import AtFrequency
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.wear_history import WearHistory
 from tribodyn.hbm.wear_law import JointWear
 

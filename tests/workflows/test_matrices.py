@@ -14,13 +14,13 @@ from tests.helpers.matrix_scene import SCENE, matrix_folder
 from tests.helpers.verification_models import random_structure
 from tribodyn.hbm import thesis_rule
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.continuation import natural
 from tribodyn.hbm.evolution import Duty, WearProblem
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.hbm.operating_point import AtPeak
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.reduction import foreign as reduction_foreign
 from tribodyn.reduction.foreign import read_matrices, reduced_model
 from tribodyn.workflows.result import store

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.accuracy.trade_table import NAMES, QUANTITIES, Trade, TradeRow, key_of, load
 from tribodyn.workflows.scene.scene_file import SceneFile, read
 from tribodyn.workflows.scene.units import to_si

@@ -10,7 +10,7 @@ import numpy as np
 
 from tribodyn.hbm import harmonic_choice
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.sampling import sampling_error
 from tribodyn.hbm.step_error import UNKNOWN, step_error
 from tribodyn.workflows.accuracy import accuracy

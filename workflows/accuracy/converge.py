@@ -20,7 +20,7 @@ from matplotlib.ticker import NullLocator
 from matplotlib.tri import Triangulation
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
-from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.accuracy import limit
 from tribodyn.workflows.accuracy.knobs import Ladder, Setting, study_of, study_path
 from tribodyn.workflows.accuracy.limit import Limit

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
-from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.accuracy.knobs import Knob, Setting, chosen, knobs_of, study_of
 from tribodyn.workflows.accuracy.limit import limit_of
 from tribodyn.workflows.accuracy.measure import Measured, measure

@@ -14,9 +14,9 @@ import numpy as np
 from tribodyn.geometry import parts
 from tribodyn.hbm import harmonic_choice, stability
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.operating_point import NoPeak, OperatingPoint, Site
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.time_integration import IntegrationFailed, Options
 from tribodyn.hbm.verify import verify
 from tribodyn.hbm.wear_history import LIFE_SHARE

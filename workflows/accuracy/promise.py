@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.accuracy.accuracy import OF_WEAR, Choice, parsed, table_of, tuned
 from tribodyn.workflows.accuracy.knobs import Study, study_of
 from tribodyn.workflows.accuracy.measure import Measured, measure

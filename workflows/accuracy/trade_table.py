@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.accuracy.knobs import study_of
 from tribodyn.workflows.accuracy.limit import limit_of
 from tribodyn.workflows.result.whole_file import replacing

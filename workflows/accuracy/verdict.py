@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.operating_point import NoPeak
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.wear_history import LIFE_SHARE, cycles_to_preload
 from tribodyn.workflows.accuracy import probes
 from tribodyn.workflows.accuracy.probes import Answers, InTime, State, relative

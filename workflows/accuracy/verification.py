@@ -13,9 +13,10 @@ from matplotlib.figure import Figure
 
 from tribodyn.hbm import newton, stability
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.branch import CONVERGED, amplitude
+from tribodyn.hbm.branch import amplitude
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time_integration import Options
 from tribodyn.hbm.verify import Verification, verify

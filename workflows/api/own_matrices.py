@@ -26,6 +26,7 @@ from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.operating_point import AtFrequency, AtPeak
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.wear_history import WearHistory, WearRow
 from tribodyn.hbm.wear_law import JointWear
 from tribodyn.reduction import damping, foreign
@@ -132,7 +133,7 @@ class Cycle:
     @property
     def converged(self) -> bool:
         """Whether it is a solution."""
-        return self.outcome == newton.CONVERGED
+        return self.outcome == CONVERGED
 
     @property
     def frequency(self) -> float:

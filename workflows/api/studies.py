@@ -13,11 +13,12 @@ from tribodyn.fem.part import Part
 from tribodyn.hbm import newton, stability
 from tribodyn.hbm import verify as hbm_verify
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.branch import CONVERGED, Branch
+from tribodyn.hbm.branch import Branch
 from tribodyn.hbm.chatter import Chatter, chatter
 from tribodyn.hbm.continuation import arc_length
 from tribodyn.hbm.folds_in_time import Coexisting, FoldInTime, coexisting, fold_in_time, solutions_at
 from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.stability import BranchStability
 from tribodyn.hbm.time_integration import IntegrationFailed
 from tribodyn.hbm.time_integration import Options as TimeOptions

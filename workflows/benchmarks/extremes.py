@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.benchmarks import extremes_wear
 from tribodyn.workflows.benchmarks.extremes_judge import REFUSED, WRONG, Verdict, sampled_honestly, tried
 from tribodyn.workflows.benchmarks.extremes_models import Body, beam, lattice, rigid, scaled

@@ -11,10 +11,10 @@ import numpy as np
 
 from tribodyn.hbm import newton, recovery
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.continuation import arc_length
 from tribodyn.hbm.law import SEPARATES, STICKS
 from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.reference import DenseBalance
 from tribodyn.hbm.sampling import sampling_error
 from tribodyn.workflows.benchmarks.extremes_march import force_error

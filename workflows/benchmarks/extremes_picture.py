@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.benchmarks.extremes import Trial, counts
 from tribodyn.workflows.benchmarks.extremes_judge import REFUSED, WRONG
 from tribodyn.workflows.pictures.style import BLUE, ORANGE, RED, STYLE

@@ -8,10 +8,9 @@ from functools import partial
 import numpy as np
 
 from tribodyn.hbm import error_controlled_rule, thesis_rule
-from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.evolution import Duty, WearProblem
 from tribodyn.hbm.operating_point import AtFrequency
-from tribodyn.hbm.outcome import WearEnd
+from tribodyn.hbm.outcome import CONVERGED, WearEnd
 from tribodyn.hbm.step_error import UNKNOWN, step_error
 from tribodyn.hbm.wear_history import LIFE_SHARE, WearHistory
 from tribodyn.hbm.wear_law import JointWear

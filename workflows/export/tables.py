@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.result.result import Result
 
 Table = Mapping[str, np.ndarray]

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.wear_history import WearHistory
 from tribodyn.workflows.pictures import maps
 from tribodyn.workflows.pictures.figures import axes_of, force_unit, heading, length_unit, save, status_name, titled

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.pictures.style import CYCLE, GREY, INK
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import state_of

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tribodyn.hbm.branch import CONVERGED, Branch
+from tribodyn.hbm.branch import Branch
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.wear_history import WearHistory
 from tribodyn.workflows.result.facts import BudgetEntry, Facts, Stage
 

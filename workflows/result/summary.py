@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm.branch import CONVERGED
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.wear_events import events
 from tribodyn.hbm.wear_history import LIFE_SHARE, cycles_to_preload
 from tribodyn.workflows.accuracy import budget, verdict

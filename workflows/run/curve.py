@@ -8,10 +8,11 @@ import numpy as np
 
 from tribodyn.hbm import harmonic_choice, residual_shear, stability
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.branch import CONVERGED, Branch
+from tribodyn.hbm.branch import Branch
 from tribodyn.hbm.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.operating_point import AtPeak
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.result.result import CurveStability, ShearBounds
 
 CHOICES = 3  # times that harmonics are chosen, at the peak that the last choice has

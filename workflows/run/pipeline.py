@@ -11,8 +11,8 @@ import numpy as np
 
 from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.branch import CONVERGED, Branch
-from tribodyn.hbm.outcome import BranchEnd
+from tribodyn.hbm.branch import Branch
+from tribodyn.hbm.outcome import CONVERGED, BranchEnd
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.accuracy import verdict
 from tribodyn.workflows.accuracy.budget import with_budget

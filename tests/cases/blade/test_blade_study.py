@@ -12,7 +12,7 @@ from tests.helpers.pictures import assert_not_blank
 from tribodyn import build_wheel, critical_speeds
 from tribodyn.hbm import newton
 from tribodyn.hbm import travelling_wave as waves
-from tribodyn.hbm.branch import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.cases.blade import study as blade_study
 from tribodyn.workflows.cases.blade.few_sectors import FEW_SECTORS
 from tribodyn.workflows.cases.blade.study import Extent
