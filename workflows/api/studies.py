@@ -18,7 +18,7 @@ from tribodyn.hbm.chatter import Chatter, chatter
 from tribodyn.hbm.continuation import arc_length
 from tribodyn.hbm.folds_in_time import Coexisting, FoldInTime, coexisting, fold_in_time, solutions_at
 from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED, BranchEnd, WearEnd
 from tribodyn.hbm.stability import BranchStability
 from tribodyn.hbm.time_integration import IntegrationFailed
 from tribodyn.hbm.time_integration import Options as TimeOptions
@@ -61,6 +61,7 @@ __all__ = [
     "STICKS",
     "Bench",
     "Branch",
+    "BranchEnd",
     "BranchStability",
     "Chatter",
     "Coexisting",
@@ -83,6 +84,7 @@ __all__ = [
     "TimeOptions",
     "Varied",
     "Verification",
+    "WearEnd",
     "WearHistory",
     "Wheel",
     "build_wheel",

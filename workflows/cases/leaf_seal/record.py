@@ -1,4 +1,4 @@
-"""What is kept of one configuration of the leaf seal's study, so that a stopped study can go on and be drawn again."""
+"""What is kept of one configuration of the leaf seal's study, so that a stopped study can be resumed and drawn again."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn import SEPARATES, STICKS, Scene, write_whole
+from tribodyn import SEPARATES, STICKS, BranchEnd, Scene, write_whole
 from tribodyn.workflows.cases.leaf_seal.cases import Case
 from tribodyn.workflows.cases.leaf_seal.response import LINER_NODE, LeafResponse
 
@@ -43,7 +43,7 @@ class Record:
     @property
     def complete(self) -> bool:
         """Whether the curve came to its end."""
-        return "points" in self.numbers and not self.numbers["end"].startswith("ended at")
+        return "points" in self.numbers and BranchEnd.of(self.numbers["end"]) is not BranchEnd.ENDED
 
 
 def of_response(case: Case, response: LeafResponse) -> Record:

@@ -2,7 +2,7 @@
 
 Some thirty configurations, one response curve each, with folds, stability and chattering; a table, the summary of all
 curves, and for the scene itself the pictures of the thesis. A configuration that fails is told and left behind; every
-one that is done is kept, so that a stopped study can go on.
+one that is done is kept, so that a stopped study can be resumed.
 """
 
 from __future__ import annotations

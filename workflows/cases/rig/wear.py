@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tribodyn import HarmonicBalance, WearHistory, state_at, wear, worn
+from tribodyn import HarmonicBalance, WearEnd, WearHistory, state_at, wear, worn
 from tribodyn.workflows.cases.rig.model import NoSolution, Rig
 
 WORN = 0.1e-6  # depth from which on a pair counts as worn [m]: what a profilometer tells from noise
@@ -39,7 +39,7 @@ class RigWear:
     @property
     def lost(self) -> bool:
         """Whether the preload was used up."""
-        return self.end.startswith("preload at rest")
+        return self.history.ended is WearEnd.LOST_AT_REST
 
     @property
     def spent(self) -> np.ndarray:
