@@ -1,4 +1,4 @@
-"""What is kept of one configuration of the leaf seal's study, so that a stopped study can be resumed and drawn again."""
+"""What is kept of one configuration of the leaf seal's study, to resume a stopped study and to draw it again."""
 
 from __future__ import annotations
 
