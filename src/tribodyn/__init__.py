@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from tribodyn.hbm.wear_law import names as wear_laws
     from tribodyn.reduction.foreign import ForeignMatrices as Matrices
     from tribodyn.reduction.foreign import from_arrays, read_matrices
+    from tribodyn.workflows.api.designs import study
     from tribodyn.workflows.api.own_matrices import Balance, Contact, Cycle, Structure, reduce, wear_law
     from tribodyn.workflows.api.scenes import build, load, plan, read_scene, run, scene_names
     from tribodyn.workflows.api.studies import (
@@ -109,6 +110,7 @@ if TYPE_CHECKING:
         write_mistuned,
         write_whole,
     )
+    from tribodyn.workflows.designs.table import StudyTable
     from tribodyn.workflows.result.result import Result
     from tribodyn.workflows.result.store import ResultError
     from tribodyn.workflows.run.failure import SolveFailed
@@ -128,6 +130,7 @@ _HOME: dict[str, tuple[str, ...]] = {
     "SceneFile": ("tribodyn.workflows.scene.scene_file",),
     "SolveFailed": ("tribodyn.workflows.run.failure",),
     "Structure": ("tribodyn.workflows.api.own_matrices",),
+    "StudyTable": ("tribodyn.workflows.designs.table",),
     "__version__": ("tribodyn.version",),
     "build": ("tribodyn.workflows.api.scenes",),
     "contact_laws": ("tribodyn.hbm.law", "names"),
@@ -140,6 +143,7 @@ _HOME: dict[str, tuple[str, ...]] = {
     "reduce": ("tribodyn.workflows.api.own_matrices",),
     "run": ("tribodyn.workflows.api.scenes",),
     "scene_names": ("tribodyn.workflows.api.scenes",),
+    "study": ("tribodyn.workflows.api.designs",),
     "wear_law": ("tribodyn.workflows.api.own_matrices",),
     "wear_laws": ("tribodyn.hbm.wear_law", "names"),
 }
@@ -266,6 +270,7 @@ __all__ = [
     "SolveFailed",
     "State",
     "Structure",
+    "StudyTable",
     "TimeOptions",
     "Varied",
     "Verification",
@@ -319,6 +324,7 @@ __all__ = [
     "scene_names",
     "solutions_at",
     "state_at",
+    "study",
     "support_wear",
     "support_work",
     "vary",

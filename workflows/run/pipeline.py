@@ -29,18 +29,29 @@ from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import Scene
 
 
-def run(file: SceneFile, folder: Path | None, progress: Progress, earlier: Result | None = None) -> Result:
+def run(
+    file: SceneFile,
+    folder: Path | None,
+    progress: Progress,
+    earlier: Result | None = None,
+    build: Callable[[SceneFile], modelling.Model] | None = None,
+) -> Result:
     """Compute everything that a scene asks for, and keep it in `folder`/result.h5 while it grows.
 
     folder : None keeps nothing on disk
     earlier : an unfinished result of the same scene to resume
+    build : makes the model, for runs that share what models are made of; from the scene alone by default
     Raises  ValueError: the scene asks for what cannot be, SolveFailed: after what was computed is kept
     """
     scene, clock = file.scene, Clock(earlier)
     settings.check_names(scene)
     keep = Keeper(None if folder is None else folder / "result.h5", clock)
     with alone_in(folder), limited(scene.solver.threads), TemporaryDirectory() as scratch:
-        model = modelling.build(file, folder or Path(scratch), progress, () if earlier is None else earlier.harmonics)
+        if build is not None:
+            model = build(file)
+        else:
+            chosen = () if earlier is None else earlier.harmonics
+            model = modelling.build(file, folder or Path(scratch), progress, chosen)
         result = earlier or described(file, model.part, model.balance, model.choice)
         if scene.wears and result.patch is not None:
             # raises before anything long is begun

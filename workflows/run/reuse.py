@@ -18,6 +18,7 @@ from tribodyn.reduction.model import ReducedModel
 from tribodyn.workflows.run import modelling, part_reduction, settings
 from tribodyn.workflows.run.contact_surfaces import surface_gap
 from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.schema import PartScene
 
 HOLD = "hold"  # the load that takes the place of a prescribed displacement
 LATE: Any = {
@@ -28,6 +29,11 @@ LATE: Any = {
     "response": {"frequency", "references", "points", "method", "stability", "bounds", "options"},
 }  # fmt: skip
 """What a scene may change without another part or reduction."""
+
+
+def early_of(scene: PartScene) -> str:
+    """What a part and its reduction are made of: equal texts, equal models."""
+    return json.dumps(scene.model_dump(mode="json", exclude=LATE), sort_keys=True)
 
 
 @dataclass
@@ -42,11 +48,11 @@ class Bench:
     def plain(self, file: SceneFile, opening: np.ndarray | None = None) -> ReducedModel:
         """The reduced model, not damped, with nothing prescribed; opening : (n_pair,) added to its gaps [m]."""
         scene = file.part_scene
-        early = json.dumps(scene.model_dump(mode="json", exclude=LATE), sort_keys=True)
+        early = early_of(scene)
         if self.part is None or self.reduced is None or early != self.early:
             with TemporaryDirectory() as folder:
                 mesh, node_sets = modelling.make_mesh(file, Path(folder))
-            self.part = modelling.make_part(scene, mesh, node_sets)
+            self.part = modelling.make_part(scene, mesh, node_sets, file.folder)
             self.reduced, self.early = hold(part_reduction.reduce(scene, self.part), self.part.held), early
         interface = self.reduced.interface
         gap = interface.gap

@@ -1,0 +1,227 @@
+"""Studies: designs against closed forms, one table for any number of workers, nothing finished is lost or repeated."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas
+import pytest
+import xarray
+from scipy import stats
+
+import tribodyn as td
+from tests.helpers.command import leave
+from tribodyn.workflows.designs import design, pool, study_file
+from tribodyn.workflows.designs.journal import Journal
+from tribodyn.workflows.designs.task import Row, Task
+
+TINY = ["geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "response.points=6", "wear="]
+PRESS, FRICTION = "loads.static.press.value", "contact.friction"
+TABLES: dict[str, Any] = {
+    "study": {"scene": "beam", "design": "grid", "set": TINY},
+    # a scene refuses a friction below 0
+    "vary": {FRICTION: [0.3, -0.5], PRESS: ["10 kN", "20 kN"]},
+}
+
+
+def drawn(kind: str, runs: int, vary: dict[str, Any], **more: Any) -> list[dict[str, Any]]:
+    tables = {"study": {"scene": "beam", "design": kind, "runs": runs, "seed": 3}, "vary": vary, **more}
+    return design.runs(study_file.parse(tables, "mine.toml", Path()))
+
+
+@pytest.mark.parametrize("kind", ["sobol", "latin_hypercube"])
+def test_draws_have_the_moments_of_their_distributions(kind: str) -> None:
+    rows = drawn(kind, 1024, {
+        "a": {"distribution": "uniform", "low": "1 mm", "high": "3 mm"},
+        "b": {"distribution": "normal", "mean": "20 kN", "cov": "10 %"},
+        "c": {"distribution": "lognormal", "median": "2 kN", "cov": 0.5},
+        "d": {"distribution": "triangular", "low": 0, "mode": 1, "high": 4},
+        "e": {"distribution": "normal", "mean": 0.0, "std": 1.0, "low": 0.0},
+        "f": [1, 2],
+    })  # fmt: skip
+    values = {key: np.array([row[key] for row in rows]) for key in "abcdef"}
+    width = math.sqrt(math.log(1.25))
+    wanted = {  # mean and standard deviation
+        "a": (2e-3, 2e-3 / math.sqrt(12)),
+        "b": (20e3, 2e3),
+        "c": (2e3 * math.exp(width**2 / 2), 2e3 * math.exp(width**2 / 2) * 0.5),
+        "d": (5 / 3, math.sqrt((16 + 1 - 4) / 18)),
+        "e": (math.sqrt(2 / math.pi), math.sqrt(1 - 2 / math.pi)),  # half normal
+        "f": (1.5, 0.5),
+    }
+    for key, (mean, deviation) in wanted.items():
+        assert values[key].mean() == pytest.approx(mean, rel=0.01), key
+        assert values[key].std() == pytest.approx(deviation, rel=0.03), key
+    assert values["e"].min() > 0
+
+
+def test_correlations_are_those_of_a_gaussian_copula() -> None:
+    vary = {
+        "a": {"distribution": "uniform", "low": 0, "high": 1},
+        "b": {"distribution": "lognormal", "median": 1, "cov": 0.3},
+        "c": {"distribution": "uniform", "low": 0, "high": 1},
+    }
+    rows = drawn("sobol", 2048, vary, correlations=[{"keys": ["a", "b"], "value": 0.7}])
+    a, b, c = (np.array([row[key] for row in rows]) for key in "abc")
+    assert stats.spearmanr(a, b).statistic == pytest.approx(6 / math.pi * math.asin(0.35), abs=0.01)
+    assert stats.spearmanr(a, c).statistic == pytest.approx(0, abs=0.02)
+    assert b.mean() == pytest.approx(math.sqrt(1.09), rel=0.01)  # its own distribution stays
+    one = [{"keys": ["a", "b"], "value": 0.9}, {"keys": ["b", "c"], "value": 0.9}, {"keys": ["a", "c"], "value": -0.9}]
+    with pytest.raises(td.SceneError, match="no variables have all of these correlations"):
+        drawn("sobol", 8, vary, correlations=one)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"vary": {"contact.fricton": [0.3]}}, "unknown key contact.fricton .did you mean friction"),
+        ({"vary": {FRICTION: 0.3}}, "vary.contact.friction: expected a list of values or a distribution"),
+        ({"vary": {FRICTION: {"distribution": "normal", "mean": 0.3}}}, "draw with design"),
+        ({"vary": {}}, "vary is empty"),
+        ({"study": {"scene": "beam", "design": "sobol"}}, "say how many runs"),
+        ({"study": {"scene": "beam", "design": "grid", "runs": 3}}, "leave it out"),
+        ({"study": {"scene": "beam", "design": "list"}, "vary": {"a": [1], "b": [1, 2]}}, "need one length"),
+        ({"study": {"scene": "beam", "design": "grid", "worker": 2}}, "unknown key study.worker"),
+        ({"study": {"scene": "no", "design": "grid"}}, 'there is no scene "no"'),
+        ({"correlations": [{"keys": [FRICTION, "b"], "value": 0.1}]}, "does not vary by a distribution"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_a_sentence(change: dict[str, Any], sentence: str, tmp_path: Path) -> None:
+    with pytest.raises(td.SceneError, match=sentence):
+        td.study(TABLES | change, tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("table", "sentence"),
+    [
+        ({"distribution": "normal", "mean": "3 N", "std": "2 mm"}, "different units"),
+        ({"distribution": "uniform", "low": 2, "high": 1}, "low 2.0 is not below high 1.0"),
+        ({"distribution": "lognormal", "median": -1, "cov": 0.1}, "median -1.0 is not above 0"),
+        ({"distribution": "triangular", "low": 0, "high": 1}, "needs high, low, mode; this has high, low"),
+        ({"distribution": "normal", "mean": 0, "std": 1, "low": 99}, "nothing is left"),
+    ],
+)
+def test_a_wrong_distribution_is_refused(table: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(td.SceneError, match=sentence):
+        drawn("sobol", 4, {"a": table})
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The study done by two processes."""
+    folder = tmp_path_factory.mktemp("two")
+    td.study(TABLES, folder, workers=2)
+    return folder
+
+
+def test_a_row_is_what_the_run_itself_gives(done: Path) -> None:
+    frame = pandas.read_csv(done / "study.csv", index_col="run", float_precision="round_trip")
+    assert list(frame.index) == [1, 2, 3, 4]
+    assert list(frame["status"]) == ["complete", "complete", "refused", "refused"]
+    assert "friction" in frame["sentence"][3]
+    assert list(frame[PRESS]) == [10e3, 20e3] * 2  # in SI units
+    own = td.run("beam", overrides=[*TINY, f"{FRICTION}=0.3", f"{PRESS}=20 kN", "verdict.enabled=false"]).summary()
+    assert frame["peak_m_first"][2] == pytest.approx(own["peak_m"][0], rel=1e-9)
+    assert frame["peak_hz_first"][2] == own["peak_hz"][0]
+    with xarray.open_dataset(done / "study.h5", engine="h5netcdf") as data:
+        assert data["peak_m_first"].dims == ("run",)
+        np.testing.assert_array_equal(data["peak_m_first"], frame["peak_m_first"])
+        assert list(data["status"].values) == list(frame["status"])
+    assert (done / "study.png").stat().st_size > 5000
+
+
+def test_the_table_does_not_depend_on_the_workers(done: Path, tmp_path: Path) -> None:
+    td.study(TABLES, tmp_path, workers=1)
+    for name in ("study.csv", "study.h5"):
+        assert (tmp_path / name).read_bytes() == (done / name).read_bytes()
+
+
+def test_resuming_repeats_nothing_and_takes_what_a_larger_study_shares(
+    done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = (done / "rows.jsonl").read_text().splitlines(keepends=True)
+    assert len(lines) == 2
+    (tmp_path / "rows.jsonl").write_text(lines[0] + lines[1] + '{"run": 2, "key": "torn')
+    asked: list[int] = []
+
+    def pretend(tasks: list[Task], workers: int) -> Any:
+        for one in tasks:
+            asked.append(one.number)
+            yield Row(one.number, one.key, "failed", "at 400 Hz")
+
+    monkeypatch.setattr(pool, "finished", pretend)
+    found = td.study(TABLES, tmp_path, resume=True)
+    assert asked == []
+    assert (tmp_path / "study.h5").read_bytes() == (done / "study.h5").read_bytes()
+    larger = TABLES | {"vary": {FRICTION: [0.2, 0.3], PRESS: ["10 kN", "20 kN"]}}
+    found = td.study(larger, tmp_path, resume=True)
+    assert asked == [1, 2]
+    assert list(found.columns["status"]) == ["failed", "failed", "complete", "complete"]
+    td.study(larger, tmp_path, resume=True)
+    assert asked == [1, 2]  # what failed fails again
+
+
+def test_the_key_of_a_run_follows_its_files(tmp_path: Path) -> None:
+    (tmp_path / "map.txt").write_text("1")
+    one = Task(1, "own", 'file = "map.txt"', ("a=1",), tmp_path)
+    assert one.key == replace(one, number=2).key
+    assert one.key != replace(one, overrides=("a=2",)).key
+    before = one.key
+    (tmp_path / "map.txt").write_text("22")
+    assert one.key != before
+
+
+def test_a_process_that_dies_takes_no_other_run_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    good = Task(1, "none", "", (), tmp_path)
+    monkeypatch.setattr(pool, "solve", die_at_two)
+    rows = {row.run: row for row in pool.finished([replace(good, number=n) for n in (1, 2, 3, 4)], 2)}
+    assert {n: row.status for n, row in rows.items()} == {1: "refused", 2: "lost", 3: "refused", 4: "refused"}
+    assert "died 3 times" in rows[2].sentence
+
+
+def die_at_two(one: Task) -> Row:
+    if one.number == 2:
+        os.kill(os.getpid(), signal.SIGTERM)
+    return Row(one.number, one.key, "refused", "")
+
+
+def test_the_command_resumes_a_study_that_was_killed(
+    done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(
+        f'[study]\nscene = "beam"\ndesign = "grid"\nset = {json.dumps(TINY)}\n'
+        f'[vary]\n{FRICTION} = [0.3, -0.5]\n{PRESS} = ["10 kN", "20 kN"]\n'
+    )
+    words = ["study", str(file), "--workers", "1", "--out", str(tmp_path / "out")]
+    process = subprocess.Popen([sys.executable, "-m", "tribodyn", *words], stdout=subprocess.DEVNULL)
+    journal = Journal(tmp_path / "out")
+    while not journal.rows() and process.poll() is None:
+        time.sleep(0.02)
+    process.kill()
+    process.wait()
+    before = journal.rows()
+    assert before
+    code, out, _ = leave([*words, "--resume", "--json"], capsys)
+    assert code == 0
+    assert json.loads(out)["runs"] == {"complete": 2, "failed": 0, "refused": 2, "lost": 0}
+    after = journal.rows()
+    assert all(after[key].seconds == row.seconds for key, row in before.items())
+    assert (tmp_path / "out" / "study.csv").read_bytes() == (done / "study.csv").read_bytes()
+
+
+def test_dask_gives_the_same_table(done: Path, tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    td.study(TABLES, tmp_path, workers=1, scheduler="local")
+    assert (tmp_path / "study.h5").read_bytes() == (done / "study.h5").read_bytes()

@@ -1,0 +1,66 @@
+"""The word of the command `tribodyn` that does the many runs of a study."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+
+from tribodyn.workflows.command.words import Flag, Json, make_room
+
+
+def study(
+    file: Path,
+    *,
+    workers: int | None = None,
+    scheduler: str = "",
+    out: Path | None = None,
+    resume: Flag = False,
+    as_json: Json = False,
+) -> None:
+    """Run a scene many times, over lists of values or drawn from distributions, and leave one table.
+
+    A scene may name Python files beside it: running somebody's study runs his code.
+
+    Parameters
+    ----------
+    file
+        A .toml file with [study] and [vary].
+    workers
+        Processes; as many as there are cores by default.
+    scheduler
+        Address of a scheduler of dask.distributed, such as tcp://host:8786, or "local" for one of its own.
+    out
+        Folder of study.csv, study.h5 and study.png; results/NAME by default.
+    resume
+        Take the runs that the folder holds already, and do the others.
+    as_json
+        Print JSON for machines.
+    """
+    from tribodyn.workflows.designs import study as studies
+    from tribodyn.workflows.designs import study_file
+    from tribodyn.workflows.run.progress import Progress, console_progress
+
+    make_room(out)
+    read = study_file.read(file)
+    folder = out or Path("results") / read.name
+    progress = Progress() if as_json else console_progress()
+    try:
+        found = studies.run(read, folder, progress, workers, scheduler, resume)
+    except KeyboardInterrupt:
+        again = shlex.join(["tribodyn", "study", str(file), "--out", str(folder), "--resume"])
+        raise KeyboardInterrupt(f"stopped; what was finished is kept in {folder}: resume with {again}") from None
+    counts = {status: found.count(status) for status in ("complete", "failed", "refused", "lost")}
+    if as_json:
+        files = {kind: str(folder / f"study.{kind}") for kind in ("csv", "h5")}
+        print(json.dumps({"study": found.name, "runs": counts, "influence": found.influence(), **files}, indent=2))
+        return
+    print("runs: " + ", ".join(f"{count} {status}" for status, count in counts.items() if count))
+    for number, by_key in found.influence().items():
+        if number.endswith("_first") or number in ("life_cycles", "depth_max_m"):
+            told = ", ".join(f"{key} {rank:+.2f}" for key, rank in sorted(by_key.items(), key=lambda i: -abs(i[1])))
+            print(f"{number:14} rank correlation with {told}")
+    print(folder / "study.csv", folder / "study.h5", sep="\n")
+
+
+COMMANDS = (study,)

@@ -1,0 +1,131 @@
+"""Distributions that a number of a scene is drawn from, in SI units."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from scipy import stats
+
+from tribodyn.workflows.scene import units
+from tribodyn.workflows.scene.fields import Table
+
+Given = float | str
+
+# kind -> numbers that it must have, numbers of which one must be there, numbers that it may have
+NUMBERS: dict[str, tuple[set[str], set[str], set[str]]] = {
+    "uniform": ({"low", "high"}, set(), set()),
+    "triangular": ({"low", "mode", "high"}, set(), set()),
+    "normal": ({"mean"}, {"std", "cov"}, {"low", "high"}),
+    "lognormal": ({"median", "cov"}, set(), {"low", "high"}),
+}
+
+
+class Distribution(Table):
+    """A distribution as a study gives it; numbers have units, or are in SI."""
+
+    distribution: Literal["uniform", "normal", "lognormal", "triangular"]
+    low: Given | None = None
+    """Smallest value; of a normal or lognormal one, where it is truncated."""
+    high: Given | None = None
+    """Largest value; of a normal or lognormal one, where it is truncated."""
+    mode: Given | None = None
+    """Most likely value."""
+    mean: Given | None = None
+    """Mean, before it is truncated."""
+    median: Given | None = None
+    """Median, before it is truncated."""
+    std: Given | None = None
+    """Standard deviation, before it is truncated."""
+    cov: Given | None = None
+    """Coefficient of variation, standard deviation over mean, before it is truncated, such as "10 %"."""
+
+
+@dataclass(frozen=True)
+class Marginal:
+    """A distribution of a number in SI units, truncated to [low, high]."""
+
+    law: Any
+    low: float = -math.inf
+    high: float = math.inf
+
+    @classmethod
+    def of(cls, table: Distribution) -> Marginal:
+        """The distribution of a table; raises ValueError with a sentence."""
+        given = {name for name in table.model_fields_set if name != "distribution"}
+        must, one_of, may = NUMBERS[table.distribution]
+        wants = ", ".join([*sorted(must), *([" or ".join(sorted(one_of, reverse=True))] if one_of else [])])
+        if not must <= given or (one_of and len(given & one_of) != 1) or given - must - one_of - may:
+            optional = f", and may have {' and '.join(sorted(may, reverse=True))}" if may else ""
+            raise ValueError(f"a {table.distribution} distribution needs {wants}{optional}; this has {_told(given)}")
+        n = _numbers({name: getattr(table, name) for name in given})
+        if "low" in n and "high" in n and not n["low"] < n["high"]:
+            raise ValueError(f"low {table.low} is not below high {table.high}")
+        for name in ("std", "cov"):
+            if name in n and not n[name] > 0:
+                raise ValueError(f"{name} {getattr(table, name)} is not above 0")
+        if table.distribution == "uniform":
+            return cls(stats.uniform(n["low"], n["high"] - n["low"]))
+        if table.distribution == "triangular":
+            width = n["high"] - n["low"]
+            if not n["low"] <= n["mode"] <= n["high"]:
+                raise ValueError(f"mode {table.mode} is not between low {table.low} and high {table.high}")
+            return cls(stats.triang((n["mode"] - n["low"]) / width, n["low"], width))
+        ends = n.get("low", -math.inf), n.get("high", math.inf)
+        if table.distribution == "normal":
+            deviation = n["std"] if "std" in n else n["cov"] * abs(n["mean"])
+            if not deviation > 0:
+                raise ValueError("a cov of a mean of 0 is no deviation: give std")
+            found = cls(stats.norm(n["mean"], deviation), *ends)
+        else:
+            if not n["median"] > 0:
+                raise ValueError(f"median {table.median} is not above 0")
+            # coefficient of variation v of a lognormal variable: v^2 = exp(s^2) - 1
+            found = cls(stats.lognorm(math.sqrt(math.log1p(n["cov"] ** 2)), scale=n["median"]), *ends)
+        if not found.law.cdf(found.high) - found.law.cdf(found.low) > 0:
+            raise ValueError("nothing is left of the distribution between low and high")
+        return found
+
+    def at(self, share: np.ndarray) -> np.ndarray:
+        """Quantiles; share : (n,) in (0, 1)."""
+        below, upto = self.law.cdf(self.low), self.law.cdf(self.high)
+        return np.clip(self.law.ppf(below + share * (upto - below)), self.low, self.high)
+
+
+def _told(given: set[str]) -> str:
+    return ", ".join(sorted(given)) or "none of them"
+
+
+def _numbers(given: dict[str, Given]) -> dict[str, float]:
+    """The numbers in SI units; all but the coefficient of variation in the same one."""
+    found = {"cov": units.to_si(given["cov"], "")} if "cov" in given else {}
+    unit = {name: unit_of(value) for name, value in given.items() if name != "cov"}
+    if len(set(unit.values())) > 1:
+        raise ValueError("its numbers have different units: " + ", ".join(f"{n} {given[n]}" for n in unit))
+    return found | {name: units.to_si(given[name], of) for name, of in unit.items()}
+
+
+def unit_of(value: Given) -> str:
+    """The unit that a scene counts a quantity in; raises ValueError where it is no quantity."""
+    if not isinstance(value, str):
+        return ""
+    match = units.NUMBER.match(value)
+    if match is None:
+        raise ValueError(f'"{value}" is not a number with a unit')
+    dimension = units.parse_unit(match[2]).dimension
+    for unit in units.EXAMPLES:
+        if units.parse_unit(unit).dimension == dimension:
+            return unit
+    raise ValueError(f'no key of a scene has the unit of "{value}"')
+
+
+def si(value: Any) -> float | None:
+    """A value of a list as a number in SI units, None where it is none."""
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        return None
+    try:
+        return units.to_si(value, unit_of(value))
+    except ValueError:
+        return None

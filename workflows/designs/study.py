@@ -1,0 +1,98 @@
+"""A study from its file to its table: what is done already is not done again, and what is finished is on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from tribodyn.workflows.designs import cluster, design, pool
+from tribodyn.workflows.designs.journal import Journal
+from tribodyn.workflows.designs.study_file import Study
+from tribodyn.workflows.designs.table import StudyTable, table, write
+from tribodyn.workflows.designs.task import Row, Task
+from tribodyn.workflows.run.checkpoint import alone_in
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.reuse import early_of
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.scene_file import SceneError
+from tribodyn.workflows.scene.schema import PartScene
+
+
+def run(
+    study: Study,
+    folder: Path,
+    progress: Progress,
+    workers: int | None = None,
+    scheduler: str = "",
+    resume: bool = False,
+) -> StudyTable:
+    """Do the runs of a study, and leave study.csv, study.h5 and study.png in `folder`.
+
+    workers : processes, as many as there are cores by default; scheduler : see cluster.finished, none by default
+    resume : take the rows that `folder` holds of the same runs
+    Raises  SceneError, ValueError: the study asks for what cannot be; SolveFailed: the scheduler was lost
+    """
+    if workers is not None and workers < 1:
+        raise ValueError(f"workers {workers}: give at least 1")
+    varied = design.runs(study)
+    tasks, refused = _tasks(study, varied)
+    folder.mkdir(parents=True, exist_ok=True)
+    with alone_in(folder):
+        journal, rows = Journal(folder), dict(refused)
+        earlier = journal.rows() if resume else {}
+        for task in tasks:
+            row = earlier.get(task.key)
+            if row is not None and row.status != "lost":
+                rows[task.number] = replace(row, run=task.number)
+        known = [row for number, row in sorted(rows.items()) if number not in refused]
+        previous = journal.begin(known, resume)
+        if previous:
+            progress.say(f"the rows that were here are now {previous}")
+        if resume:
+            progress.say(f"{len(known)} of {len(varied)} runs are done already")
+        # runs that share mesh and reduction come one after the other
+        left = sorted((task for task in tasks if task.number not in rows), key=lambda task: task.early)
+        try:
+            with progress.track(f"{len(left)} runs") as advance:
+                for done, row in enumerate(_finished(left, workers or pool.cores(), scheduler), 1):
+                    journal.add(row)
+                    rows[row.run] = row
+                    bad = sum(one.status != "complete" for one in rows.values())
+                    advance(done / len(left), f"{done} of {len(left)}{f', {bad} not complete' if bad else ''}")
+        finally:
+            found = table(study.name, varied, rows) if rows else None
+            if found is not None:
+                write(found, folder)
+        assert found is not None
+        if found.count("complete"):
+            found.plot().savefig(folder / "study.png")
+    return found
+
+
+def _finished(tasks: Sequence[Task], workers: int, scheduler: str) -> Iterator[Row]:
+    if not tasks:
+        return iter(())
+    return cluster.finished(tasks, scheduler, workers) if scheduler else pool.finished(tasks, workers)
+
+
+def _tasks(study: Study, varied: Sequence[dict[str, Any]]) -> tuple[list[Task], dict[int, Row]]:
+    """The runs, and rows for those whose scene is refused; raises SceneError where every one is."""
+    always = ["solver.threads=1", *([] if study.settings.verdict else ["verdict.enabled=false"]), *study.settings.set]
+    base = scene_file.read(study.scene, always)
+    tasks, refused = [], {}
+    for number, values in enumerate(varied, 1):
+        own = [f"{key}={tomli_w.dumps({'v': value}).partition('=')[2].strip()}" for key, value in values.items()]
+        task = Task(number, base.name, base.text, (*always, *own), base.folder)
+        try:
+            scene = task.scene().scene
+        except SceneError as error:
+            refused[number] = Row(number, "", "refused", str(error))
+        else:
+            tasks.append(replace(task, early=early_of(scene) if isinstance(scene, PartScene) else ""))
+    if not tasks:
+        raise SceneError(f"every run is refused, the first: {refused[1].sentence}")
+    return tasks, refused

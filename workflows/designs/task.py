@@ -1,0 +1,152 @@
+"""One run of a study, in whatever process it is done, and the row that it leaves."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+import time
+import tomllib
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Literal
+
+import numpy as np
+
+from tribodyn.version import __version__
+from tribodyn.workflows.accuracy.verdict import QUANTITIES
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.run import modelling, pipeline
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.reuse import Bench
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.schema import PartScene
+
+Status = Literal["complete", "failed", "refused", "lost"]
+ENDS = ("peak_hz", "peak_m", "preload_N")  # of which a summary has the first and the last
+SINGLE = ("energy_J", "depth_max_m", "volume_m3", "cycles", "life_cycles")
+
+
+@dataclass(frozen=True)
+class Task:
+    """One run: a scene by its text, so that another process or machine needs no file of it.
+
+    number : of the run, from 1; overrides : of the scene, those of the run last; folder : of the files it names
+    early : what its mesh and reduction are made of, empty where they are not shared
+    """
+
+    number: int
+    name: str
+    text: str
+    overrides: tuple[str, ...]
+    folder: Path
+    early: str = field(default="", repr=False, compare=False)
+
+    @property
+    def key(self) -> str:
+        """Hash of all that the row depends on: scene, overrides, contents of the files that they name, version."""
+        content = hashlib.sha256(repr((__version__, self.text, self.overrides)).encode())
+        for path in sorted(set(_files(self.text, self.overrides, self.folder))):
+            content.update(_digest(path, path.stat().st_mtime_ns))
+        return content.hexdigest()
+
+    def scene(self) -> SceneFile:
+        """The scene of the run; raises SceneError."""
+        return scene_file.parse(self.text, f"{self.name}.toml", self.overrides, self.folder)
+
+
+@dataclass(frozen=True)
+class Row:
+    """What a run leaves.
+
+    key : of the task; sentence : how it ended; numbers : by column, SI units, what there is none of is left out
+    status : complete, failed in a solve, refused as a scene, or lost with the process that worked on it
+    """
+
+    run: int
+    key: str
+    status: Status
+    sentence: str
+    numbers: dict[str, float] = field(default_factory=dict)
+    seconds: float = 0.0
+
+    def record(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self)
+
+
+_one_at_a_time = threading.Lock()  # workers may have several threads, Gmsh and the threads of BLAS are of a process
+_bench = Bench()
+
+
+def solve(task: Task) -> Row:
+    """Do one run; whatever goes wrong in it becomes its row."""
+    start = time.perf_counter()
+
+    def ended(status: Status, sentence: object, numbers: dict[str, float] | None = None) -> Row:
+        told = " ".join(str(sentence).split())
+        return Row(task.number, task.key, status, told, numbers or {}, time.perf_counter() - start)
+
+    with _one_at_a_time:
+        try:
+            result = pipeline.run(task.scene(), None, Progress(), build=_model)
+        except np.linalg.LinAlgError as error:
+            return ended("failed", error)
+        except (ValueError, OSError) as error:
+            return ended("refused", error)
+        except MemoryError as error:
+            return ended("failed", str(error) or "the memory of this machine is not enough")
+        except RuntimeError as error:
+            return ended("failed", error)
+        except Exception as error:  # one run that nobody foresaw does not stop the others
+            return ended("failed", f"{type(error).__name__}: {error}")
+        return ended("complete", result.state, numbers_of(result))
+
+
+def _model(file: SceneFile) -> modelling.Model:
+    """The model of a scene; mesh, part and reduction are those of the run before, where the scene allows it."""
+    if isinstance(file.scene, PartScene):
+        return _bench.model(file)
+    with TemporaryDirectory() as folder:
+        return modelling.build(file, Path(folder), Progress())
+
+
+def numbers_of(result: Result) -> dict[str, float]:
+    """The numbers of a result by column: those of its summary, and of its verdict where it has one."""
+    summary = result.summary()
+    numbers: dict[str, float | None] = {}
+    for name in ENDS:
+        first, last = summary[name] or (None, None)
+        numbers |= {f"{name}_first": first, f"{name}_last": last}
+    numbers |= {name: summary[name] for name in SINGLE}
+    numbers["peak_at_end"] = summary["peak_at_end"]
+    for name in QUANTITIES if summary["verdict"] else ():
+        said = summary["verdict"][name]
+        numbers |= {f"{name}_error": said["error"], f"{name}_stated": said["stated"]}
+    return {name: float(value) for name, value in numbers.items() if value is not None}
+
+
+def _files(text: str, overrides: tuple[str, ...], folder: Path) -> Iterator[Path]:
+    """Files that a scene and its overrides name."""
+    for value in _texts([tomllib.loads(text), *(one.partition("=")[2].strip(" \"'") for one in overrides)]):
+        if len(value) < 256 and "\n" not in value and "\0" not in value and (folder / value).is_file():
+            yield folder / value
+
+
+def _texts(value: Any) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+        yield f"{value}.py"  # a law or part of one's own
+    elif isinstance(value, dict):
+        yield from _texts(list(value.values()))
+    elif isinstance(value, list):
+        for item in value:
+            yield from _texts(item)
+
+
+@cache
+def _digest(path: Path, changed: int) -> bytes:
+    return hashlib.sha256(path.read_bytes()).digest()
