@@ -110,7 +110,7 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress) -> 
             else _unknown("mesh and contact grid", "verdict.mesh is false")
         )
     checks: list[tuple[State, InTime]] = []
-    refusal = ""
+    refusal = "" if wanted.in_time else "verdict.in_time is false"
     if wanted.in_time:
         with progress.stage("verdict: time integration"):
             for state in [seen[i] for i in sorted({0, len(seen) // 2, len(seen) - 1})] if seen else []:
