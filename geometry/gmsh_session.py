@@ -31,6 +31,7 @@ def session() -> Iterator[Any]:
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.restoreDefaults()  # else options of an earlier session of this process stay
+        gmsh.option.setNumber("General.AbortOnError", 2)  # raise, as `initialize` has it; the defaults go on instead
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.option.setNumber("General.NumThreads", 1)  # the same mesh on every machine
         yield gmsh

@@ -82,7 +82,7 @@ def test_law_with_constant_normal_load_is_the_closed_form_to_rounding_where_its_
     damping = 2 * RATIO * np.sqrt(MASS * STIFFNESS)
     force = x * (STIFFNESS - MASS * omega**2 + 1j * omega * damping + closed_form_force(x))
     parameters = ContactParameters.of(("t1",), [[KT]], friction=MU, normal_load=NORMAL_FORCE)
-    model = oscillator(MASS, STIFFNESS, RATIO, "n")
+    model = oscillator(MASS, STIFFNESS, RATIO, "t1")
     basis = HarmonicBasis((1,), 16, "located")
     balance = HarmonicBalance.of(
         model, Joint("contact", "jenkins_constant", parameters), basis, Excitation.of({}, {1: {"force": force}}), omega
