@@ -28,7 +28,7 @@ def finished(tasks: Sequence[Task], address: str, workers: int) -> Iterator[Row]
         raise ValueError(f"--scheduler {address}: no scheduler answers there ({error})") from None
     try:
         by_future = {client.submit(solve, task, pure=False, priority=-i): task for i, task in enumerate(tasks)}
-        for future in distributed.as_completed(by_future):
+        for future in distributed.as_completed(list(by_future), loop=client.loop):
             yield _row(future, by_future.pop(future), address)
     finally:
         client.close()
