@@ -126,7 +126,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_row_is_what_the_run_itself_gives(done: Path) -> None:
-    frame = pandas.read_csv(done / "study.csv", index_col="run", float_precision="round_trip")
+    frame = pandas.read_csv(done / "study.csv", index_col="run")
     assert list(frame.index) == [1, 2, 3, 4]
     assert list(frame["status"]) == ["complete", "complete", "refused", "refused"]
     assert "friction" in frame["sentence"][3]
@@ -136,7 +136,7 @@ def test_a_row_is_what_the_run_itself_gives(done: Path) -> None:
     assert frame["peak_hz_first"][2] == own["peak_hz"][0]
     with xarray.open_dataset(done / "study.h5", engine="h5netcdf") as data:
         assert data["peak_m_first"].dims == ("run",)
-        np.testing.assert_array_equal(data["peak_m_first"], frame["peak_m_first"])
+        np.testing.assert_allclose(data["peak_m_first"], frame["peak_m_first"], rtol=1e-14)
         assert list(data["status"].values) == list(frame["status"])
     assert (done / "study.png").stat().st_size > 5000
 

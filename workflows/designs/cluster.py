@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -53,4 +54,5 @@ def _library() -> Any:
         raise ValueError(
             '--scheduler needs the package distributed: install it with pip install "tribodyn[cluster]"'
         ) from None
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a lost scheduler is told in one sentence
     return distributed
