@@ -123,7 +123,7 @@ def test_planar_slip_is_parallel_to_friction_whatever_the_springs(ratio):
     rng = np.random.default_rng(2)
     for _ in range(200):
         k = np.array([1.0, ratio, 1.0])
-        p = np.array([*k, 0.3, 0.0, 0.0, 0.0])
+        p = np.array([*k, 0.0, 0.3])  # springs, gap, friction
         w = rng.normal(size=2)
         x, before = np.array([*rng.normal(size=2), rng.uniform(0.01, 1)]), w.copy()
         f = np.zeros(3)

@@ -151,7 +151,7 @@ def test_stick_limit_is_the_linear_spring(name, components):
         x, drawn, _ = draw(law, components, basis, 50, seed=8)
         if "n" in components:
             x[:, -1, 0] = np.abs(x[:, -1, 1:]).sum(axis=1) + 1
-        parameters = ContactParameters.of(components, drawn.stiffness, friction=1e6, normal_load=1.0)
+        parameters = ContactParameters.of(components, drawn.stiffness, **own(name, friction=1e6, normal_load=1.0, cubic=0.0))
         cycle = aft.cycle(law, x, parameters, basis)
         linear = drawn.stiffness[:, :, None] * x
         stiffness = np.stack([np.diag(np.repeat(k, basis.n_coeff)) for k in drawn.stiffness])
@@ -174,7 +174,7 @@ def test_full_slip_limit_of_energy(name, components):
             x[0, -1, 0] = load
         k = np.full((1, len(components)), kt)
         k[0, -1] = 1.0 if "n" in components else kt
-        parameters = ContactParameters.of(components, k, friction=mu, normal_load=load)
+        parameters = ContactParameters.of(components, k, **own(name, friction=mu, normal_load=load))
         cycle = aft.cycle(law, x, parameters, basis)
         energy = basis.work_per_cycle(cycle.force, x)[0, 0]
         exact = 4 * mu * load * (amplitude - mu * load / kt)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.helpers.contact_draws import HARMONICS, LOCATED, draw
+from tests.helpers.contact_draws import HARMONICS, LOCATED, draw, own
 from tests.helpers.random_problems import cases
 from tribodyn.hbm import aft, located
 from tribodyn.hbm import law as contact_law
@@ -85,7 +85,7 @@ def test_what_locating_buys(name, components, swing, order):
         normal = x[:, -1]
         normal *= swing / np.hypot(normal[:, 1::2], normal[:, 2::2]).sum(axis=1)[:, None]
         normal[:, 0] = 1
-    p = ContactParameters.of(components, np.ones((200, len(components))), friction=0.5, normal_load=1.0)
+    p = ContactParameters.of(components, np.ones((200, len(components))), **own(name, friction=0.5, normal_load=1.0))
     exact = aft.cycle(law, x, p, WITH_STATIC)
     samples = 8 * 2 ** np.arange(10)
     error = []

@@ -144,7 +144,7 @@ def test_a_branch_in_another_parameter_is_marked_with_it():
 
 def test_names_and_refusals():
     model = oscillator(1.0, 1e4, 0.01)
-    parameters = ContactParameters.of(("t1", "n"), [[1e4, 1e4]])
+    parameters = ContactParameters.of(("t1", "n"), [[1e4, 1e4]], friction=0.3)
     excitation = Excitation.of({"normal": 1.0}, {1: {"force": 1.0}})
     balance = HarmonicBalance.of(
         model, Joint("contact", "jenkins", parameters), HarmonicBasis((0, 1), 32), excitation, 200.0
