@@ -34,11 +34,16 @@ from tribodyn.hbm.wear_history import LIFE_SHARE, WearHistory, WearRow, history,
 from tribodyn.hbm.wearing import WearingBalance
 
 GAMMA = 1 - 1 / np.sqrt(2)
-GROWTH = (0.2, 3.0)  # limits of the ratio of one step to the one before
-TREND = 0.2  # power with which an error that grows from step to step holds the next one back
-LANDING = (0.97, 0.999)  # of the preload at which an event is located, where a step that would pass it must end
-FAINTEST = 1e-4  # share of the first preload below which the last touch is noise of Newton's tolerance
-LEAPS = 0.01 * 3.0 ** np.arange(5)  # depths of steps over the end of a branch, of the tolerance, tried in turn
+STEP_RATIO_LIMITS = (0.2, 3.0)  # limits of the ratio of one step to the one before
+ERROR_TREND_POWER = 0.2  # power with which an error that grows from step to step holds the next one back
+# shares of an event's preload between which a step that would pass the event must end: just below it, so that the next
+# step starts beyond it
+EVENT_WINDOW = (0.97, 0.999)
+# of the first preload, where a run ends at the latest: below it the last touch is noise of Newton's tolerance
+LEAST_PRELOAD_SHARE = 1e-4
+# depths of explicit steps over the end of a branch, shares of the tolerance, tried in turn; the longest, 0.81, stays
+# within the tolerance
+EXPLICIT_STEPS = 0.01 * 3.0 ** np.arange(5)
 MAX_CORRECTIONS = 12  # solves of a stage
 GAIN_ACCURACY = 1e-9  # of the depth, for laws whose depth per work is not constant
 
@@ -62,10 +67,11 @@ def evolve(
     """Wear the contact until it is lost, with steps chosen by a local error estimate on depth and on life.
 
     on_row, resume, return : as for the thesis's rule; `step_error` of a row is its estimate over the tolerance. The
-    last touch of a vibrating contact does not end in finite time: FAINTEST ends the run where `lost_below` does not.
+    last touch of a vibrating contact does not end in finite time: LEAST_PRELOAD_SHARE ends the run where `lost_below`
+    does not.
     Raises  ValueError where the wear law wears pairs that do no friction work
     """
-    problem = replace(problem, lost_below=max(problem.lost_below, FAINTEST))
+    problem = replace(problem, lost_below=max(problem.lost_below, LEAST_PRELOAD_SHARE))
     rows = rows_to_go_on(resume)
     if rows:  # the state after the last step was not kept: take the step again, to the same bits
         again = rows.pop()
@@ -106,7 +112,7 @@ class _Taken:
 def _step(problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow]) -> _Taken:
     """One accepted step from a state; where an event would be passed, the step ends at it."""
     smallest = 1e-9 * tolerance.scale / float(state.rate.max())
-    leap = LEAPS[0] * tolerance.share * tolerance.scale / float(state.rate.max())
+    leap = EXPLICIT_STEPS[0] * tolerance.share * tolerance.scale / float(state.rate.max())
     stride = 10 * leap
     drift, slopes = np.zeros(len(state.points)), -np.ones(len(state.points))
     if rows and rows[-1].plan[0] > 0:
@@ -126,7 +132,7 @@ def _step(problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Se
             error = _error(problem, tolerance, state, stride, first, second)
         if error <= 1.0:
             preload = problem.preload(second.points[0].state)
-            if preload >= LANDING[0] * target:
+            if preload >= EVENT_WINDOW[0] * target:
                 break
             longest = stride
             stride *= _share_to(target, problem.preload(state.points[0].state), preload)
@@ -136,8 +142,8 @@ def _step(problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Se
             return _leap(problem, replace(state, solves=solves), leap, second.failure, rows)
     worn = second.depth - state.depth
     work = stride * ((1 - GAMMA) * first.work + GAMMA * second.work)
-    trend = (rows[-1].step_error / error) ** TREND if rows and error > 0 else 1.0
-    ratio = float(np.clip(_growth(error) * min(trend, 1.0), *GROWTH))
+    trend = (rows[-1].step_error / error) ** ERROR_TREND_POWER if rows and error > 0 else 1.0
+    ratio = float(np.clip(_growth(error) * min(trend, 1.0), *STEP_RATIO_LIMITS))
     plan = np.array([stride * ratio, *slopes])
     row = row_of(problem, replace(state, solves=solves), stride, worn, work, error, plan)
     return _Taken(row, replace(second, solves=0))
@@ -148,12 +154,12 @@ def _leap(problem: WearProblem, state: WearState, stride: float, failure: str, r
 
     The response folds, or the tracked peak merges with a valley: no solution follows on the one here. A step that did
     not get over it, or behind which none was found, is followed by a longer one, up to the tolerance. Where pairs
-    hammer and branches are short, the rule goes on in such steps.
+    hammer and branches are short, the rule continues in such steps.
     """
     nothing = np.zeros_like(problem.area)
     plan = np.zeros(1 + len(state.points))
     tried = next((i for i, row in enumerate(reversed(rows)) if row.plan[0] > 0), len(rows))
-    for length in LEAPS[min(tried, len(LEAPS) - 1) :] / LEAPS[0] * stride if failure else ():
+    for length in EXPLICIT_STEPS[min(tried, len(EXPLICIT_STEPS) - 1) :] / EXPLICIT_STEPS[0] * stride if failure else ():
         worn = length * state.rate
         after = assess(problem, state.depth + worn, state.cycles + length, None)
         state = replace(state, solves=state.solves + after.solves)
@@ -174,7 +180,7 @@ def _event(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) -> f
 
 def _share_to(target: float, start: float, end: float) -> float:
     """Share of a step after which the preload has fallen from start to just below the target, along its logarithm."""
-    aim = np.mean(LANDING) * target
+    aim = np.mean(EVENT_WINDOW) * target
     return float(np.clip(np.log(start / aim) / np.log(start / max(end, 1e-3 * target)), 0.05, 0.95))
 
 
@@ -310,4 +316,4 @@ def _error(
 
 def _growth(error: float) -> float:
     """Ratio of the next step to this one by the second order of the error, with a margin."""
-    return float(np.clip(0.85 / np.sqrt(max(error, 1e-10)), *GROWTH))
+    return float(np.clip(0.85 / np.sqrt(max(error, 1e-10)), *STEP_RATIO_LIMITS))

@@ -201,7 +201,7 @@ def reason_to_stop(
     rows: Sequence[WearRow] = (),
     step_depth: float = 0.0,
 ) -> str:
-    """Why a run ends at a state, as a sentence; empty where it goes on.
+    """Why a run ends at a state, as a sentence; empty where it continues.
 
     first_preload, first_at_rest : of the unworn contact, vibrating and at rest [N]
     rows : taken before; step_depth : a depth that is worth wearing [m]: wear has faded out where the deepest pair needs
@@ -243,7 +243,7 @@ def row_of(
 
 
 def state_of(problem: WearProblem, row: WearRow) -> WearState:
-    """The state that a row was made from, solved points included, so that a resumed run goes on bit for bit."""
+    """The state that a row was made from, solved points included, so that a run resumes bit for bit."""
     points = []
     for i, duty in enumerate(problem.mission):
         balance = problem.at_depth(row.depth).with_load(duty.load)

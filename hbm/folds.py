@@ -80,7 +80,7 @@ class NoFold(RuntimeError):
 
 @dataclass(frozen=True)
 class _Fold:
-    """A fold with the direction in which its line goes on.
+    """A fold with the direction in which its line continues.
 
     value : of the parameter; solution : at the fold; along : unit tangent of the response curve
     tangent, change : of (x, omega) and of the parameter along the line of folds, of unit length together

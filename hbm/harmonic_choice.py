@@ -22,8 +22,10 @@ from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.threads import single
 
 ACCURACY = 1e-3  # of the linear solves behind the estimate
-QUIET = 1e-2  # an output that vibrates less than this share of the liveliest one is measured against that share
-USEFUL = 3  # harmonics in a row that turn out useful, the faintest first, after which no more are tried for dropping
+# an output that vibrates less than this share of the largest vibration is measured against that share
+LEAST_VIBRATION_SHARE = 1e-2
+# useful harmonics in a row, the smallest first, after which no more are tried for dropping
+USEFUL_IN_A_ROW = 3
 SAFETY = 0.5  # share of the tolerance that the harmonics left out may use up when the set grows
 
 
@@ -105,7 +107,7 @@ def choose(balance: HarmonicBalance, omega: Sequence[float], options: ChoiceOpti
         history.append((kept, trial.error))
     useful = 0
     for h in [h for h in trial.by_content() if h not in loaded and h != 1]:
-        if trial.error > options.tolerance or useful == USEFUL:
+        if trial.error > options.tolerance or useful == USEFUL_IN_A_ROW:
             break
         fewer = tuple(k for k in kept if k != h)
         attempt = _Trial.of(wide, fewer, omega, trial, options, shrinking=True)
@@ -161,7 +163,7 @@ def estimate(wide: HarmonicBalance, kept: tuple[int, ...], omega: float, x: np.n
     linear, point = wide.linearise(state), wide.at(omega)
     direct = wide.outputs(state)
     vibration = np.linalg.norm(response[:, wide.basis.order > 0], axis=1)
-    scale = np.maximum(vibration, QUIET * vibration.max(initial=0.0))
+    scale = np.maximum(vibration, LEAST_VIBRATION_SHARE * vibration.max(initial=0.0))
     scale[scale == 0] = np.inf
 
     def measure(change: np.ndarray) -> float:

@@ -313,7 +313,7 @@ def _segments(w, r, u, load, hs, edges, touching, n_edge, at, segments):
 
 @numba.njit(cache=True)
 def _append(segments, n, start, stop, kind, w, origin, tilt):
-    """Append a segment, or lengthen the last one where it goes on unchanged."""
+    """Append a segment, or lengthen the last one where it continues unchanged."""
     if n > 0:
         last = segments[n - 1]
         if last[1] == start and last[2] == kind and last[3] == w and last[4] == origin:

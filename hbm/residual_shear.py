@@ -4,7 +4,7 @@ A pair that slips or lifts once in every cycle forgets how it was loaded. A pair
 slider may stand anywhere between the two ends at which the cycle just fits into the friction limit, so its static shear
 is free within that range, and with it the static balance, the normal loads, and what the other pairs do.
 
-The start that a HarmonicBalance uses unless told otherwise is the unloaded one: all sliders at zero, that is, contact
+The start that a HarmonicBalance uses by default is the unloaded one: all sliders at zero, that is, contact
 closes without shear and a stuck pair bears the shear that the loads put on it, or as much of it as friction holds. The
 bounds start instead from sliders that are far away on one side. The first cycle drags them to the end of the range that
 belongs to the motion, where they stay (a Jenkins slider settles in one cycle, at that end exactly), so one solve finds
@@ -27,7 +27,7 @@ from tribodyn.hbm.branch import amplitude
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.threads import single
 
-FAR = 1e4  # times the largest travel of a slider that the unloaded cycle allows
+START_OFFSET = 1e4  # times the largest travel of a slider that the unloaded cycle allows
 LINEAR = 1e-9  # deviation of the vibrating force of a stuck pair from its spring, relative to the largest
 
 
@@ -188,7 +188,7 @@ def _solve_pushed(
     Where Newton does not get there at once, the sliders are moved out in steps that halve when one fails.
     """
     x, omega = unloaded.state.x, unloaded.state.omega
-    far = -side * FAR * max(reach.max(), np.finfo(float).tiny)
+    far = -side * START_OFFSET * max(reach.max(), np.finfo(float).tiny)
     solution = newton.solve(balance.with_memory(far), omega, x, options)
     if solution.converged or not unloaded.converged:
         return solution

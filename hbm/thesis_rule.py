@@ -28,7 +28,7 @@ def evolve(
 
     step_depth : largest depth that one step may wear, v_w,max [m]; Z is floored to whole cycles, but at least one
     on_row : called with each finished row, for checkpoints and progress
-    resume : rows of an interrupted run of the same problem; the run goes on after them to the same numbers
+    resume : rows of an interrupted run of the same problem; the run resumes after them, to the same numbers
     Returns the history; its `end` says why it stopped, also where a solve failed
     """
     if not step_depth > 0:

@@ -12,11 +12,11 @@ from tribodyn.hbm.continuation._curve import KINK_ANGLE, CurvePoint, Segment, lo
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.parameter import Parameter
 
-FADE = 0.8  # the characteristic length falls to this share per point where the vibration gets small
-STRAY = 0.35  # miss of the prediction, in steps, beyond which the step is too long
+LEAST_LENGTH_RATIO = 0.8  # the characteristic length falls to this share per point where the vibration gets small
+LARGEST_MISS = 0.35  # miss of the prediction, in steps, beyond which the step is too long
 CORNER_STEP = 0.1  # longest step in which a corner is looked for
 STEP_TANGENT = 1e-6  # relative accuracy of tangents along the way
-RELAX = 1.1  # growth per step of the cap on steps after a rewind
+CAP_GROWTH = 1.1  # growth per step of the cap on steps after a rewind
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,8 @@ class Stepper:
     def _measure(self, flat: np.ndarray) -> Metric:
         """The metric at a point: its length is the size of the vibration or the way that x has gone, of late."""
         vibration = np.linalg.norm(flat[:, self._order > 0])
-        self._length = max(float(vibration), float(np.linalg.norm(flat - self._reference)), FADE * self._length)
+        away = float(np.linalg.norm(flat - self._reference))
+        self._length = max(float(vibration), away, LEAST_LENGTH_RATIO * self._length)
         length = self._length or float(np.linalg.norm(flat)) or 1.0
         return Metric(length, self._width)
 
@@ -150,10 +151,10 @@ class Stepper:
     def _fits(self, trial: Segment, step: float) -> bool:
         """Whether a step is short for the curve, or turns at a corner whose legs are straight and meet."""
         stray = self._metric.norm(trial.end.place - self._ahead(step))
-        if trial.angle <= KINK_ANGLE and stray <= STRAY * step:
+        if trial.angle <= KINK_ANGLE and stray <= LARGEST_MISS * step:
             return True
         self.trouble = f"the curve turns sharply, or jumps, at every step down to {step:.1e}"
-        if trial.angle < STRAY:
+        if trial.angle < LARGEST_MISS:
             return False
         first, second, miss = trial.corner
         if min(first, second) < -0.02 * step or first + second > 2 * step or miss > 0.05 * trial.length:
@@ -172,7 +173,7 @@ class Stepper:
 
         trial : a segment that ends on the leg behind the kink, if there is one
         The derivative ahead of the kink is that of its other side: along the null direction there, either way, the
-        curve must go on. A point is sought in the hyperplane that both legs cross in their sense, and none that lies on
+        curve goes. A point is sought in the hyperplane that both legs cross in their sense, and none that lies on
         the leg we came on.
         """
         here, metric = self._here, self._metric
@@ -191,7 +192,7 @@ class Stepper:
         return None
 
     def _legs(self, ahead: Direction) -> list[Direction]:
-        """Directions in which the curve may go on, from the derivative at a place that need not lie on the curve."""
+        """Directions in which the curve may continue, from the derivative at a place that need not lie on the curve."""
         balance, omega = self._path.place(ahead.p)
         state = balance.evaluate(omega, ahead.x.reshape(balance.contact.n_pair, -1, ahead.x.shape[-1]))
         o = self._options.newton
@@ -226,5 +227,5 @@ class Stepper:
         else:
             self._bend = (after - before) * (1.0 / segment.length)
             factor = min(factor, max(0.5, o.angle / max(segment.angle, 1e-9)))
-        self._cap = min(o.max_step, RELAX * self._cap)
+        self._cap = min(o.max_step, CAP_GROWTH * self._cap)
         self._step = float(np.clip(step * factor, o.min_step, self._cap))

@@ -149,7 +149,7 @@ class _Sweep:
             return ""
 
     def _jump(self, here: float) -> bool:
-        """Go on behind a fold, small or large, where no solution follows on the one here; whether there is one."""
+        """Continue behind a fold, small or large, where no solution follows on the one here; whether there is one."""
         step = self._options.min_step
         while step < self._options.max_step:
             step *= 10

@@ -4,7 +4,7 @@ One step: predict along the tangent (bent by the last change of the tangent), co
 The step grows and shrinks with the Newton steps and the turn of the tangent. Kinks, as contact laws make them, are
 crossed where their two legs are straight and meet; behind one that turns by more than a right angle the curve is looked
 for in the directions that the derivative there offers. A walk that comes back onto its own way took a wrong turn: it is
-rewound and goes on in shorter steps. Where all that fails, as where pairs hammer and the curve has gaps, the parameter
+rewound and resumes in shorter steps. Where all that fails, as where pairs hammer and the curve has gaps, the parameter
 alone takes a short step over the place, and the branch says where.
 Source  Keller 1977 (pseudo arc length); step control and kinks ours.
 """
@@ -140,7 +140,7 @@ class _Walk:
         return self._came_back(parts)
 
     def _jump(self) -> bool:
-        """Step over a gap in the curve, its parameter going on as it went; whether there is a solution behind."""
+        """Step over a gap in the curve, its parameter moving on as before; whether there is a solution behind."""
         here, span, sense = self._builder.value[-1], self._bounds[1] - self._bounds[0], self._stepper.sense
         for share in JUMPS if len(self._jumps) < MAX_JUMPS else ():
             value = here + sense * share * span
@@ -179,7 +179,7 @@ class _Walk:
         return self._lost(parts, here)
 
     def _lost(self, parts: list[Segment], here: str) -> str | None:
-        """Whether the walk is back on its own way: then it went wrong there, is rewound and goes on in shorter steps.
+        """Whether the walk is back on its own way: then it went wrong there, is rewound and continues in shorter steps.
 
         Against its sense it turned where it should not; in its sense it left the curve for a closed one beside it.
         """

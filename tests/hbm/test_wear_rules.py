@@ -288,7 +288,7 @@ def test_where_no_branch_goes_on_the_rule_takes_explicit_steps_to_the_end(proble
 
     tolerance = error_controlled_rule.Tolerance(0.05, 2e-4)
     worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Never("tip", 420.0)),)), tolerance)
-    explicit = thesis_rule.evolve(problem, error_controlled_rule.LEAPS[-1] * 0.05 * 2e-4)
+    explicit = thesis_rule.evolve(problem, error_controlled_rule.EXPLICIT_STEPS[-1] * 0.05 * 2e-4)
     assert worn.end == explicit.end
     assert np.all(worn.step_error[:-1] == 1.0)
     assert worn.worn.max() <= 1e-5

@@ -157,7 +157,7 @@ def render(result: Path, *, out: Path | None = None, formats: Formats = ("png",)
     result
         Folder or file of a result.
     out
-        Folder of the pictures; beside the result unless told.
+        Folder of the pictures; beside the result by default.
     formats
         png, pdf or svg, can be repeated.
     dpi

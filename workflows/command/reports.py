@@ -20,7 +20,7 @@ def report(*result: Path, out: Path | None = None) -> None:
     result
         Folders or files of results; several are shown side by side, with differences from the first.
     out
-        The .html file; report.html beside the first result unless told.
+        The .html file; report.html beside the first result by default.
     """
     from tribodyn.workflows.api import scenes
     from tribodyn.workflows.report import page

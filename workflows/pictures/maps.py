@@ -20,7 +20,7 @@ from tribodyn.workflows.result.states import shown_states, state_of
 def patch_maps(result: Result, rows: np.ndarray | None = None, scale: Literal["column", "shared"] = "column") -> Figure:
     """Depth, status over the cycle and mean pressure, one column for each state.
 
-    rows : of the wear history, or points of a response that does not wear; those of the result unless told
+    rows : of the wear history, or points of a response that does not wear; those of the result by default
     scale : whether each map has its own scale, with its range, or all maps of a row share one
     """
     patch = result.patch
