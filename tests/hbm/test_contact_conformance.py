@@ -151,7 +151,8 @@ def test_stick_limit_is_the_linear_spring(name, components):
         x, drawn, _ = draw(law, components, basis, 50, seed=8)
         if "n" in components:
             x[:, -1, 0] = np.abs(x[:, -1, 1:]).sum(axis=1) + 1
-        parameters = ContactParameters.of(components, drawn.stiffness, **own(name, friction=1e6, normal_load=1.0, cubic=0.0))
+        numbers = own(name, friction=1e6, normal_load=1.0, cubic=0.0)
+        parameters = ContactParameters.of(components, drawn.stiffness, **numbers)
         cycle = aft.cycle(law, x, parameters, basis)
         linear = drawn.stiffness[:, :, None] * x
         stiffness = np.stack([np.diag(np.repeat(k, basis.n_coeff)) for k in drawn.stiffness])

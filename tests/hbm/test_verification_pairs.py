@@ -28,7 +28,7 @@ def slab_balance(case: tuple[float, float, float], top: int) -> HarmonicBalance:
     model = slab(11, 5)
     parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(20e6, 30e6), friction=0.4)
     excitation = Excitation.of({"press": 100.0}, {1: {"shake": shake, "rock": 1j * rock}})
-    basis = HarmonicBasis(tuple(range(top + 1)), 512)
+    basis = HarmonicBasis(tuple(range(top + 1)), 512, "located")
     return HarmonicBalance.of(model, Joint("contact", "jenkins", parameters), basis, excitation, 2 * np.pi * hertz)
 
 
