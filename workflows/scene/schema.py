@@ -435,7 +435,7 @@ class Pictures(Table):
 class Solver(Table):
     """Tolerances of the solver, and threads of the linear algebra."""
 
-    tolerance: Annotated[Number, Field(gt=0, ge=1e-13, lt=1)] = 1e-8
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-8
     """Newton's tolerance on the contact displacement, relative to its size."""
     krylov: Annotated[Number, Field(gt=0, lt=1)] = 0.1
     """How exactly each Newton direction is solved, at the least."""
