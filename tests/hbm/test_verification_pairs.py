@@ -45,24 +45,25 @@ def slab_verified(
     return solution.state.cycle.status, (result.largest, result.waveform["edge"], result.contact), result
 
 
-def test_55_pairs_of_which_some_stick_some_slip_and_some_lift_agree_with_time_integration():
+@pytest.mark.parametrize("tops", [(1, 7), pytest.param((1, 3, 5, 7, 9), marks=pytest.mark.slow)])
+def test_55_pairs_of_which_some_stick_some_slip_and_some_lift_agree_with_time_integration(tops):
     errors = {}
-    for top in (1, 3, 5, 7, 9):
+    for top in tops:
         status, errors[top], result = slab_verified(ABOVE_RESONANCE, top)
     assert status.shape == (55,)
     assert np.sum(status & SEPARATES > 0) == 24
     assert np.sum(status & SLIPS > 0) == 38
     assert np.sum(status == STICKS) == 17
     assert max(errors[7]) < 0.002
-    for a, b in pairwise((1, 3, 5, 9)):  # at 7 the scalars are at the error of the time integration, 6e-4
-        assert errors[b][0] < errors[a][0]
-    for a, b in pairwise((1, 3, 5, 7, 9)):
+    assert errors[7][0] < errors[1][0]  # from 5 on the scalars are at the error of the time integration
+    for a, b in pairwise(tops):
         assert errors[b][1] < errors[a][1]
         assert errors[b][2] < errors[a][2]
     assert result.step_error < 1e-3
     assert result.drift < 1e-8
 
 
+@pytest.mark.slow
 def test_55_sliding_pairs_of_which_40_lift_agree_with_time_integration_within_one_per_cent_at_seven_harmonics():
     errors = {}
     for top in (5, 7, 9):
