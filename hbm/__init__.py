@@ -8,5 +8,5 @@ Curves                continuation/, parameter, branch, outcome, bordered, folds
 Stability             stability, floquet, chatter; nonlinear_modes, free_vibration
 Wear                  evolution, thesis_rule, error_controlled_rule, wearing, step_error, wear_history, wear_events,
                       wear_law and the laws in wear/, preload_at_rest
-Beside it             time_integration, time_step, folds_in_time, verify
+Beside it             time_integration, time_step, folds_in_time, verify, threads
 """

@@ -120,7 +120,7 @@ def _at_response_peak(site: Site, balance: HarmonicBalance, result: Result) -> S
         return None
     height = np.where([o == CONVERGED for o in curve.outcome], curve.amplitude(curve.output_names[0]), -1.0)
     best = int(np.argmax(height))
-    if height[best] <= 0:
+    if height[best] <= 0 or balance.contact.n_pair == 0:
         return None
     if best in (0, len(height) - 1):
         raise NoPeak("the response is highest at an end of response.frequency, which is no peak: widen the range")

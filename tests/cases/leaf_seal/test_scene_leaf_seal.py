@@ -329,11 +329,11 @@ def test_the_study_has_its_thirty_configurations_and_writes_what_it_found(tmp_pa
 @pytest.mark.parametrize(
     ("override", "sentence"),
     [
-        ("contact.friction=0.5", "contact.friction has no meaning for the components n"),
+        ("contact.friction=0.5", "unknown key contact.friction"),
         ("contact.normal_stiffness=", "contact.normal_stiffness is missing"),
         ("contact.plane=", "give its plane"),
         ("motion.front.direction=z", '"front" is no contact face'),
-        ("loads.static.pressure.direction=z", "expected either value and direction"),
+        ("loads.static.pressure.direction=z", "expected no direction with pressure"),
         ("geometry.fixed_axes.left_hole=w", "must be some of the letters"),
         ("damping.state=sliding", "damping.state"),
         ("harmonics.kept=[1]", "gaps, which act in harmonic 0: keep it"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy.linalg import eigh
 
 from tests.helpers.coarse_scenes import QUICK_RIG as QUICK
 from tests.helpers.coarse_scenes import RIG as COARSE
+from tribodyn.hbm import wear_law
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.workflows.cases.rig import fit as rig_fit
 from tribodyn.workflows.cases.rig import published
@@ -143,7 +145,7 @@ def test_life_and_work_tell_the_coefficient(rig):
     assert found.values[0] == pytest.approx(5.5e-15 * np.sqrt(np.prod(ratios)), rel=1e-6)
     np.testing.assert_allclose(found.sensitivity, [[-1.0], [-1.0]], rtol=1e-6)
     with pytest.raises(ValueError, match="a run that loses its preload"):
-        rig_fit.fit_coefficient(replace(run, end="stopped after 3 wear steps"), 5.5e-15)
+        rig_fit.fit_coefficient(replace(run, history=replace(run.history, end="stopped after 3 wear steps")), 5.5e-15)
 
 
 def test_both_wear_rules_use_up_the_preload_alike():
@@ -209,7 +211,7 @@ def test_a_scene_that_is_not_this_rig_is_one_sentence(override, words):
 
 def test_a_wear_law_beside_the_scene_is_found(tmp_path):
     """The law of a file, the energy's own written once more, gives the same wear."""
-    law = "from hbm.wear.energy import depth_rate"
+    law = (Path(wear_law.__file__).parent / "wear" / "energy.py").read_text(encoding="utf-8")
     text = scene_file.find("rig").read_text(encoding="utf-8")
     (tmp_path / "own.py").write_text(law, encoding="utf-8")
     (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
