@@ -38,7 +38,7 @@ def with_shown(scene: Scene, result: Result, balance: HarmonicBalance, part: Par
     """
     result = replace(result, fields=None, loops=None)
     numbers = result.shown_rows()
-    if not len(numbers):
+    if not len(numbers) or balance.contact.n_pair == 0:  # loops and states of a contact that is not there
         return result
     states: list[Solved | WearRow]
     if result.wear is not None:
