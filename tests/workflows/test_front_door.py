@@ -140,6 +140,7 @@ def test_every_plot_is_a_figure(worn: td.Result, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match='no wear plot "life"'):
         worn.plot_wear("life")  # type: ignore[arg-type]
     unworn = td.run("beam", overrides={**SMALL, "wear.max_steps": 0})
-    for draw in (unworn.plot_wear, unworn.plot_hysteresis, unworn.plot_patch):
-        with pytest.raises(ValueError, match="the result holds no"):
-            draw()
+    assert unworn.plot_hysteresis().axes
+    assert unworn.plot_patch().axes
+    with pytest.raises(ValueError, match="the result holds no"):
+        unworn.plot_wear()

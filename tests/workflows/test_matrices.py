@@ -18,9 +18,11 @@ from tribodyn.hbm.continuation import natural
 from tribodyn.hbm.evolution import Duty, WearProblem
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.joint import Joint
 from tribodyn.hbm.law import ContactParameters
 from tribodyn.hbm.operating_point import AtPeak
 from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.wear_law import JointWear
 from tribodyn.reduction import foreign as reduction_foreign
 from tribodyn.reduction.foreign import read_matrices, reduced_model
 from tribodyn.workflows.result import store
@@ -72,7 +74,7 @@ def test_the_scene_is_the_same_as_the_documented_python(folder: Path, monkeypatc
         kind.__name__.rpartition(".")[2]: kind
         for kind in (
             ContactParameters, HarmonicBalance, HarmonicBasis, Excitation, natural, AtPeak, Duty, WearProblem,
-            thesis_rule, read_matrices, reduced_model,
+            Joint, JointWear, thesis_rule, read_matrices, reduced_model,
         )
     }  # fmt: skip
     exec(example, names)

@@ -28,7 +28,8 @@ from tribodyn.workflows.scene import scene_file
 
 ROOT = Path(__file__).parents[2]
 ALWAYS = {"facts", "frf", "patch", "provenance", "references"}
-WEAR = {"wear", "fields", "loops", "part"}
+DRAWN = {"fields", "loops", "part"}
+WEAR = {"wear"} | DRAWN
 RUNS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "beam": (
         ("geometry.n_patch=5", "response.points=6", "wear.max_steps=2"),
@@ -44,12 +45,12 @@ RUNS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     ),
     "leaf_seal": (
         ("response.frequency=[250, 300]",),
-        {"pairs": 126, "components": 1, "coefficients": 3, "systems": 1, "groups": ALWAYS | {"stability"}},
+        {"pairs": 126, "components": 1, "coefficients": 3, "systems": 1, "groups": ALWAYS | {"stability"} | DRAWN},
     ),
     "rig": (
         ("response.method='natural'", "response.points=2", "response.frequency=[250, 252]", "wear="),
         # harmonic 0 has the platform's height prescribed, the others do not
-        {"pairs": 55, "components": 3, "coefficients": 7, "systems": 2, "groups": ALWAYS},
+        {"pairs": 55, "components": 3, "coefficients": 7, "systems": 2, "groups": ALWAYS | DRAWN},
     ),
     "blade": (
         ("response.points=4", "wear.max_steps=1"),

@@ -9,8 +9,8 @@ import pytest
 
 import tribodyn as td
 from tribodyn.hbm.operating_point import NoPeak
-from tribodyn.workflows.accuracy import verdict
-from tribodyn.workflows.accuracy.verdict import LARGEST, QUANTITIES, Contribution
+from tribodyn.workflows.accuracy import statement, verdict
+from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution
 
 SMALL = (
     "geometry.n_patch=5", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=4", "wear.tolerance=10 %",
@@ -36,7 +36,7 @@ def test_every_quantity_has_a_statement(small: td.Result) -> None:
 @pytest.mark.slow
 def test_the_life_with_one_harmonic_is_known_to_be_off(small: td.Result) -> None:
     """More harmonics make the contact of this scene live half as long again (see the page on accuracy)."""
-    contributions = verdict.loaded(small.verdict).contributions
+    contributions = statement.loaded(small.verdict).contributions
     (harmonics,) = (c for c in contributions if c.source == "harmonics" and c.quantity == "life")
     finer = td.run("beam", overrides=(*SMALL, "harmonics.kept=[0, 1, 2, 3, 4, 5, 6, 7, 8, 9]", "verdict.enabled=false"))
     ours, theirs = small.summary()["life_cycles"], finer.summary()["life_cycles"]
@@ -52,7 +52,7 @@ def test_the_coarser_mesh_tells_the_error_of_this_one(small: td.Result) -> None:
         overrides=(*SMALL[3:], "geometry.n_patch=9", "geometry.n_length=10", "geometry.n_height=3", "wear=",
                    "verdict.enabled=false"),
     )  # fmt: skip
-    contributions = verdict.loaded(small.verdict).contributions
+    contributions = statement.loaded(small.verdict).contributions
     (mesh,) = (c for c in contributions if c.source.startswith("mesh") and c.quantity == "peak_frequency")
     true = abs(small.summary()["peak_hz"][0] / finer.summary()["peak_hz"][0] - 1)
     assert mesh.error is not None

@@ -16,7 +16,7 @@ from typing import Any, Literal
 import numpy as np
 
 from tribodyn.version import __version__
-from tribodyn.workflows.accuracy.verdict import QUANTITIES
+from tribodyn.workflows.accuracy.statement import QUANTITIES
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress

@@ -176,7 +176,7 @@ class Result:
     facts : what was modelled and how long it took
     stage : how far the run came; `state` is its sentence
     budget : what each discretisation contributes to the error, empty before it is known
-    verdict : JSON text of accuracy.verdict.Verdict, empty where none was asked for
+    verdict : JSON text of accuracy.statement.Verdict, empty where none was asked for
     response : curve of the unworn contact; stability, bounds : of it, where the scene asks for them
     """
 

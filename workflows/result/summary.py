@@ -10,7 +10,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.wear_events import events
 from tribodyn.hbm.wear_history import LIFE_SHARE, cycles_to_preload
-from tribodyn.workflows.accuracy import budget, verdict
+from tribodyn.workflows.accuracy import budget, statement
 from tribodyn.workflows.accuracy.trade_table import plain
 from tribodyn.workflows.result.result import Result
 
@@ -32,7 +32,7 @@ def summary(result: Result) -> dict[str, Any]:
     peak_is_stable : whether that peak of the curve is a motion that stays, None where this was not asked for
     stable_peak_hz, stable_peak_m : the highest point of the curve that is
     seconds : of computing, interrupted runs included
-    verdict : quantity -> value, error, dominated_by, stated, reason, see workflows.accuracy.verdict; None without
+    verdict : quantity -> value, error, dominated_by, stated, reason, see workflows.accuracy.statement; None without
     error_budget : what each discretisation contributes, see result.facts.BudgetEntry
     """
     numbers: dict[str, Any] = {"state": result.state, "finished": result.finished}
@@ -43,7 +43,7 @@ def summary(result: Result) -> dict[str, Any]:
     numbers |= _curve(result)
     numbers["free_hz"] = result.facts.free_hz.tolist()
     numbers["error_budget"] = [vars(entry) for entry in result.budget]
-    numbers["verdict"] = verdict.record(result.verdict)
+    numbers["verdict"] = statement.record(result.verdict)
     return {name: plain(value) for name, value in numbers.items()}
 
 
@@ -141,7 +141,7 @@ def lines(result: Result) -> list[tuple[str, str]]:
         first, last = (float("nan") if value is None else scale * value for value in numbers[name])
         return f"{first:.5g} {unit}" if numbers["wear_steps"] == 0 else f"{first:.5g} -> {last:.5g} {unit}"
 
-    shown = verdict.lines(verdict.loaded(result.verdict)) if result.verdict else []
+    shown = statement.lines(statement.loaded(result.verdict)) if result.verdict else []
     shown += [
         ("scene", result.provenance["scene_name"]),
         ("state", result.state),

@@ -12,6 +12,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
+from tribodyn.hbm.operating_point import NoPeak
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.accuracy import measure
 from tribodyn.workflows.scene import scene_file
@@ -88,7 +89,7 @@ def _row(
             fitted = tuple(found)
             file = scene_file.read(scene, (*file.overrides, *fitted))
         values, outcome = ask(file)
-    except RuntimeError as failure:
+    except (RuntimeError, NoPeak) as failure:
         return Varied(change, {}, fitted, str(failure))
     return Varied(change, values, fitted, outcome)
 
