@@ -26,10 +26,10 @@ def small() -> td.Result:
 def test_every_quantity_has_a_statement(small: td.Result) -> None:
     said = small.summary()["verdict"]
     assert tuple(said) == QUANTITIES
-    for name, statement in said.items():
-        assert set(statement) == {"value", "error", "dominated_by", "stated", "reason"}, name
-        if statement["stated"] and statement["error"] is not None:
-            assert statement["error"] <= LARGEST
+    for name, said_of in said.items():
+        assert set(said_of) == {"value", "error", "dominated_by", "stated", "reason"}, name
+        if said_of["stated"] and said_of["error"] is not None:
+            assert said_of["error"] <= LARGEST
     assert json.loads(json.dumps(said)) == said
 
 
