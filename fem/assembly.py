@@ -21,12 +21,14 @@ Materials = AnyMaterial | Mapping[str, AnyMaterial]
 class Body:
     """name : unique in an assembly, may be empty for an only body, whose groups then keep their names;
     mesh, node_sets : as geometry.mesh.read gives them; material : one, or by subdomain
+    notes : sentences on what was done to its file, and on what of it is not used
     """
 
     name: str
     mesh: Any
     node_sets: Mapping[str, np.ndarray]
     material: Materials
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ Source  ties: Bernardi, Maday and Patera, A new nonconforming approach to domain
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -76,6 +76,26 @@ class Tie:
         moved = csr_matrix((scalar.data, (scalar.row, columns[scalar.col])), shape=(len(tied), n))
         dofs = (tied[:, None] * 3 + np.arange(3)).ravel()
         return Following(dofs, csr_matrix(kron(moved, np.eye(3), format="csr")), self.what)
+
+
+@dataclass(frozen=True)
+class Equation:
+    """A linear equation between displacements of single nodes, sum of factor * u = 0; the first one follows the others.
+
+    what : name for errors; terms : (group of one node, axis 0..2, factor)
+    """
+
+    what: str
+    terms: Sequence[tuple[str, int, float]]
+
+    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following:
+        """The first displacement in terms of the others; raises ValueError where its factor is zero."""
+        if len(self.terms) < 2 or not self.terms[0][2]:
+            raise ValueError(f"{self.what} needs two terms or more, the first with a factor that is not zero")
+        dofs = [3 * int(named(node_sets, group)[0]) + axis for group, axis, _ in self.terms]
+        factors = [-factor / self.terms[0][2] for _, _, factor in self.terms[1:]]
+        row = coo_matrix((factors, ([0] * len(factors), dofs[1:])), shape=(1, 3 * mesh.doflocs.shape[1]))
+        return Following(np.array(dofs[:1]), csr_matrix(row), self.what)
 
 
 def _summed(blocks: list[tuple[np.ndarray, np.ndarray, np.ndarray]], n: int) -> csr_matrix:

@@ -41,7 +41,7 @@ def _assemble(
     nodes = connectivity(mesh)
     kinds, kind = of_elements(mesh, material)
     isotropic = all(isinstance(one, Material) for one in kinds)
-    rho = np.array([one.rho for one in kinds])[kind]
+    rho = densities(mesh, material)
     if isotropic:
         lam, mu, _ = per_element(mesh, material)
     else:
@@ -120,6 +120,12 @@ def of_elements(
             f"name each of the subdomains {sorted(members)} once"
         )
     return [*material.values()], kind
+
+
+def densities(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]) -> np.ndarray:
+    """Density of each element of one mesh (n_element,) [kg/m3]; raises ValueError as `of_elements` does."""
+    kinds, kind = of_elements(mesh, material)
+    return np.array([one.rho for one in kinds])[kind]
 
 
 def per_element(

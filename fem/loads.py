@@ -123,6 +123,20 @@ class Centrifugal:
         return mass @ (arm - np.outer(arm @ axis, axis)).ravel()
 
 
+@dataclass(frozen=True)
+class Sum:
+    """Several loads that act together as one. parts : each with its factor."""
+
+    parts: Sequence[tuple[Load, float]]
+
+    def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any) -> np.ndarray:
+        """Force vector (3 n_node,)."""
+        force = np.zeros(3 * mesh.doflocs.shape[1])
+        for load, factor in self.parts:
+            force += factor * load.vector(mesh, node_sets, mass)
+        return force
+
+
 def unit(direction: Sequence[float], what: str) -> np.ndarray:
     """Unit vector (3,) along a direction.
 

@@ -127,6 +127,10 @@ class Part:
             full = (self.follow @ q.reshape(len(q), -1)).reshape(full.shape)
         return full.reshape(len(self.points), 3, *q.shape[1:])
 
+    def largest(self, q: np.ndarray) -> float:
+        """Largest displacement of a node [m] under free DOFs q (n_free,)."""
+        return float(np.linalg.norm(self.field(q), axis=1).max())
+
     def rows(self, vectors: Any) -> Any:
         """Rows (k, n_dof) over all DOFs, sparse, as rows (k, n_free) over the free ones."""
         return vectors[:, self.free] if self.follow is None else csr_matrix(vectors @ self.follow)

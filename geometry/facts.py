@@ -14,7 +14,8 @@ from tribodyn.geometry.mesh import quality
 
 @dataclass(frozen=True)
 class Facts:
-    """low, high : (3,) corners of the box around it [m]; volume [m3]; centre : (3,) of its volume [m]
+    """low, high : (3,) corners of the box around it [m]; volume [m3]; mass [kg], None without a density
+    centre : (3,) of its mass, or of its volume without a density [m]
     scaled_jacobian, worst_centre : of the worst element, see geometry.mesh.quality; (3,) [m]
     """
 
@@ -24,10 +25,14 @@ class Facts:
     centre: np.ndarray
     scaled_jacobian: float
     worst_centre: np.ndarray
+    mass: float | None = None
 
 
-def facts(mesh: Any) -> Facts:
-    """Measure a mesh. mesh : skfem MeshHex2 or MeshTet2. Raises ValueError: an element is inverted or degenerate"""
+def facts(mesh: Any, density: np.ndarray | None = None) -> Facts:
+    """Measure a mesh. mesh : skfem MeshHex2 or MeshTet2; density : (n_element,) [kg/m3]
+
+    Raises  ValueError: an element is inverted or degenerate
+    """
     found = quality(mesh)
     X, w = get_quadrature(mesh.elem.refdom, 5)
     mapping = mesh.mapping()
@@ -35,9 +40,12 @@ def facts(mesh: Any) -> Facts:
     x = mapping.F(X)
     volume = float(weight.sum())
     worst = mesh.p[:, mesh.t[:, found.worst_element]].mean(axis=1)
-    centre = np.einsum("ieq,eq->i", x, weight) / volume
+    heavy = weight if density is None else weight * density[:, None]
+    total = float(heavy.sum())
+    centre = np.einsum("ieq,eq->i", x, heavy) / total
+    mass = None if density is None else total
     points = mesh.doflocs
-    return Facts(points.min(axis=1), points.max(axis=1), volume, centre, found.scaled_jacobian, worst)
+    return Facts(points.min(axis=1), points.max(axis=1), volume, centre, found.scaled_jacobian, worst, mass)
 
 
 def area(mesh: Any, facets: np.ndarray) -> float:

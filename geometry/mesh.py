@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -11,27 +11,38 @@ from skfem.quadrature import get_quadrature
 
 from tribodyn.geometry.sources import read as sources
 from tribodyn.geometry.sources import solid
+from tribodyn.geometry.sources.cad import Sizes
 from tribodyn.geometry.sources.deck import Deck
 
 Groups = dict[str, np.ndarray]
 
 
-def read(path: str | Path) -> tuple[Any, Groups]:
+def read(path: str | Path, sizes: Sizes | None = None) -> tuple[Any, Groups]:
     """Read a mesh of one body, or several seen as one, with all its groups.
 
     path : a mesh file that `sources.read` knows; coordinates in metres. Elements become 27-node hexahedra or 10-node
         tetrahedra: of the same shape where they are of one kind, cut into tetrahedra where kinds mix
+    sizes : of the elements of a CAD file, in its unit
     Returns mesh : skfem MeshHex2 or MeshTet2; surface groups are its boundaries, volume groups its subdomains;
         node_sets : every group of any dimension, name -> node numbers, edge, face and middle nodes included
     Raises ValueError: no such file, one that is no mesh, a group outside the volume mesh, an inverted element
     """
-    raw = sources.read_raw(path)
+    mesh, node_sets, _ = read_with_notes(path, sizes)
+    return mesh, node_sets
+
+
+def read_with_notes(path: str | Path, sizes: Sizes | None = None) -> tuple[Any, Groups, tuple[str, ...]]:
+    """The same as `read`, and sentences on what was done to the file and on what of it is not used."""
+    raw = sources.read_raw(path, sizes=sizes)
     body = solid.build(raw)
     lost = sources.lost(raw, {"": body})
     if lost and raw.deck == Deck() and Path(path).suffix.lower() == ".msh":
         raise ValueError(f"mesh file '{path}' has {lost[0]}")
     quality(body.mesh)
-    return body.mesh, body.node_sets
+    kinds = [f.name for f in fields(Deck) if getattr(raw.deck, f.name)]
+    left = [f"its {', '.join(kinds)}: bring it as [decks.NAME] to use them"] if kinds else []
+    unused = [f"not used: {clause}" for clause in (*raw.unused, *lost, *left)]
+    return body.mesh, body.node_sets, (*sources.done(raw, {"the mesh": body}), *unused)
 
 
 @dataclass(frozen=True)

@@ -26,11 +26,13 @@ ELEMENTS_ALONG = 10  # on the longest edge of the box, where no size is asked fo
 class Sizes:
     """Element sizes, in the unit of the file. everywhere : None for a tenth of the shape's length
     bodies : name of a solid -> size; faces : number of a face -> size there
+    only : name of the one solid that is meshed, None for all
     """
 
     everywhere: float | None = None
     bodies: Mapping[str, float] = field(default_factory=dict)
     faces: Mapping[int, float] = field(default_factory=dict)
+    only: str | None = None
 
 
 def read(path: Path, sizes: Sizes | None = None) -> RawMesh:
@@ -81,8 +83,15 @@ def _meshed(gmsh: Any, path: Path, shapes: Mapping[str, int], sizes: Sizes) -> R
     for what, wanted, known in (("solid", sizes.bodies, shapes), ("face", sizes.faces, faces)):
         for key in wanted:
             if key not in known:
-                listed = ", ".join(map(str, sorted(known, key=str)[:12]))
+                listed = ", ".join(map(str, sorted(known)[:12]))
                 raise ValueError(f"CAD file '{path}' has no {what} {key} to give a size to: it has {listed}")
+    if sizes.only is not None:
+        if sizes.only not in shapes:
+            raise ValueError(f"CAD file '{path}' has no solid '{sizes.only}': it has {', '.join(shapes)}")
+        shapes = {sizes.only: shapes[sizes.only]}
+        model.setVisibility(model.getEntities(), 0)
+        model.setVisibility([(3, *shapes.values())], 1, recursive=True)
+        gmsh.option.setNumber("Mesh.MeshOnlyVisible", 1)
     box = np.array(model.getBoundingBox(-1, -1)).reshape(2, 3)
     everywhere = sizes.everywhere or float(np.ptp(box, axis=0).max()) / ELEMENTS_ALONG
     for values in ((everywhere,), sizes.bodies.values(), sizes.faces.values()):

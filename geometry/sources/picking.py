@@ -1,16 +1,33 @@
-"""Faces of a body picked by where they lie: within a box, nearest to a point, by their normal.
+"""Faces of a body picked by rule: within a box, nearest to a point, by their normal, by their numbers in a CAD file.
 
-Only facets of the boundary are picked; faces of a CAD file have groups "face N" of their own.
+Only facets of the boundary are picked.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 SMOOTH = np.cos(np.radians(30.0))  # facets that meet at less belong to one face
+ALONG = 5.0  # degrees to which a facet faces a direction, unless told
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Which facets of the boundary belong to a face: those that satisfy all that is given.
+
+    box : two corners [m], within which all corners of a facet lie; nearest : (3,) point [m] whose nearest smooth face
+    is taken; normal : (3,) along which the facets look to `within` [rad]; numbers : of faces of a CAD file
+    """
+
+    box: tuple[Sequence[float], Sequence[float]] | None = None
+    nearest: Sequence[float] | None = None
+    normal: Sequence[float] | None = None
+    within: float = np.radians(ALONG)
+    numbers: Sequence[int] = ()
 
 
 def outline(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -25,36 +42,89 @@ def outline(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return facets, centre.T, (normal / np.linalg.norm(normal, axis=0)).T
 
 
+def picked(mesh: Any, rule: Rule) -> np.ndarray:
+    """Facets that satisfy a rule; raises ValueError where none does, or where the rule says nothing."""
+    found = []
+    if rule.box is not None:
+        found.append(within_box(mesh, *rule.box))
+    if rule.normal is not None:
+        found.append(by_normal(mesh, rule.normal, float(np.degrees(rule.within))))
+    if len(rule.numbers):
+        found.append(by_number(mesh, rule.numbers))
+    if rule.nearest is not None:
+        found.append(nearest(mesh, rule.nearest, *found))
+    if not found:
+        raise ValueError("a face needs a rule: give box, nearest, normal or cad")
+    common = found[0]
+    for other in found[1:]:
+        common = np.intersect1d(common, other)
+    return _some(common, mesh, "satisfies all its rules together")
+
+
+def with_faces(
+    mesh: Any, node_sets: Mapping[str, np.ndarray], rules: Mapping[str, Rule]
+) -> tuple[Any, dict[str, np.ndarray]]:
+    """The mesh and its node sets with a face for each rule.
+
+    Raises  ValueError, naming the face, where it picks nothing or has the name of a group that is there
+    """
+    boundaries, sets = dict(mesh.boundaries or {}), dict(node_sets)
+    for name, rule in rules.items():
+        if name in sets or name in boundaries:
+            raise ValueError(f"faces.{name} has the name of a group of the mesh: give it another")
+        try:
+            boundaries[name] = picked(mesh, rule)
+        except ValueError as trouble:
+            raise ValueError(f"faces.{name}: {trouble}") from None
+        sets[name] = np.unique(mesh.dofs.get_facet_dofs(boundaries[name]).flatten())
+    return (mesh.with_boundaries(boundaries), sets) if rules else (mesh, sets)
+
+
 def within_box(mesh: Any, low: Sequence[float], high: Sequence[float]) -> np.ndarray:
     """Boundary facets whose corners all lie in a box [m]; raises ValueError where there are none."""
     facets, _, _ = outline(mesh)
     corners = mesh.p[:, mesh.facets[:, facets]]
     slack = 1e-6 * float(np.ptp(mesh.p, axis=1).max())
     inside = (corners >= np.reshape(low, (3, 1, 1)) - slack) & (corners <= np.reshape(high, (3, 1, 1)) + slack)
-    return _some(facets[inside.all(axis=(0, 1))], mesh, f"lies within the box {list(low)} to {list(high)}")
+    return _some(facets[inside.all(axis=(0, 1))], mesh, f"lies within the box {_place(low)} to {_place(high)} m")
 
 
-def by_normal(mesh: Any, direction: Sequence[float], degrees: float = 5.0) -> np.ndarray:
+def by_normal(mesh: Any, direction: Sequence[float], degrees: float = ALONG) -> np.ndarray:
     """Boundary facets whose outward normal points along a direction to within an angle; raises ValueError likewise."""
     facets, _, normal = outline(mesh)
     along = np.asarray(direction, dtype=float)
     if along.shape != (3,) or not along.any():
         raise ValueError(f"a normal must be three numbers that are not all zero, got {list(direction)}")
     here = normal @ (along / np.linalg.norm(along)) >= np.cos(np.radians(degrees))
-    return _some(facets[here], mesh, f"faces {list(direction)} to within {degrees:g} degrees")
+    return _some(facets[here], mesh, f"faces {_place(along.tolist())} to within {degrees:g} degrees")
 
 
-def nearest(mesh: Any, point: Sequence[float]) -> np.ndarray:
-    """The smooth face nearest to a point [m]: its nearest facet and all that go on from it without an edge."""
-    facets, centre, normal = outline(mesh)
-    place = np.full(mesh.facets.shape[1], -1)
-    place[facets] = np.arange(len(facets))
+def by_number(mesh: Any, numbers: Sequence[int]) -> np.ndarray:
+    """Facets of faces of a CAD file by their numbers; raises ValueError for one that the body has not."""
+    boundaries = mesh.boundaries or {}
+    known = [name for name in boundaries if name.startswith("face ")]
+    for number in numbers:
+        if f"face {number}" not in known:
+            listed = ", ".join(name.partition(" ")[2] for name in known)
+            raise ValueError(f"the body has no face {number} of a CAD file: it has {listed or 'none, being a mesh'}")
+    return np.unique(np.concatenate([boundaries[f"face {number}"] for number in numbers]))
+
+
+def nearest(mesh: Any, point: Sequence[float], *among: np.ndarray) -> np.ndarray:
+    """The smooth face nearest to a point [m]: its nearest facet and all that go on from it without an edge.
+
+    among : sets of facets that the nearest one belongs to
+    """
+    facets, _, normal = outline(mesh)
     edges = mesh.f2e[:, facets]
     owner: dict[int, list[int]] = {}
     for i, around in enumerate(edges.T.tolist()):
         for edge in around:
             owner.setdefault(edge, []).append(i)
-    start = int(np.linalg.norm(centre - np.asarray(point, dtype=float), axis=1).argmin())
+    distance = _distance(mesh.p[:, mesh.facets[:, facets]], np.asarray(point, dtype=float))
+    for allowed in among:
+        distance[~np.isin(facets, allowed)] = np.inf
+    start = int(distance.argmin())
     found, queue = {start}, [start]
     while queue:
         i = queue.pop()
@@ -66,9 +136,32 @@ def nearest(mesh: Any, point: Sequence[float]) -> np.ndarray:
     return np.asarray(np.sort(facets[sorted(found)]))
 
 
+def _distance(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Distance (k,) of a point to polygons with corners (3, 3 or 4, k), seen as flat triangles."""
+    p = corners - point[:, None, None]
+    best = np.full(p.shape[2], np.inf)
+    for j in range(1, p.shape[1] - 1):
+        a, b, c = p[:, 0], p[:, j], p[:, j + 1]
+        normal = np.cross(b - a, c - a, axis=0)
+        size = (normal**2).sum(axis=0)
+        inside = np.ones(len(best), dtype=bool)
+        for one, other in ((a, b), (b, c), (c, a)):
+            inside &= (np.cross(one, other, axis=0) * normal).sum(axis=0) >= 0
+            along = other - one
+            part = np.clip(-(one * along).sum(axis=0) / (along**2).sum(axis=0), 0, 1)
+            best = np.minimum(best, np.linalg.norm(one + part * along, axis=0))
+        height = np.abs((a * normal).sum(axis=0)) / np.sqrt(size)
+        best = np.where(inside, np.minimum(best, height), best)
+    return best
+
+
+def _place(point: Sequence[float]) -> str:
+    return f"({', '.join(f'{float(c):.4g}' for c in point)})"
+
+
 def _some(facets: np.ndarray, mesh: Any, what: str) -> np.ndarray:
     if not len(facets):
         low, high = mesh.p.min(axis=1), mesh.p.max(axis=1)
-        extent = " to ".join("(" + ", ".join(f"{x:.4g}" for x in corner) + ")" for corner in (low, high))
+        extent = " to ".join(_place(corner) for corner in (low, high))
         raise ValueError(f"no face of the boundary {what}: the body reaches from {extent} m")
     return facets

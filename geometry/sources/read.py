@@ -40,6 +40,7 @@ class Source:
     points : name -> (3,) reference points that belong to no element [m]
     said : sentences on what was done to it, such as elements raised to second order
     unused : clauses that name what was found and is not used
+    counts : group of nodes -> body -> how many of its nodes the file lists there, before edge nodes were added
     """
 
     bodies: Mapping[str, Body]
@@ -47,6 +48,7 @@ class Source:
     points: Mapping[str, np.ndarray] = field(default_factory=dict)
     said: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
+    counts: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
 
 
 def read(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> Source:
@@ -59,7 +61,12 @@ def read(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> S
     raw = read_raw(path, unit, sizes)
     parts = solid.bodies(raw)
     built = {name: solid.build(raw, elements) for name, elements in parts.items()}
-    return Source(built, raw.deck, raw.points_of_reference, _said(raw, built), (*raw.unused, *lost(raw, built)))
+    counts = {
+        group: {name: int((body.node_of[rows] >= 0).sum()) for name, body in built.items()}
+        for group, rows in raw.nodes.items()
+    }
+    unused = (*raw.unused, *lost(raw, built))
+    return Source(built, raw.deck, raw.points_of_reference, done(raw, built), unused, counts)
 
 
 def read_raw(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> RawMesh:
@@ -116,7 +123,8 @@ def lost(raw: RawMesh, built: Mapping[str, Body]) -> tuple[str, ...]:
     return tuple(clauses)
 
 
-def _said(raw: RawMesh, built: Mapping[str, Body]) -> tuple[str, ...]:
+def done(raw: RawMesh, built: Mapping[str, Body]) -> tuple[str, ...]:
+    """Sentences on what was done to a file on the way to bodies."""
     said = list(raw.said)
     low = [cells for cells in raw.cells if is_first_order(cells.kind)]
     if low:

@@ -12,11 +12,14 @@ from tribodyn.fem.assembly import Assembly, Body, Materials
 from tribodyn.fem.constraints import Clamp, Constraint, named
 from tribodyn.fem.couplings import DistributedCoupling, RigidCoupling, Tie
 from tribodyn.fem.cyclic import rotation
+from tribodyn.fem.loads import Load
 from tribodyn.fem.material import AnyMaterial, Material, Orthotropic
 from tribodyn.fem.springs import Mass
 from tribodyn.fem.surface import surface
 from tribodyn.geometry import mesh as mesh_reader
 from tribodyn.geometry import parts, placing
+from tribodyn.geometry.sources import cad, picking
+from tribodyn.workflows.run import decks
 from tribodyn.workflows.scene import structure
 from tribodyn.workflows.scene.schema import Geometry
 from tribodyn.workflows.scene.structure import AXES, SolidMaterial, StructureScene
@@ -29,12 +32,16 @@ def part_mesh(part: str, parameters: Mapping[str, int | float], path: Path) -> t
     return mesh_reader.read(path)
 
 
-def geometry_mesh(geometry: Geometry, folder: Path, scratch: Path) -> tuple[Any, dict[str, np.ndarray]]:
+Noted = tuple[Any, dict[str, np.ndarray], tuple[str, ...]]
+"""A mesh, its node sets, and sentences on what was done to its file and is not used of it."""
+
+
+def geometry_mesh(geometry: Geometry, folder: Path, scratch: Path) -> Noted:
     """The mesh of [geometry]: read from a file in `folder`, or built and kept in `scratch`."""
     if geometry.mesh is not None:
-        return mesh_reader.read(folder / geometry.mesh)
+        return mesh_reader.read_with_notes(folder / geometry.mesh)
     assert geometry.part_name is not None
-    return part_mesh(geometry.part_name, geometry.parameters, scratch / "mesh.msh")
+    return *part_mesh(geometry.part_name, geometry.parameters, scratch / "mesh.msh"), ()
 
 
 def assembly(scene: StructureScene, folder: Path, scratch: Path) -> Assembly:
@@ -44,36 +51,65 @@ def assembly(scene: StructureScene, folder: Path, scratch: Path) -> Assembly:
     """
     if scene.geometry is not None:
         assert scene.material is not None
-        mesh, node_sets = geometry_mesh(scene.geometry, folder, scratch)
+        mesh, node_sets, notes = geometry_mesh(scene.geometry, folder, scratch)
         one = scene.material
-        bodies = [Body("", mesh, node_sets, Material(one.young, one.poisson, one.density, one.expansion))]
+        bodies = [Body("", mesh, node_sets, Material(one.young, one.poisson, one.density, one.expansion), notes)]
     else:
         bodies = []
         for name, table in scene.bodies.items():
             try:
-                mesh, node_sets = _placed(table, folder, scratch / f"mesh_{name}.msh")
-                bodies.append(Body(name, mesh, node_sets, _material(table, scene.materials)))
+                mesh, node_sets, notes = _placed(table, folder, scratch / f"mesh_{name}.msh")
+                told = tuple(f"bodies.{name}: {note}" for note in notes)
+                bodies.append(Body(name, mesh, node_sets, _material(table, scene.materials), told))
             except ValueError as trouble:
                 raise ValueError(f"bodies.{name}: {trouble}") from None
+    brought = of_decks(scene, folder)
+    bodies += [body for deck in brought.values() for body in deck.bodies]
+    points = {name: list(place) for deck in brought.values() for name, place in deck.points.items()}
     whole = Assembly(bodies)
-    if not scene.couplings:
-        return whole
-    return Assembly(bodies, {name: _middle(whole, table) for name, table in scene.couplings.items()})
+    for name, coupling in scene.couplings.items():
+        if name in points:
+            raise ValueError(f"couplings.{name} has the name of a point of a deck: give it another")
+        points[name] = _middle(whole, coupling)
+    return Assembly(bodies, points) if points else whole
 
 
-def _placed(table: structure.Body, folder: Path, path: Path) -> tuple[Any, dict[str, np.ndarray]]:
+def of_decks(scene: StructureScene, folder: Path) -> dict[str, decks.Structure]:
+    """What the decks of a scene bring, by their names; raises ValueError as `decks.structure` does."""
+    materials = {name: solid(table) for name, table in scene.materials.items()} if scene.decks else {}
+    return {name: decks.structure(name, table, materials, folder) for name, table in scene.decks.items()}
+
+
+def _placed(table: structure.Body, folder: Path, path: Path) -> Noted:
+    notes: tuple[str, ...] = ()
     if table.mesh is not None:
-        mesh, node_sets = mesh_reader.read(folder / table.mesh)
+        mesh, node_sets, notes = mesh_reader.read_with_notes(folder / table.mesh, _sizes(table))
     else:
         assert table.part_name is not None
         mesh, node_sets = part_mesh(table.part_name, table.parameters, path)
     if table.volume is not None:
         mesh, node_sets = placing.taken(mesh, node_sets, table.volume)
+    mesh = placing.placed(mesh, table.unit, np.eye(3), np.zeros(3))
+    mesh, node_sets = picking.with_faces(mesh, node_sets, {name: face.rule for name, face in table.faces.items()})
     turn, shift = np.eye(3), np.zeros(3)
     for one in table.turns:
         R, point = rotation(one.axis, one.angle), np.array(one.point)
         turn, shift = R @ turn, R @ (shift - point) + point
-    return placing.placed(mesh, table.unit, turn, shift + np.array(table.translation)), node_sets
+    return placing.placed(mesh, 1.0, turn, shift + np.array(table.translation)), node_sets, notes
+
+
+def _sizes(table: structure.Body) -> cad.Sizes | None:
+    """Sizes of elements in the unit of a CAD file, of which only the body's own solid is meshed; None for a mesh.
+
+    Raises  ValueError where sizes are asked of a file that is a mesh already
+    """
+    assert table.mesh is not None
+    if Path(table.mesh).suffix.lower() not in cad.ENDINGS:
+        if table.size is not None or table.face_sizes:
+            raise ValueError(f"size and face_sizes are for CAD files, '{table.mesh}' is meshed already: leave them out")
+        return None
+    faces = {int(name.removeprefix("face ")): size / table.unit for name, size in table.face_sizes.items()}
+    return cad.Sizes(table.size and table.size / table.unit, faces=faces, only=table.volume)
 
 
 def _material(table: structure.Body, materials: Mapping[str, SolidMaterial]) -> Materials:
@@ -106,7 +142,7 @@ def _middle(whole: Assembly, table: structure.Coupling) -> list[float]:
     return [float(c) for c in middle]
 
 
-def clamps(scene: StructureScene) -> list[Clamp]:
+def clamps(scene: StructureScene, folder: Path) -> list[Clamp]:
     """What holds the bodies and the points of couplings."""
     found = []
     if scene.geometry is not None:
@@ -119,18 +155,25 @@ def clamps(scene: StructureScene) -> list[Clamp]:
         for point, axes in ((name, AXES[:3]), (f"{name}.turn", AXES[3:])):
             held = "".join(axis[-1] for axis in axes if axis in table.fixed)
             found += [Clamp(point, held)] if held else []
-    return found
+    return found + [clamp for deck in of_decks(scene, folder).values() for clamp in deck.clamps]
 
 
-def constraints(scene: StructureScene) -> list[Constraint]:
-    """Ties and couplings."""
+def constraints(scene: StructureScene, folder: Path) -> list[Constraint]:
+    """Ties, couplings and equations."""
     found: list[Constraint] = [Tie(f"ties.{name}", t.first, t.second, t.reach) for name, t in scene.ties.items()]
     for name, table in scene.couplings.items():
         kind = RigidCoupling if table.kind == "rigid" else DistributedCoupling
         found.append(kind(name, table.face))
-    return found
+    return found + [one for deck in of_decks(scene, folder).values() for one in deck.constraints]
 
 
-def masses(scene: StructureScene) -> list[Mass]:
+def masses(scene: StructureScene, folder: Path) -> list[Mass]:
     """Lumped masses."""
-    return [Mass(table.at, table.mass, table.inertia) for table in scene.masses.values()]
+    own = [Mass(table.at, table.mass, table.inertia) for table in scene.masses.values()]
+    return own + [mass for deck in of_decks(scene, folder).values() for mass in deck.masses]
+
+
+def deck_loads(scene: StructureScene, folder: Path) -> dict[str, Load]:
+    """The loads that decks bring, by name."""
+    brought = of_decks(scene, folder)
+    return {decks.load_name(name): deck.load for name, deck in brought.items()}

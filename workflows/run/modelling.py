@@ -33,7 +33,7 @@ from tribodyn.reduction.damping import modal_damping, rayleigh
 from tribodyn.reduction.held import hold
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ReducedModel
-from tribodyn.workflows.run import bodies, curve, matrix_model, memory, part_reduction, settings, tightening
+from tribodyn.workflows.run import bodies, curve, decks, matrix_model, memory, part_reduction, settings, tightening
 from tribodyn.workflows.run.contact_surfaces import surface_gap
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.contact import Contact, FaceContact
@@ -97,7 +97,8 @@ def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]
     if isinstance(scene, StructureScene):
         whole = bodies.assembly(scene, file.folder, folder)
         return whole, whole.node_sets
-    return bodies.geometry_mesh(file.part_scene.geometry, file.folder, folder)
+    mesh, node_sets, _ = bodies.geometry_mesh(file.part_scene.geometry, file.folder, folder)
+    return mesh, node_sets
 
 
 def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], folder: Path | None = None) -> Part:
@@ -109,6 +110,8 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
     }
     if scene.wheel is not None and scene.wheel.speed:
         loads[CENTRIFUGAL] = Centrifugal(scene.wheel.axis)
+    if isinstance(scene, StructureScene):
+        loads |= bodies.deck_loads(scene, folder or Path())
     rods = tightening.rods(scene, mesh, node_sets) if isinstance(scene, StructureScene) else {}
     loads |= rods
     geometry = scene.geometry if isinstance(scene, PartScene | StructureScene) else None
@@ -117,7 +120,7 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
         mesh,
         node_sets,
         material,
-        clamps(scene),
+        clamps(scene, folder or Path()),
         part_reduction.contacts(scene),
         loads,
         {
@@ -127,8 +130,8 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
         | {tightening.output(name): Elongation(rod) for name, rod in rods.items()},
         springs=[*springs(scene), *(rod for rod in rods.values() if rod.stiffness)],
         held=[] if turning is None else [NoMeanRotation(turning)],
-        constraints=bodies.constraints(scene) if isinstance(scene, StructureScene) else (),
-        masses=bodies.masses(scene) if isinstance(scene, StructureScene) else (),
+        constraints=bodies.constraints(scene, folder or Path()) if isinstance(scene, StructureScene) else (),
+        masses=bodies.masses(scene, folder or Path()) if isinstance(scene, StructureScene) else (),
     )
 
 
@@ -140,10 +143,10 @@ def with_surfaces(scene: MeshScene, part: Part, folder: Path) -> tuple[Part, tup
     return replace(part, interface=replace(part.interface, gap=part.interface.gap + measured.gap)), measured.repairs
 
 
-def clamps(scene: MeshScene) -> list[Clamp]:
-    """What holds the part, whole groups or along some axes."""
+def clamps(scene: MeshScene, folder: Path) -> list[Clamp]:
+    """What holds the part, whole groups or along some axes; files of the scene are in `folder`."""
     if isinstance(scene, StructureScene):
-        return bodies.clamps(scene)
+        return bodies.clamps(scene, folder)
     assert isinstance(scene, PartScene)
     geometry = scene.geometry
     return [*(Clamp(group) for group in geometry.fixed), *(Clamp(*item) for item in geometry.fixed_axes.items())]
@@ -239,7 +242,9 @@ def elastic(scene: Scene, face: str) -> tuple[float, float]:
     if isinstance(scene, PartScene | StructureScene) and scene.material is not None:
         return scene.material.young, scene.material.poisson
     assert isinstance(scene, StructureScene)
-    body = scene.bodies[face.partition(".")[0]]
+    body = scene.bodies.get(face.partition(".")[0])
+    if body is None:
+        raise ValueError(f"the punch on '{face}' needs a body of [bodies.NAME]: give its stiffness")
     solid = None if not isinstance(body.material, str) else bodies.solid(scene.materials[body.material])
     if not isinstance(solid, Material):
         raise ValueError(f"the punch on '{face}' needs a body of one isotropic material: give its stiffness")
@@ -309,6 +314,8 @@ def excite(scene: Scene, base: np.ndarray | None) -> Excitation:
     loads: dict[tuple[int, str], complex] = {(0, name): load.amplitude for name, load in scene.loads.static.items()}
     if isinstance(scene, MeshScene):
         loads |= {(0, name): given.displacement for name, given in scene.prescribed.items()}
+        if isinstance(scene, StructureScene):
+            loads |= {(0, decks.load_name(name)): 1.0 for name in scene.decks}
         if scene.wheel is not None and scene.wheel.speed:
             loads[0, CENTRIFUGAL] = (2 * np.pi * scene.wheel.speed) ** 2
     for name, load in scene.loads.harmonic.items():

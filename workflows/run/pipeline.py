@@ -19,7 +19,7 @@ from tribodyn.workflows.accuracy.budget import with_budget
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.run import curve, modelling, references, settings, wear_run, worn_responses
+from tribodyn.workflows.run import curve, head, modelling, references, settings, wear_run, worn_responses
 from tribodyn.workflows.run.checkpoint import Clock, Keeper, alone_in
 from tribodyn.workflows.run.description import described
 from tribodyn.workflows.run.failure import SolveFailed
@@ -52,6 +52,8 @@ def run(
         else:
             chosen = () if earlier is None else earlier.harmonics
             model = modelling.build(file, folder or Path(scratch), progress, chosen)
+        for line in head.lines(file, model):
+            progress.say(line)
         result = earlier or described(file, model.part, model.balance, model.choice)
         if scene.wears and result.patch is not None:
             # raises before anything long is begun

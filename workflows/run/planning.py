@@ -95,7 +95,7 @@ def plan(file: SceneFile) -> Plan:
             mesh, node_sets = make_mesh(file, Path(folder))
         built = file.mesh_scene
         elements, nodes = int(mesh.nelements), mesh.doflocs.shape[1]
-        free = free_dofs(3 * nodes, clamps(built), node_sets)
+        free = free_dofs(3 * nodes, clamps(built, file.folder), node_sets)
         full = len(free)
         pairs, masters = _contact(built, mesh, node_sets, free)
         held = int(isinstance(built, PartScene) and built.geometry.no_turning is not None)

@@ -11,6 +11,8 @@ from typing import Annotated, Any, Self
 from pydantic import BeforeValidator, Field, PrivateAttr, ValidationInfo, model_validator
 
 from tribodyn.workflows.scene.contact import FaceContact
+from tribodyn.workflows.scene.decks import Deck, in_metres
+from tribodyn.workflows.scene.faces import FaceRule, Point
 from tribodyn.workflows.scene.fields import Angle, Direction, Length, Number, Stiffness, Table, quantity
 from tribodyn.workflows.scene.own import folder_of, own_file
 from tribodyn.workflows.scene.schema import (
@@ -20,16 +22,10 @@ from tribodyn.workflows.scene.schema import (
     MeshScene,
     part_parameters,
 )
-from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.wear import JointWear
 from tribodyn.workflows.scene.words import unknown_key
 
 GROUND = "ground"
-Point = tuple[Length, Length, Length]
-
-
-def _unit(value: object) -> object:
-    return to_si(f"1 {value}", "m") if isinstance(value, str) else value
 
 
 class Rotation(Table):
@@ -55,8 +51,14 @@ class Body(Table):
     """Mesh file, relative to the scene file, instead of a part."""
     volume: str | None = None
     """Volume group of the mesh that is this body; the whole mesh by default."""
-    unit: Annotated[float, BeforeValidator(_unit), Field(gt=0)] = 1.0
+    unit: Annotated[float, BeforeValidator(in_metres), Field(gt=0)] = 1.0
     """Length unit of the mesh file, such as "mm"."""
+    size: Annotated[Length, Field(gt=0)] | None = None
+    """Element size of a CAD file, a tenth of its length by default."""
+    face_sizes: dict[str, Annotated[Length, Field(gt=0)]] = Field(default_factory=dict)
+    """Element sizes at faces of a CAD file: "face 6" = size."""
+    faces: dict[str, FaceRule] = Field(default_factory=dict)
+    """Faces that are picked by rule, by name."""
     rotation: Rotation | tuple[Rotation, ...] = ()
     """Turn of the body, or several one after the other, before it is moved."""
     translation: Point = (0.0, 0.0, 0.0)
@@ -79,6 +81,9 @@ class Body(Table):
         other = {key: value for key, value in table.items() if key not in cls.model_fields}
         if ("part" in own) == ("mesh" in own):
             raise ValueError('expected either part = "name" or mesh = "file.msh", and not both')
+        for key in ("size", "face_sizes", "volume", "unit"):
+            if "part" in own and key in own:
+                raise ValueError(f"{key} is for a mesh or a CAD file: a part has parameters of its own")
         if not isinstance(own.get("part"), str):
             return own | other
         try:
@@ -91,6 +96,13 @@ class Body(Table):
     @model_validator(mode="after")
     def _remember_the_file(self, info: ValidationInfo) -> Self:
         self._own = own_file(folder_of(info), self.part, "part")
+        return self
+
+    @model_validator(mode="after")
+    def _names_of_faces(self) -> Self:
+        for name in self.face_sizes:
+            if not (name.startswith("face ") and name.removeprefix("face ").isdigit()):
+                raise ValueError(f'face_sizes: expected faces by their numbers, such as "face 6", got "{name}"')
         return self
 
     @property
@@ -245,6 +257,8 @@ class StructureScene(MeshScene):
 
     bodies: dict[str, Body] = Field(default_factory=dict)
     """Bodies by name."""
+    decks: dict[str, Deck] = Field(default_factory=dict)
+    """Decks of other FE programs by name, which bring bodies and what joins, holds and loads them."""
     materials: dict[str, SolidMaterial] = Field(default_factory=dict)
     """Materials by name."""
     geometry: Geometry | None = None
@@ -271,7 +285,8 @@ class StructureScene(MeshScene):
 
     @model_validator(mode="after")
     def _whole(self) -> StructureScene:
-        if bool(self.bodies) == (self.geometry is not None) or (self.geometry is None) != (self.material is None):
+        several = bool(self.bodies or self.decks)
+        if several == (self.geometry is not None) or (self.geometry is None) != (self.material is None):
             raise ValueError("expected either [bodies.NAME] with [materials.NAME], or [geometry] with [material]")
         if self.wear is not None and not self.joints:
             raise ValueError("contact is missing: [wear] needs [contact] or [contacts.NAME]")
@@ -285,6 +300,9 @@ class StructureScene(MeshScene):
             for material in body.materials:
                 if material not in self.materials:
                     raise ValueError(f"bodies.{name}: {unknown_key(f'materials.{material}', [*self.materials])}")
+        for name, deck in self.decks.items():
+            if deck.material is not None and deck.material not in self.materials:
+                raise ValueError(f"decks.{name}: {unknown_key(f'materials.{deck.material}', [*self.materials])}")
         for name, bolt in self.bolts.items():
             if bolt.material is not None and bolt.material not in self.materials:
                 raise ValueError(f"bolts.{name}: {unknown_key(f'materials.{bolt.material}', [*self.materials])}")

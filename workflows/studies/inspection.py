@@ -11,30 +11,33 @@ from typing import Any
 import numpy as np
 
 from tribodyn.fem.assembly import Assembly
-from tribodyn.fem.elasticity import assemble
-from tribodyn.fem.factor import factorise
+from tribodyn.fem.elasticity import assemble, densities
 from tribodyn.fem.material import Material
 from tribodyn.fem.modes import modes
 from tribodyn.geometry.facts import area, facts
 from tribodyn.geometry.sources import read as sources
-from tribodyn.workflows.run import modelling, part_reduction
+from tribodyn.workflows.run import head, modelling, oddities, part_reduction
 from tribodyn.workflows.scene import scene_file
-
-LARGE, SMALL = 20.0, 1e-4  # [m], sizes beyond which the unit of length is doubted
-LIGHT, HEAVY = 50.0, 30_000.0  # [kg/m3]; foams are below, nothing is above
-SOFT, HARD = 1e6, 2e12  # [Pa]; rubber and diamond
-BENT = 0.1  # of its size: more is no small displacement
-WATCHED = 6  # modes whose resonance is looked at
 
 
 @dataclass(frozen=True)
 class Solid:
-    """One body. material : None where nothing says it"""
+    """One body. material : one, or by volume group, None where nothing says it"""
 
     name: str
     mesh: Any
     node_sets: Mapping[str, np.ndarray]
-    material: Material | None = None
+    material: Any = None
+
+    @property
+    def density(self) -> np.ndarray | None:
+        """Density of each element (n_element,) [kg/m3], None where nothing says it."""
+        return None if self.material is None else densities(self.mesh, self.material)
+
+    @property
+    def plain(self) -> Material | None:
+        """Its only, isotropic material."""
+        return self.material if isinstance(self.material, Material) else None
 
 
 @dataclass(frozen=True)
@@ -135,7 +138,7 @@ def _of_file(path: Path, unit: str, material: Material | None, n_modes: int) -> 
             raise ValueError(f"{path} gives no material to compute modes with: give --young, --poisson and --density")
         found = replace(found, frequencies=_free_frequencies(solids, n_modes))
     hint = 'give --unit mm (in a scene: unit = "mm")'
-    remarks += _odd_sizes(found.size, hint) + _odd_materials({s.name: s.material for s in solids if s.material})
+    remarks += oddities.odd_sizes(found.size, hint) + _odd_materials(solids)
     return replace(found, remarks=tuple(remarks))
 
 
@@ -168,7 +171,7 @@ def of_part(file: scene_file.SceneFile, part: Any) -> Inspection:
     """The facts of a part of a scene that is assembled already."""
     scene = file.mesh_scene
     solids = _solids(file, part)
-    found = measured(solids)
+    found = measured(solids, head.notes(file, part))
     gap = np.asarray(part.interface.gap)
     gaps = {
         name: {"least_m": float(gap[pairs].min()), "largest_m": float(gap[pairs].max())}
@@ -176,33 +179,29 @@ def of_part(file: scene_file.SceneFile, part: Any) -> Inspection:
         if gap[pairs].size
     }
     remarks = [
-        *_odd_sizes(found.size, "scale the mesh to metres"),
-        *_odd_materials({one.name: one.material for one in solids if one.material is not None}),
-        *_odd_deflection(scene, part, float(np.linalg.norm(found.size))),
+        *oddities.odd_sizes(found.size, "scale the mesh to metres"),
+        *_odd_materials(solids),
+        *oddities.odd_deflection(scene, part.system, part.largest, float(np.linalg.norm(found.size))),
     ]
     return replace(found, gaps=gaps, remarks=tuple(remarks))
 
 
+def _odd_materials(solids: Sequence[Solid]) -> list[str]:
+    return oddities.odd_materials({one.name: one.plain for one in solids if one.plain is not None})
+
+
 def _solids(file: scene_file.SceneFile, part: Any) -> list[Solid]:
-    """The bodies of a part; of those of several materials only the mesh is measured."""
+    """The bodies of a part."""
     if isinstance(part.mesh, Assembly):
-        return [
-            Solid(body.name or file.name, body.mesh, body.node_sets, _isotropic(body.material))
-            for body in part.mesh.bodies
-        ]
-    own = part_reduction.material(file.mesh_scene, part.mesh)
-    return [Solid(file.name, part.mesh, part.node_sets, _isotropic(own))]
-
-
-def _isotropic(material: Any) -> Material | None:
-    return material if isinstance(material, Material) else None
+        return [Solid(b.name or file.name, b.mesh, b.node_sets, b.material) for b in part.mesh.bodies]
+    return [Solid(file.name, part.mesh, part.node_sets, part_reduction.material(file.mesh_scene, part.mesh))]
 
 
 def measured(solids: Sequence[Solid], said: Iterable[str] = (), unused: Iterable[str] = ()) -> Inspection:
     """Sizes, volumes, masses, groups and the worst element of bodies."""
-    all_facts = {solid.name: facts(solid.mesh) for solid in solids}
+    all_facts = {solid.name: facts(solid.mesh, solid.density) for solid in solids}
     volume = sum(one.volume for one in all_facts.values())
-    masses = [s.material.rho * all_facts[s.name].volume for s in solids if s.material is not None]
+    masses = [one.mass for one in all_facts.values() if one.mass is not None]
     mass = sum(masses) if len(masses) == len(solids) else None
     weights = masses if mass else [all_facts[s.name].volume for s in solids]
     centre = np.average([all_facts[s.name].centre for s in solids], axis=0, weights=weights)
@@ -216,7 +215,7 @@ def measured(solids: Sequence[Solid], said: Iterable[str] = (), unused: Iterable
             "kind": "hexahedra" if solid.mesh.t.shape[0] == 8 else "tetrahedra",
             "nodes": solid.mesh.doflocs.shape[1],
             "volume_m3": one.volume,
-            "mass_kg": None if solid.material is None else solid.material.rho * one.volume,
+            "mass_kg": one.mass,
             "centre_m": one.centre.tolist(),
         }
         faces = solid.mesh.boundaries or {}
@@ -233,71 +232,3 @@ def measured(solids: Sequence[Solid], said: Iterable[str] = (), unused: Iterable
     return Inspection(
         tuple(solids), high - low, volume, mass, centre, bodies, groups, worst, tuple(unused), tuple(said)
     )
-
-
-def _odd_sizes(size: np.ndarray, cure: str) -> list[str]:
-    longest = float(size.max())
-    if longest > LARGE:
-        return [f"it is {longest:.4g} m long, as a mesh in millimetres read in metres would be: {cure}"]
-    if longest < SMALL:
-        return [
-            f"it is {1e6 * longest:.4g} um long, as a mesh in metres read in millimetres would be: correct its unit"
-        ]
-    return []
-
-
-def _odd_materials(materials: Mapping[str, Material]) -> list[str]:
-    remarks = []
-    for name, one in materials.items():
-        if one.rho < LIGHT or one.rho > HEAVY:
-            unit = "g/cm3" if 0.1 < one.rho < LIGHT else "another unit"
-            remarks.append(
-                f"the density of {name} is {one.rho:.4g} kg/m3, as a value in {unit} without its unit would be: "
-                'write it with its unit, such as "7.86 g/cm3"'
-            )
-        if one.E < SOFT or one.E > HARD:
-            unit = "GPa" if one.E < 2e3 else "MPa" if one.E < SOFT else "another unit"
-            remarks.append(
-                f"Young's modulus of {name} is {one.E:.4g} Pa, as a value in {unit} without its unit would be: "
-                'write it with its unit, such as "210 GPa"'
-            )
-    return remarks
-
-
-def _odd_deflection(scene: Any, part: Any, size: float) -> list[str]:
-    """A remark where a load, alone and with the contact open, bends the part beyond a linear model.
-
-    Static loads by their static deflection; harmonic ones by the resonances in the range of the response, with the
-    modal damping of the scene.
-    """
-    moved: dict[str, tuple[float, str]] = {}
-    system = part.system
-    try:
-        factor = factorise(system.stiffness)
-    except ValueError:  # nothing holds it but the contact
-        return []
-    for name, load in {**scene.loads.static, **scene.loads.harmonic}.items():
-        if name in system.loads:
-            moved[name] = (_largest(part, factor.solve(system.loads[name] * load.amplitude)), "at rest")
-    ratio = scene.damping.modal
-    if ratio:
-        omega, phi = modes(system.stiffness, system.mass, min(WATCHED, system.mass.shape[0]), factor=factor)
-        low, high = (2 * np.pi * f for f in scene.response.frequency)
-        for name, load in scene.loads.harmonic.items():
-            force = system.loads[name] * load.amplitude if name in system.loads else 0.0 * phi[:, 0]
-            for i in np.flatnonzero((omega * load.harmonic >= low) & (omega <= high * load.harmonic) & (omega > 0)):
-                swing = _largest(part, phi[:, i] * (phi[:, i] @ force) / (2 * ratio * omega[i] ** 2))
-                moved[name] = max(
-                    moved.get(name, (0.0, "")), (swing, f"at its resonance of {omega[i] / 6.2832:.4g} Hz")
-                )
-    name, (largest, where) = max(moved.items(), key=lambda item: item[1][0], default=("", (0.0, "")))
-    if largest <= BENT * size:
-        return []
-    return [
-        f"load {name} alone moves the part by {1e3 * largest:.3g} mm on {1e3 * size:.3g} mm {where} while the "
-        "contact is open, more than a linear model describes: check its unit, or keep this in mind"
-    ]
-
-
-def _largest(part: Any, q: np.ndarray) -> float:
-    return float(np.linalg.norm(part.field(q), axis=1).max())

@@ -1,0 +1,154 @@
+"""A deck of another FE program brought whole, against the same structure said by hand; what is not used is named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tribodyn.fem.factor import factorise
+from tribodyn.fem.modes import modes
+from tribodyn.fem.part import Part
+from tribodyn.workflows.run import bodies, modelling
+from tribodyn.workflows.scene import scene_file
+
+LAP = (Path(__file__).parents[1] / "geometry" / "decks" / "lap.inp").read_text()
+# the deck's second block stands beside its first one: move it over
+PLACE = "          0.,           0.,          10.\n          0.,"
+TEXT = LAP.replace(PLACE, "0., -10., 10.\n 0.,")
+REST = """
+[scene]
+title = "A deck"
+[loads.harmonic.shake]
+group = "Block-2"
+direction = "y"
+value = "1 N"
+[response]
+group = "Block-2"
+direction = "y"
+frequency = ["1 kHz", "2 kHz"]
+[reduction]
+modes = 4
+"""
+DECK = '[decks.lap]\nfile = "lap.inp"\nunit = "mm"\n'
+BY_HAND = """
+[materials.Steel]
+young = "210 GPa"
+poisson = 0.3
+density = "7850 kg/m3"
+expansion = "12e-6 1/K"
+[bodies.Block-1]
+mesh = "lap.inp"
+volume = "Block-1"
+unit = "mm"
+material = "Steel"
+fixed = ["Foot"]
+[bodies.Block-2]
+mesh = "lap.inp"
+volume = "Block-2"
+unit = "mm"
+material = "Steel"
+[ties.glue]
+first = "Block-2.Lower"
+second = "Block-1.Upper"
+reach = "0.5 mm"
+[couplings.RP]
+face = "Block-1.End"
+point = ["25 mm", "5 mm", "5 mm"]
+[loads.static.cload]
+group = "RP"
+direction = "y"
+value = "-100 N"
+[loads.static.press]
+group = "Block-1.Upper"
+pressure = "3 MPa"
+"""
+
+
+def part(text: str, folder: Path, deck: str = TEXT) -> Part:
+    (folder / "lap.inp").write_text(deck)
+    file = scene_file.parse(text + REST, "scene.toml", (), folder)
+    mesh, node_sets = modelling.make_mesh(file, folder)
+    return modelling.make_part(file.mesh_scene, mesh, node_sets, folder)
+
+
+def test_a_deck_is_the_structure_that_the_same_tables_by_hand_make(tmp_path: Path) -> None:
+    known = '["ties", "couplings", "supports", "forces", "pressures"]'
+    brought, said = (part(text, tmp_path) for text in (DECK + f"use = {known}\n", BY_HAND))
+    omega = [modes(of.system.stiffness, of.system.mass, 6)[0] for of in (brought, said)]
+    np.testing.assert_allclose(*omega, rtol=1e-9)
+    by_hand = said.system.loads["cload"] * -100.0 + said.system.loads["press"] * 3e6
+    np.testing.assert_allclose(brought.system.loads["decks.lap"], by_hand, atol=1e-9 * np.abs(by_hand).max())
+
+
+def test_an_equation_of_a_deck_holds(tmp_path: Path) -> None:
+    of = part(DECK, tmp_path)
+    u = of.field(factorise(of.system.stiffness).solve(of.system.loads["decks.lap"]))
+    one, other = (int(of.node_sets[f"Block-2.node Block-2.{n}"][0]) for n in (11, 12))
+    assert abs(u[one, 0]) > 1e-9
+    assert u[one, 0] == pytest.approx(u[other, 0], rel=1e-12)
+    assert u[one, 1] != pytest.approx(u[other, 1], rel=1e-3)
+
+
+def test_what_is_not_used_is_named(tmp_path: Path) -> None:
+    (tmp_path / "lap.inp").write_text(TEXT)
+    file = scene_file.parse(DECK + 'use = ["supports"]\n' + REST, "scene.toml", (), tmp_path)
+    notes = [note for deck in bodies.of_decks(file.scene, tmp_path).values() for note in deck.notes]
+    said = "; ".join(notes)
+    for clause in ("*PLASTIC", "1 of its ties that use leaves", "1 of its pressures that", "points RP, which carry"):
+        assert clause in said, clause
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (("*Density\n 7.85e-09,\n", ""), "has no density: say .materials.Steel. in the scene"),
+        (("*Solid Section, elset=All, material=Steel\n,\n", ""), 'with decks.lap.material = "name"'),
+        (("ref node=RP", "ref node=Block-1.9"), "its reference node belongs to the mesh"),
+        (("Lower, Upper", "Tips, Upper"), "is a set of nodes that make no face|is no node and no set|has not"),
+        (("Foot, ENCASTRE", "Foot, ENCASTRE\nBlock-2.All, ENCASTRE"), "moves nodes that are clamped"),
+    ],
+)
+def test_what_cannot_be_carried_over_is_one_sentence(tmp_path: Path, change: tuple[str, str], sentence: str) -> None:
+    assert change[0] in TEXT
+    with pytest.raises(ValueError, match=sentence) as raised:
+        part(DECK, tmp_path, TEXT.replace(*change))
+    assert "\n" not in str(raised.value)
+    assert str(raised.value).startswith("decks.lap") or "of deck lap" in str(raised.value)
+
+
+PICKED = """
+[materials.steel]
+young = "210 GPa"
+poisson = 0.3
+density = "7850 kg/m3"
+[bodies.Block-2]
+part = "block"
+length = "40 mm"
+width = "20 mm"
+height = "10 mm"
+n_length = 4
+n_width = 2
+material = "steel"
+fixed = ["left"]
+translation = ["5 mm", "0 mm", "0 mm"]
+[bodies.Block-2.faces.left]
+normal = "-x"
+[bodies.Block-2.faces.patch]
+normal = "z"
+box = [["10 mm", "0 mm", "0 mm"], ["30 mm", "20 mm", "10 mm"]]
+[bodies.Block-2.faces.end]
+nearest = ["41 mm", "9 mm", "4 mm"]
+"""
+
+
+def test_faces_are_picked_by_rule_where_the_body_is_made(tmp_path: Path) -> None:
+    of = part(PICKED, tmp_path)
+    x, _, z = of.mesh.doflocs
+    np.testing.assert_array_equal(of.node_sets["Block-2.left"], np.flatnonzero(abs(x - 5e-3) < 1e-9))
+    np.testing.assert_array_equal(of.node_sets["Block-2.end"], np.flatnonzero(abs(x - 45e-3) < 1e-9))
+    inside = (abs(z - 10e-3) < 1e-9) & (x > 15e-3 - 1e-9) & (x < 35e-3 + 1e-9)
+    np.testing.assert_array_equal(of.node_sets["Block-2.patch"], np.flatnonzero(inside))
+    with pytest.raises(ValueError, match=r"bodies.Block-2: faces.left: .* satisfies all its rules together"):
+        part(PICKED.replace('normal = "-x"', 'normal = "-x"\nbox = [[0, 0, 0], ["40 mm", "20 mm", 0]]'), tmp_path)

@@ -1,0 +1,287 @@
+"""A deck of another FE program as part of a structure: its bodies, materials, constraints, supports and loads.
+
+What cannot be carried over and would change the structure is refused. What changes nothing, such as a support of a
+point that nothing moves, is named among what is not used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tribodyn.fem.assembly import Body
+from tribodyn.fem.constraints import AXES, Clamp, Constraint
+from tribodyn.fem.couplings import DistributedCoupling, Equation, RigidCoupling, Tie
+from tribodyn.fem.loads import Load, Moment, NodalForce, Pressure, Sum
+from tribodyn.fem.material import AnyMaterial, Material, Orthotropic
+from tribodyn.fem.springs import Mass
+from tribodyn.geometry.sources import deck, picking, read
+from tribodyn.workflows.scene.decks import EVERYTHING
+from tribodyn.workflows.scene.decks import Deck as Table
+
+UNITS = {metres: name for name, metres in read.UNITS.items()}
+ALL_AXES = (0, 1, 2, 3, 4, 5)
+
+
+@dataclass
+class Structure:
+    """What a deck brings into a scene. points : name -> (3,) of its reference points [m]; load : all its loads
+    notes : sentences on what was done to it, and on what of it is not used"""
+
+    bodies: list[Body]
+    points: dict[str, np.ndarray] = field(default_factory=dict)
+    clamps: list[Clamp] = field(default_factory=list)
+    constraints: list[Constraint] = field(default_factory=list)
+    masses: list[Mass] = field(default_factory=list)
+    load: Sum = field(default_factory=lambda: Sum(()))
+    notes: list[str] = field(default_factory=list)
+
+
+def load_name(deck_name: str) -> str:
+    """Name of the load that a deck brings."""
+    return f"decks.{deck_name}"
+
+
+def structure(name: str, table: Table, materials: Mapping[str, AnyMaterial], folder: Path) -> Structure:
+    """What the deck of a table brings.
+
+    materials : those of the scene, which take the place of the deck's of the same name; folder : of the scene
+    Raises  ValueError, one sentence: the deck cannot be read, lacks a material, or says what cannot be carried over
+    """
+    path = folder / table.file
+    if table.unit not in UNITS:
+        raise ValueError(f"decks.{name}.unit: expected one of {', '.join(read.UNITS)}")
+    try:
+        stamp = path.stat().st_mtime_ns if path.is_file() else 0
+        return _Carrying(name, table, materials, _read(path, UNITS[table.unit], stamp)).done()
+    except ValueError as trouble:
+        said = str(trouble)
+        raise ValueError(said if said.startswith("decks.") else f"decks.{name}: {said}") from None
+
+
+@lru_cache(maxsize=4)
+def _read(path: Path, unit: str, stamp: int) -> read.Source:
+    return read.read(path, unit)
+
+
+class _Carrying:
+    """One deck on its way into a structure."""
+
+    def __init__(self, name: str, table: Table, materials: Mapping[str, AnyMaterial], source: read.Source):
+        self.name, self.table, self.source, self.deck = name, table, source, source.deck
+        self.materials = materials
+        self.faces: dict[str, list[str]] = {}  # group of the deck -> its names in the assembly
+        self.sets: dict[str, list[str]] = {}
+        self.made = Structure([self._body(body) for body in source.bodies])
+        self.notes = self.made.notes
+        self.axes_of: dict[str, set[int]] = {}  # point -> its axes that an equation moves
+        self.carried: set[str] = set()  # points that a coupling ties to a face
+
+    def done(self) -> Structure:
+        """All of it."""
+        use = self.table.use
+        for kind in EVERYTHING:
+            entries = getattr(self.deck, kind)
+            if kind in use:
+                getattr(self, f"_{kind}")(entries)
+            elif entries:
+                self.notes.append(f"{self._what(kind, entries)} that use leaves out")
+        self._points()
+        self.made.clamps += [Clamp(group) for group in self.table.fixed]
+        self.made.clamps += [Clamp(group, axes) for group, axes in self.table.fixed_axes.items()]
+        unused = [f"not used: {clause}" for clause in (*self.source.unused, *self.notes)]
+        self.made.notes = [f"decks.{self.name}: {sentence}" for sentence in (*self.source.said, *unused)]
+        return self.made
+
+    # bodies
+
+    def _body(self, name: str) -> Body:
+        found = self.source.bodies[name]
+        rules = {}
+        for face, rule in self.table.faces.items():
+            if rule.body not in self.source.bodies:
+                known = ", ".join(self.source.bodies)
+                raise ValueError(f"faces.{face}: the deck has no body '{rule.body}'; it has {known}")
+            if rule.body == name:
+                rules[face] = rule.rule
+        mesh, node_sets = picking.with_faces(found.mesh, found.node_sets, rules)
+        material = self._material(name, mesh)
+        for group in {*node_sets, *(mesh.boundaries or {})}:
+            kept = self.faces if group in (mesh.boundaries or {}) else self.sets
+            kept.setdefault(group, []).append(f"{name}.{group}")
+        return Body(name, mesh, node_sets, material)
+
+    def _material(self, name: str, mesh: Any) -> Any:
+        """Material of a body, or volume group -> material where it has several."""
+        given: dict[str, AnyMaterial] = {}
+        count = np.zeros(mesh.nelements, dtype=int)
+        for one in self.deck.materials:
+            for group in one.groups:
+                if group in (mesh.subdomains or {}):
+                    given[group] = self._solid(one)
+                    count[mesh.subdomains[group]] += 1
+        if (count > 1).any():
+            many = int((count > 1).sum())
+            raise ValueError(f"the sections of body '{name}' overlap in {many} elements: correct them")
+        if (count == 1).all():
+            return given if len(given) > 1 else next(iter(given.values()))
+        if self.table.material is None:
+            raise ValueError(
+                f"the deck gives {int((count == 0).sum())} of {mesh.nelements} elements of body '{name}' no material: "
+                f'name one of the scene with decks.{self.name}.material = "name"'
+            )
+        other = self.materials[self.table.material]
+        if not given:
+            return other
+        raise ValueError(f"the deck gives a part of body '{name}' no material: give all its elements a section")
+
+    def _solid(self, one: deck.DeckMaterial) -> AnyMaterial:
+        if one.name in self.materials:
+            return self.materials[one.name]
+        instead = f"say [materials.{one.name}] in the scene, which takes its place"
+        if one.density is None:
+            raise ValueError(f"material '{one.name}' of the deck has no density: {instead}")
+        along = one.expansion or 0.0
+        if one.engineering is not None:
+            e = one.engineering
+            return Orthotropic(e[:3], e[3:6], e[6:], one.density, expansion=(along,) * 3)
+        if one.young is None or one.poisson is None:
+            raise ValueError(f"material '{one.name}' of the deck has no elastic constants that are known: {instead}")
+        return Material(one.young, one.poisson, one.density, along)
+
+    # constraints
+
+    def _ties(self, ties: Sequence[deck.Tie]) -> None:
+        for tie in ties:
+            what = f"tie '{tie.name}' of deck {self.name}"
+            slaves, masters = (self._faces(place, what) for place in (tie.slave, tie.master))
+            if len(masters) > 1:
+                raise ValueError(f"{what}: its master lies on {', '.join(masters)}; {self._instead('ties', 'ties')}")
+            self.made.constraints += [Tie(what, slave, masters[0], tie.tolerance) for slave in slaves]
+
+    def _couplings(self, couplings: Sequence[deck.Coupling]) -> None:
+        for one in couplings:
+            what = f"coupling '{one.name}' of deck {self.name}"
+            if one.point not in self.source.points:
+                raise ValueError(
+                    f"{what}: its reference node belongs to the mesh; give it one of its own, or "
+                    f"{self._instead('couplings', 'couplings')}"
+                )
+            if not set(one.axes) >= {0, 1, 2}:
+                raise ValueError(f"{what} couples some directions alone; {self._instead('couplings', 'couplings')}")
+            kind = RigidCoupling if one.kind == "kinematic" else DistributedCoupling
+            places = self._groups(one.face, what)
+            if len(places) > 1 and kind is DistributedCoupling:
+                listed = ", ".join(places)
+                raise ValueError(f"{what}: its face lies on {listed}; {self._instead('couplings', 'couplings')}")
+            self.carried.add(one.point)
+            self.made.constraints += [kind(one.point, place) for place in places]
+
+    def _equations(self, equations: Sequence[deck.Equation]) -> None:
+        for number, one in enumerate(equations, 1):
+            what = f"equation {number} of deck {self.name}"
+            terms = []
+            for group, axis, factor in one.terms:
+                if group in self.source.points:
+                    self.axes_of.setdefault(group, set()).add(axis)
+                    terms.append((group if axis < 3 else f"{group}.turn", axis % 3, factor))
+                elif axis < 3:
+                    terms.append((self._groups(group, what)[0], axis, factor))
+                else:
+                    raise ValueError(f"{what} turns a node of a solid, which has no rotation; correct the deck")
+            self.made.constraints.append(Equation(what, tuple(terms)))
+
+    def _masses(self, masses: Sequence[deck.PointMass]) -> None:
+        for one in masses:
+            places = [one.group] if one.group in self.source.points else self._groups(one.group, "a mass")
+            self._needs_coupling(one.group, "mass")
+            self.made.masses += [Mass(place, one.value / len(places)) for place in places]
+
+    def _supports(self, supports: Sequence[deck.Support]) -> None:
+        moved = [one for one in supports if one.value]
+        if moved:
+            self.notes.append(f"{self._what('supports', moved)} with a displacement: say it as [prescribed.NAME]")
+        held: dict[str, set[int]] = {}
+        for one in supports:
+            if not one.value:
+                held.setdefault(one.group, set()).add(one.axis)
+        for group, axes in held.items():
+            if group in self.source.points:
+                if group not in self.carried and group not in self.axes_of:
+                    self.notes.append(f"the support of point '{group}', which carries nothing")
+                    continue
+                self.made.clamps += _held(group, axes)
+            else:
+                letters = "".join(AXES[axis] for axis in sorted(axes) if axis < 3)
+                places = self._groups(group, "a support") if letters else []
+                self.made.clamps += [Clamp(place, letters) for place in places]
+
+    # loads
+
+    def _forces(self, forces: Sequence[deck.Force]) -> None:
+        parts: list[tuple[Load, float]] = []
+        for one in forces:
+            direction = np.eye(3)[one.axis % 3]
+            if one.group in self.source.points:
+                self._needs_coupling(one.group, "force")
+                kind = NodalForce if one.axis < 3 else Moment
+                parts.append((kind(one.group, direction), one.value))
+            elif one.axis >= 3:
+                raise ValueError(f"a moment acts on '{one.group}', which has no rotation; couple it to a point")
+            else:
+                for place in self._groups(one.group, "a force"):
+                    body = next(name for name in self.source.bodies if place == f"{name}.{one.group}")
+                    count = self.source.counts[one.group][body]
+                    parts.append((NodalForce(place, direction, "nodes"), count * one.value))
+        self._load(parts)
+
+    def _pressures(self, pressures: Sequence[deck.FacePressure]) -> None:
+        self._load([(Pressure(place), p.value) for p in pressures for place in self._faces(p.face, "a pressure")])
+
+    def _load(self, parts: Sequence[tuple[Load, float]]) -> None:
+        self.made.load = Sum((*self.made.load.parts, *parts))
+
+    # places
+
+    def _points(self) -> None:
+        """Reference points that something carries; what of them nothing moves is held."""
+        for point in [*self.carried, *(p for p in self.axes_of if p not in self.carried)]:
+            self.made.points[point] = self.source.points[point]
+            if point not in self.carried:
+                self.made.clamps += _held(point, set(ALL_AXES) - self.axes_of[point])
+        idle = [point for point in self.source.points if point not in self.made.points]
+        if idle:
+            self.notes.append(f"points {', '.join(idle)}, which carry nothing")
+
+    def _needs_coupling(self, group: str, what: str) -> None:
+        if group in self.source.points and group not in self.carried:
+            raise ValueError(f"a {what} acts on point '{group}', which is coupled to nothing; couple it to a face")
+
+    def _faces(self, place: str, what: str) -> list[str]:
+        if place in self.faces:
+            return self.faces[place]
+        kind = "is a set of nodes that make no face" if place in self.sets else "lies on no body"
+        raise ValueError(f"{what}: '{place}' {kind}; give a surface of element faces")
+
+    def _groups(self, place: str, what: str) -> list[str]:
+        found = self.faces.get(place, []) + self.sets.get(place, [])
+        if not found:
+            raise ValueError(f"{what}: '{place}' lies on no body; correct the deck")
+        return found
+
+    def _instead(self, kind: str, table: str) -> str:
+        return f"say it as [{table}.NAME] of the scene and leave {kind} out of decks.{self.name}.use"
+
+    def _what(self, kind: str, entries: Sequence[Any]) -> str:
+        return f"1 of its {kind}" if len(entries) == 1 else f"{len(entries)} {kind}"
+
+
+def _held(point: str, axes: set[int]) -> list[Clamp]:
+    """Clamps of a reference point along axes 0..5."""
+    shifts, turns = ("".join(AXES[axis % 3] for axis in sorted(axes) if axis // 3 == k) for k in (0, 1))
+    return [Clamp(name, letters) for name, letters in ((point, shifts), (f"{point}.turn", turns)) if letters]
