@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -73,6 +74,9 @@ def pardiso_available() -> bool:
     loads.
     """
     os.environ.setdefault("MKL_CBWR", "AUTO")
+    # pypardiso searches the whole environment, a second of processor at each solver, unless told where MKL lies
+    for path in sorted(Path(sys.prefix).glob("lib/libmkl_rt*")) + sorted(Path(sys.prefix).glob("Library/bin/mkl_rt*")):
+        os.environ.setdefault("PYPARDISO_MKL_RT", str(path))
     try:
         import pypardiso  # noqa: F401
     except (ImportError, OSError):

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 from scipy.ndimage import distance_transform_edt, median_filter
-from scipy.signal import fftconvolve
 from scipy.sparse.linalg import spsolve
 
 LARGEST_SIZE = 1.0
@@ -234,6 +233,7 @@ def _local_linear(z: np.ndarray, axis: int, step: float, cutoff: float) -> np.nd
     reach = int(cutoff / step)
     offset = np.arange(-reach, reach + 1) * (step / cutoff)
     weight = np.exp(-np.pi * (offset / GAUSS_CONSTANT) ** 2)  # ISO 16610-21, eq. 1, up to its norm
+    from scipy.signal import fftconvolve  # half a second to load, and few scenes have surfaces
 
     def moment(values: np.ndarray, order: int) -> np.ndarray:
         kernel = (weight * offset**order)[::-1]

@@ -9,6 +9,7 @@ import numba
 import numpy as np
 
 from tribodyn.hbm import law as contact_law
+from tribodyn.hbm.compiled_law import pointer
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.law import ContactCycle, ContactParameters
 
@@ -128,7 +129,7 @@ def _plain_march(law: ModuleType, samples: np.ndarray, p: np.ndarray, memory: np
     s, force = memory.copy(), np.zeros(samples.shape)
     for _ in range(FIRST_CYCLES):
         before, size = s.copy(), np.full(len(s), np.finfo(float).tiny)
-        _follow(law.step, samples, p, s, size, force)
+        _follow(pointer(law.step), samples, p, s, size, force)
         if np.all(np.abs(s - before) <= PERIODIC * size[:, None]):
             return force
     return None
@@ -150,7 +151,7 @@ def _periodic(
     jac = np.zeros((n_pair, n_comp * weight.shape[1], n_comp * phi.shape[1]))
     status = np.zeros(n_pair, np.int64)
     rows, columns = np.ascontiguousarray(weight.T), np.ascontiguousarray(phi)
-    _record(law.step, samples, p, columns, rows, s, ds, force, jac, status)
+    _record(pointer(law.step), samples, p, columns, rows, s, ds, force, jac, status)
     return force, jac, status
 
 
@@ -180,7 +181,7 @@ def settle(
         """One cycle of the pairs i: memory after it, its two derivatives, and the relative drift."""
         eye = np.broadcast_to(np.eye(s.shape[1]), (len(i), s.shape[1], s.shape[1]))
         after, slopes, size = s.copy(), np.concatenate([ds, eye], axis=2), np.full(len(i), np.finfo(float).tiny)
-        _advance(law.step, samples[i], p[i], phi, after, slopes, size)
+        _advance(pointer(law.step), samples[i], p[i], phi, after, slopes, size)
         return after, slopes[..., : ds.shape[2]], slopes[..., ds.shape[2] :], np.abs(after - s).max(axis=1) / size
 
     open_pairs = _repeat(turn, np.arange(len(s)), s, ds, FIRST_CYCLES)
@@ -229,32 +230,31 @@ def _newton(turn: Turn, i: np.ndarray, s: np.ndarray, ds: np.ndarray) -> np.ndar
     return np.concatenate([i, *rejected])
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _follow(step, x, p, s, size, force):
     """One cycle of every pair: force at its samples, s to its value after it, `size` the largest |s| met."""
     n_pair, n_comp, n_time = x.shape
     n_state = s.shape[1]
-    f = np.zeros(n_comp)
+    point, f = np.zeros(n_comp), np.zeros(n_comp)
     dfx, dfs = np.zeros((n_comp, n_comp)), np.zeros((n_comp, n_state))
     dsx, dss = np.zeros((n_state, n_comp)), np.zeros((n_state, n_state))
     for i in range(n_pair):
         for j in range(n_time):
-            step(x[i, :, j], s[i], p[i], f, dfx, dfs, dsx, dss)
+            for c in range(n_comp):
+                point[c] = x[i, c, j]
+            step(point, s[i], p[i], f, dfx, dfs, dsx, dss)
             for c in range(n_comp):
                 force[i, c, j] = f[c]
             for r in range(n_state):
                 size[i] = max(size[i], abs(s[i, r]))
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _advance(step, x, p, phi, s, ds, size):
-    """One cycle of every pair: s and ds to their values after it, `size` the largest |s| met.
-
-    Not cached, nor are `_record` and `_follow`: `step` lives in another file.
-    """
+    """One cycle of every pair: s and ds to their values after it, `size` the largest |s| met."""
     n_pair, n_comp, n_time = x.shape
     n_state = s.shape[1]
-    f = np.zeros(n_comp)
+    point, f = np.zeros(n_comp), np.zeros(n_comp)
     dfx, dfs = np.zeros((n_comp, n_comp)), np.zeros((n_comp, n_state))
     dsx, dss = np.zeros((n_state, n_comp)), np.zeros((n_state, n_state))
     before = np.zeros((n_state, ds.shape[2]))
@@ -262,20 +262,22 @@ def _advance(step, x, p, phi, s, ds, size):
         for j in range(n_time):
             dsx[:] = 0.0
             dss[:] = 0.0
-            step(x[i, :, j], s[i], p[i], f, dfx, dfs, dsx, dss)
+            for c in range(n_comp):
+                point[c] = x[i, c, j]
+            step(point, s[i], p[i], f, dfx, dfs, dsx, dss)
             for r in range(n_state):
                 size[i] = max(size[i], abs(s[i, r]))
             _chain(dsx, dss, phi[j], ds[i], before)
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _record(step, x, p, phi, weight, s, ds, force, jac, status):
     """The periodic cycle from memory s and its derivative ds: force samples, Jacobian, status bits."""
     n_pair, n_comp, n_time = x.shape
     n_coeff = phi.shape[1]
     n_state = s.shape[1]
     m = n_comp * n_coeff
-    f = np.zeros(n_comp)
+    point, f = np.zeros(n_comp), np.zeros(n_comp)
     dfx, dfs = np.zeros((n_comp, n_comp)), np.zeros((n_comp, n_state))
     dsx, dss = np.zeros((n_state, n_comp)), np.zeros((n_state, n_state))
     before = np.zeros((n_state, m))
@@ -289,7 +291,9 @@ def _record(step, x, p, phi, weight, s, ds, force, jac, status):
             dfs[:] = 0.0
             dsx[:] = 0.0
             dss[:] = 0.0
-            status[i] |= step(x[i, :, j], memory, p[i], f, dfx, dfs, dsx, dss)
+            for c in range(n_comp):
+                point[c] = x[i, c, j]
+            status[i] |= step(point, memory, p[i], f, dfx, dfs, dsx, dss)
             for c in range(n_comp):
                 force[i, c, j] = f[c]
                 for d in range(n_comp):
@@ -307,7 +311,7 @@ def _record(step, x, p, phi, weight, s, ds, force, jac, status):
                 jac[i, c * len(weight) : (c + 1) * len(weight)] = product[:, c * m : (c + 1) * m]
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _chain(dsx, dss, phi, ds, before):
     """ds <- dss ds + dsx phi, over the columns of ds; those beyond the coefficients carry dss alone."""
     n_state, n_comp = dsx.shape

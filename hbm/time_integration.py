@@ -16,7 +16,7 @@ import numpy as np
 import scipy.linalg as sla
 
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.hbm import newton, time_step
+from tribodyn.hbm import compiled_law, newton, time_step
 from tribodyn.hbm.anderson import Anderson
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -149,7 +149,7 @@ class TimeStepper:
         normal = components.index("n") if "n" in components else -1
         compliance = np.ascontiguousarray(0.5 * (compliance + compliance.T))
         self.contact = time_step.Contact(joint.parameters.packed(), joint.parameters.gap, normal, compliance)
-        self.law = time_step.pointer(joint.module.step)
+        self.law = compiled_law.pointer(joint.module.step)
 
     def _load(self, n: int) -> np.ndarray:
         """(n, n_coeff) coefficients of the loads."""

@@ -17,8 +17,6 @@ by pair: Jean and Moreau 1999 (non-smooth contact dynamics); the condensation to
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
 from typing import NamedTuple
 
 import numba
@@ -29,9 +27,6 @@ SWEEPS, SLOW = 60, 0.5  # at most of Gauss-Seidel; factor per sweep from which o
 LOCAL, DAMPED = 40, 20  # iterations of one pair; from which on its steps are halved
 NEWTON = 60
 SEPARATES = 4  # as in hbm.law
-
-_VECTOR, _MATRIX = numba.float64[::1], numba.float64[:, ::1]
-_LAW = numba.int64(_VECTOR, _VECTOR, _VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _MATRIX)
 
 
 class Contact(NamedTuple):
@@ -86,12 +81,6 @@ class Record(NamedTuple):
     y: np.ndarray
     bits: np.ndarray
     slopes: np.ndarray
-
-
-@cache
-def pointer(step: Callable) -> Callable:
-    """The kernel of a law as a function pointer: one compiled `march`, cached on disk, serves every law."""
-    return numba.cfunc(_LAW)(step.py_func) if hasattr(step, "py_func") else step
 
 
 @numba.njit(cache=True)
