@@ -17,9 +17,11 @@ from cyclopts import App
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
-from tribodyn import declare
+from tribodyn.found import Kind
 from tribodyn.geometry import parts
-from tribodyn.hbm import contact, continuation, wear
+from tribodyn.hbm import continuation
+from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.wear import law as wear_law
 from tribodyn.workflows.command.main import app
 from tribodyn.workflows.result import store
 from tribodyn.workflows.scene.fields import Direction, Quantity
@@ -43,9 +45,9 @@ def write(folder: Path) -> None:
         "scene_of_a_part": scene_keys(PartScene),
         "scene_of_matrices": scene_keys(MatrixScene, without=PartScene),
         "parts": parameters_of(f"tribodyn.geometry.{name}" for name in parts.names()),
-        "continuations": parameters_of((f"{continuation.__name__}.{name}" for name in continuation.names()), "Options"),
-        "contact_laws": numbers_of(contact.__path__[0]),
-        "wear_laws": numbers_of(wear.__path__[0]),
+        "continuations": parameters_of(f"{continuation.KIND.package}.{name}" for name in continuation.names()),
+        "contact_laws": numbers_of(contact_law.KIND),
+        "wear_laws": numbers_of(wear_law.KIND),
         "commands": commands(app),
         "result": result_layout(),
         "folders": folders(),
@@ -154,11 +156,11 @@ def _default(field: Any) -> str:
 # Parameters that a file declares
 
 
-def parameters_of(modules: Iterable[str], name: str = "Parameters") -> str:
+def parameters_of(modules: Iterable[str]) -> str:
     """A section for each module that declares a dataclass of parameters, with defaults and meanings."""
     lines: list[str] = []
     for module in map(importlib.import_module, modules):
-        kind = getattr(module, name)
+        kind = module.Options if hasattr(module, "Options") else module.Parameters
         lines += [f"## `{module.__name__.rpartition('.')[2]}`", "", _paragraph(_head(module)), ""]
         meanings = _meanings(kind)
         rows = []
@@ -171,16 +173,14 @@ def parameters_of(modules: Iterable[str], name: str = "Parameters") -> str:
     return "\n".join(lines)
 
 
-def numbers_of(folder: str) -> str:
-    """A section for each law of a folder, with the numbers that it declares; no law is run for it."""
+def numbers_of(kind: Kind) -> str:
+    """A section for each file of a kind, with the numbers that it declares; none is run for it."""
     lines: list[str] = []
-    for path in sorted(Path(folder).glob("*.py")):
-        if path.stem == "__init__":
-            continue
+    for path in map(kind.file_of, kind.names()):
         head = (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").split("\n\n")[0]
         lines += [f"## `{path.stem}`", "", _paragraph(head), ""]
         rows = []
-        for own in declare.read(path):
+        for own in kind.declared(path.stem):
             default = "required" if own.needed else "" if own.default is None else f"`{own.default:g}`"
             limits = (("at least", own.low), ("above", own.above), ("at most", own.high))
             bounds = [f"{word} {limit:g}" for word, limit in limits if limit is not None]

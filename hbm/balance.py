@@ -3,7 +3,7 @@
     R(x) = x - x_lin(w) - G(w) g(x),    g(x) = k x - f_c(x)
 
 g is the departure of the contact from its stuck, closed state; where all is stuck it vanishes and x = x_lin.
-Source  design of tribodyn; x_lin and G in hbm.compliance; f_c from a contact law by alternating frequency/time.
+Source  design of tribodyn; x_lin and G in hbm.linear.compliance; f_c from a contact law by alternating frequency/time.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from typing import Protocol
 
 import numpy as np
 
-from tribodyn.hbm.compliance import CompliancePoint, ContactCompliance
+from tribodyn.hbm.contact.joint import Contact, Joint
+from tribodyn.hbm.contact.law import STICKS, ContactCycle
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Contact, Joint
 from tribodyn.hbm.krylov import gmres
-from tribodyn.hbm.law import STICKS, ContactCycle
+from tribodyn.hbm.linear.compliance import CompliancePoint, ContactCompliance
 from tribodyn.reduction.model import ReducedModel
 
 

@@ -15,7 +15,7 @@ class HarmonicBasis:
     harmonics : kept harmonics, any strictly increasing set; x_0 is there only where 0 is among them
     n_samples : equidistant time samples of one period; more than twice the highest harmonic, so that none is aliased
     transitions : contact forces are taken at the samples ("sampled"), or the instants of stick, slip, contact and
-        separation are located and the forces between them integrated in closed form ("located", see hbm.located)
+        separation are located and the forces between them integrated in closed form ("located")
     """
 
     harmonics: tuple[int, ...]

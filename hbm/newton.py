@@ -8,7 +8,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, Linearisation, State
-from tribodyn.hbm.law import ContactCycle
+from tribodyn.hbm.contact.law import ContactCycle
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
 

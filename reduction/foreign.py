@@ -16,9 +16,10 @@
     history = thesis_rule.evolve(wear, 1e-6, max_steps=5)
     print(history.cycles, history.depth.max(axis=1))
 
-with `ContactParameters` from hbm.law, `Joint` from hbm.joint, `HarmonicBalance` from hbm.balance, `HarmonicBasis` from
-hbm.harmonics, `Excitation` from hbm.excitation, `natural` from hbm.continuation, `AtPeak` from hbm.operating_point,
-`Duty` and `WearProblem` from hbm.evolution, `JointWear` from hbm.wear_law and `thesis_rule` from hbm. A scene with
+with `ContactParameters` from hbm.contact.law, `Joint` from hbm.contact.joint, `HarmonicBalance` from hbm.balance,
+`HarmonicBasis` from hbm.harmonics, `Excitation` from hbm.excitation, `natural` from hbm.continuation.methods, `AtPeak`
+from hbm.continuation.operating_point, `Duty` and `WearProblem` from hbm.wear.evolution, `JointWear` from hbm.wear.law
+and `thesis_rule` from hbm.wear. The names of `import tribodyn` are a shorter way to the same; a scene with
 [model] does the same without Python.
 
 Units are SI after `scale`. A DOF is a number from 0, or (node, component) where the file carries labels (Abaqus text,

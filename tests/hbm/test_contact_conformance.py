@@ -7,14 +7,15 @@ import scipy.linalg as sla
 from tests.helpers.contact_draws import HARMONICS, LAWS, LOCATED, draw, own, tangential
 from tests.helpers.verification_models import interface, modal_damping
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.hbm import aft, newton
-from tribodyn.hbm import law as contact_law
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact import aft
+from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS, ContactParameters
-from tribodyn.hbm.recovery import coordinates
+from tribodyn.hbm.linear.recovery import coordinates
 from tribodyn.reduction.model import ReducedModel
 
 EVERY_LAW = pytest.mark.parametrize(("name", "components"), LAWS, ids=lambda v: v if isinstance(v, str) else "".join(v))

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from tests.helpers.contact_draws import HARMONICS, LOCATED, draw, own
 from tests.helpers.random_problems import cases
-from tribodyn.hbm import aft, located
-from tribodyn.hbm import law as contact_law
+from tribodyn.hbm.contact import aft, located
+from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS, ContactParameters
 
 EVERY_LAW = pytest.mark.parametrize(
     ("name", "components"), LOCATED, ids=lambda v: v if isinstance(v, str) else "".join(v)

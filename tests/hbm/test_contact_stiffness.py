@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from tribodyn.hbm.contact_stiffness import ElasticPair, RoundedPunch, SphereContact, rectangular_punch
+from tribodyn.hbm.contact.stiffness import ElasticPair, RoundedPunch, SphereContact, rectangular_punch
 
 STEEL = (210e9, 0.3, 210e9, 0.3)
 MIXED = ElasticPair(210e9, 0.3, 70e9, 0.33)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.helpers.continuation_models import Duffing, rubbing_mass
-from tribodyn.hbm import parameter
-from tribodyn.hbm.branch import Branch
-from tribodyn.hbm.continuation import adaptive, natural
-from tribodyn.hbm.continuation.adaptive import Options, interpolate
+from tribodyn.hbm.continuation import parameter
+from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.continuation.methods import adaptive, natural
+from tribodyn.hbm.continuation.methods.adaptive import Options, interpolate
 
 
 def worst(branch: Branch, reference: Branch) -> float:

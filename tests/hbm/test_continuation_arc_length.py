@@ -11,16 +11,17 @@ from scipy.optimize import minimize_scalar
 
 from tests.helpers.continuation_models import Duffing, Lifting, rubbing_mass, rubbing_pairs
 from tests.helpers.verification_models import random_structure, slab
-from tribodyn.hbm import bordered, newton, parameter
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.bordered import Direction, Metric
-from tribodyn.hbm.continuation import arc_length, natural
-from tribodyn.hbm.continuation.arc_length import Options
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.continuation import bordered, parameter
+from tribodyn.hbm.continuation.bordered import Direction, Metric
+from tribodyn.hbm.continuation.methods import arc_length, natural
+from tribodyn.hbm.continuation.methods.arc_length import Options
+from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import ContactParameters
-from tribodyn.hbm.parameter import Parameter
 
 
 def pressed_slab(harmonics: tuple[int, ...] = (0, 1, 2), rock: float = 2.0, how: str = "located") -> HarmonicBalance:

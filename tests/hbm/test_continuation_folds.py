@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.helpers.continuation_models import Duffing, Lifting
-from tribodyn.hbm import parameter
-from tribodyn.hbm.continuation import arc_length
-from tribodyn.hbm.folds import FoldOptions, track_fold
+from tribodyn.hbm.continuation import parameter
+from tribodyn.hbm.continuation.folds import FoldOptions, track_fold
+from tribodyn.hbm.continuation.methods import arc_length
 
 
 @pytest.fixture(scope="module")

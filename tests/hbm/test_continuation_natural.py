@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.helpers.continuation_models import Duffing, Lifting
-from tribodyn.hbm import parameter
-from tribodyn.hbm.continuation import arc_length, natural
-from tribodyn.hbm.continuation.natural import Options
+from tribodyn.hbm.continuation import parameter
+from tribodyn.hbm.continuation.methods import arc_length, natural
+from tribodyn.hbm.continuation.methods.natural import Options
 
 
 @pytest.mark.parametrize("n_points", [20, 80])

@@ -9,13 +9,13 @@ from tests.helpers.pressed_body import N_PAIR, balance_of, pressed_body
 from tests.helpers.verification_models import interface
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
-from tribodyn.hbm.compliance import ContactCompliance
-from tribodyn.hbm.continuation import natural
+from tribodyn.hbm.continuation.methods import natural
+from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.excitation import Excitation
-from tribodyn.hbm.expansion import SingularStuckSystem
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.linear.compliance import ContactCompliance
+from tribodyn.hbm.linear.expansion import SingularStuckSystem
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.operating_point import AtPeak
 from tribodyn.hbm.reference import DenseBalance
 from tribodyn.reduction.model import ReducedModel
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from tests.helpers.continuation_models import Duffing, Lifting, rubbing_mass, rubbing_pairs
-from tribodyn.hbm import harmonic_choice, newton
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.harmonic_choice import ChoiceOptions, NotSolved, choose, widened
+from tribodyn.hbm.continuation import harmonic_choice
+from tribodyn.hbm.continuation.harmonic_choice import ChoiceOptions, NotSolved, choose, widened
 
 
 def friction() -> tuple[HarmonicBalance, list[float]]:

@@ -11,17 +11,19 @@ import scipy.linalg as sla
 from tests.helpers.pressed_body import N_PAIR, balance_of, pressed_body, wear_problem
 from tests.helpers.verification_models import interface
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.hbm import error_controlled_rule, newton, stability, thesis_rule
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.evolution import Duty
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.continuation.operating_point import AtFrequency
+from tribodyn.hbm.continuation.residual_shear import response_bounds
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import ContactParameters
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.operating_point import AtFrequency
-from tribodyn.hbm.residual_shear import response_bounds
-from tribodyn.hbm.wear_law import JointWear
+from tribodyn.hbm.stability import exponents
+from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
+from tribodyn.hbm.wear.evolution import Duty
+from tribodyn.hbm.wear.law import JointWear
 from tribodyn.reduction.model import ReducedModel
 
 OMEGA = 420.0
@@ -71,7 +73,7 @@ def test_bounds_and_stability_of_a_split_face_are_those_of_the_face() -> None:
     np.testing.assert_allclose(many.shear, one.shear, atol=1e-9 * np.abs(one.shear).max())
     np.testing.assert_array_equal(many.stuck, one.stuck)
     states = [newton.solve_from_rest(b, OMEGA, TIGHT).state for b in (whole, parts)]
-    first, second = (stability.stability(b, s) for b, s in zip((whole, parts), states, strict=True))
+    first, second = (exponents.stability(b, s) for b, s in zip((whole, parts), states, strict=True))
     np.testing.assert_allclose(np.sort(second.exponents.real), np.sort(first.exponents.real), atol=1e-7 * OMEGA)
 
 

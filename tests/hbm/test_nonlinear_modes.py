@@ -12,11 +12,11 @@ from scipy.special import ellipk
 from tests.helpers.verification_models import oscillator, random_structure
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, backbone
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import ContactParameters
-from tribodyn.hbm.nonlinear_modes import BackboneOptions, backbone
 from tribodyn.reduction.model import ReducedModel
 
 MASS, STIFFNESS, RATIO = 1.3, 4.0e4, 0.01

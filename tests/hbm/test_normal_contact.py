@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 
 from tests.helpers.verification_models import floating_beam
-from tribodyn.hbm import newton, time_integration
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.chatter import chatter, sign_changes
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import SEPARATES, STICKS, ContactParameters
 from tribodyn.hbm.excitation import Excitation
-from tribodyn.hbm.expansion import SingularStuckSystem
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import SEPARATES, STICKS, ContactParameters
+from tribodyn.hbm.linear.expansion import SingularStuckSystem
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.wear.impact import impact_work, loading_work
-from tribodyn.hbm.wear_law import Exposure
+from tribodyn.hbm.stability.chatter import chatter, sign_changes
+from tribodyn.hbm.time import time_integration
+from tribodyn.hbm.wear.law import Exposure
+from tribodyn.hbm.wear.laws.impact import impact_work, loading_work
 from tribodyn.reduction.model import ReducedModel
 
 STIFFNESS = 50.0

@@ -7,13 +7,13 @@ import pytest
 from scipy.optimize import root
 
 from tests.helpers.pressed_body import N_PAIR, wear_problem
-from tribodyn.hbm import error_controlled_rule, thesis_rule
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.evolution import WearProblem
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import WearEnd
-from tribodyn.hbm.wear_history import WearHistory
+from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
+from tribodyn.hbm.wear.evolution import WearProblem
+from tribodyn.hbm.wear.history import WearHistory
 
 
 def worn(problem: WearProblem, rule: str, max_steps: int = 10_000, resume: WearHistory | None = None) -> WearHistory:

@@ -7,13 +7,13 @@ from tests.helpers.verification_models import interface, random_structure
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.branch import amplitude
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.continuation.branch import amplitude
+from tribodyn.hbm.continuation.residual_shear import amplitude_slope, response_bounds
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import ContactParameters
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.residual_shear import amplitude_slope, response_bounds
 from tribodyn.reduction.model import ReducedModel
 
 TIGHT = NewtonOptions(tolerance=1e-11)

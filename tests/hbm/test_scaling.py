@@ -9,15 +9,16 @@ import pytest
 
 from tests.helpers.verification_models import random_structure
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.hbm import newton, time_integration
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import ContactParameters
 from tribodyn.hbm.newton import Solution
-from tribodyn.hbm.stability import stability
-from tribodyn.hbm.time_integration import Options
+from tribodyn.hbm.stability.exponents import stability
+from tribodyn.hbm.time import time_integration
+from tribodyn.hbm.time.time_integration import Options
 
 OMEGA = 305.3
 GIGA = 2.0**30  # rounding is the same in both units, so that even a long way to the solution is the same

@@ -6,16 +6,18 @@ import numpy as np
 import pytest
 
 from tests.helpers.verification_models import oscillator, random_structure
-from tribodyn.hbm import newton, parameter, time_integration
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation import arc_length
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.continuation import parameter
+from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.excitation import Excitation
-from tribodyn.hbm.floquet import monodromy
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import ContactParameters
-from tribodyn.hbm.stability import Stability, mark, stability
-from tribodyn.hbm.time_integration import Options, TimeStepper
+from tribodyn.hbm.stability.exponents import Stability, mark, stability
+from tribodyn.hbm.stability.floquet import monodromy
+from tribodyn.hbm.time import time_integration
+from tribodyn.hbm.time.time_integration import Options, TimeStepper
 from tribodyn.reduction.model import ReducedModel
 
 OMEGA = 305.3

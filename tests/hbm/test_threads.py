@@ -9,11 +9,11 @@ from threadpoolctl import ThreadpoolController, threadpool_limits
 from tests.helpers.verification_models import oscillator
 from tribodyn.hbm import newton, threads
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation import adaptive, arc_length, natural
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.continuation.methods import adaptive, arc_length, natural
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import ContactParameters
 
 OMEGA = 100.0
 

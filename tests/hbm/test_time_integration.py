@@ -7,13 +7,14 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tests.helpers.verification_models import interface, oscillator, random_structure
-from tribodyn.hbm import newton, time_integration
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import ContactParameters
-from tribodyn.hbm.time_integration import Options, TimeStepper
+from tribodyn.hbm.time import time_integration
+from tribodyn.hbm.time.time_integration import Options, TimeStepper
 from tribodyn.reduction.model import ReducedModel
 
 OMEGA = 300.0

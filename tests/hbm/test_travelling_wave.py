@@ -5,15 +5,15 @@ import pytest
 
 from tests.helpers import small_wheel as small
 from tribodyn.hbm import newton
-from tribodyn.hbm import travelling_wave as waves
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation import natural
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactParameters
+from tribodyn.hbm.continuation.methods import natural
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS, ContactParameters
+from tribodyn.hbm.linear import travelling_wave as waves
+from tribodyn.hbm.linear.recovery import coordinates, full_displacement
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.recovery import coordinates, full_displacement
 from tribodyn.reduction.cyclic import nodal_diameters, relative_map, travelling_wave
 
 EXACT = newton.NewtonOptions(tolerance=1e-11)

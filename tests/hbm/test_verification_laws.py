@@ -9,13 +9,13 @@ from tests.helpers.verification_models import interface
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.time_integration import Options
-from tribodyn.hbm.verify import verify
+from tribodyn.hbm.time.time_integration import Options
+from tribodyn.hbm.time.verify import verify
 from tribodyn.reduction.model import ReducedModel
 
 STIFFNESS = np.array([4.0e4, 5.0e4, 6.0e4])

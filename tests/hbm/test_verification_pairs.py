@@ -10,13 +10,13 @@ import pytest
 from tests.helpers.verification_models import random_structure, slab
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation import arc_length
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactParameters
+from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS, ContactParameters
-from tribodyn.hbm.time_integration import Options
-from tribodyn.hbm.verify import Verification, verify
+from tribodyn.hbm.time.time_integration import Options
+from tribodyn.hbm.time.verify import Verification, verify
 
 BESIDE_RESONANCE = (900.0, 60.0, 12.0)  # frequency [Hz], shaking and rocking force [N]: all pairs slip, most lift
 ABOVE_RESONANCE = (2500.0, 40.0, 40.0)  # pairs that stay stuck, pairs that slip, pairs that lift

@@ -10,13 +10,13 @@ import pytest
 from tests.helpers.verification_models import oscillator
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import ContactParameters
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.time_integration import Options
-from tribodyn.hbm.verify import verify
+from tribodyn.hbm.time.time_integration import Options
+from tribodyn.hbm.time.verify import verify
 
 MASS, STIFFNESS, RATIO = 1.3, 4.0e4, 0.01
 KT, KN, MU, PRESS = 3.0e4, 5.0e6, 0.4, 50.0

@@ -9,17 +9,19 @@ import numpy as np
 import pytest
 
 from tests.helpers.pressed_body import N_PAIR, wear_problem
-from tribodyn.hbm import error_controlled_rule, newton, thesis_rule, wear_law
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.evolution import Duty, WearProblem, assess
+from tribodyn.hbm.contact.law import SEPARATES
+from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak, BesidePeak, Correction, OperatingPoint
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.law import SEPARATES
-from tribodyn.hbm.operating_point import AtFrequency, AtPeak, BesidePeak, Correction, OperatingPoint
 from tribodyn.hbm.outcome import WearEnd
-from tribodyn.hbm.wear_events import events
-from tribodyn.hbm.wear_history import WearHistory, cycles_to_preload
-from tribodyn.hbm.wear_law import JointWear
-from tribodyn.hbm.wearing import WearingBalance
+from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
+from tribodyn.hbm.wear import law as wear_law
+from tribodyn.hbm.wear.events import events
+from tribodyn.hbm.wear.evolution import Duty, WearProblem, assess
+from tribodyn.hbm.wear.history import WearHistory, cycles_to_preload
+from tribodyn.hbm.wear.implicit_stage import WearingBalance
+from tribodyn.hbm.wear.law import JointWear
 from tribodyn.workflows.scene import scene_file
 
 

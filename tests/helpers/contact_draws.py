@@ -6,9 +6,9 @@ from types import ModuleType
 
 import numpy as np
 
-from tribodyn.hbm import law as contact_law
+from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.law import ContactParameters
 
 LAWS = [(name, components) for name in contact_law.names() for components in contact_law.load(name).COMPONENTS]
 LOCATED = [(name, components) for name, components in LAWS if hasattr(contact_law.load(name), "located")]

@@ -10,13 +10,13 @@ import scipy.linalg as sla
 from tests.helpers.verification_models import interface
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.evolution import Duty, WearProblem
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import ContactParameters
-from tribodyn.hbm.operating_point import AtFrequency
-from tribodyn.hbm.wear_law import JointWear
+from tribodyn.hbm.wear.evolution import Duty, WearProblem
+from tribodyn.hbm.wear.law import JointWear
 from tribodyn.reduction.model import ReducedModel
 
 N_PAIR = 4

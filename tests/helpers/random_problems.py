@@ -19,12 +19,12 @@ from hypothesis import strategies as st
 from tests.helpers.contact_draws import LAWS, LOCATED, own
 from tests.helpers.verification_models import interface, modal_damping
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.hbm import law as contact_law
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import ContactParameters
 from tribodyn.reduction.model import ReducedModel
 
 HARMONICS = ((0, 1), (1,), (0, 1, 2, 3), (1, 3), (0, 1, 5), (2,), tuple(range(8)))

@@ -9,12 +9,12 @@ from tribodyn.fem.material import Material
 from tribodyn.fem.part import Contact
 from tribodyn.geometry import blade
 from tribodyn.geometry import mesh as mesh_file
-from tribodyn.hbm import travelling_wave as waves
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import ContactParameters
+from tribodyn.hbm.linear import travelling_wave as waves
 from tribodyn.reduction.cyclic import reduce_sector, travelling_wave, wheel_model
 from tribodyn.reduction.damping import modal_damping
 

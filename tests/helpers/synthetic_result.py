@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from tribodyn.hbm.branch import Branch
+from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.outcome import CONVERGED, WearEnd
-from tribodyn.hbm.wear_history import WearHistory
+from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.result.facts import Facts, Stage
 from tribodyn.workflows.result.result import (
     CurveStability,

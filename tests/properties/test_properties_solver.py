@@ -27,24 +27,25 @@ from tests.helpers.random_problems import (
     omega_of,
     problem_of,
 )
-from tribodyn.hbm import error_controlled_rule, newton, thesis_rule
-from tribodyn.hbm.aft import CycleNotPeriodic
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.continuation import arc_length, natural
-from tribodyn.hbm.evolution import Duty, WearProblem
-from tribodyn.hbm.expansion import SingularStuckSystem, UndampedResonance
+from tribodyn.hbm.contact.aft import CycleNotPeriodic
+from tribodyn.hbm.continuation.methods import arc_length, natural
+from tribodyn.hbm.continuation.operating_point import AtFrequency
+from tribodyn.hbm.linear.expansion import SingularStuckSystem, UndampedResonance
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.operating_point import AtFrequency
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.wear_history import WearHistory
-from tribodyn.hbm.wear_law import JointWear
+from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
+from tribodyn.hbm.wear.evolution import Duty, WearProblem
+from tribodyn.hbm.wear.history import WearHistory
+from tribodyn.hbm.wear.law import JointWear
 
 DECLARED = (SingularStuckSystem, UndampedResonance, CycleNotPeriodic)
 TOLERANCE = NewtonOptions().tolerance
 SINGLE = float(np.finfo(np.float32).eps) / 2  # rounding of what the frequency multiplies in the compliance
 WORN = [(law, components) for law, components in LAWS if "n" in components and law != "cubic_spring"]
 # friction work that sampling makes, over the product of force and displacement: factor and order in samples per period
-# of the highest harmonic; planar friction lags where its path turns (see hbm.contact.coulomb_planar)
+# of the highest harmonic; planar friction lags where its path turns (see hbm.contact.laws.coulomb_planar)
 SAMPLING = {"coulomb_planar": (4.0, 1)}
 UNCOUPLED = (8.0, 2)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.coarse_beam import make
-from tribodyn.hbm.operating_point import AtPeak, OperatingPoint
+from tribodyn.hbm.continuation.operating_point import AtPeak, OperatingPoint
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.interface_modes import interface_modes
 from tribodyn.reduction.linear import linear_modes

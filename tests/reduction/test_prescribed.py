@@ -7,12 +7,13 @@ import pytest
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.hbm import law, newton
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact import law
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import ContactParameters
 from tribodyn.reduction.damping import modal_damping
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.prescribed import prescribe

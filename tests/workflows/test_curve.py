@@ -10,8 +10,8 @@ import pytest
 
 from tests.helpers.command import leave
 from tests.helpers.matrix_scene import matrix_folder
-from tribodyn.hbm.harmonic_choice import estimate, widened
-from tribodyn.hbm.stability import mark
+from tribodyn.hbm.continuation.harmonic_choice import estimate, widened
+from tribodyn.hbm.stability.exponents import mark
 from tribodyn.workflows.result import store
 from tribodyn.workflows.run import modelling, pipeline, settings
 from tribodyn.workflows.run.progress import Progress

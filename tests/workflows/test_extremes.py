@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tribodyn.hbm.step_error import step_error
+from tribodyn.hbm.wear.step_error import step_error
 from tribodyn.workflows.benchmarks import extremes, extremes_wear
 from tribodyn.workflows.benchmarks.extremes_judge import judged, sampled_honestly, tried
 from tribodyn.workflows.benchmarks.extremes_march import force_error

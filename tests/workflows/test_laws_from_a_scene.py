@@ -10,8 +10,8 @@ import pytest
 
 import tribodyn as td
 from tribodyn import declare
-from tribodyn.hbm import law as contact_law
-from tribodyn.hbm import wear_law
+from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.wear import law as wear_law
 
 SMALL: dict[str, Any] = {
     "geometry.n_patch": 3,

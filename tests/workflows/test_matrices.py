@@ -12,17 +12,17 @@ import pytest
 from tests.helpers.command import leave
 from tests.helpers.matrix_scene import SCENE, matrix_folder
 from tests.helpers.verification_models import random_structure
-from tribodyn.hbm import thesis_rule
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation import natural
-from tribodyn.hbm.evolution import Duty, WearProblem
+from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import ContactParameters
-from tribodyn.hbm.operating_point import AtPeak
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.wear_law import JointWear
+from tribodyn.hbm.wear import thesis_rule
+from tribodyn.hbm.wear.evolution import Duty, WearProblem
+from tribodyn.hbm.wear.law import JointWear
 from tribodyn.reduction import foreign as reduction_foreign
 from tribodyn.reduction.foreign import read_matrices, reduced_model
 from tribodyn.workflows.result import store

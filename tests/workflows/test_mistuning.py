@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tribodyn.hbm import newton
-from tribodyn.hbm.branch import amplitude
+from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies import mistuning

@@ -11,10 +11,12 @@ import pytest
 import tribodyn as td
 from tribodyn import declare
 from tribodyn.geometry import parts
-from tribodyn.hbm import aft, continuation, wear_law
-from tribodyn.hbm import law as contact_law
+from tribodyn.hbm import continuation
+from tribodyn.hbm.contact import aft
+from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.law import ContactParameters
+from tribodyn.hbm.wear import law as wear_law
 from tribodyn.workflows.accuracy import knobs
 from tribodyn.workflows.run import planning
 from tribodyn.workflows.scene import scene_file
@@ -39,7 +41,7 @@ LAW = '''
 from dataclasses import dataclass
 import numba
 from tribodyn.declare import number
-from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS
+from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
 
 COMPONENTS = (("t1", "t2", "n"),)
 
@@ -90,7 +92,7 @@ def depth_rate(exposure):
 """
 
 METHOD = """
-from tribodyn.hbm.continuation import natural
+from tribodyn.hbm.continuation.methods import natural
 
 class Options(natural.Options):
     pass

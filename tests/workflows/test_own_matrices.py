@@ -10,7 +10,7 @@ import scipy.io
 import scipy.sparse as sp
 
 import tribodyn as td
-from tribodyn.hbm.recovery import coordinates
+from tribodyn.hbm.linear.recovery import coordinates
 from tribodyn.reduction.matrix_files import read_matrix
 
 MASS = np.diag([1.0, 0.8, 1.2, 0.6])

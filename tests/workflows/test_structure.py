@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from tribodyn.geometry import blocks
-from tribodyn.hbm import law, newton
+from tribodyn.hbm import newton
+from tribodyn.hbm.contact import law
 from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file

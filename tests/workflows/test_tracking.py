@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.command import leave
-from tribodyn.hbm.continuation import arc_length
+from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.workflows.run import modelling, pipeline, settings
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import read

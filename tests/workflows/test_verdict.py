@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tribodyn as td
-from tribodyn.hbm.operating_point import NoPeak
+from tribodyn.hbm.continuation.operating_point import NoPeak
 from tribodyn.workflows.accuracy import statement, verdict
 from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution
 

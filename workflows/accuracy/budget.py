@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm import harmonic_choice
 from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.contact.sampling import sampling_error
+from tribodyn.hbm.continuation import harmonic_choice
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.sampling import sampling_error
-from tribodyn.hbm.step_error import UNKNOWN, step_error
+from tribodyn.hbm.wear.step_error import UNKNOWN, step_error
 from tribodyn.workflows.accuracy import accuracy
 from tribodyn.workflows.accuracy.trade_table import NAMES, QUANTITIES, Trade
 from tribodyn.workflows.result.facts import BudgetEntry

@@ -8,9 +8,9 @@ from time import process_time
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tribodyn.hbm.operating_point import AtFrequency, OperatingPoint
+from tribodyn.hbm.continuation.operating_point import AtFrequency, OperatingPoint
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.wear_history import LIFE_SHARE, WearHistory, cycles_to_preload
+from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
 from tribodyn.workflows.accuracy.trade_table import QUANTITIES
 from tribodyn.workflows.run import memory, modelling, pipeline, settings, wear_run
 from tribodyn.workflows.run.progress import Progress

@@ -12,14 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from tribodyn.geometry import parts
-from tribodyn.hbm import harmonic_choice, stability
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation import harmonic_choice
+from tribodyn.hbm.continuation.operating_point import NoPeak, OperatingPoint, Site
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.operating_point import NoPeak, OperatingPoint, Site
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.time_integration import IntegrationFailed, Options
-from tribodyn.hbm.verify import verify
-from tribodyn.hbm.wear_history import LIFE_SHARE
+from tribodyn.hbm.stability import exponents
+from tribodyn.hbm.time.time_integration import IntegrationFailed, Options
+from tribodyn.hbm.time.verify import verify
+from tribodyn.hbm.wear.history import LIFE_SHARE
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.progress import Progress
@@ -149,7 +150,7 @@ def in_time(state: State) -> InTime:
     """The same state by time integration of the reduced model; raises ValueError where that has no equation in time."""
     harmonics = state.balance.basis.harmonics
     options = Options(max(STEPS, STEPS_PER_HARMONIC * harmonics[-1]), tolerance=DRIFT, max_periods=PERIODS)
-    stable = stability.stability(state.balance, state.here.state).stable
+    stable = exponents.stability(state.balance, state.here.state).stable
     try:
         found = verify(state.balance, state.here.state, options)
     except IntegrationFailed as failure:

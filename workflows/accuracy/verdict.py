@@ -12,9 +12,9 @@ from time import process_time
 
 import numpy as np
 
-from tribodyn.hbm.operating_point import NoPeak
+from tribodyn.hbm.continuation.operating_point import NoPeak
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.wear_history import LIFE_SHARE, cycles_to_preload
+from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload
 from tribodyn.workflows.accuracy import probes
 from tribodyn.workflows.accuracy.probes import Answers, InTime, State, relative
 from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution, Statement, Verdict

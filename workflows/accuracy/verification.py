@@ -11,16 +11,17 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from tribodyn.hbm import newton, stability
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.branch import amplitude
+from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.threads import limited
-from tribodyn.hbm.time_integration import Options
-from tribodyn.hbm.verify import Verification, verify
-from tribodyn.hbm.wear_history import WearRow
+from tribodyn.hbm.time.time_integration import Options
+from tribodyn.hbm.time.verify import Verification, verify
+from tribodyn.hbm.wear.history import WearRow
 from tribodyn.workflows.pictures.plots import axes_of, force_unit, length_unit
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
 from tribodyn.workflows.result.result import Result
@@ -156,7 +157,7 @@ def compare(
         steps = steps or max(STEPS, STEPS_PER_HARMONIC * balance.basis.harmonics[-1])
         with progress.stage("time integration"):
             found = verify(balance, solution.state, Options(steps, tolerance=TOLERANCE, max_periods=PERIODS))
-        stable = stability.stability(balance, solution.state).stable
+        stable = exponents.stability(balance, solution.state).stable
     return Comparison(balance, solution, found, stable, row, steps, time.perf_counter() - start)
 
 

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from threadpoolctl import threadpool_limits
 
-from tribodyn.hbm import error_controlled_rule, thesis_rule
-from tribodyn.hbm.evolution import WearProblem
-from tribodyn.hbm.wear_history import LIFE_SHARE, WearHistory, cycles_to_preload
+from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
+from tribodyn.hbm.wear.evolution import WearProblem
+from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
 from tribodyn.workflows.accuracy.published import WearStep, published_wear_steps
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE, STYLE
 from tribodyn.workflows.run import modelling, wear_run

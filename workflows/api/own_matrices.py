@@ -13,22 +13,24 @@ import numpy as np
 import scipy.sparse as sp
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
-from tribodyn.hbm import continuation, error_controlled_rule, newton, thesis_rule, verify
-from tribodyn.hbm import nonlinear_modes as modes
-from tribodyn.hbm import stability as floquet
-from tribodyn.hbm import time_integration as time
+from tribodyn.hbm import continuation, newton
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.branch import Branch, amplitude
-from tribodyn.hbm.evolution import Duty, WearProblem
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.continuation import nonlinear_modes as modes
+from tribodyn.hbm.continuation.branch import Branch, amplitude
+from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import ContactParameters
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.operating_point import AtFrequency, AtPeak
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.wear_history import WearHistory, WearRow
-from tribodyn.hbm.wear_law import JointWear
+from tribodyn.hbm.stability import exponents as floquet
+from tribodyn.hbm.time import time_integration as time
+from tribodyn.hbm.time import verify
+from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
+from tribodyn.hbm.wear.evolution import Duty, WearProblem
+from tribodyn.hbm.wear.history import WearHistory, WearRow
+from tribodyn.hbm.wear.law import JointWear
 from tribodyn.reduction import damping, foreign
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.foreign import ForeignMatrices, Terms
@@ -240,7 +242,7 @@ class Balance:
     def integrate(self, frequency: float, start: Cycle | None = None, **options: Any) -> time.PeriodicMotion:
         """The periodic motion at a frequency [Hz] by integration in time, from a cycle of the balance or from rest.
 
-        options : of hbm.time_integration.Options, such as steps=1024 a period
+        options : of hbm.time.time_integration.Options, such as steps=1024 a period
         """
         return time.integrate(
             self.problem, HZ * frequency, None if start is None else start.state, time.Options(**options)

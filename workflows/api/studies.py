@@ -10,22 +10,23 @@ from dataclasses import replace
 import numpy as np
 
 from tribodyn.fem.part import Part
-from tribodyn.hbm import newton, stability
-from tribodyn.hbm import verify as hbm_verify
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.branch import Branch
-from tribodyn.hbm.chatter import Chatter, chatter
-from tribodyn.hbm.continuation import arc_length
-from tribodyn.hbm.folds_in_time import Coexisting, FoldInTime, coexisting, fold_in_time, solutions_at
-from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS
+from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
+from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd, WearEnd
-from tribodyn.hbm.stability import BranchStability
-from tribodyn.hbm.time_integration import IntegrationFailed
-from tribodyn.hbm.time_integration import Options as TimeOptions
-from tribodyn.hbm.verify import Verification
-from tribodyn.hbm.wear import impact
-from tribodyn.hbm.wear_history import WearHistory, cycles_to_preload
-from tribodyn.hbm.wear_law import Exposure
+from tribodyn.hbm.stability import exponents
+from tribodyn.hbm.stability.chatter import Chatter, chatter
+from tribodyn.hbm.stability.exponents import BranchStability
+from tribodyn.hbm.time import verify as hbm_verify
+from tribodyn.hbm.time.folds_in_time import Coexisting, FoldInTime, coexisting, fold_in_time, solutions_at
+from tribodyn.hbm.time.time_integration import IntegrationFailed
+from tribodyn.hbm.time.time_integration import Options as TimeOptions
+from tribodyn.hbm.time.verify import Verification
+from tribodyn.hbm.wear.history import WearHistory, cycles_to_preload
+from tribodyn.hbm.wear.law import Exposure
+from tribodyn.hbm.wear.laws import impact
 from tribodyn.reduction.mode_matching import mac, match_kinds, match_modes
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.workflows.accuracy.published import published_wear_steps
@@ -134,7 +135,7 @@ __all__ = [
 
 build_wheel = wheels.build
 mistuned = mistuning.respond
-mark_stability = stability.mark
+mark_stability = exponents.mark
 peak_memory = memory.peak
 
 

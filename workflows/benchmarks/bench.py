@@ -18,7 +18,7 @@ import numpy as np
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation import natural
+from tribodyn.hbm.continuation.methods import natural
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.reference import DenseBalance
@@ -164,12 +164,12 @@ def _refined(
 
 def _shares(stats: pstats.Stats) -> dict[str, float]:
     """Share of the profiled time by routine, named as in the thesis: contact, balance, direction of the Newton step."""
-    names = {("law.py", "cycle"): "contact", ("balance.py", "solve"): "direction"}
+    names = {("contact/joint.py", "cycle"): "contact", ("hbm/balance.py", "solve"): "direction"}
     seconds = dict.fromkeys(names.values(), 0.0)
     entries = stats.stats  # type: ignore[attr-defined]
     for (path, _, function), (_, _, _, cumulative, _) in entries.items():
-        name = names.get((Path(path).name, function))
-        if name is not None and Path(path).parent.name == "hbm":
+        name = names.get(("/".join(Path(path).parts[-2:]), function))
+        if name is not None:
             seconds[name] += cumulative
     total = max(cumulative for *_, cumulative, _ in entries.values())
     shares = {name: value / total for name, value in seconds.items()}

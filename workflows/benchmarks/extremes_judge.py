@@ -9,14 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tribodyn.hbm import newton, recovery
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.continuation import arc_length
-from tribodyn.hbm.law import SEPARATES, STICKS
+from tribodyn.hbm.contact.law import SEPARATES, STICKS
+from tribodyn.hbm.contact.sampling import sampling_error
+from tribodyn.hbm.continuation.methods import arc_length
+from tribodyn.hbm.linear import recovery
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.reference import DenseBalance
-from tribodyn.hbm.sampling import sampling_error
 from tribodyn.workflows.benchmarks.extremes_march import force_error
 
 REFUSED, WRONG = "refused", "wrong"

@@ -11,10 +11,10 @@ import numpy as np
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
-from tribodyn.hbm.law import ContactParameters
 from tribodyn.reduction.damping import modal_damping
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.workflows.run import modelling

@@ -18,7 +18,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
-from tribodyn.hbm.continuation import natural
+from tribodyn.hbm.continuation.methods import natural
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.pictures.plots import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE

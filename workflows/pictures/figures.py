@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch as Swatch
 from matplotlib.ticker import MaxNLocator
 
-from tribodyn.hbm.law import SEPARATES
+from tribodyn.hbm.contact.law import SEPARATES
 from tribodyn.workflows.pictures.style import DPI, FORMATS, STATUS, STYLE
 from tribodyn.workflows.result.result import Result
 

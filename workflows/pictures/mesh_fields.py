@@ -50,7 +50,7 @@ def patch_fields(result: Result, row: int = -1) -> pv.PolyData:
     """The faces of the contact patch with what a wear row says of each pair.
 
     Point data (n_pair,): wear_depth [m], gap [m] before loading, pressure [Pa] mean over the cycle, energy [J] friction
-    work of one cycle, status (bits of hbm.law: 1 sticks, 2 slips, 4 separates)
+    work of one cycle, status (bits of hbm.contact.law: 1 sticks, 2 slips, 4 separates)
     Raises  ValueError where the result has no worn patch with faces
     """
     import pyvista as pv

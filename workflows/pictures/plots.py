@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.wear_history import WearHistory
+from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.pictures import maps
 from tribodyn.workflows.pictures.figures import axes_of, force_unit, heading, length_unit, save, status_name, titled
 from tribodyn.workflows.pictures.style import BLUE, CYCLE, GREEN, GREY, INK, ORANGE, RED, STATUS, STYLE, WEAR_MAP

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from tribodyn.fem.cyclic import rotation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.travelling_wave import at_sector
+from tribodyn.hbm.linear.travelling_wave import at_sector
 from tribodyn.workflows.pictures import view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, scale_bar
 from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tribodyn.hbm.branch import Branch
+from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.wear_history import WearHistory
+from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.result.facts import BudgetEntry, Facts, Stage
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ class CurveStability:
 
     stable : (n_point,) False also where the point did not converge
     growth : (n_point,) largest growth rate of a perturbation [1/s], nan where the point did not converge
-    omega, position : (n_bifurcation,) [rad/s], and between which points, see hbm.stability.Bifurcation
+    omega, position : (n_bifurcation,) [rad/s], and between which points, see hbm.stability.exponents.Bifurcation
     kinds : "fold", "flip" or "Neimark-Sacker" of each bifurcation
     """
 
@@ -109,7 +109,7 @@ class CurveStability:
 
 @dataclass(frozen=True)
 class ShearBounds:
-    """How far the curve depends on the load path of stuck pairs, see hbm.residual_shear.
+    """How far the curve depends on the load path of stuck pairs, see hbm.continuation.residual_shear.
 
     amplitude_low, amplitude_high : (n_point,) range of the first output's amplitude [m]
     energy_low, energy_high : (n_point,) range of the friction work per cycle [J]

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS
 from tribodyn.workflows.result.result import Result
 
 CLOSE = 1e-9  # of the largest force: what counts as none, and as being on the friction limit times 1000

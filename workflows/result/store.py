@@ -19,8 +19,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from tribodyn.hbm.branch import Branch
-from tribodyn.hbm.wear_history import WearHistory
+from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.result.facts import BudgetEntry, Facts, Stage
 from tribodyn.workflows.result.result import (
     CurveStability,

@@ -8,8 +8,8 @@ import numpy as np
 
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.wear_events import events
-from tribodyn.hbm.wear_history import LIFE_SHARE, cycles_to_preload
+from tribodyn.hbm.wear.events import events
+from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload
 from tribodyn.workflows.accuracy import budget, statement
 from tribodyn.workflows.accuracy.trade_table import plain
 from tribodyn.workflows.result.result import Result

@@ -6,13 +6,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tribodyn.hbm import harmonic_choice, residual_shear, stability
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.branch import Branch
-from tribodyn.hbm.harmonic_choice import HarmonicChoice
+from tribodyn.hbm.continuation import harmonic_choice, residual_shear
+from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
+from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.operating_point import AtPeak
 from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.stability import exponents
 from tribodyn.workflows.result.result import CurveStability, ShearBounds
 
 CHOICES = 3  # times that harmonics are chosen, at the peak that the last choice has
@@ -44,7 +45,7 @@ def choose_harmonics(
 
 def stability_of(balance: HarmonicBalance, branch: Branch) -> CurveStability:
     """Stability of every point of a curve by Hill's method, and its bifurcations."""
-    found = stability.mark(balance, branch)
+    found = exponents.mark(balance, branch)
     return CurveStability(
         found.stable,
         found.leading.real,

@@ -14,7 +14,7 @@ from tribodyn.fem.part import Part
 from tribodyn.geometry import mesh as mesh_reader
 from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.harmonic_choice import HarmonicChoice
+from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.version import package_version
 from tribodyn.workflows.result.facts import Around, Facts, Stage
 from tribodyn.workflows.result.result import PartMesh, Patch, Result

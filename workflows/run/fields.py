@@ -9,8 +9,8 @@ import numpy as np
 
 from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.recovery import full_displacement
-from tribodyn.hbm.wear_history import WearRow
+from tribodyn.hbm.linear.recovery import full_displacement
+from tribodyn.hbm.wear.history import WearRow
 from tribodyn.workflows.result.result import Fields, Loops, Result
 from tribodyn.workflows.scene.schema import Scene
 

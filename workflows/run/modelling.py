@@ -22,13 +22,13 @@ from tribodyn.fem.part import Part
 from tribodyn.fem.springs import Spring
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.fem.thermal import Heating, temperature_at
-from tribodyn.hbm import law
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact_stiffness import rectangular_punch
+from tribodyn.hbm.contact import law
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.stiffness import rectangular_punch
+from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.excitation import Excitation
-from tribodyn.hbm.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.joint import Joint
 from tribodyn.reduction.damping import modal_damping, rayleigh
 from tribodyn.reduction.held import hold
 from tribodyn.reduction.linear import stuck_stiffness

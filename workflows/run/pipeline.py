@@ -11,7 +11,7 @@ import numpy as np
 
 from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.branch import Branch
+from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.accuracy import verdict

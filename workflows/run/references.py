@@ -7,7 +7,7 @@ import scipy.linalg as sla
 
 from tribodyn.fem.factor import SINGULAR, softest_residual
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.branch import amplitude
+from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.workflows.result.result import References
 from tribodyn.workflows.scene.schema import MeshScene, Scene

@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm import continuation, law, wear_law
-from tribodyn.hbm.evolution import Duty
+from tribodyn.hbm import continuation
+from tribodyn.hbm.contact import law
+from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak, BesidePeak
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.operating_point import AtFrequency, AtPeak, BesidePeak
+from tribodyn.hbm.wear import law as wear_law
+from tribodyn.hbm.wear.evolution import Duty
 from tribodyn.workflows.run import references
 from tribodyn.workflows.scene.own import is_file
 from tribodyn.workflows.scene.schema import Scene

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from tribodyn.hbm import error_controlled_rule, thesis_rule
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.evolution import WearProblem
-from tribodyn.hbm.wear_history import WearHistory, WearRow, history, rows_to_go_on
-from tribodyn.hbm.wear_law import JointWear
+from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
+from tribodyn.hbm.wear.evolution import WearProblem
+from tribodyn.hbm.wear.history import WearHistory, WearRow, history, rows_to_go_on
+from tribodyn.hbm.wear.law import JointWear
 from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import settings
@@ -80,7 +80,7 @@ def evolve(
     on_row: Callable[[WearRow], None] | None = None,
     resume: WearHistory | None = None,
 ) -> WearHistory:
-    """Wear by the rule that a scene asks for; limit : of `step_limit` [m], the rest as for hbm.thesis_rule."""
+    """Wear by the rule that a scene asks for; limit : of `step_limit` [m], the rest as for hbm.wear.thesis_rule."""
     if wear.rule == "thesis":
         return thesis_rule.evolve(problem, limit, max_steps, on_row, resume)
     tolerance = error_controlled_rule.Tolerance(wear.tolerance, limit)

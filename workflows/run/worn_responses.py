@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.branch import Branch
+from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.result.result import Result, WornResponses
 

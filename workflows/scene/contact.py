@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, StrictBool, StrictInt, model_validator
 
-from tribodyn.hbm import law as contact_law
+from tribodyn.hbm.contact import law as contact_law
 from tribodyn.workflows.scene.fields import Angle, Direction, Length, Stiffness, Table
 from tribodyn.workflows.scene.own import LawTable
 

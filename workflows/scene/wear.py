@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
-from tribodyn.hbm import wear_law
+from tribodyn.hbm.wear import law as wear_law
 from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.own import LawTable
 from tribodyn.workflows.scene.units import to_si

@@ -16,8 +16,8 @@ from pydantic import Field, StrictBool, StrictInt, model_validator
 from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm import newton
-from tribodyn.hbm.operating_point import OperatingPoint
-from tribodyn.hbm.wear_history import LIFE_SHARE, WearHistory, cycles_to_preload
+from tribodyn.hbm.continuation.operating_point import OperatingPoint
+from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.workflows.accuracy import measure
 from tribodyn.workflows.run import modelling, settings

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm.branch import Branch
-from tribodyn.hbm.continuation import arc_length
-from tribodyn.hbm.folds_in_time import FoldInTime, fold_in_time
+from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import limited
-from tribodyn.hbm.time_integration import IntegrationFailed
+from tribodyn.hbm.time.folds_in_time import FoldInTime, fold_in_time
+from tribodyn.hbm.time.time_integration import IntegrationFailed
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress

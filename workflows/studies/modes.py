@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from tribodyn.hbm.nonlinear_modes import Backbone, BackboneOptions, backbone
+from tribodyn.hbm.continuation.nonlinear_modes import Backbone, BackboneOptions, backbone
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.plots import axes_of, length_unit

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm.branch import Branch
+from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.wear.impact import loading_work
+from tribodyn.hbm.wear.laws.impact import loading_work
 from tribodyn.workflows.result.columns import write_columns
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.scene import scene_file

@@ -12,7 +12,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from tribodyn.hbm.operating_point import NoPeak
+from tribodyn.hbm.continuation.operating_point import NoPeak
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.accuracy import measure
 from tribodyn.workflows.scene import scene_file

@@ -14,10 +14,10 @@ import numpy as np
 from tribodyn.fem.cyclic import Sector
 from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.branch import Branch
-from tribodyn.hbm.continuation import adaptive
+from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.continuation.methods import adaptive
+from tribodyn.hbm.linear.travelling_wave import on_wheel
 from tribodyn.hbm.outcome import BranchEnd
-from tribodyn.hbm.travelling_wave import on_wheel
 from tribodyn.reduction.cyclic import ReducedSector, nodal_diameters, travelling_wave, wheel_model
 from tribodyn.workflows.run import modelling, part_reduction
 from tribodyn.workflows.run.failure import SolveFailed

@@ -11,7 +11,7 @@ from tests.helpers.coarse_scenes import BLADE as COARSE
 from tests.helpers.pictures import assert_not_blank
 from tribodyn import build_wheel, critical_speeds
 from tribodyn.hbm import newton
-from tribodyn.hbm import travelling_wave as waves
+from tribodyn.hbm.linear import travelling_wave as waves
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.cases.blade import study as blade_study
 from tribodyn.workflows.cases.blade.few_sectors import FEW_SECTORS

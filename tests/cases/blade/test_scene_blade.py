@@ -14,7 +14,7 @@ from tribodyn.fem.constraints import named
 from tribodyn.fem.cyclic import rotation
 from tribodyn.fem.elasticity import assemble
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.travelling_wave import at_sector, left_face
+from tribodyn.hbm.linear.travelling_wave import at_sector, left_face
 from tribodyn.reduction.cyclic import nodal_diameters
 from tribodyn.workflows.pictures import render, render_wheel
 from tribodyn.workflows.result import store, summary

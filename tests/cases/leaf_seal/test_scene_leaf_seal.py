@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribodyn.hbm import newton, stability, time_integration
-from tribodyn.hbm.law import SEPARATES, STICKS
-from tribodyn.hbm.recovery import coordinates
-from tribodyn.hbm.time_integration import Options
+from tribodyn.hbm import newton
+from tribodyn.hbm.contact.law import SEPARATES, STICKS
+from tribodyn.hbm.linear.recovery import coordinates
+from tribodyn.hbm.stability import exponents
+from tribodyn.hbm.time import time_integration
+from tribodyn.hbm.time.time_integration import Options
 from tribodyn.workflows.cases.leaf_seal import figures as leaf_figures
 from tribodyn.workflows.cases.leaf_seal import fit as leaf_fit
 from tribodyn.workflows.cases.leaf_seal import record as leaf_record
@@ -212,7 +214,7 @@ def test_three_solutions_share_a_frequency_and_time_integration_knows_which_are_
         share = beyond[i] / (beyond[i] - beyond[i + 1])
         x = (1 - share) * response.branch.contact[i] + share * response.branch.contact[i + 1]
         states.append(newton.solve(balance, omega, x.reshape(126, 1, -1)).state)
-    assert [stability.stability(balance, state).stable for state in states] == [True, False, True]
+    assert [exponents.stability(balance, state).stable for state in states] == [True, False, True]
     row = balance.compliance.output_names.index(LINER_NODE)
     ours, theirs = [], []
     for state, periods in zip(states, (40, 250, 40), strict=True):

@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 
 from tests.helpers.coarse_scenes import QUICK_RIG as QUICK
 from tests.helpers.coarse_scenes import RIG as COARSE
-from tribodyn.hbm import wear_law
+from tribodyn.hbm.wear import law as wear_law
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.workflows.cases.rig import fit as rig_fit
 from tribodyn.workflows.cases.rig import published

@@ -1,0 +1,162 @@
+"""Contact laws: what a law file offers, the parameters it sees, and how it is found by its name.
+
+A law is a module `hbm/contact/<name>.py`, or a file of one's own, with
+
+- `COMPONENTS` : the component tuples it accepts, such as (("t1", "t2", "n"),)
+- `Parameters` : its own numbers with their units, see `tribodyn.declare`; none where the class is missing
+- `n_state(components)` : number of memory variables of one pair
+- `step` : numba function that advances one pair by one time sample (see `hbm.contact.aft.march`); its p is a packed row
+- optionally `cycle(x, parameters, memory, basis, jacobian)` : the same periodic cycle at the samples, faster
+- optionally `located(x, parameters, memory, basis, jacobian)` : the cycle with its transitions located between samples
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from tribodyn import declare
+from tribodyn.found import Kind
+
+STICKS, SLIPS, SEPARATES = 1, 2, 4
+
+
+@dataclass(frozen=True)
+class ContactParameters:
+    """Parameters of every node pair.
+
+    components : which relative displacements the law sees, in the order t1, t2, n
+    stiffness : (n_pair, n_component) contact springs [N/m], >= 0 and finite
+    gap : (n_pair,) opening of the unloaded pair [m], wear adds to it, interference is negative
+    numbers : the law's own by name, each (n_pair,), in the units that the law declares
+    """
+
+    components: tuple[str, ...]
+    stiffness: np.ndarray
+    gap: np.ndarray
+    numbers: Mapping[str, np.ndarray]
+
+    @classmethod
+    def of(
+        cls,
+        components: tuple[str, ...],
+        stiffness: np.ndarray,
+        *,
+        gap: np.ndarray | float = 0.0,
+        **numbers: np.ndarray | float,
+    ) -> ContactParameters:
+        """Parameters with scalars spread over all pairs; numbers : the law's own, such as friction=0.4.
+
+        Raises  ValueError for what no contact can have; a `Joint` checks the law's own numbers
+        """
+        k = np.atleast_2d(np.asarray(stiffness, float))
+        if k.shape[1] != len(components):
+            raise ValueError(f"contact stiffness has {k.shape[1]} columns for the components {components}")
+
+        def spread(value: np.ndarray | float) -> np.ndarray:
+            return np.array(np.broadcast_to(np.asarray(value, float), (len(k),)))
+
+        made = cls(tuple(components), k, spread(gap), {name: spread(value) for name, value in numbers.items()})
+        for name, value, low in (("stiffness", made.stiffness, 0.0), ("gap", made.gap, -np.inf)):
+            if not np.all(np.isfinite(value)) or np.any(value < low):
+                raise ValueError(f"contact {name} must be finite{' and >= 0' if low == 0 else ''} at every pair")
+        return made
+
+    @property
+    def n_pair(self) -> int:
+        """Number of node pairs."""
+        return len(self.stiffness)
+
+    def taken(self, pairs: np.ndarray) -> ContactParameters:
+        """The parameters of some pairs, by their indices."""
+        numbers = {name: value[pairs] for name, value in self.numbers.items()}
+        return replace(self, stiffness=self.stiffness[pairs], gap=self.gap[pairs], numbers=numbers)
+
+    def scaled(self, name: str, factor: float) -> ContactParameters:
+        """The same with one of the law's own numbers times a factor."""
+        return replace(self, numbers={**self.numbers, name: factor * self.numbers[name]})
+
+    @property
+    def tangential(self) -> list[int]:
+        """Positions of the tangential components, the ones in which friction works."""
+        return [i for i, c in enumerate(self.components) if c != "n"]
+
+    def packed(self) -> np.ndarray:
+        """(n_pair, 4 + n_number) rows [k of the up to three components, gap, the law's own numbers] for kernels.
+
+        The numbers stand in the order in which the law declares them, as a `Joint` has put them.
+        """
+        rows = np.zeros((self.n_pair, 4 + len(self.numbers)))
+        rows[:, : len(self.components)] = self.stiffness
+        rows[:, 3] = self.gap
+        for column, value in enumerate(self.numbers.values(), start=4):
+            rows[:, column] = value
+        return rows
+
+
+@dataclass(frozen=True)
+class ContactCycle:
+    """One periodic cycle of all pairs.
+
+    force : (n_pair, n_component, n_coeff) Fourier coefficients of the contact force [N], work-conjugate to x
+    jacobian : (n_pair, n_component * n_coeff, n_component * n_coeff) d force / d x [N/m], or None if not asked for
+    status : (n_pair,) bits of what happened in the cycle: STICKS | SLIPS | SEPARATES
+    """
+
+    force: np.ndarray
+    jacobian: np.ndarray | None
+    status: np.ndarray
+
+
+KIND = Kind("contact law", "tribodyn.hbm.contact.laws", ("step", "n_state"))
+names, file_of, declared = KIND.names, KIND.file_of, KIND.declared
+
+
+@cache
+def load(name: str) -> ModuleType:
+    """The law module of this name, or of a file of one's own; raises ValueError where there is none."""
+    module = KIND.load(name)
+    if not isinstance(getattr(module, "COMPONENTS", None), tuple):
+        raise ValueError(f'contact law file \'{name}\' has no COMPONENTS, such as (("t1", "n"),)')
+    return module
+
+
+def called(law: ModuleType) -> str:
+    """Name of a law for sentences."""
+    assert law.__file__ is not None
+    return Path(law.__file__).stem
+
+
+@cache
+def _order(law: ModuleType) -> tuple[str, ...]:
+    assert law.__file__ is not None
+    return tuple(n.name for n in declare.read(Path(law.__file__)))
+
+
+def require_order(law: ModuleType, parameters: ContactParameters) -> None:
+    """Raise ValueError where parameters do not hold a law's own numbers in its order, as `checked` gives them."""
+    if tuple(parameters.numbers) != _order(law):
+        has, own = ", ".join(parameters.numbers) or "none", ", ".join(_order(law)) or "none"
+        raise ValueError(f"contact law '{called(law)}' has the numbers {own}, in this order, and was given {has}")
+
+
+def check_components(name: str, components: tuple[str, ...]) -> None:
+    """Raise ValueError where the law of this name does not serve these components."""
+    accepted = load(name).COMPONENTS
+    if components not in accepted:
+        known = " or ".join("(" + ", ".join(c) + ")" for c in accepted)
+        raise ValueError(f"contact law '{Path(name).stem}' has components {known}, not {components}")
+
+
+def checked(name: str, parameters: ContactParameters) -> ContactParameters:
+    """The parameters with the law's own numbers complete and in their order; raises ValueError where that fails."""
+    check_components(name, parameters.components)
+    values = declare.checked(declared(name), parameters.numbers, f"contact law '{Path(name).stem}'")
+    n = parameters.n_pair
+    numbers = {key: np.array(np.broadcast_to(np.asarray(v, float), (n,))) for key, v in values.items()}
+    return replace(parameters, numbers=numbers)

@@ -1,0 +1,206 @@
+"""Jenkins elements with variable normal load: one or two uncoupled tangential directions and a unilateral normal one.
+
+N = max(k_n (v - gap), 0); each tangential spring k_t drags a slider w that holds |T| <= mu N and lets go when N = 0.
+Source  Yang, Chu and Menq 1998; Tamatam 2021, eq. 3.24-3.28.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from tribodyn.declare import number
+from tribodyn.hbm.contact import located as transitions
+from tribodyn.hbm.contact.aft import by_kernel
+from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
+from tribodyn.hbm.harmonics import HarmonicBasis
+
+COMPONENTS = (("t1", "t2", "n"), ("t1", "n"), ("t2", "n"))
+
+OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3  # kinds of samples; slip by its sense
+SIDE = np.array([0.0, 0.0, 1.0, -1.0])  # sign of T in slip
+
+located = transitions.cycle
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """The law's own numbers."""
+
+    friction: float = number("", low=0.0)
+    """Coulomb coefficient."""
+
+
+
+def n_state(components: tuple[str, ...]) -> int:
+    """One slider position per tangential direction [m]."""
+    return len(components) - 1
+
+
+@numba.njit(cache=True)
+def step(x, w, p, f, dfx, dfs, dsx, dss):
+    """Advance one pair by one sample; writes force, memory and their derivatives, returns the status bits."""
+    t = x.size - 1
+    kn, mu = p[t], p[4]
+    N = kn * (x[t] - p[3])  # eq. 3.24
+    if N <= 0.0:
+        for c in range(t):
+            f[c] = 0.0
+            w[c] = x[c]
+            dsx[c, c] = 1.0
+        f[t] = 0.0
+        return SEPARATES
+    f[t] = N
+    dfx[t, t] = kn
+    bits = 0
+    for c in range(t):
+        kt = p[c]
+        T = kt * (x[c] - w[c])  # eq. 3.26
+        if abs(T) <= mu * N:
+            f[c] = T
+            dfx[c, c] = kt
+            dfs[c, c] = -kt
+            dss[c, c] = 1.0
+            bits |= STICKS
+        else:
+            sign = 1.0 if T > 0.0 else -1.0
+            f[c] = sign * mu * N  # eq. 3.27
+            w[c] = x[c] - f[c] / kt  # eq. 3.28
+            dfx[c, t] = sign * mu * kn
+            dsx[c, c] = 1.0
+            dsx[c, t] = -sign * mu * kn / kt
+            bits |= SLIPS
+    return bits
+
+
+def cycle(
+    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
+) -> ContactCycle:
+    """The periodic cycle at the samples of the basis, with the Jacobian in closed form between transitions.
+
+    Between two transitions dT/du and dT/dv are known (stick: minus the instant the stick began; slip: mu k_n;
+    separation: 0), so a block of the Jacobian is a difference of prefix sums of basis products.
+    x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_component - 1) slider positions at the start [m]
+    """
+    return by_kernel(_cycle, x, parameters, memory, basis, jacobian)
+
+
+@numba.njit(cache=True)
+def _cycle(x, p, memory, phi, product, single, force, jac, status):
+    n_pair, n_comp, n_time = x.shape
+    t = n_comp - 1
+    want = jac.shape[0] > 0
+    kind, slider = np.empty(n_time, np.int8), np.empty(n_time)
+    for i in range(n_pair):
+        kn, mu, gap = p[i, t], p[i, 4], p[i, 3]
+        bits = 0
+        n_open = 0
+        for j in range(n_time):
+            N = kn * (x[i, t, j] - gap)
+            force[i, t, j] = N if N > 0.0 else 0.0
+            if N <= 0.0:
+                n_open += 1
+        if n_open > 0:
+            bits |= SEPARATES
+        if want and n_open < n_time:
+            _add_normal(kn, n_open, force[i, t], product, t, jac[i])
+        for c in range(t):
+            if n_open == n_time:
+                force[i, c, :] = 0.0
+                continue
+            origin, sense = _march(p[i, c], mu, memory[i, c], x[i, c], force[i, t], force[i, c], kind, slider)
+            for j in range(n_time):
+                bits |= STICKS if kind[j] == STICK else 0 if kind[j] == OPEN else SLIPS
+            if want:
+                _add_tangential(p[i, c], mu * kn, kind, origin, sense, c, t, phi, product, single, jac[i])
+        status[i] = bits
+
+
+@numba.njit(cache=True)
+def _add_normal(kn, n_open, N, product, t, jac):
+    """d N / d v : k_n while closed."""
+    n_time = N.size
+    m = product.shape[1]
+    o = t * m
+    if n_open == 0:
+        for a in range(m):
+            jac[o + a, o + a] = kn
+        return
+    j = 0
+    while j < n_time:
+        if N[j] <= 0.0:
+            j += 1
+            continue
+        start = j
+        while j < n_time and N[j] > 0.0:
+            j += 1
+        for a in range(m):
+            for b in range(m):
+                jac[o + a, o + b] += kn * (product[j, a, b] - product[start, a, b])
+
+
+@numba.njit(cache=True)
+def _march(kt, mu, w, u, N, T, kind, slider):
+    """One slider over its periodic cycle: force T, kind of every sample and slider position after it.
+
+    The period map is a clamp, so the first cycle settles the memory; the second is marched until it meets the first.
+    Returns the last sample of the first cycle that does not stick, which decides where the slider stands, and its kind;
+    -1 where the slider stands where the load path left it
+    """
+    origin, sense = -1, OPEN
+    for turn in range(2):
+        for j in range(u.size):
+            if N[j] <= 0.0:
+                w, T[j], kind[j] = u[j], 0.0, OPEN
+            else:
+                pull, limit = kt * (u[j] - w), mu * N[j]
+                if pull > limit:
+                    T[j], kind[j] = limit, FORWARD
+                    w = u[j] - limit / kt
+                elif pull < -limit:
+                    T[j], kind[j] = -limit, BACKWARD
+                    w = u[j] + limit / kt
+                else:
+                    T[j], kind[j] = pull, STICK
+            if turn == 1 and slider[j] == w:
+                break
+            slider[j] = w
+            if turn == 0 and kind[j] != STICK:
+                origin, sense = j, kind[j]
+    return origin, sense
+
+
+@numba.njit(cache=True)
+def _add_tangential(kt, slope, kind, origin, sense, c, t, phi, product, single, jac):
+    """d T / d u and d T / d v of one slider, one segment of samples of the same kind after the other.
+
+    `origin` is the sample where the present stick began, `side` the slope of the slip before it (0: separation).
+    """
+    n_time, m = phi.shape
+    o, on = c * m, t * m
+    if origin < 0:
+        for a in range(m):
+            jac[o + a, o + a] = kt
+        return
+    side = slope * SIDE[sense]
+    start = 0
+    for j in range(1, n_time + 1):
+        now = kind[start]
+        if j < n_time and kind[j] == now:
+            continue
+        first, last = product[start], product[j]
+        if now == STICK:
+            for a in range(m):
+                weight = single[j, a] - single[start, a]
+                for b in range(m):
+                    jac[o + a, o + b] += kt * (last[a, b] - first[a, b] - weight * phi[origin, b])
+                    jac[o + a, on + b] += side * weight * phi[origin, b]
+        else:
+            origin, side = j - 1, slope * SIDE[now]
+            if now != OPEN:
+                for a in range(m):
+                    for b in range(m):
+                        jac[o + a, on + b] += side * (last[a, b] - first[a, b])
+        start = j

@@ -1,0 +1,218 @@
+"""Bordered Newton-Krylov: solutions where the parameter is an unknown too, so that a fold is a point like any other.
+
+    [ I - G dg/dx   dR/dp ] [dx]   [r]
+    [     c^T         c_p ] [dp] = [s]
+
+stays regular where I - G dg/dx alone is singular. Unknowns are scaled by a `Metric`, so that lengths and parameter
+values compare; the border acts on the active rows only, which is enough: a direction that moves no active pair moves p.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tribodyn.hbm.balance import Linearisation, State
+from tribodyn.hbm.continuation.parameter import Parameter
+from tribodyn.hbm.krylov import gmres
+from tribodyn.hbm.newton import NewtonOptions, Solution, relative_residual
+from tribodyn.hbm.outcome import CONVERGED
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A direction in (x, p): x (n_contact, n_coeff) [m], p in the unit of the parameter."""
+
+    x: np.ndarray
+    p: float
+
+    def __mul__(self, factor: float) -> Direction:
+        return Direction(factor * self.x, factor * self.p)
+
+    def __add__(self, other: Direction) -> Direction:
+        return Direction(self.x + other.x, self.p + other.p)
+
+    def __sub__(self, other: Direction) -> Direction:
+        return Direction(self.x - other.x, self.p - other.p)
+
+
+@dataclass(frozen=True)
+class Metric:
+    """The inner product of arc length: length [m] and width (unit of the parameter) count as one each."""
+
+    length: float
+    width: float
+
+    def dot(self, a: Direction, b: Direction) -> float:
+        """<a, b>, without unit."""
+        return float(np.vdot(a.x, b.x)) / self.length**2 + a.p * b.p / self.width**2
+
+    def norm(self, a: Direction) -> float:
+        """Length of a direction, without unit."""
+        return float(np.sqrt(self.dot(a, a)))
+
+    def unit(self, a: Direction) -> Direction:
+        """The direction with norm one."""
+        return a * (1.0 / self.norm(a))
+
+
+class BorderFailed(RuntimeError):
+    """The bordered system could not be solved."""
+
+
+def solve(
+    linear: Linearisation,
+    slope: np.ndarray,
+    border: Direction,
+    metric: Metric,
+    rhs: tuple[np.ndarray, float],
+    tolerance: float,
+    max_products: int,
+) -> tuple[Direction, int]:
+    """Solve the bordered system by GMRES, or directly where GMRES stalls.
+
+    slope : (n_contact, n_coeff) dR/dp; border : c, of any norm; rhs : r (n_contact, n_coeff) [m] and s
+    Returns the direction and the products spent
+    Raises  BorderFailed
+    """
+    rows = linear.rows
+    shape = (len(rows), slope.shape[1])
+    column = slope[rows].ravel() * (metric.width / metric.length)
+    row = np.append(border.x[rows].ravel() / metric.length, border.p / metric.width)
+    size = float(np.linalg.norm(row))
+    if size == 0.0:
+        raise BorderFailed("the border vanishes on the active contacts")
+    row /= size
+    right = np.append(rhs[0][rows].ravel() / metric.length, rhs[1] / size)
+
+    def product(v: np.ndarray) -> np.ndarray:
+        moved = linear.product(v[:-1].reshape(shape)).ravel() if len(rows) else v[:-1]
+        return np.append(moved + v[-1] * column, row @ v)
+
+    precondition = _coarse_inverse(linear, column, row) if len(rows) else None
+    y, spent, reached = gmres(product, right, tolerance, max_products, precondition)
+    if not reached <= max(10 * tolerance, 0.5):  # stalled: the direct way
+        matrix = np.stack([product(e) for e in np.eye(len(right))], axis=1)
+        spent += len(right)
+        try:
+            y = np.linalg.solve(matrix, right)
+        except np.linalg.LinAlgError:
+            raise BorderFailed("the bordered system is singular") from None
+    if not np.all(np.isfinite(y)):
+        raise BorderFailed("the bordered system has no finite solution")
+    dp = float(y[-1]) * metric.width
+    d = linear.spread(y[:-1].reshape(shape) * metric.length, rhs[0] - slope * dp)
+    return Direction(d, dp), spent
+
+
+def _coarse_inverse(
+    linear: Linearisation, column: np.ndarray, row: np.ndarray
+) -> Callable[[np.ndarray], np.ndarray] | None:
+    """The inverse of the bordered system with the coarse part of G alone, regular at folds as the whole is."""
+    if linear.coarse is None:
+        return None
+    u, a, matrix = linear.coarse
+    shape = (len(u), len(column) // len(u))
+
+    def inner(d: np.ndarray) -> np.ndarray:
+        found: np.ndarray = a @ (u.T @ linear.g_slope(d.reshape(shape))).ravel()
+        return found
+
+    edge = (u.T @ row[:-1].reshape(shape)).ravel()
+    corner = row[-1] - row[:-1] @ column
+    try:
+        inverse = np.linalg.inv(np.block([[matrix, inner(column)[:, None]], [edge, corner]]))
+    except np.linalg.LinAlgError:
+        return None
+
+    def apply(v: np.ndarray) -> np.ndarray:
+        y = inverse @ np.append(inner(v[:-1]), v[-1] - row[:-1] @ v[:-1])
+        return np.append(v[:-1] - y[-1] * column + (u @ y[:-1].reshape(u.shape[1], -1)).ravel(), y[-1])
+
+    return apply
+
+
+def tangent(
+    path: Parameter,
+    value: float,
+    state: State,
+    border: Direction,
+    metric: Metric,
+    options: NewtonOptions,
+    tolerance: float,
+) -> Direction:
+    """Unit tangent of the solution curve at a state, on the side that the border points to; raises BorderFailed."""
+    balance, _ = path.place(value)
+    linear = balance.linearise(state)
+    zero = np.zeros_like(state.residual)
+    found, _ = solve(linear, path.slope(value, state), border, metric, (zero, 1.0), tolerance, options.max_products)
+    side = 1.0 if metric.dot(found, border) >= 0 else -1.0
+    return metric.unit(found) * side
+
+
+def correct(
+    path: Parameter, start: Direction, border: Direction, metric: Metric, options: NewtonOptions
+) -> tuple[Solution, float]:
+    """Newton for R(x, p) = 0 in the hyperplane of a start, normal to the border.
+
+    Returns the solution, converged or not, and its value of the parameter
+    Source  inexact Newton with the forcing term of Eisenstat and Walker 1996, choice 2
+    """
+    place = _Place.at(path, start.p, start.x)
+    history = [place.error]
+    forcing, products, outcome = 1e-2, 0, ""
+    while place.error > options.tolerance:
+        steps = len(history) - 1
+        if steps == options.max_steps:
+            outcome = f"not converged in {steps} steps: {place.error:.1e}"
+            break
+        balance, _ = path.place(place.value)
+        target = max(min(forcing, 0.1), 0.3 * options.tolerance / place.error, 1e-12)
+        slope = path.slope(place.value, place.state)
+        try:
+            linear = balance.linearise(place.state)
+            direction, spent = solve(
+                linear, slope, border, metric, (-place.state.residual, 0.0), target, options.max_products
+            )
+        except BorderFailed as reason:
+            outcome = str(reason)
+            break
+        products += spent
+        new = place.search(path, direction)
+        history.append(new.error)
+        if new.error >= place.error * (1 - 1e-10):
+            outcome = f"no descent from relative residual {place.error:.1e}"
+            break
+        forcing = 0.5 * (new.error / place.error) ** 1.5
+        place = new
+    return Solution(place.state, outcome or CONVERGED, len(history) - 1, products, tuple(history)), place.value
+
+
+@dataclass(frozen=True)
+class _Place:
+    """One (x, p) of the Newton iteration with its relative residual."""
+
+    value: float
+    state: State
+    error: float
+
+    @classmethod
+    def at(cls, path: Parameter, value: float, flat: np.ndarray) -> _Place:
+        balance, omega = path.place(value)
+        state = balance.evaluate(omega, flat.reshape(balance.contact.n_pair, -1, flat.shape[-1]))
+        error = relative_residual(state, balance.x_lin(omega))
+        return cls(value, state, error if np.isfinite(error) else np.inf)
+
+    def search(self, path: Parameter, direction: Direction) -> _Place:
+        """Backtrack until the residual falls; the best trial where none falls enough, for the derivative has kinks."""
+        best, length = self, 1.0
+        for _ in range(8):
+            trial = _Place.at(path, self.value + length * direction.p, self.state.flat + length * direction.x)
+            if trial.error < best.error:
+                best = trial
+            if trial.error <= (1 - 0.1 * length) * self.error:
+                return trial
+            length *= 0.5
+        return best

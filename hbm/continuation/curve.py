@@ -1,0 +1,233 @@
+"""Points and segments of a solution curve: interpolation between two points, kinks, and the fold between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from tribodyn.hbm.continuation import bordered
+from tribodyn.hbm.continuation.bordered import BorderFailed, Direction, Metric
+from tribodyn.hbm.continuation.parameter import Parameter
+from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.outcome import CONVERGED
+
+KINK_ANGLE = 0.75  # turn between neighbouring points beyond which they lie on either side of a kink [rad]
+FOLD_TIGHTER = 1e-3  # Newton tolerance at folds, relative to that of other points
+FOLD_TRIALS = 80
+SHARP = 1e-10  # relative accuracy of tangents at folds
+
+
+@dataclass(frozen=True, eq=False)
+class CurvePoint:
+    """A point of the curve.
+
+    place : (x, p); tangent : unit tangent, which points along the walk
+    solution : what was solved there, None once it is behind
+    """
+
+    place: Direction
+    tangent: Direction
+    solution: Solution | None = None
+    fold: bool = False
+
+    @classmethod
+    def of(cls, value: float, solution: Solution, tangent: Direction, fold: bool = False) -> CurvePoint:
+        """The point of a solution."""
+        return cls(Direction(solution.state.flat, value), tangent, solution, fold)
+
+    @property
+    def value(self) -> float:
+        """The parameter."""
+        return self.place.p
+
+    def bare(self) -> CurvePoint:
+        """The point without its solution, which is large."""
+        return replace(self, solution=None)
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """The curve between two neighbouring points, in one metric."""
+
+    start: CurvePoint
+    end: CurvePoint
+    metric: Metric
+
+    @cached_property
+    def chord(self) -> Direction:
+        """From start to end."""
+        return self.end.place - self.start.place
+
+    @cached_property
+    def length(self) -> float:
+        """Length of the chord."""
+        return self.metric.norm(self.chord)
+
+    @cached_property
+    def angle(self) -> float:
+        """Turn of the tangent between the ends [rad]."""
+        return float(np.arccos(np.clip(self.metric.dot(self.start.tangent, self.end.tangent), -1.0, 1.0)))
+
+    @cached_property
+    def along(self) -> Direction:
+        """Unit direction along which both ends advance alike, so that hyperplanes normal to it cut the curve once."""
+        return self.metric.unit(self.start.tangent + self.end.tangent)
+
+    @cached_property
+    def corner(self) -> tuple[float, float, float]:
+        """Where the tangents of the ends come closest: ahead of the start, before the end, and how far apart."""
+        cosine = np.cos(self.angle)
+        ahead, behind = self.metric.dot(self.chord, self.start.tangent), self.metric.dot(self.chord, self.end.tangent)
+        sine2 = max(1.0 - cosine**2, 1e-300)
+        a, b = (ahead - cosine * behind) / sine2, (behind - cosine * ahead) / sine2
+        miss = self.chord - self.start.tangent * a - self.end.tangent * b
+        return a, b, self.metric.norm(miss)
+
+    @property
+    def turns(self) -> bool:
+        """Whether the parameter turns back between the ends, none of which is the fold itself."""
+        if self.start.fold or self.end.fold:
+            return False
+        return self.start.tangent.p * self.end.tangent.p < 0
+
+    @property
+    def hides_folds(self) -> bool:
+        """Whether the cubic through the ends turns back twice although the tangents at its ends agree."""
+        slopes = np.array([self.start.tangent.p, self.end.tangent.p]) * self.length
+        rise = self.chord.p
+        a = 3 * (slopes[0] + slopes[1] - 2 * rise)  # derivative of the Hermite cubic: a s^2 + b s + c
+        b = 6 * rise - 4 * slopes[0] - 2 * slopes[1]
+        if a == 0.0 or not 0.0 < -b / (2 * a) < 1.0:
+            return False
+        extreme = slopes[0] - b * b / (4 * a)
+        return extreme * slopes[0] < -1e-3 * slopes[0] ** 2
+
+    def bare(self) -> Segment:
+        """The segment without the solutions at its ends."""
+        return Segment(self.start.bare(), self.end.bare(), self.metric)
+
+    def near(self, other: Segment) -> bool:
+        """Whether the ranges of the parameter of two segments meet."""
+        low, high = sorted((self.start.value, self.end.value))
+        a, b = sorted((other.start.value, other.end.value))
+        return a <= high and low <= b
+
+    def crosses(self, bound: float) -> bool:
+        """Whether the segment leaves through a bound of the parameter; one that starts on it may leave it inwards."""
+        a, b = self.start.value - bound, self.end.value - bound
+        return a * b < 0 or (b == 0.0 and a != 0.0)
+
+    def at(self, s: float) -> Direction:
+        """The Hermite cubic through the ends and their tangents at s in 0..1, or two straight lines round a kink."""
+        if self.angle > KINK_ANGLE:
+            a, b, _ = self.corner
+            if s * (a + b) < a:
+                return self.start.place + self.start.tangent * (s * (a + b))
+            return self.end.place - self.end.tangent * ((1 - s) * (a + b))
+        h = self.length
+        return (
+            self.start.place * ((1 + 2 * s) * (1 - s) ** 2)
+            + self.end.place * (s * s * (3 - 2 * s))
+            + self.start.tangent * (h * s * (1 - s) ** 2)
+            + self.end.tangent * (h * s * s * (s - 1))
+        )
+
+    def guess_at(self, bound: float) -> np.ndarray:
+        """(n_contact, n_coeff) x of the interpolation where it crosses a bound of the parameter."""
+        low, high = 0.0, 1.0
+        side = np.sign(self.start.value - bound)
+        for _ in range(50):
+            s = 0.5 * (low + high)
+            if np.sign(self.at(s).p - bound) == side:
+                low = s
+            else:
+                high = s
+        return self.at(high).x
+
+    def passes(self, path: Parameter, point: CurvePoint, sense: float, options: NewtonOptions) -> bool:
+        """Whether the segment passes through a known point, in its sense (1) or against it (-1).
+
+        A close call is decided by solving in the hyperplane through the point, from the segment
+        """
+        if self.length == 0.0 or point is self.start or point is self.end or self.angle > KINK_ANGLE:
+            return False
+        metric = self.metric
+        s = metric.dot(point.place - self.start.place, self.chord) / self.length**2
+        border = metric.unit(point.tangent)
+        if not 0.0 <= s <= 1.0 or sense * metric.dot(border, self.chord) < 0.9 * self.length:
+            return False
+        here = self.at(s)
+        if metric.norm(point.place - here) > 0.05 * self.length:
+            return False
+        guess = here + border * metric.dot(point.place - here, border)
+        solution, value = bordered.correct(path, guess, border, metric, options)
+        miss = metric.norm(Direction(solution.state.flat, value) - point.place)
+        return solution.converged and miss < 1e-4 * self.length
+
+
+def locate_fold(path: Parameter, segment: Segment, options: NewtonOptions, tolerance: float) -> CurvePoint | None:
+    """The point between the ends of a segment where the parameter turns back: the tangent's share in it is zero.
+
+    tolerance : relative, on the parameter
+    Returns the fold, also where it is a kink with tangents of either sign beside it; None where a solve fails
+    """
+    tight = replace(options, tolerance=max(FOLD_TIGHTER * options.tolerance, 1e-13))
+    metric = segment.metric
+    try:
+        ends = [replace(p, tangent=_sharp_tangent(path, p, metric, tight)) for p in (segment.start, segment.end)]
+        segment, weight, corner = Segment(ends[0], ends[1], metric), [1.0, 1.0], np.inf
+        for _ in range(FOLD_TRIALS):
+            before, corner = corner, _corner_value(segment)
+            settled = abs(corner - before) <= 0.1 * tolerance * abs(corner)
+            guess = segment.at(_share(segment, weight, settled))
+            solution, value = bordered.correct(path, guess, segment.along, metric, tight)
+            if min(solution.history) > options.tolerance:
+                return None
+            tangent = bordered.tangent(path, value, solution.state, segment.along, metric, tight, SHARP)
+            point = CurvePoint.of(value, replace(solution, outcome=CONVERGED), tangent, fold=True)
+            if tangent.p * segment.start.tangent.p > 0:  # Illinois: halve the weight of an end that stays
+                segment, weight = Segment(point, segment.end, metric), [1.0, 0.5 * weight[1]]
+            else:
+                segment, weight = Segment(segment.start, point, metric), [0.5 * weight[0], 1.0]
+            steepest = max(abs(segment.start.tangent.p), abs(segment.end.tangent.p))
+            slope = abs(tangent.p) if segment.angle < KINK_ANGLE else steepest
+            if settled or slope * segment.length <= tolerance * abs(value) or segment.length < 1e-13:
+                return point
+    except BorderFailed:
+        return None
+    return point
+
+
+def _sharp_tangent(path: Parameter, point: CurvePoint, metric: Metric, options: NewtonOptions) -> Direction:
+    """The tangent of a point, more accurate than the walk has it; raises BorderFailed."""
+    balance, omega = path.place(point.value)
+    flat = point.place.x
+    state = balance.evaluate(omega, flat.reshape(balance.contact.n_pair, -1, flat.shape[-1]))
+    return bordered.tangent(path, point.value, state, point.tangent, metric, options, SHARP)
+
+
+def _corner_value(segment: Segment) -> float:
+    """The parameter where the tangents of the ends meet; none where the segment is smooth."""
+    a, b, _ = segment.corner
+    if segment.angle <= KINK_ANGLE or min(a, b) <= 0:
+        return float("nan")
+    return segment.start.value + a * segment.start.tangent.p
+
+
+def _share(segment: Segment, weight: list[float], settled: bool) -> float:
+    """Where between its ends to look for the fold of a segment, 0..1.
+
+    Round a corner it is on the longer leg, close to where the tangents meet, so that both legs get short in turn and
+    the meeting point settles; there at last. Elsewhere it is the secant's zero of the tangent's share in the parameter.
+    """
+    if segment.angle > KINK_ANGLE:
+        a, b, _ = segment.corner
+        if min(a, b) <= 0:
+            return 0.5
+        if settled:
+            return a / (a + b)
+        return (0.9 * a if a > b else a + 0.1 * b) / (a + b)
+    a, b = abs(segment.start.tangent.p) * weight[0], abs(segment.end.tangent.p) * weight[1]
+    return float(np.clip(a / (a + b), 0.02, 0.98))

@@ -1,0 +1,337 @@
+"""Folds of a frequency response, followed directly while a second parameter changes: load, gap, stiffness, wear.
+
+The solutions at all frequencies and all values of the parameter form a surface. On it the fold is where the tangent at
+constant parameter has no share in frequency; this scalar, from a bordered solve that is regular at the fold, is brought
+to zero by Newton in the two coordinates of the surface, and the line of folds is followed by its own arc length, round
+the cusps where two folds meet. Where kinks of the law keep Newton from it, the fold is searched along the curve.
+Source  minimally bordered systems, Griewank and Reddien 1984, Govaerts 2000; differences of the scalar by steps ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation import bordered
+from tribodyn.hbm.continuation.bordered import BorderFailed, Direction, Metric
+from tribodyn.hbm.continuation.branch import amplitude
+from tribodyn.hbm.continuation.curve import CurvePoint
+from tribodyn.hbm.continuation.parameter import FREQUENCY, Parameter
+from tribodyn.hbm.continuation.stepper import Options, Stepper
+from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.threads import single
+
+WIDTH = 0.1  # frequency that counts as one, relative
+DIFFERENCE = 1e-4  # step along the surface by which the scalar is differentiated
+TANGENT = 1e-10  # relative accuracy of tangents
+KEEP = 1e-5  # the scalar at a fold; its frequency is off by the square of it
+NEAREST, SEARCH = 1e-3, 8  # arc length of the first step in the search for a fold, and its steps either way
+
+
+@dataclass(frozen=True)
+class FoldOptions:
+    """How a line of folds is followed.
+
+    step, max_step, min_step : arc length of the first, longest and shortest step; one is the size of the vibration,
+        a tenth of the frequency, or `width` times the range of the parameter
+    max_points : points after which to end; trials : Newton steps allowed per fold
+    """
+
+    step: float = 0.05
+    max_step: float = 0.3
+    min_step: float = 1e-3
+    width: float = 0.2
+    max_points: int = 500
+    trials: int = 8
+    newton: NewtonOptions = field(default_factory=NewtonOptions)
+
+
+@dataclass(frozen=True)
+class FoldCurve:
+    """A line of folds in the order it was followed.
+
+    parameter_name : what was changed; parameter : (n_point,) its values; omega : (n_point,) of the folds [rad/s]
+    output_names; response : (n_point, n_output, n_coeff) [m]; contact : (n_point, n_contact, n_coeff) [m]
+    cusps : indices of the points next to which the parameter turns back: two folds meet there and vanish
+    end : sentence that says where and why it ends
+    """
+
+    parameter_name: str
+    parameter: np.ndarray
+    omega: np.ndarray
+    output_names: tuple[str, ...]
+    response: np.ndarray
+    contact: np.ndarray
+    cusps: tuple[int, ...]
+    end: str
+
+    def amplitude(self, output: str) -> np.ndarray:
+        """(n_point,) vibration amplitude of an output at the folds [m]."""
+        return amplitude(self.response[:, self.output_names.index(output)])
+
+
+class NoFold(RuntimeError):
+    """No fold was found near a place."""
+
+
+@dataclass(frozen=True)
+class _Fold:
+    """A fold with the direction in which its line continues.
+
+    value : of the parameter; solution : at the fold; along : unit tangent of the response curve
+    tangent, change : of (x, omega) and of the parameter along the line of folds, of unit length together
+    """
+
+    value: float
+    solution: Solution
+    along: Direction
+    tangent: Direction
+    change: float
+
+    @property
+    def place(self) -> Direction:
+        """(x, omega)."""
+        return Direction(self.solution.state.flat, self.solution.state.omega)
+
+
+@single
+def track_fold(
+    path: Parameter,
+    start: float,
+    stop: float,
+    omega: float,
+    x: np.ndarray,
+    options: FoldOptions | None = None,
+    on_point: Callable[[int, int], None] | None = None,
+) -> FoldCurve:
+    """Follow a fold of the frequency response from `start` of a parameter towards `stop`.
+
+    path : the second parameter, such as `parameter.load(balance, omega)`; its own frequency is not used
+    omega, x (n_pair, n_component, n_coeff) : the fold at `start`, or near it, as a Branch lists it [rad/s], [m]
+    on_point : called with points done and points allowed
+    Returns the line of folds; it may turn back at a cusp and then ends where it passes `start` or `stop`
+    Raises  ValueError where there is no fold near the place given
+    """
+    options = options or FoldOptions()
+    if path.omega is None:
+        raise ValueError("a fold is followed against a second parameter, such as the load, not against the frequency")
+    if start == stop:
+        raise ValueError(f"start and stop are the same, {path.say(start)}: there is no fold to follow")
+    surface = _Surface(path, options, omega, abs(stop - start))
+    flat = x.reshape(-1, x.shape[-1])
+    try:
+        here = surface.first(start, Direction(flat, omega), float(np.sign(stop - start)))
+    except NoFold as reason:
+        raise ValueError(f"no fold near {omega / (2 * np.pi):.6g} Hz at {path.say(start)}: {reason}") from None
+    line, step, end = [here], options.step, ""
+    low, high = min(start, stop), max(start, stop)
+    while not end:
+        if len(line) >= options.max_points:
+            end = f"ended at {path.say(here.value)}: {options.max_points} points were allowed"
+            break
+        there, trouble = None, ""
+        while there is None and step >= options.min_step:
+            try:
+                there = surface.ahead(here, step)
+            except NoFold as reason:
+                step, trouble = 0.5 * step, str(reason)
+        if there is None:
+            end = f"ended at {path.say(here.value)}: {trouble}"
+            break
+        bound = low if there.value < low else high if there.value > high else None
+        if bound is not None:
+            share = (bound - here.value) / (there.value - here.value)
+            guess = here.place + (there.place - here.place) * share
+            try:
+                there = surface.at(bound, guess, here)
+                end = f"{'turned back to' if bound == start else 'reached'} {path.say(bound)}"
+            except NoFold as reason:
+                end = f"ended at {path.say(here.value)}: {reason}"
+                break
+        line.append(there)
+        step = float(np.clip(surface.next_step(here, there, step), options.min_step, options.max_step))
+        here = there
+        if on_point is not None:
+            on_point(len(line), options.max_points)
+    return surface.curve(line, end)
+
+
+class _Surface:
+    """Solutions over frequency and parameter, and the scalar that vanishes at folds."""
+
+    def __init__(self, path: Parameter, options: FoldOptions, omega: float, span: float):
+        self._path, self._options = path, options
+        self._width, self._span = WIDTH * omega, options.width * span
+        self._newton = replace(options.newton, tolerance=max(1e-3 * options.newton.tolerance, 1e-13), max_steps=15)
+
+    def _metric(self, flat: np.ndarray, balance: HarmonicBalance) -> Metric:
+        vibration = np.linalg.norm(flat[:, balance.basis.order > 0]) or np.linalg.norm(flat) or 1.0
+        return Metric(float(vibration), self._width)
+
+    def _response(self, value: float) -> Parameter:
+        """The response curve at one value of the parameter."""
+        balance = self._path.make(value)
+        return Parameter(FREQUENCY, lambda _: balance, None)
+
+    def first(self, value: float, guess: Direction, sense: float) -> _Fold:
+        """The fold nearest to a guess (x, omega) at a value, with its line towards `sense`; raises NoFold."""
+        metric = self._metric(guess.x, self._path.make(value))
+        along = self._null(self._response(value), guess, metric)
+        point = self._searched(value, guess, along, metric)
+        solution, along = point.solution, point.tangent
+        assert solution is not None
+        try:
+            across = self._across(value, solution, along, metric)
+            scalar, slopes = self._slopes(value, point.place, along, across, metric)
+        except BorderFailed as reason:
+            raise NoFold(str(reason)) from None
+        shares = (-slopes[1], slopes[0]) if abs(scalar) <= KEEP and slopes[0] != 0 else (0.0, 1.0)
+        sign = -1.0 if shares[1] * sense < 0 else 1.0
+        tangent = along * shares[0] + across * shares[1]
+        return self._unit(_Fold(value, solution, along, tangent, shares[1]), metric, sign)
+
+    def ahead(self, here: _Fold, step: float) -> _Fold:
+        """The next fold of the line: by Newton, or where kinks forbid that by search at a value; raises NoFold."""
+        metric = self._metric(here.place.x, self._path.make(here.value))
+        value, guess = here.value + step * here.change, here.place + here.tangent * step
+        try:
+            there = self._newton_fold(value, guess, here.along)
+            moved, change = there.place - here.place, there.value - here.value
+            dot = metric.dot(moved, there.tangent) + change * there.change / self._span**2
+            if 0.3 * step < self._length(metric, moved, change) < 2 * step and abs(dot) > 0.7 * step:
+                return self._unit(there, metric, float(np.sign(dot)))
+        except NoFold:
+            pass
+        return self.at(value, guess, here)
+
+    def at(self, value: float, guess: Direction, here: _Fold) -> _Fold:
+        """The fold at a value, next to the fold `here` on its line; raises NoFold."""
+        metric = self._metric(here.place.x, self._path.make(here.value))
+        reach = 2 * self._length(metric, guess - here.place, value - here.value)
+        point = self._searched(value, guess, here.along, metric)
+        moved = point.place - here.place
+        if value == here.value or self._length(metric, moved, value - here.value) > reach:
+            raise NoFold(f"the next fold, at {self._path.say(value)}, lies on another line")
+        assert point.solution is not None
+        return self._unit(_Fold(value, point.solution, point.tangent, moved, value - here.value), metric, 1.0)
+
+    def _newton_fold(self, value: float, guess: Direction, along: Direction) -> _Fold:
+        """Newton for the fold near a guess (x, omega), normal to the line of folds; raises NoFold."""
+        row = np.zeros(2)
+        for trial in range(self._options.trials):
+            response = self._response(value)
+            metric = self._metric(guess.x, response.make(value))
+            solution = self._solved(response, guess, along, metric)
+            here = Direction(solution.state.flat, solution.state.omega)
+            try:
+                along = bordered.tangent(response, here.p, solution.state, along, metric, self._newton, TANGENT)
+                across = self._across(value, solution, along, metric)
+                scalar, slopes = self._slopes(value, here, along, across, metric)
+            except BorderFailed as reason:
+                raise NoFold(str(reason)) from None
+            size = float(np.hypot(*slopes))
+            if size == 0.0:
+                break
+            line = np.array([-slopes[1], slopes[0]]) / size
+            if trial == 0:
+                row = line
+            if abs(scalar) <= KEEP:
+                tangent = along * float(line[0]) + across * float(line[1])
+                return _Fold(value, solution, along, tangent, float(line[1]))
+            matrix = np.array([slopes, row])
+            if abs(np.linalg.det(matrix)) < 1e-12 * size:
+                break
+            move = np.linalg.solve(matrix, [-scalar, 0.0])
+            move *= min(1.0, 0.3 / max(abs(move[0]), abs(move[1]) / self._span, 1e-300))
+            guess = here + along * float(move[0]) + across * float(move[1])
+            value += float(move[1])
+        raise NoFold(f"Newton found no fold near {self._path.say(value)}")
+
+    def _solved(self, response: Parameter, guess: Direction, border: Direction, metric: Metric) -> Solution:
+        solution, _ = bordered.correct(response, guess, border, metric, self._newton)
+        if min(solution.history) > self._options.newton.tolerance:
+            raise NoFold(f"no solution near {response.say(guess.p)}: {solution.outcome}")
+        return replace(solution, outcome=CONVERGED)
+
+    def _null(self, response: Parameter, guess: Direction, metric: Metric) -> Direction:
+        """Tangent of the response curve at a guess, with the vibration itself as the border."""
+        balance = response.make(guess.p)
+        state = balance.evaluate(guess.p, guess.x.reshape(balance.contact.n_pair, -1, guess.x.shape[-1]))
+        border = metric.unit(Direction(np.where(balance.basis.order > 0, guess.x, 0.0), 0.0))
+        try:
+            return bordered.tangent(response, guess.p, state, border, metric, self._newton, TANGENT)
+        except BorderFailed as reason:
+            raise NoFold(str(reason)) from None
+
+    def _across(self, value: float, solution: Solution, along: Direction, metric: Metric) -> Direction:
+        """d (x, omega) / d value at constant position along the response curve."""
+        state, response = solution.state, self._response(value)
+        force = replace(self._path, omega=state.omega).slope(value, state)
+        linear, slope = response.make(value).linearise(state), response.slope(state.omega, state)
+        return bordered.solve(linear, slope, along, metric, (-force, 0.0), TANGENT, self._newton.max_products)[0]
+
+    def _slopes(
+        self, value: float, here: Direction, along: Direction, across: Direction, metric: Metric
+    ) -> tuple[float, tuple[float, float]]:
+        """The scalar (share of the frequency in the unit tangent) and its derivatives along and across."""
+
+        def scalar(v: float, place: Direction) -> float:
+            response = self._response(v)
+            balance = response.make(v)
+            state = balance.evaluate(place.p, place.x.reshape(balance.contact.n_pair, -1, place.x.shape[-1]))
+            return bordered.tangent(response, place.p, state, along, metric, self._newton, TANGENT).p / metric.width
+
+        reach = 1.0 / max(metric.norm(across), 1.0 / self._span)  # change of the parameter that counts as one
+        central = scalar(value, here)
+        one = (scalar(value, here + along * DIFFERENCE) - central) / DIFFERENCE
+        step = DIFFERENCE * reach
+        two = (scalar(value + step, here + across * step) - central) / step
+        return central, (one, two)
+
+    def _length(self, metric: Metric, moved: Direction, change: float) -> float:
+        return float(np.hypot(metric.norm(moved), change / self._span))
+
+    def _unit(self, fold: _Fold, metric: Metric, sign: float) -> _Fold:
+        """The fold with its direction of unit length, turned round where the sign is negative."""
+        factor = sign / self._length(metric, fold.tangent, fold.change)
+        return replace(fold, tangent=fold.tangent * factor, change=fold.change * factor)
+
+    def _searched(self, value: float, guess: Direction, along: Direction, metric: Metric) -> CurvePoint:
+        """The fold nearest to a guess at a value: the response curve is walked both ways; raises NoFold."""
+        response = self._response(value)
+        solution = self._solved(response, guess, along, metric)
+        omega = solution.state.omega
+        options = Options(step=NEAREST, width=1.0, newton=self._options.newton)
+        ways = [Stepper(response, options, solution, omega, omega + self._width, along * sign) for sign in (1.0, -1.0)]
+        for _ in range(SEARCH):
+            for way in ways:
+                for part in way.advance():
+                    if part.end.fold:
+                        return part.end
+        raise NoFold(f"the response has no fold any more at {self._path.say(value)}")
+
+    def next_step(self, here: _Fold, there: _Fold, step: float) -> float:
+        """The step after one that went from here to there, by the turn of the line."""
+        metric = self._metric(there.place.x, self._path.make(there.value))
+        turned = self._length(metric, there.tangent - here.tangent, there.change - here.change)
+        return step * float(np.clip(0.25 / max(turned, 1e-9), 0.5, 2.0))
+
+    def curve(self, line: list[_Fold], end: str) -> FoldCurve:
+        """The result."""
+        value = np.array([f.value for f in line])
+        balance = self._path.make(line[0].value)
+        turn = np.diff(value)
+        return FoldCurve(
+            self._path.name,
+            value,
+            np.array([f.solution.state.omega for f in line]),
+            balance.compliance.output_names,
+            np.stack([self._path.make(f.value).outputs(f.solution.state) for f in line]),
+            np.stack([f.solution.state.flat for f in line]),
+            tuple(int(i) for i in np.flatnonzero(turn[1:] * turn[:-1] < 0) + 1),
+            end,
+        )

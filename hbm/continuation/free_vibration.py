@@ -1,0 +1,194 @@
+"""Free vibration with friction: the balance without a force, in frequency and damping, bordered by a reference mode.
+
+    M q'' + (C - 2 zeta w M) q' + K q + B^T f_c(x) = F_0,    phi^T M q_1 = a
+
+The linear side is solved directly in all modes of the stuck structure, since the added term changes it at every point;
+the border, the reference mode phi, keeps it regular in resonance, and what it needs to hold phi at the amplitude a is
+the residual that w and zeta bring to zero. A point is described by scaled coordinates: static displacement, vibration
+over amplitude, the logarithm of w, zeta, and the logarithm of a.
+Source  extended periodic motion concept: Krack 2015, Computers & Structures 154; the bordered elimination is ours
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as sla
+
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.law import SEPARATES, ContactCycle
+from tribodyn.hbm.krylov import gmres
+
+
+@dataclass(frozen=True)
+class Point:
+    """x (n_pair, c, n_coeff), omega, zeta at amplitude a, and what they give.
+
+    coordinates : (n_contact * n_coeff + 3,) the same, scaled
+    residual : (n_contact * n_coeff + 2,), scaled; eta : complex modal amplitudes (n, n_harmonic)
+    factors : of the bordered dynamic stiffness of each harmonic
+    """
+
+    coordinates: np.ndarray
+    a: float
+    x: np.ndarray
+    omega: float
+    zeta: float
+    cycle: ContactCycle
+    eta: np.ndarray
+    residual: np.ndarray
+    factors: list[tuple[np.ndarray, np.ndarray]]
+
+
+class FreeVibration:
+    """The problem of one reference mode.
+
+    balance : its vibration load plays no part; mode : number of the reference mode, from 0, of the structure stuck
+        where the static load keeps it closed; output : whose motion in the reference mode measures the amplitude
+    reference_omega : [rad/s]; per_amplitude : motion of the output per modal amplitude a
+    Raises  ValueError for what has no such mode
+    """
+
+    def __init__(self, balance: HarmonicBalance, mode: int, output: str | None):
+        model, self.balance, self.basis = balance.model, balance, balance.basis
+        if model.per_harmonic is not None:
+            raise ValueError(
+                "nonlinear modes need one system for all harmonics: this model has one of its own per harmonic"
+            )
+        if 1 not in self.basis.harmonics:
+            raise ValueError("nonlinear modes need harmonic 1 among the harmonics")
+        system, b = model.system, np.asarray(model.interface.B)
+        names = balance.compliance.output_names
+        if not names or (output is not None and output not in names):
+            raise ValueError(
+                f"no output '{output}' to measure the amplitude: the model has {', '.join(names) or 'none'}"
+            )
+        self.k = balance.compliance.k
+        mass = np.asarray(system.mass)
+        self.lam, phi = sla.eigh(np.asarray(system.stiffness) + b.T @ (self.k[:, None] * b), mass)
+        self.n = len(self.lam)
+        self.U = b @ phi
+        self.O = np.array([system.outputs[name] @ phi for name in names])
+        self.damping = np.zeros_like(mass) if system.damping is None else phi.T @ np.asarray(system.damping) @ phi
+        static = sum(
+            (v * system.loads[name] for (h, name), v in balance.excitation.loads.items() if h == 0), np.zeros(self.n)
+        )
+        base = balance.excitation.base
+        self.base = np.zeros(len(b)) if base is None or not self.basis.has_static else base[:, 0]
+        self.static_load = phi.T @ np.real(static) + self.U.T @ (self.k * self.base)
+        self.rest, apart = self._static_state()
+        squares, shapes = np.linalg.eigh(np.diag(self.lam) - self.U[apart].T @ (self.k[apart, None] * self.U[apart]))
+        if not 0 <= mode < self.n:
+            raise ValueError(f"there is no mode {mode}: the model has modes 0 to {self.n - 1}")
+        if squares[mode] <= 1e-13 * squares[-1]:
+            raise ValueError(f"mode {mode} is a rigid-body motion at rest: choose one that vibrates")
+        self.reference, self.reference_omega = shapes[:, mode], float(np.sqrt(squares[mode]))
+        moved = self.O @ self.reference
+        self.per_amplitude = float(abs(moved[0 if output is None else names.index(output)]))
+        if self.per_amplitude <= 1e-9 * np.abs(self.O).max():
+            raise ValueError(f"output '{output or names[0]}' does not move in mode {mode}: choose another output")
+
+    def _static_state(self) -> tuple[np.ndarray, np.ndarray]:
+        """x at rest, and which contacts are open there."""
+        still = self.balance.with_load(0.0)
+        solution = newton.solve(still, still.omega_max, still.stuck(still.omega_max))
+        if not solution.converged:
+            raise ValueError(f"no static equilibrium for a nonlinear mode to vibrate about: {solution.outcome}")
+        apart = solution.state.cycle.status & SEPARATES > 0
+        return solution.state.x, np.repeat(apart, solution.state.x.shape[1])
+
+    def first_guess(self, a: float) -> Point:
+        """The reference mode about the static equilibrium."""
+        x = self.rest.copy()
+        x[:, :, int(self.basis.has_static)] += a * (self.U @ self.reference).reshape(x.shape[:2])
+        zeta = float(self.reference @ self.damping @ self.reference) / (2 * self.reference_omega)
+        flat = x.reshape(self._shape) / self._units(a)
+        return self.evaluate(np.concatenate([flat.ravel(), [np.log(self.reference_omega), zeta, np.log(a)]]))
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        return len(self.k), self.basis.n_coeff
+
+    def _units(self, a: float) -> np.ndarray:
+        """(n_coeff,) displacement per coordinate: for x_0 that of rest, for the rest the amplitude."""
+        vibration = float(np.linalg.norm(self.U @ self.reference))
+        still = float(np.linalg.norm(self.rest[:, :, 0])) if self.basis.has_static else 0.0
+        return np.where(self.basis.order == 0, still or a * vibration, a * vibration)
+
+    def evaluate(self, coordinates: np.ndarray) -> Point:
+        """Everything at one point."""
+        omega, a = (float(np.exp(c)) for c in coordinates[[-3, -1]])
+        zeta = float(coordinates[-2])
+        flat = coordinates[:-3].reshape(self._shape) * self._units(a)
+        x = flat.reshape(self.rest.shape)
+        cycle = self.balance.contact.cycle(x, self.basis, self.balance.memory)
+        g = self.k[:, None] * flat - cycle.force.reshape(flat.shape)
+        factors = []
+        for h in self.basis.harmonics:
+            s = 1j * h * omega
+            d = s * self.damping + np.diag(self.lam + s * s - 2 * zeta * omega * s)
+            border, corner = (self.reference, 0.0) if h == 1 else (np.zeros(self.n), 1.0)
+            factors.append(sla.lu_factor(np.block([[d, border[:, None]], [border[None], np.array([[corner]])]])))
+        rhs = self._rhs(self.U.T @ self.basis.to_complex(g), a)
+        if self.basis.has_static:
+            rhs[:-1, 0] += self.static_load
+        eta, mismatch = self._solve(factors, rhs)
+        move = self.basis.to_real(self.U @ eta)
+        if self.basis.has_static:
+            move[:, 0] -= self.base
+        residual = self._residual(a, flat - move, mismatch)
+        return Point(coordinates, a, x, omega, zeta, cycle, eta, residual, factors)
+
+    def _rhs(self, modal_force: np.ndarray | float, a: float) -> np.ndarray:
+        """(n + 1, n_harmonic) right-hand side of the bordered systems."""
+        rhs = np.zeros((self.n + 1, len(self.basis.harmonics)), complex)
+        rhs[:-1] = modal_force
+        rhs[-1, self.basis.harmonics.index(1)] = a
+        return rhs
+
+    def _solve(self, factors: list[tuple[np.ndarray, np.ndarray]], rhs: np.ndarray) -> tuple[np.ndarray, complex]:
+        """Modal amplitudes, and what is missing along the reference mode in harmonic 1."""
+        out = np.stack([sla.lu_solve(f, rhs[:, i]) for i, f in enumerate(factors)], axis=1)
+        return out[:-1], out[-1, self.basis.harmonics.index(1)]
+
+    def _residual(self, a: float, x: np.ndarray, mismatch: complex) -> np.ndarray:
+        """x_0 relative to rest and vibration, the vibration and the mismatch relative to the vibration."""
+        vibration = self._units(a)[-1]
+        scale = np.where(self.basis.order == 0, np.maximum(self._units(a), vibration), vibration)
+        relative = mismatch / (self.reference_omega**2 * a)
+        return np.concatenate([(x / scale).ravel(), [relative.real, relative.imag]])
+
+    def correction(self, p: Point, normal: np.ndarray, tolerance: float, max_products: int) -> np.ndarray:
+        """Newton direction for the coordinates within the hyperplane normal to `normal`."""
+        jac = p.cycle.jacobian
+        assert jac is not None
+        units = self._units(p.a)
+        dynamic = np.where(self.basis.order == 0, 0.0, p.x.reshape(self._shape))
+        by_omega, by_zeta, by_a = self._slopes(p)
+        size = float(np.linalg.norm(normal))
+
+        def product(y: np.ndarray) -> np.ndarray:
+            d = y[:-3].reshape(self._shape) * units + y[-1] * dynamic
+            dg = self.k[:, None] * d - np.matmul(jac, d.reshape(len(jac), -1, 1)).reshape(d.shape)
+            eta, mismatch = self._solve(p.factors, self._rhs(self.U.T @ self.basis.to_complex(dg), 0.0))
+            out = self._residual(p.a, d - self.basis.to_real(self.U @ eta), mismatch)
+            return np.append(out + y[-3] * by_omega + y[-2] * by_zeta + y[-1] * by_a, normal @ y / size)
+
+        return gmres(product, np.append(-p.residual, 0.0), tolerance, max_products)[0]
+
+    def _slopes(self, p: Point) -> tuple[np.ndarray, ...]:
+        """Derivatives of the residual at fixed x by the logarithm of omega, by zeta and by the logarithm of a."""
+        h = np.asarray(self.basis.harmonics)
+        by_omega = 1j * h * (self.damping @ p.eta) + (-2 * h**2 * p.omega - 4j * p.zeta * h * p.omega) * p.eta
+        by_zeta = (-2j * h * p.omega**2) * p.eta
+        found = []
+        for rhs in (self._rhs(-p.omega * by_omega, 0.0), self._rhs(-by_zeta, 0.0), self._rhs(0.0, p.a)):
+            eta, mismatch = self._solve(p.factors, rhs)
+            found.append(self._residual(p.a, -self.basis.to_real(self.U @ eta), mismatch))
+        return tuple(found)
+
+    def outputs(self, p: Point) -> np.ndarray:
+        """(n_output, n_coeff) response of the observed outputs [m]."""
+        return self.basis.to_real(self.O @ p.eta)

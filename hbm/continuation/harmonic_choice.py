@@ -1,0 +1,255 @@
+"""Choice of harmonics, any set, from an estimate of what the others would change.
+
+A solution with few harmonics is put into a balance with many. Its residual there is the contact force at the harmonics
+left out, sent through their compliance; one Newton step turns it into a change of the response, coupling to the kept
+harmonics included. The step is linear, so the change splits into one share for each harmonic left out: those with the
+largest shares are taken in, until what remains is below the tolerance; harmonics that turn out useless are dropped.
+Source  a posteriori estimate by one Newton step in the larger space, as in Urabe 1965 and Grolet and Thouverez 2012;
+the split by harmonic is ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation.methods import arc_length
+from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.threads import single
+
+ACCURACY = 1e-3  # of the linear solves behind the estimate
+# an output that vibrates less than this share of the largest vibration is measured against that share
+LEAST_VIBRATION_SHARE = 1e-2
+# useful harmonics in a row, the smallest first, after which no more are tried for dropping
+USEFUL_IN_A_ROW = 3
+SAFETY = 0.5  # share of the tolerance that the harmonics left out may use up when the set grows
+
+
+@dataclass(frozen=True)
+class ChoiceOptions:
+    """How harmonics are chosen.
+
+    tolerance : of the response of each output, relative to its vibration
+    highest : highest harmonic that may be kept; the estimate looks at half as many again
+    rounds : times the set may grow
+    """
+
+    tolerance: float = 1e-2
+    highest: int = 15
+    rounds: int = 8
+    newton: NewtonOptions = field(default_factory=NewtonOptions)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What harmonics left out would change.
+
+    error : change of the response of the worst output, relative to its vibration
+    shares : harmonic left out -> its own share in the change, in the same measure
+    """
+
+    error: float
+    shares: Mapping[int, float]
+
+
+@dataclass(frozen=True)
+class HarmonicChoice:
+    """The harmonics chosen and what they are worth.
+
+    harmonics : the set; estimate : of its truncation error at the worst of the frequencies
+    tolerance : that was asked for; omega : frequencies looked at [rad/s]
+    history : sets tried in turn with their estimated errors
+    balance : with the chosen harmonics; x : its solutions, one (n_pair, n_component, n_coeff) for each frequency [m]
+    outcome : sentence
+    """
+
+    harmonics: tuple[int, ...]
+    estimate: Estimate
+    tolerance: float
+    omega: tuple[float, ...]
+    history: tuple[tuple[tuple[int, ...], float], ...]
+    balance: HarmonicBalance
+    x: tuple[np.ndarray, ...]
+    outcome: str
+
+
+class NotSolved(RuntimeError):
+    """The balance has no solution to estimate the error of; the message says where and why."""
+
+
+@single
+def choose(balance: HarmonicBalance, omega: Sequence[float], options: ChoiceOptions | None = None) -> HarmonicChoice:
+    """Choose harmonics for a problem, at frequencies where the choice matters, such as about a resonance.
+
+    balance : the problem; its own harmonics play no part beyond those that carry loads, its samples are kept
+    omega : frequencies [rad/s]
+    Returns the choice, also where the tolerance is not met with the harmonics allowed: `outcome` says so
+    Raises  NotSolved; ValueError where the samples are too few for the highest harmonic of the estimate
+    """
+    options = options or ChoiceOptions()
+    wide = widened(balance, options.highest)
+    loaded = {h for (h, _), value in balance.excitation.loads.items() if value != 0}
+    if balance.basis.has_static:
+        loaded.add(0)
+    kept = tuple(sorted(loaded | {1}))
+    trial = _Trial.of(wide, kept, omega, None, options)
+    history = [(kept, trial.error)]
+    for _ in range(options.rounds):
+        wanted = trial.wanted(options)
+        if trial.error <= options.tolerance or not wanted:
+            break
+        kept = tuple(sorted({*kept, *wanted}))
+        trial = _Trial.of(wide, kept, omega, trial, options)
+        history.append((kept, trial.error))
+    useful = 0
+    for h in [h for h in trial.by_content() if h not in loaded and h != 1]:
+        if trial.error > options.tolerance or useful == USEFUL_IN_A_ROW:
+            break
+        fewer = tuple(k for k in kept if k != h)
+        attempt = _Trial.of(wide, fewer, omega, trial, options, shrinking=True)
+        history.append((fewer, attempt.error))
+        useful += 1
+        if attempt.error <= options.tolerance:
+            kept, trial, useful = fewer, attempt, 0
+    if not trial.worst.shares:
+        trial = _Trial.of(wide, kept, omega, trial, options)
+    met = trial.error <= options.tolerance
+    outcome = f"harmonics {', '.join(map(str, kept))}: estimated truncation error {trial.error:.1e}"
+    if not met:
+        outcome += f", above the tolerance {options.tolerance:.1e}: allow harmonics above {options.highest}"
+    return HarmonicChoice(
+        kept,
+        trial.worst,
+        options.tolerance,
+        tuple(omega),
+        tuple(history),
+        wide.with_harmonics(kept),
+        tuple(trial.x),
+        outcome,
+    )
+
+
+def widened(balance: HarmonicBalance, highest: int) -> HarmonicBalance:
+    """The problem with all harmonics to half as many again as `highest`, for estimates; raises ValueError."""
+    top = highest + (highest + 1) // 2
+    basis = replace(balance.basis, harmonics=tuple(range(top + 1)))
+    excitation = balance.excitation
+    if excitation.base is not None:
+        excitation = replace(excitation, base=balance.basis.transfer(excitation.base, basis))
+    wide = HarmonicBalance.of(
+        balance.model,
+        balance.contact.joints,
+        basis,
+        excitation,
+        balance.omega_max,
+        balance.memory,
+    )
+    return wide.with_load(balance.load_factor)
+
+
+def estimate(wide: HarmonicBalance, kept: tuple[int, ...], omega: float, x: np.ndarray, split: bool = True) -> Estimate:
+    """What the harmonics of a wide balance would change in a solution with some of them.
+
+    wide : from `widened`; kept : harmonics of the solution x (n_pair, n_component, n_coeff) [m] at omega [rad/s]
+    split : whether the shares are wanted too, at the cost of one linear solve each
+    """
+    narrow = wide.with_harmonics(kept)
+    response = narrow.basis.transfer(narrow.outputs(narrow.evaluate(omega, x, jacobian=False)), wide.basis)
+    state = wide.evaluate(omega, narrow.basis.transfer(x, wide.basis))
+    linear, point = wide.linearise(state), wide.at(omega)
+    direct = wide.outputs(state)
+    vibration = np.linalg.norm(response[:, wide.basis.order > 0], axis=1)
+    scale = np.maximum(vibration, LEAST_VIBRATION_SHARE * vibration.max(initial=0.0))
+    scale[scale == 0] = np.inf
+
+    def measure(change: np.ndarray) -> float:
+        return float((np.linalg.norm(change, axis=1) / scale).max(initial=0.0))
+
+    def change(of: set[int]) -> np.ndarray:
+        own = np.isin(wide.basis.order, list(of))
+        moved, _, _ = linear.solve(np.where(own, -state.residual, 0.0), ACCURACY)
+        return point.outputs(linear.departure_slope(moved)) + np.where(own, direct, 0.0)
+
+    absent = set(wide.basis.harmonics) - set(kept)
+    if not split:
+        return Estimate(measure(change(absent)), {})
+    changes = {h: change({h}) for h in sorted(absent)}
+    return Estimate(measure(np.sum(list(changes.values()), axis=0)), {h: measure(c) for h, c in changes.items()})
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """One set of harmonics, solved and estimated at every frequency."""
+
+    kept: tuple[int, ...]
+    x: list[np.ndarray]
+    content: np.ndarray
+    estimates: list[Estimate]
+
+    @classmethod
+    def of(
+        cls,
+        wide: HarmonicBalance,
+        kept: tuple[int, ...],
+        omega: Sequence[float],
+        before: _Trial | None,
+        options: ChoiceOptions,
+        shrinking: bool = False,
+    ) -> _Trial:
+        """Solve and estimate, from the solutions of another set where there is one; raises NotSolved.
+
+        shrinking : only whether the tolerance is met matters, not the shares; ends at the first frequency where not
+        """
+        narrow = wide.with_harmonics(kept)
+        solved, estimates = [], []
+        content = np.zeros(len(kept))
+        for i, w in enumerate(omega):
+            if before is not None:
+                old = replace(wide.basis, harmonics=before.kept)
+                solution = newton.solve(narrow, w, old.transfer(before.x[i], narrow.basis), options.newton)
+            if before is None or not solution.converged:
+                solution = arc_length.solve_along_load(narrow, w, options.newton)
+            if not solution.converged:
+                where = f"{w / (2 * np.pi):.6g} Hz with harmonics {', '.join(map(str, kept))}"
+                raise NotSolved(f"harmonics cannot be chosen: no solution at {where}: {solution.outcome}")
+            x = solution.state.x
+            solved.append(x)
+            estimates.append(estimate(wide, kept, w, x, split=not shrinking))
+            size = np.array([np.linalg.norm(x[..., narrow.basis.order == h]) for h in kept])
+            content = np.maximum(content, size / size[np.array(kept) > 0].max(initial=1e-300))
+            if shrinking and estimates[-1].error > options.tolerance:
+                break
+        return cls(kept, solved, content, estimates)
+
+    @property
+    def worst(self) -> Estimate:
+        """The estimate at the frequency where it is largest."""
+        return max(self.estimates, key=lambda e: e.error)
+
+    @property
+    def error(self) -> float:
+        """The largest estimated error."""
+        return self.worst.error
+
+    def wanted(self, options: ChoiceOptions) -> set[int]:
+        """Harmonics to take in: the fewest that leave the shares of the others below the tolerance everywhere."""
+        wanted: dict[int, float] = {}
+        for found in self.estimates:
+            if found.error <= options.tolerance:
+                continue
+            allowed = sorted((h for h in found.shares if h <= options.highest), key=lambda h: -found.shares[h])
+            rest = np.array([found.shares[h] for h in allowed])
+            remaining = np.sqrt(np.cumsum(rest[::-1] ** 2))[::-1]  # of this one and all smaller ones
+            for h, left in zip(allowed, remaining, strict=True):
+                if left > SAFETY * options.tolerance:
+                    wanted[h] = max(wanted.get(h, 0.0), found.shares[h])
+        first = sorted(wanted, key=lambda h: -wanted[h])
+        return set(first[: max(2, len(self.kept))])  # a rough solution tells little about the rest
+
+    def by_content(self) -> list[int]:
+        """Kept harmonics, the one with the least contact motion first."""
+        return [self.kept[i] for i in np.argsort(self.content)]

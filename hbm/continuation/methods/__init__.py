@@ -1,0 +1,1 @@
+"""Continuation methods, one file each, found by name."""

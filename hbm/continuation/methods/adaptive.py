@@ -1,0 +1,205 @@
+"""Adaptive continuation: natural steps, dense only where the response bends.
+
+After each step the response extrapolated through the last four points is compared with the solved one. The difference
+tells the fourth derivative, hence the error of a cubic interpolation between the points; the step is chosen so that
+this error stays at the tolerance. A step that was too long is kept as a point further on. At a fold the sweep jumps,
+as a measured one does, and says where.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation import parameter
+from tribodyn.hbm.continuation.branch import Branch, BranchBuilder
+from tribodyn.hbm.continuation.methods.arc_length import solve_along_load
+from tribodyn.hbm.continuation.methods.natural import DEGREE, extrapolate
+from tribodyn.hbm.continuation.parameter import Parameter
+from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.threads import single
+
+KINK = 0.3  # least share of the miss of extrapolation that counts as error of interpolation, as next to a kink
+JUMP = 1e3  # error estimate in the shortest step, relative to the tolerance, beyond which the response has jumped
+SLACK = 2.0  # an error estimate may exceed the tolerance by this factor before the step is taken back
+
+
+@dataclass(frozen=True)
+class Options:
+    """How points are placed.
+
+    tolerance : of the interpolated response, relative to the largest response met so far, for each output
+    step, max_step, min_step : first, longest and shortest step, relative to |stop - start|; a response that still
+        changes abruptly, or is not found, in the shortest step has jumped
+    max_points : points after which to end
+    """
+
+    tolerance: float = 1e-3
+    step: float = 5e-3
+    max_step: float = 0.05
+    min_step: float = 1e-6
+    max_points: int = 5000
+    newton: NewtonOptions = field(default_factory=NewtonOptions)
+
+    def __post_init__(self) -> None:
+        if not self.tolerance > 0:
+            raise ValueError(f"the tolerance of adaptive points must be > 0, not {self.tolerance:g}")
+        if not 0 < self.min_step <= self.step <= self.max_step:
+            raise ValueError(
+                f"adaptive steps must obey 0 < min_step <= step <= max_step, "
+                f"not {self.min_step:g}, {self.step:g}, {self.max_step:g}"
+            )
+
+
+@single
+def follow(
+    problem: HarmonicBalance | Parameter,
+    start: float,
+    stop: float,
+    options: Options | None = None,
+    on_point: Callable[[int, int], None] | None = None,
+) -> Branch:
+    """Follow the response from one frequency, or value of a parameter, to another.
+
+    start, stop : [rad/s] or in the unit of the parameter, either order
+    on_point : called with points done and points expected at the present pace
+    Returns a Branch; `end` says where it ends and why, and where the response jumped to another branch on the way
+    """
+    options = options or Options()
+    path = parameter.of(problem)
+    builder = BranchBuilder(path)
+    first = solve_along_load(*path.place(start), options.newton)
+    builder.add(start, first)
+    if not first.converged:
+        return builder.finish(f"ended at {path.say(start)}: {first.outcome}")
+    sweep = _Sweep(path, options, builder, first, start, stop)
+    while builder.value[-1] != stop:
+        if len(builder.value) >= options.max_points:
+            return builder.finish(f"ended at {path.say(builder.value[-1])}: {options.max_points} points were allowed")
+        trouble = sweep.advance()
+        if trouble:
+            return builder.finish(f"ended at {path.say(builder.value[-1])}: {trouble}")
+        if on_point is not None:
+            done = len(builder.value)
+            share = abs(builder.value[-1] - start) / abs(stop - start)
+            on_point(done, max(done, min(options.max_points, round(done / max(share, 1e-3)))))
+    jumps = ", ".join(path.say(value) for value in sweep.jumps)
+    return builder.finish(f"reached {path.say(stop)}" + (f"; the response jumped at {jumps}" if jumps else ""))
+
+
+def interpolate(branch: Branch, values: np.ndarray) -> np.ndarray:
+    """Response between the points of a branch, by the cubic through the four nearest points.
+
+    values : (n,) of the stepped parameter, within the branch
+    Returns (n, n_output, n_coeff) Fourier coefficients of the outputs [m]
+    """
+    order = np.argsort(branch.parameter)
+    known, response = branch.parameter[order], branch.response[order]
+    window = min(DEGREE + 1, len(known))
+    first = np.clip(np.searchsorted(known, values) - window // 2, 0, len(known) - window)
+    pieces = [(slice(i, i + window), value) for i, value in zip(first, values, strict=True)]
+    return np.stack([extrapolate(known[piece], list(response[piece]), value) for piece, value in pieces])
+
+
+class _Sweep:
+    """The last points, the step to come, and points solved ahead."""
+
+    def __init__(
+        self, path: Parameter, options: Options, builder: BranchBuilder, first: Solution, start: float, stop: float
+    ):
+        self._path, self._options, self._builder, self._stop = path, options, builder, stop
+        self._span = stop - start
+        self._step = options.step
+        self._ahead: list[tuple[float, Solution]] = []  # the nearest last
+        self._clean = 0  # first point after the last jump
+        self._response = [self._outputs(start, first)]
+        self._largest = self._size(self._response[0])
+        self.jumps: list[float] = []
+
+    def _outputs(self, value: float, solution: Solution) -> np.ndarray:
+        return self._path.place(value)[0].outputs(solution.state)
+
+    def _size(self, response: np.ndarray) -> np.ndarray:
+        """(n_output,) size of a response or of a difference of two [m]."""
+        return np.linalg.norm(response, axis=1)
+
+    def advance(self) -> str:
+        """One point more; a sentence where that fails."""
+        here = self._builder.value[-1]
+        while True:
+            value, solution = self._solve(here)
+            if not solution.converged:
+                if self._step <= self._options.min_step:
+                    return "" if self._jump(here) else solution.outcome
+                self._step = max(0.25 * self._step, self._options.min_step)
+                continue
+            response = self._outputs(value, solution)
+            error = self._error(value, response)
+            step = abs((value - here) / self._span)
+            if error > SLACK and step > 1.001 * self._options.min_step:
+                self._ahead.append((value, solution))
+                self._step = max(step * self._factor(error), self._options.min_step)
+                continue
+            self._accept(value, solution, response, jumped=error > JUMP)
+            if error <= JUMP:
+                self._step = float(np.clip(step * self._factor(error), self._options.min_step, self._options.max_step))
+            return ""
+
+    def _jump(self, here: float) -> bool:
+        """Continue behind a fold, small or large, where no solution follows on the one here; whether there is one."""
+        step = self._options.min_step
+        while step < self._options.max_step:
+            step *= 10
+            value = here + min(step, (self._stop - here) / self._span) * self._span
+            place = self._path.place(value)
+            solution = newton.solve(*place, self._builder.x[-1], self._options.newton)
+            if not solution.converged:
+                solution = solve_along_load(*place, self._options.newton)
+            if solution.converged:
+                self._ahead = [a for a in self._ahead if abs(a[0] - here) > abs(value - here)]
+                self._accept(value, solution, self._outputs(value, solution), jumped=True)
+                return True
+        return False
+
+    def _factor(self, error: float) -> float:
+        return float(np.clip(0.9 * max(error, 1e-12) ** (-1 / (DEGREE + 1)), 0.2, 2.0))
+
+    def _solve(self, here: float) -> tuple[float, Solution]:
+        """The next point: the stop or one solved ahead where it is near, else one solved anew."""
+        value = here + self._step * self._span
+        if self._ahead and abs(self._ahead[-1][0] - here) <= 1.2 * abs(value - here):
+            return self._ahead.pop()
+        if abs(self._stop - here) <= 1.2 * abs(value - here):
+            value = self._stop
+        known = max(self._clean, len(self._builder.value) - DEGREE - 1)
+        guess = extrapolate(np.array(self._builder.value[known:]), self._builder.x[known:], value)
+        return value, newton.solve(*self._path.place(value), guess, self._options.newton)
+
+    def _error(self, value: float, response: np.ndarray) -> float:
+        """Estimated error of interpolation in the step to a value, relative to the tolerance."""
+        first = max(self._clean, len(self._builder.value) - DEGREE - 1)
+        known = np.array(self._builder.value[first:])
+        if len(known) < DEGREE:  # too few points to tell: the first steps are short anyway
+            return 1.0
+        missed = self._size(response - extrapolate(known, self._response[first:], value))
+        window = np.append(known[1:], value)  # of the polynomial that interpolates here, at worst
+        between = np.linspace(known[-1], value, 9)[1:-1]
+        share = np.abs(np.prod(between[:, None] - window, axis=1)).max() / np.abs(np.prod(value - known))
+        share = max(share, KINK)
+        scale = np.maximum(self._largest, self._size(response))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            relative = np.where(scale > 0, missed / scale, 0.0)
+        return float(share * relative.max(initial=0.0) / self._options.tolerance)
+
+    def _accept(self, value: float, solution: Solution, response: np.ndarray, jumped: bool) -> None:
+        self._builder.add(value, solution)
+        self._response.append(response)
+        self._largest = np.maximum(self._largest, self._size(response))
+        if jumped:
+            self.jumps.append(value)
+            self._clean = len(self._builder.value) - 1
+            self._step = self._options.step

@@ -1,0 +1,201 @@
+"""Pseudo arc length continuation: the solution curve in (x, parameter) is followed round its folds.
+
+One step: predict along the tangent (bent by the last change of the tangent), correct in the hyperplane normal to it.
+The step grows and shrinks with the Newton steps and the turn of the tangent. Kinks, as contact laws make them, are
+crossed where their two legs are straight and meet; behind one that turns by more than a right angle the curve is looked
+for in the directions that the derivative there offers. A walk that comes back onto its own way took a wrong turn: it is
+rewound and resumes in shorter steps. Where all that fails, as where pairs hammer and the curve has gaps, the parameter
+alone takes a short step over the place, and the branch says where.
+Source  Keller 1977 (pseudo arc length); step control and kinks ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation import parameter
+from tribodyn.hbm.continuation.branch import Branch, BranchBuilder
+from tribodyn.hbm.continuation.curve import CurvePoint, Segment
+from tribodyn.hbm.continuation.parameter import Parameter
+from tribodyn.hbm.continuation.stepper import Options, Stepper
+from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.threads import single
+
+__all__ = ["Options", "follow", "solve_along_load"]
+
+JUMPS = 10 ** np.arange(-6.0, -2.5)  # of the range, lengths of a step over a gap in the curve, tried in turn
+MAX_JUMPS = 20
+REWINDS = 4  # times that a walk which came back onto its own way goes back to where it went wrong
+
+
+@single
+def follow(
+    problem: HarmonicBalance | Parameter,
+    start: float,
+    stop: float,
+    options: Options | None = None,
+    on_point: Callable[[int, int], None] | None = None,
+) -> Branch:
+    """Follow the solution curve from `start` towards `stop`, folds included, until it leaves the bounds.
+
+    start, stop : [rad/s] or in the unit of the parameter, either order
+    on_point : called with points done and points expected at the present pace
+    Returns a Branch with its folds; its end says whether it reached the stop, came back, closed on itself or got stuck
+    Raises  ValueError where start and stop are the same or out of the bounds
+    """
+    options = options or Options()
+    path = parameter.of(problem)
+    if start == stop:
+        raise ValueError(f"start and stop are the same, {path.say(start)}: there is no curve to follow")
+    bounds = options.bounds or (min(start, stop), max(start, stop))
+    if not bounds[0] <= start <= bounds[1]:
+        raise ValueError(f"the start, {path.say(start)}, lies outside of the bounds of the continuation")
+    place = path.place(start)
+    if options.guess is not None:
+        first = newton.solve(*place, options.guess, options.newton)
+    elif path.name == parameter.LOAD:
+        first = newton.solve_from_rest(*place, options.newton)
+    else:
+        first = solve_along_load(*place, options.newton)
+    builder = BranchBuilder(path)
+    builder.add(start, first)
+    if not first.converged:
+        return builder.finish(f"ended at {path.say(start)}: {first.outcome}")
+    walk = _Walk(path, options, builder, Stepper(path, options, first, start, stop), bounds, abs(stop - start))
+    while (end := walk.go_on()) is None:
+        if on_point is not None:
+            done = len(builder.value)
+            share = abs(builder.value[-1] - start) / abs(stop - start)
+            on_point(done, max(done, min(options.max_points, round(done / max(share, 1e-3)))))
+    return builder.finish(end + walk.gaps)
+
+
+@single
+def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None) -> Solution:
+    """Solve at one frequency [rad/s] without a neighbouring solution, also where the curve in the load has folds.
+
+    Newton from rest and its load ramp are tried first; else the curve of solutions over the load is followed
+    Returns a Solution; its outcome is the one from rest where the curve does not reach the load either
+    """
+    options = options or NewtonOptions()
+    first = newton.solve_from_rest(balance, omega, options)
+    if first.converged:
+        return first
+    ramp = follow(parameter.load(balance, omega), 0.0, balance.load_factor, Options(newton=options))
+    if ramp.parameter[-1] != balance.load_factor:
+        return first
+    last = newton.solve(balance, omega, ramp.contact[-1].reshape(first.state.x.shape), options)
+    return replace(last, outcome=last.outcome if last.converged else first.outcome)
+
+
+class _Walk:
+    """Steps taken into a branch, and the reasons to end it."""
+
+    def __init__(
+        self,
+        path: Parameter,
+        options: Options,
+        builder: BranchBuilder,
+        stepper: Stepper,
+        bounds: tuple[float, float],
+        reach: float,
+    ):
+        self._path, self._options, self._builder, self._stepper, self._bounds = path, options, builder, stepper, bounds
+        self._reach = reach
+        self._start = builder.value[0]
+        self._first: CurvePoint | None = None
+        self._size = float(np.linalg.norm(builder.x[0]))
+        self._rows = [1]  # points in the branch before each segment
+        self._rewinds = 0
+        self._jumps: list[float] = []
+
+    @property
+    def gaps(self) -> str:
+        """Where the walk stepped over gaps in the curve, to be added to how it ended; empty where it did not."""
+        places = ", ".join(self._path.say(value) for value in self._jumps)
+        return f"; stepped over gaps in the curve at {places}" if places else ""
+
+    def go_on(self) -> str | None:
+        """One step more; the sentence that ends the branch, or None."""
+        builder, path = self._builder, self._path
+        if len(builder.value) >= self._options.max_points:
+            return f"ended at {path.say(builder.value[-1])}: {self._options.max_points} points were allowed"
+        parts = self._stepper.advance()
+        if not parts:
+            return None if self._jump() else f"ended at {path.say(builder.value[-1])}: {self._stepper.trouble}"
+        self._first = self._first or parts[0].start.bare()
+        for part in parts:
+            bound = next((b for b in self._bounds if part.crosses(b)), None)
+            if bound is not None:
+                return self._land(part, bound)
+            if part.turns:  # a fold that is a kink, right behind the last point
+                builder.mark_fold()
+            assert part.end.solution is not None
+            builder.add(part.end.value, part.end.solution, fold=part.end.fold)
+        self._rows.append(len(builder.value))
+        return self._came_back(parts)
+
+    def _jump(self) -> bool:
+        """Step over a gap in the curve, its parameter moving on as before; whether there is a solution behind."""
+        here, span, sense = self._builder.value[-1], self._bounds[1] - self._bounds[0], self._stepper.sense
+        for share in JUMPS if len(self._jumps) < MAX_JUMPS else ():
+            value = here + sense * share * span
+            if sense == 0 or not self._bounds[0] < value < self._bounds[1]:
+                break
+            solution = newton.solve(*self._path.place(value), self._builder.x[-1], self._options.newton)
+            if solution.converged:
+                self._jumps.append(value)
+                self._builder.add(value, solution)
+                self._stepper = Stepper(self._path, self._options, solution, value, value + sense * self._reach)
+                self._rows, self._first = [len(self._builder.value)], None
+                return True
+        return False
+
+    def _land(self, part: Segment, bound: float) -> str:
+        """Solve at the bound that the curve crosses."""
+        balance, omega = self._path.place(bound)
+        flat = part.guess_at(bound)
+        guess = flat.reshape(balance.contact.n_pair, -1, flat.shape[-1])
+        last = newton.solve(balance, omega, guess, self._options.newton)
+        self._builder.add(bound, last)
+        if not last.converged:
+            return f"ended at {self._path.say(bound)}: {last.outcome}"
+        return f"{'turned back to' if bound == self._start else 'reached'} {self._path.say(bound)}"
+
+    def _came_back(self, parts: list[Segment]) -> str | None:
+        """Whether the curve is closed, or lost itself in infinity or in its own past."""
+        builder, here, newton_options = self._builder, self._path.say(self._builder.value[-1]), self._options.newton
+        growth = self._options.max_growth
+        if np.linalg.norm(builder.x[-1]) > growth * self._size > 0:
+            return f"ended at {here}: the response grows without bound, {growth:.0e} times that of the first point"
+        assert self._first is not None
+        old = self._stepper.segments
+        if len(old) > 3 and any(p.passes(self._path, self._first, 1.0, newton_options) for p in parts):
+            return f"closed curve: came back to its first point after {len(builder.value)} points"
+        return self._lost(parts, here)
+
+    def _lost(self, parts: list[Segment], here: str) -> str | None:
+        """Whether the walk is back on its own way: then it went wrong there, is rewound and continues in shorter steps.
+
+        Against its sense it turned where it should not; in its sense it left the curve for a closed one beside it.
+        """
+        old, newton_options = self._stepper.segments, self._options.newton
+        for index in range(1, len(old) - 2):
+            near = [p for p in parts if p.near(old[index])]
+            for sense in (-1.0, 1.0):
+                if not any(p.passes(self._path, old[index].start, sense, newton_options) for p in near):
+                    continue
+                if self._rewinds == REWINDS:
+                    return f"ended at {here}: the curve came back onto itself"
+                self._rewinds += 1
+                index = index if sense < 0 else max(index - 2, 0)
+                self._stepper.rewind(index)
+                self._builder.truncate(self._rows[index])
+                del self._rows[index + 1 :]
+                return None
+        return None

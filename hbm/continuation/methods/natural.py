@@ -1,0 +1,146 @@
+"""Natural continuation: the parameter is stepped, the solution follows by extrapolation of its last points.
+
+A step that fails is halved. Where that does not help the curve is followed by arc length: if it has a fold there, the
+sweep jumps as a measured one does, to where the curve comes to the next value or else to what is found from rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation import parameter
+from tribodyn.hbm.continuation.branch import Branch, BranchBuilder
+from tribodyn.hbm.continuation.methods import arc_length
+from tribodyn.hbm.continuation.parameter import Parameter
+from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.threads import single
+
+DEGREE = 2  # of the extrapolating polynomial
+APART = 0.5  # least distance of its points, in steps
+ROUND_FOLDS = 200  # points by arc length on the way round folds
+SHORTEST, SLOWEST = 0.03, 0.8  # of Newton's method where a shorter step of the continuation is left to try
+
+
+@dataclass(frozen=True)
+class Options:
+    """n_points : equidistant values, ends included; refinements : times a failed step may be halved."""
+
+    n_points: int = 200
+    refinements: int = 6
+    newton: NewtonOptions = field(default_factory=NewtonOptions)
+
+    def __post_init__(self) -> None:
+        if self.n_points < 2 or self.refinements < 0:
+            raise ValueError(
+                f"natural points need n_points >= 2 and refinements >= 0, not {self.n_points}, {self.refinements}"
+            )
+
+
+@single
+def follow(
+    problem: HarmonicBalance | Parameter,
+    start: float,
+    stop: float,
+    options: Options | None = None,
+    on_point: Callable[[int, int], None] | None = None,
+) -> Branch:
+    """Follow the response from one frequency, or value of a parameter, to another.
+
+    start, stop : [rad/s] or in the unit of the parameter, either order
+    on_point : called with points done and points wanted
+    Returns a Branch; its end says at which folds the response jumped, and where and why a branch ends early. Points
+        of the branch that are folds are marked
+    """
+    options = options or Options()
+    path = parameter.of(problem)
+    builder = BranchBuilder(path)
+    solution = newton.solve_from_rest(*path.place(start), options.newton)
+    builder.add(start, solution)
+    wanted = np.linspace(start, stop, options.n_points)[1:]
+    for done, value in enumerate(wanted, start=1):
+        if not solution.converged:
+            break
+        solution = _step(path, builder, value, options, options.refinements)
+        if not solution.converged:
+            solution = _by_arc_length(path, builder, solution, value, stop, options)
+        if on_point is not None:
+            on_point(done + 1, options.n_points)
+    if solution.converged:
+        folds = ", ".join(path.say(builder.value[i]) for i in builder.folds)
+        jumped = f"; the response jumped at folds: {folds} (arc_length goes round them)" if folds else ""
+        return builder.finish(f"reached {path.say(stop)}{jumped}")
+    return builder.finish(f"ended at {path.say(builder.value[-1])}: {solution.outcome}")
+
+
+def _step(path: Parameter, builder: BranchBuilder, value: float, options: Options, halvings: int) -> Solution:
+    """One step to `value`, through points in between where it fails."""
+    hasty = replace(options.newton, shortest=SHORTEST, slowest=SLOWEST)
+    patience = hasty if halvings > 0 else options.newton
+    solution = newton.solve(*path.place(value), predict(builder, value), patience)
+    if not solution.converged and halvings > 0:
+        middle = _step(path, builder, 0.5 * (builder.value[-1] + value), options, halvings - 1)
+        if not middle.converged:
+            return middle
+        return _step(path, builder, value, options, halvings - 1)
+    builder.add(value, solution)
+    return solution
+
+
+def _by_arc_length(
+    path: Parameter, builder: BranchBuilder, failed: Solution, value: float, stop: float, options: Options
+) -> Solution:
+    """Replace the failed last point by the fold that made it fail, if any, and the solution behind it, at `value`."""
+    here, origin, shape = builder.value[-2], builder.value[0], failed.state.x.shape
+    way = arc_length.Options(
+        width=arc_length.Options.width * abs((stop - origin) / (value - here)),
+        bounds=(min(origin, value), max(origin, value)),
+        guess=builder.x[-2],
+        max_points=ROUND_FOLDS,
+        newton=options.newton,
+    )
+    curve = arc_length.follow(path, here, value, way)
+    arrived = curve.parameter[-1] == value and curve.outcome[-1] == CONVERGED
+    if not (arrived or curve.folds):
+        return failed
+    builder.truncate(len(builder.value) - 1)
+    for first in curve.folds[:1]:
+        fold, x = float(curve.parameter[first]), curve.contact[first].reshape(shape)
+        builder.add(fold, newton.solve(*path.place(fold), x, options.newton), fold=True)
+    if arrived:
+        solution = newton.solve(*path.place(value), curve.contact[-1].reshape(shape), options.newton)
+    else:
+        solution = arc_length.solve_along_load(*path.place(value), options.newton)
+        if not solution.converged:
+            why = f"the curve turns back at a fold, {path.say(fold)}; arc_length goes round it"
+            solution = replace(solution, outcome=why)
+    builder.add(value, solution)
+    return solution
+
+
+def predict(builder: BranchBuilder, value: float) -> np.ndarray:
+    """Extrapolation of the last points to a value of the parameter: (n_pair, n_component, n_coeff) [m].
+
+    Points closer together than half of the step, as halved steps leave them, would blow up their differences; those
+    before a fold lie on another leg of the curve.
+    """
+    apart = APART * abs(value - builder.value[-1])
+    chosen = [len(builder.value) - 1]
+    for i in reversed(range(builder.folds[-1] + 1 if builder.folds else 0, chosen[0])):
+        if len(chosen) > DEGREE:
+            break
+        if abs(builder.value[i] - builder.value[chosen[-1]]) >= apart:
+            chosen.append(i)
+    known = chosen[::-1]
+    return extrapolate(np.array([builder.value[i] for i in known]), [builder.x[i] for i in known], value)
+
+
+def extrapolate(known: np.ndarray, values: Sequence[np.ndarray] | np.ndarray, at: float) -> np.ndarray:
+    """Lagrange polynomial through values known at points (n,), taken at another point."""
+    weights = [np.prod((at - np.delete(known, i)) / (known[i] - np.delete(known, i))) for i in range(len(known))]
+    return np.sum([w * value for w, value in zip(weights, values, strict=True)], axis=0)

@@ -1,0 +1,183 @@
+"""Nonlinear modes: backbone of frequency and damping against amplitude, by the extended periodic motion concept.
+
+    M q'' + (C - 2 zeta w M) q' + K q + B^T f_c(x) = F_0
+
+is periodic for the pair (w, zeta) at which the added, mass-proportional term balances what the contact and C dissipate.
+The backbone is followed by its arc length, since with friction it may turn back in amplitude; see `free_vibration`
+for the equations and how they are solved.
+Source  Krack 2015, Computers & Structures 154
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation.free_vibration import FreeVibration, Point
+from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.threads import single
+
+EASY, HARD = 3, 7  # Newton steps up to which the next step grows, and from which it shrinks
+EMPHASIS = 5.0  # of the logarithm of frequency and of the damping ratio beside that of the amplitude, in arc length
+CORNER = 1e-2  # of the longest step, below which any turn is taken as a corner of the curve
+
+
+@dataclass(frozen=True)
+class BackboneOptions:
+    """n_points : amplitudes on an easy way, equidistant in the logarithm: this sets the longest step
+
+    min_step : shortest step, as a fraction of the longest; max_points : points after which to end
+    """
+
+    n_points: int = 40
+    min_step: float = 1e-4
+    max_points: int = 400
+    newton: NewtonOptions = field(default_factory=NewtonOptions)
+
+
+@dataclass(frozen=True)
+class Backbone:
+    """One nonlinear mode.
+
+    amplitude : (n_point,) of the chosen output as the reference mode alone would move it [m]
+    omega : (n_point,) natural frequency [rad/s]; damping : (n_point,) modal damping ratio, structure and contact
+    output_names, response : (n_point, n_output, n_coeff) Fourier coefficients of the outputs [m]
+    contact : (n_point, n_pair * n_component, n_coeff) relative displacement [m]
+    energy : (n_point,) dissipated energy per cycle, all pairs [J]
+    outcome : for each point "converged" or a sentence; newton_steps : (n_point,)
+    reference_omega : of the mode at rest, stuck where the static load keeps the contact closed [rad/s]
+    end : sentence that says where and why the backbone ends
+    """
+
+    amplitude: np.ndarray
+    omega: np.ndarray
+    damping: np.ndarray
+    output_names: tuple[str, ...]
+    response: np.ndarray
+    contact: np.ndarray
+    energy: np.ndarray
+    outcome: tuple[str, ...]
+    newton_steps: np.ndarray
+    reference_omega: float
+    end: str
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """(n_point,) natural frequency [Hz]."""
+        return self.omega / (2 * np.pi)
+
+    @property
+    def reference_frequency(self) -> float:
+        """Frequency of the mode at rest [Hz]."""
+        return self.reference_omega / (2 * np.pi)
+
+
+_Solved = tuple[Point, str, int]
+
+
+@single
+def backbone(
+    balance: HarmonicBalance,
+    start: float,
+    stop: float,
+    mode: int = 0,
+    output: str | None = None,
+    options: BackboneOptions | None = None,
+) -> Backbone:
+    """Follow one nonlinear mode from a small to a large amplitude (or back).
+
+    balance : its vibration load plays no part, its static load does
+    start, stop : amplitudes [m] of `output` (the first by default) in the reference mode
+    mode : number of the reference mode, from 0, among the modes about the static equilibrium
+    Raises  ValueError for models whose harmonics see different systems, unknown outputs, no static equilibrium
+    """
+    options = options or BackboneOptions()
+    if not (start > 0 and stop > 0 and start != stop):
+        raise ValueError(f"the amplitudes of a backbone must be > 0 and differ, not {start} and {stop}")
+    problem = FreeVibration(balance, mode, output)
+    a, goal = np.log(np.array([start, stop]) / problem.per_amplitude)
+    solved, end = _walk(problem, float(a), float(goal), options)
+    return _result(problem, solved, end)
+
+
+def _walk(problem: FreeVibration, start: float, goal: float, options: BackboneOptions) -> tuple[list[_Solved], str]:
+    """Points from the logarithm of the amplitude `start` to `goal`, and how the walk ends."""
+    first = problem.first_guess(np.exp(start))
+    fixed = np.zeros(len(first.coordinates))
+    fixed[-1] = 1.0
+    solved = [_newton(problem, first, fixed, options.newton)]
+    if solved[0][1] != CONVERGED:
+        return solved, f"ended at the start: {solved[0][1]}"
+    longest = abs(goal - start) / max(options.n_points - 1, 1)
+    step, tangent = longest, np.sign(goal - start) * fixed
+    weight = np.ones(len(fixed))
+    weight[-3:-1] = EMPHASIS**2
+    while len(solved) < options.max_points:
+        here = solved[-1][0].coordinates
+        ahead = here + step * tangent
+        last = (ahead[-1] - goal) * (start - goal) <= 0
+        if last:
+            ahead = here + (goal - here[-1]) / tangent[-1] * tangent
+        found = _newton(problem, problem.evaluate(ahead), fixed if last else weight * tangent, options.newton)
+        turned = found[0].coordinates - here
+        size = np.sqrt(turned @ (weight * turned))
+        smooth = turned @ (weight * tangent) > 0.5 * size or step < CORNER * longest
+        if found[1] != CONVERGED or not smooth:
+            step *= 0.5
+            if step < options.min_step * longest:
+                return [*solved, found], f"ended: {found[1]}"
+            continue
+        solved.append(found)
+        if last:
+            return solved, "reached the amplitude asked for"
+        if (found[0].coordinates[-1] - start) * (goal - start) < 0:
+            return solved, "came back to where it began"
+        tangent = turned / size
+        step = min(longest, 1.6 * step) if found[2] <= EASY else 0.6 * step if found[2] >= HARD else step
+    return solved, f"stopped after {options.max_points} points"
+
+
+def _newton(problem: FreeVibration, point: Point, normal: np.ndarray, options: NewtonOptions) -> _Solved:
+    """The point of the curve in the hyperplane through a guess."""
+    error = float(np.linalg.norm(point.residual))
+    for step in range(options.max_steps):
+        if error <= options.tolerance:
+            return point, CONVERGED, step
+        direction = problem.correction(point, normal, float(np.clip(error, 1e-10, 1e-3)), options.max_products)
+        best, best_error, length = point, error, 1.0
+        for _ in range(8):
+            trial = problem.evaluate(point.coordinates + length * direction)
+            trial_error = float(np.linalg.norm(trial.residual))
+            if trial_error < best_error:
+                best, best_error = trial, trial_error
+            if trial_error <= (1 - 0.1 * length) * error:
+                break
+            length *= 0.5
+        if best is point:
+            return point, f"no descent from relative residual {error:.1e}", step + 1
+        point, error = best, best_error
+    outcome = CONVERGED if error <= options.tolerance else f"not converged in {options.max_steps} steps: {error:.1e}"
+    return point, outcome, options.max_steps
+
+
+def _result(problem: FreeVibration, solved: list[_Solved], end: str) -> Backbone:
+    points = [p for p, _, _ in solved]
+    basis = problem.basis
+    t = problem.balance.contact.tangential
+    work = [float(basis.work_per_cycle(p.cycle.force[:, t], p.x[:, t]).sum()) for p in points]
+    return Backbone(
+        amplitude=np.array([p.a for p in points]) * problem.per_amplitude,
+        omega=np.array([p.omega for p in points]),
+        damping=np.array([p.zeta for p in points]),
+        output_names=problem.balance.compliance.output_names,
+        response=np.stack([problem.outputs(p) for p in points]),
+        contact=np.stack([p.x.reshape(-1, basis.n_coeff) for p in points]),
+        energy=np.array(work),
+        outcome=tuple(outcome for _, outcome, _ in solved),
+        newton_steps=np.array([steps for _, _, steps in solved]),
+        reference_omega=problem.reference_omega,
+        end=end,
+    )

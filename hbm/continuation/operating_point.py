@@ -1,0 +1,316 @@
+"""Where the cycle is taken: at a fixed frequency, or at the resonance peak, which is tracked directly.
+
+The peak is the zero of d A^2 / d omega along the branch, with dx/d omega from the linearised balance; no sweep is
+needed once a neighbouring peak is known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.continuation.branch import Branch, amplitude
+from tribodyn.hbm.continuation.methods import adaptive, arc_length
+from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.outcome import CONVERGED
+
+SCAN_TOLERANCE = 0.03  # of the response between the points of the first search
+COARSEST = 0.05  # longest step of the first search, share of its range
+
+
+class NoPeak(ValueError):
+    """The response has no maximum inside the range that is searched; the message says where it still rises."""
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """A solution that the vibration cycle is taken from.
+
+    amplitude : of the response output [m]; response : (n_output, n_coeff) [m]; solves : balance solves spent
+    """
+
+    solution: Solution
+    amplitude: float
+    response: np.ndarray
+    solves: int
+
+    @classmethod
+    def of(cls, balance: HarmonicBalance, solution: Solution, output: str, solves: int) -> OperatingPoint:
+        """A solution with the amplitude of an output."""
+        response = balance.outputs(solution.state)
+        row = balance.compliance.output_names.index(output)
+        return cls(solution, float(amplitude(response[row])), response, solves)
+
+    @property
+    def state(self) -> State:
+        """The solved state."""
+        return self.solution.state
+
+
+@dataclass(frozen=True)
+class Correction:
+    """How far a solved cycle is from where it is to be taken.
+
+    distance : to the right frequency [rad/s]; dx : d x / d omega (n_pair, n_component, n_coeff) [m s]; solves : spent
+    """
+
+    distance: float
+    dx: np.ndarray
+    solves: int
+
+
+@dataclass(frozen=True)
+class AtFrequency:
+    """The cycle at a fixed frequency [rad/s]."""
+
+    output: str
+    omega: float
+    newton: NewtonOptions = field(default_factory=NewtonOptions)
+
+    def first(self, balance: HarmonicBalance) -> OperatingPoint:
+        """Solve without a neighbour, where need be along the folded curve of solutions over the load."""
+        return OperatingPoint.of(balance, arc_length.solve_along_load(balance, self.omega, self.newton), self.output, 1)
+
+    def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
+        """Solve from a neighbouring x; `omega` is the neighbour's and ignored here.
+
+        Where the neighbour's branch has ended in a fold, the response jumps to the one that a rising load leads to.
+        """
+        solution, solves = newton.solve(balance, self.omega, x, self.newton), 1
+        if not solution.converged:
+            solution, solves = arc_length.solve_along_load(balance, self.omega, self.newton), 2
+        return OperatingPoint.of(balance, solution, self.output, solves)
+
+    def correct(self, balance: HarmonicBalance, state: State) -> Correction:
+        """The distance of a state to the fixed frequency."""
+        return Correction(self.omega - state.omega, np.zeros_like(state.x), 0)
+
+    @property
+    def accuracy(self) -> float:
+        """Relative accuracy that the frequency is wanted with."""
+        return 0.0
+
+
+@dataclass(frozen=True)
+class AtPeak:
+    """The cycle at the resonance peak of an output.
+
+    start, stop : range that the first search scans [rad/s], from `start` on; n_scan : its steps where nothing bends are
+        up to five times as long as of so many points
+    tolerance : relative, on the frequency of the peak
+    """
+
+    output: str
+    start: float
+    stop: float
+    n_scan: int = 60
+    tolerance: float = 1e-5
+    newton: NewtonOptions = field(default_factory=NewtonOptions)
+
+    def first(self, balance: HarmonicBalance) -> OperatingPoint:
+        """Scan the range, points dense where the response bends, then refine its highest maximum.
+
+        Raises  NoPeak where no maximum lies inside the range: an end of it is no resonance
+        """
+        step = min(1 / self.n_scan, COARSEST)
+        scan = adaptive.Options(SCAN_TOLERANCE, step, min(5 * step, COARSEST), 1e-3 * step, newton=self.newton)
+        branch = adaptive.follow(balance, self.start, self.stop, scan)
+        best = self._highest_maximum(branch)
+        x = branch.contact[best].reshape(balance.contact.n_pair, len(balance.contact.components), balance.basis.n_coeff)
+        near = branch.omega[max(best - 1, 0) : best + 2]
+        width = float(np.ptp(near)) / max(len(near) - 1, 1)
+        found = self._refine(balance, branch.omega[best], x, 0.5 * width)
+        return OperatingPoint(found.solution, found.amplitude, found.response, found.solves + len(branch.omega))
+
+    def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
+        """Refine from a neighbouring peak."""
+        return self._refine(balance, omega, x, 2e-4 * omega)
+
+    def correct(self, balance: HarmonicBalance, state: State) -> Correction:
+        """The distance of a state to the peak, by its slope and as though one mode responded."""
+        here = _Slope.of(balance, Solution(state, CONVERGED, 0, 0, ()), self.output)
+        return Correction(here.distance, here.dx, 0)
+
+    @property
+    def accuracy(self) -> float:
+        """Relative accuracy that the frequency is wanted with."""
+        return self.tolerance
+
+    def _highest_maximum(self, branch: Branch) -> int:
+        """Point of a branch that is the highest of those that are higher than both their neighbours."""
+        good = np.array([outcome == CONVERGED for outcome in branch.outcome])
+        height = np.where(good, branch.amplitude(self.output), -1.0)
+        inner = np.flatnonzero(
+            good[1:-1] & (height[1:-1] > 0) & (height[1:-1] >= height[:-2]) & (height[1:-1] >= height[2:])
+        )
+        if len(inner):
+            return int(inner[np.argmax(height[inner + 1])]) + 1
+        if height.max(initial=0.0) <= 0.0:
+            raise NoPeak(f"no resonance peak of {self.output}: it does not vibrate between {_range(branch)}")
+        end = float(branch.omega[int(np.argmax(height))] / (2 * np.pi))
+        which = "lower" if end == branch.omega.min() / (2 * np.pi) else "upper"
+        raise NoPeak(
+            f"no resonance peak of {self.output} lies between {_range(branch)}: the response still rises towards the "
+            f"{which} end at {end:.5g} Hz; extend response.frequency beyond it, or name a frequency in wear.at"
+        )
+
+    def _refine(self, balance: HarmonicBalance, omega: float, x: np.ndarray, stride: float) -> OperatingPoint:
+        def solve(w: float, guess: np.ndarray) -> _Slope:
+            solution = newton.solve(balance, w, guess, self.newton)
+            return _Slope.of(balance, solution, self.output)
+
+        here = solve(omega, x)
+        solves = 1
+        if not here.solution.converged:
+            return OperatingPoint.of(balance, here.solution, self.output, solves)
+        resolution = self.tolerance * omega
+        uphill = other = None  # the latest points on either side of the zero, once it is bracketed
+        climbed: bool | None = None  # whether the last point inside the bracket replaced `uphill`
+        before: _Slope | None = None
+        best = here
+        while solves < 60:
+            side = float(np.sign(here.slope))
+            if uphill is not None and other is not None:
+                target = _zero(uphill, other)
+            elif before is None:
+                target = here.omega + (here.distance if abs(here.distance) < 20 * stride else side * stride)
+            else:  # extrapolate the slope, never further than a few strides and always uphill
+                reach = abs(here.omega - before.omega)
+                guess = (_zero(before, here) - here.omega) * side
+                target = here.omega + side * (min(guess, 8 * reach) if guess > 0 else 3 * reach)
+            target = float(np.clip(target, 1e-3 * omega, balance.omega_max))
+            if abs(target - best.omega) <= resolution:
+                break
+            there = solve(target, here.predict(target))
+            solves += 1
+            if not there.solution.converged:
+                if uphill is not None and other is not None:
+                    break
+                stride, before = 0.25 * min(stride, abs(target - here.omega)), None
+                if stride < resolution:
+                    break
+                continue
+            if there.slope * here.slope <= 0 and uphill is None:
+                uphill, other = here, there
+            elif uphill is not None and other is not None:
+                climbs = there.slope * uphill.slope > 0
+                kept = 0.5 if climbs == climbed else 1.0  # Illinois: an end that stays twice loses weight
+                if climbs:
+                    uphill, other = there, replace(other, weight=kept * other.weight)
+                else:
+                    uphill, other = replace(uphill, weight=kept * uphill.weight), there
+                climbed = climbs
+            before, here = here, there
+            if abs(there.slope) <= abs(best.slope):
+                best = there
+        if uphill is None and best.slope > 0 and best.omega >= (1 - 1e-9) * balance.omega_max:
+            hertz = balance.omega_max / (2 * np.pi)
+            raise NoPeak(
+                f"the resonance peak of {self.output} has moved beyond {hertz:.5g} Hz, the highest frequency that is "
+                "modelled: extend response.frequency"
+            )
+        return OperatingPoint.of(balance, best.solution, self.output, solves)
+
+
+def _range(branch: Branch) -> str:
+    low, high = branch.omega.min() / (2 * np.pi), branch.omega.max() / (2 * np.pi)
+    return f"{low:.5g} and {high:.5g} Hz"
+
+
+def _zero(a: _Slope, b: _Slope) -> float:
+    """Where the straight line through two slopes vanishes [rad/s]."""
+    fa, fb = a.weight * a.slope, b.weight * b.slope
+    return (a.omega * fb - b.omega * fa) / (fb - fa) if fa != fb else 0.5 * (a.omega + b.omega)
+
+
+@dataclass(frozen=True)
+class BesidePeak:
+    """The cycle at a fixed ratio to the frequency of the resonance peak, which is tracked as `AtPeak` does."""
+
+    peak: AtPeak
+    ratio: float
+
+    @property
+    def output(self) -> str:
+        """Name of the output whose peak is tracked."""
+        return self.peak.output
+
+    @property
+    def newton(self) -> NewtonOptions:
+        """How exactly and how long Newton works."""
+        return self.peak.newton
+
+    def first(self, balance: HarmonicBalance) -> OperatingPoint:
+        """Find the peak, then go to the ratio."""
+        return self._beside(balance, self.peak.first(balance))
+
+    def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
+        """From a neighbouring x at the ratio: back to the peak, refine it, and to the ratio again."""
+        solution, solves = self._walk(balance, omega, omega / self.ratio, x)
+        at_peak = self.peak.next(balance, omega / self.ratio, solution.state.x)
+        found = self._beside(balance, at_peak)
+        return replace(found, solves=found.solves + solves)
+
+    def correct(self, balance: HarmonicBalance, state: State) -> Correction:
+        """The distance of a state to the ratio times the frequency of the peak, which is found from it."""
+        solution, solves = self._walk(balance, state.omega, state.omega / self.ratio, state.x)
+        at_peak = self.peak.next(balance, state.omega / self.ratio, solution.state.x)
+        distance = self.ratio * at_peak.state.omega - state.omega
+        return Correction(distance, np.zeros_like(state.x), solves + at_peak.solves)
+
+    @property
+    def accuracy(self) -> float:
+        """Relative accuracy that the frequency is wanted with."""
+        return self.peak.tolerance
+
+    def _beside(self, balance: HarmonicBalance, peak: OperatingPoint) -> OperatingPoint:
+        omega = peak.state.omega
+        solution, solves = self._walk(balance, omega, self.ratio * omega, peak.state.x)
+        return OperatingPoint.of(balance, solution, self.peak.output, peak.solves + solves)
+
+    def _walk(self, balance: HarmonicBalance, start: float, stop: float, x: np.ndarray) -> tuple[Solution, int]:
+        """Natural steps of half a per cent from one frequency to another."""
+        count = max(1, int(np.ceil(abs(stop / start - 1) / 5e-3)))
+        for omega in np.linspace(start, stop, count + 1):
+            solution = newton.solve(balance, omega, x, self.peak.newton)
+            if solution.converged:
+                x = solution.state.x
+        return solution, count + 1
+
+
+@dataclass(frozen=True)
+class _Slope:
+    """A solved point with d A^2 / d omega and d x / d omega.
+
+    distance : to the peak [rad/s], were the response that of one mode, y = R / (p - omega)
+    """
+
+    solution: Solution
+    omega: float
+    slope: float
+    distance: float
+    dx: np.ndarray
+    weight: float = 1.0
+
+    @classmethod
+    def of(cls, balance: HarmonicBalance, solution: Solution, output: str) -> _Slope:
+        state = solution.state
+        slope_r, slope_y = balance.frequency_slope(state)
+        linear = balance.linearise(state)
+        dx = linear.solve_refined(-slope_r, 1e-8)
+        dy = slope_y + balance.at(state.omega).outputs(linear.departure_slope(dx))
+        row = balance.compliance.output_names.index(output)
+        y = balance.outputs(state)[row]
+        dynamic = balance.basis.order > 0
+        along, steepness = y[dynamic] @ dy[row][dynamic], dy[row][dynamic] @ dy[row][dynamic]
+        distance = along / steepness if steepness > 0 else 0.0
+        return cls(solution, state.omega, float(2 * along), float(distance), dx.reshape(state.x.shape))
+
+    def predict(self, omega: float) -> np.ndarray:
+        return self.solution.state.x + (omega - self.omega) * self.dx
+
+
+Site = AtFrequency | AtPeak | BesidePeak

@@ -1,0 +1,231 @@
+"""One step along a solution curve: predict, correct, judge; smooth stretches, kinks and sharp corners."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tribodyn.hbm.continuation import bordered
+from tribodyn.hbm.continuation.bordered import BorderFailed, Direction, Metric
+from tribodyn.hbm.continuation.curve import KINK_ANGLE, CurvePoint, Segment, locate_fold
+from tribodyn.hbm.continuation.parameter import Parameter
+from tribodyn.hbm.newton import NewtonOptions, Solution
+
+LEAST_LENGTH_RATIO = 0.8  # the characteristic length falls to this share per point where the vibration gets small
+LARGEST_MISS = 0.35  # miss of the prediction, in steps, beyond which the step is too long
+CORNER_STEP = 0.1  # longest step in which a corner is looked for
+STEP_TANGENT = 1e-6  # relative accuracy of tangents along the way
+CAP_GROWTH = 1.1  # growth per step of the cap on steps after a rewind
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a curve is followed.
+
+    step, max_step, min_step : arc length of the first, the longest and the shortest step; one is the size of the
+        vibration, or `width` times the range |stop - start| of the parameter
+    angle : turn of the tangent that one step aims at [rad]
+    newton_target : Newton steps that one step aims at; newton_limit : beyond it the step is halved
+    max_points : points after which to end; max_growth : of the response over that of the first point
+    bounds : values of the parameter between which the curve is followed, start and stop if None
+    guess : (n_pair, n_component, n_coeff) neighbour of the first solution [m]; from rest if None
+    fold_tolerance : relative, on the parameter at a fold
+    """
+
+    step: float = 0.05
+    max_step: float = 0.25
+    min_step: float = 1e-6
+    width: float = 0.1
+    angle: float = 0.25
+    newton_target: int = 4
+    newton_limit: int = 12
+    max_points: int = 5000
+    max_growth: float = 1e8
+    bounds: tuple[float, float] | None = None
+    guess: np.ndarray | None = None
+    fold_tolerance: float = 1e-9
+    newton: NewtonOptions = field(default_factory=NewtonOptions)
+
+    def __post_init__(self) -> None:
+        if not 0 < self.min_step <= self.step <= self.max_step:
+            raise ValueError(
+                f"arc length steps must obey 0 < min_step <= step <= max_step, "
+                f"not {self.min_step:g}, {self.step:g}, {self.max_step:g}"
+            )
+        if self.max_points < 2:
+            raise ValueError(f"max_points must be at least 2, not {self.max_points}")
+
+
+class Stepper:
+    """The point reached and the step to come.
+
+    first : the solution at `start`; the walk sets out in the direction of `stop`, or of the heading where one is given
+    trouble : why the last step that failed did
+    segments : the curve behind, without its solutions
+    """
+
+    def __init__(
+        self,
+        path: Parameter,
+        options: Options,
+        first: Solution,
+        start: float,
+        stop: float,
+        heading: Direction | None = None,
+    ):
+        self._path, self._options = path, options
+        self._newton = replace(options.newton, max_steps=min(options.newton_limit, options.newton.max_steps))
+        self._width = options.width * abs(stop - start)
+        self._order = path.place(start)[0].basis.order
+        self._reference = first.state.flat
+        self._length = 0.0
+        self._metric = self._measure(self._reference)
+        onward = Direction(np.zeros_like(self._reference), float(np.sign(stop - start)))
+        forward = self._metric.unit(heading or onward)
+        self._here = CurvePoint.of(start, first, self._tangent(start, first, forward) or forward)
+        self._bend: Direction | None = None
+        self._step, self._cap = options.step, options.max_step
+        self.segments: list[Segment] = []
+        self.trouble = ""
+
+    def _measure(self, flat: np.ndarray) -> Metric:
+        """The metric at a point: its length is the size of the vibration or the way that x has gone, of late."""
+        vibration = np.linalg.norm(flat[:, self._order > 0])
+        away = float(np.linalg.norm(flat - self._reference))
+        self._length = max(float(vibration), away, LEAST_LENGTH_RATIO * self._length)
+        length = self._length or float(np.linalg.norm(flat)) or 1.0
+        return Metric(length, self._width)
+
+    def _tangent(self, value: float, solution: Solution, border: Direction) -> Direction | None:
+        try:
+            return bordered.tangent(
+                self._path, value, solution.state, border, self._metric, self._options.newton, STEP_TANGENT
+            )
+        except BorderFailed:
+            return None
+
+    @property
+    def sense(self) -> float:
+        """Sign of the way that the parameter goes at the point reached."""
+        return float(np.sign(self._here.tangent.p))
+
+    def rewind(self, index: int) -> None:
+        """Go back to the start of an earlier segment, and on from there in shorter steps."""
+        segment = self.segments[index]
+        del self.segments[index:]
+        self._here, self._metric, self._bend = segment.start, segment.metric, None
+        self._step = self._cap = max(0.25 * segment.length, self._options.min_step)
+
+    def advance(self) -> list[Segment]:
+        """The next point of the curve, as one segment or two with a fold between; none where the walk is stuck."""
+        step = self._step
+        while step >= self._options.min_step:
+            trial = self._straight(step)
+            if step <= CORNER_STEP and (trial is None or trial.angle > KINK_ANGLE):
+                trial = self._round_corner(step, trial) or trial
+            if trial is not None and self._fits(trial, step):
+                parts = self._split(trial, careful=step > 0.1 * self._step)
+                if parts is not None:
+                    self._accept(trial, step)
+                    return parts
+            step *= 0.5 if trial is not None else 0.25
+        return []
+
+    def _ahead(self, step: float) -> Direction:
+        """Where the curve is expected after a step."""
+        there = self._here.place + self._here.tangent * step
+        return there if self._bend is None else there + self._bend * (0.5 * step * step)
+
+    def _straight(self, step: float) -> Segment | None:
+        """One step in the hyperplane normal to the tangent; None where no solution is found there."""
+        here = self._here
+        solution, value = bordered.correct(self._path, self._ahead(step), here.tangent, self._metric, self._newton)
+        if not solution.converged:
+            self.trouble = f"no solution found in a step of {step:.1e}: {solution.outcome}"
+            return None
+        moved = Direction(solution.state.flat, value) - here.place
+        tangent = self._tangent(value, solution, here.tangent) or self._metric.unit(moved)
+        return Segment(here, CurvePoint.of(value, solution, tangent), self._metric)
+
+    def _fits(self, trial: Segment, step: float) -> bool:
+        """Whether a step is short for the curve, or turns at a corner whose legs are straight and meet."""
+        stray = self._metric.norm(trial.end.place - self._ahead(step))
+        if trial.angle <= KINK_ANGLE and stray <= LARGEST_MISS * step:
+            return True
+        self.trouble = f"the curve turns sharply, or jumps, at every step down to {step:.1e}"
+        if trial.angle < LARGEST_MISS:
+            return False
+        first, second, miss = trial.corner
+        if min(first, second) < -0.02 * step or first + second > 2 * step or miss > 0.05 * trial.length:
+            return False
+        return self._is_straight(trial.start, 0.95 * first) and self._is_straight(trial.end, -0.95 * second)
+
+    def _is_straight(self, point: CurvePoint, step: float) -> bool:
+        """Whether the curve keeps the tangent of a point over a step, as a leg of a corner does."""
+        there = point.place + point.tangent * step
+        solution, value = bordered.correct(self._path, there, point.tangent, self._metric, self._newton)
+        tangent = self._tangent(value, solution, point.tangent)
+        return solution.converged and tangent is not None and self._metric.dot(tangent, point.tangent) > 0.99
+
+    def _round_corner(self, step: float, trial: Segment | None) -> Segment | None:
+        """The curve behind a kink where it turns so sharply that no hyperplane ahead meets it, or meets it far away.
+
+        trial : a segment that ends on the leg behind the kink, if there is one
+        The derivative ahead of the kink is that of its other side: along the null direction there, either way, the
+        curve goes. A point is sought in the hyperplane that both legs cross in their sense, and none that lies on
+        the leg we came on.
+        """
+        here, metric = self._here, self._metric
+        ahead = here.place + here.tangent * step
+        for leg in self._legs(ahead) if trial is None else [trial.end.tangent]:
+            along = here.tangent + leg
+            if metric.norm(along) < 1e-3:
+                continue
+            solution, value = bordered.correct(self._path, ahead, metric.unit(along), metric, self._newton)
+            tangent = self._tangent(value, solution, leg) if solution.converged else None
+            if tangent is None:
+                continue
+            segment = Segment(here, CurvePoint.of(value, solution, tangent), metric)
+            if KINK_ANGLE < segment.angle < np.pi - 1e-3 - 2 * step:
+                return segment
+        return None
+
+    def _legs(self, ahead: Direction) -> list[Direction]:
+        """Directions in which the curve may continue, from the derivative at a place that need not lie on the curve."""
+        balance, omega = self._path.place(ahead.p)
+        state = balance.evaluate(omega, ahead.x.reshape(balance.contact.n_pair, -1, ahead.x.shape[-1]))
+        o = self._options.newton
+        try:
+            leg = bordered.tangent(self._path, ahead.p, state, self._here.tangent, self._metric, o, STEP_TANGENT)
+        except BorderFailed:
+            return []
+        return [leg, leg * -1.0]
+
+    def _split(self, segment: Segment, careful: bool) -> list[Segment] | None:
+        """The segment, cut at its fold; None where it seems to hide two folds or its fold is not found.
+
+        Where not careful such a segment is taken as it is.
+        """
+        if not segment.turns:
+            return None if careful and segment.hides_folds else [segment]
+        fold = locate_fold(self._path, segment, self._options.newton, self._options.fold_tolerance)
+        if fold is None:
+            return None if careful else [segment]
+        return [Segment(segment.start, fold, self._metric), Segment(fold, segment.end, self._metric)]
+
+    def _accept(self, segment: Segment, step: float) -> None:
+        o = self._options
+        assert segment.end.solution is not None
+        self.segments.append(segment.bare())
+        before, after = segment.start.tangent, segment.end.tangent
+        self._metric = self._measure(segment.end.place.x)
+        self._here = replace(segment.end, tangent=self._metric.unit(after))
+        factor = 2.0 ** np.clip((o.newton_target - segment.end.solution.steps) / 2, -1, 2)
+        if segment.angle > KINK_ANGLE:
+            self._bend = None
+        else:
+            self._bend = (after - before) * (1.0 / segment.length)
+            factor = min(factor, max(0.5, o.angle / max(segment.angle, 1e-9)))
+        self._cap = min(o.max_step, CAP_GROWTH * self._cap)
+        self._step = float(np.clip(step * factor, o.min_step, self._cap))

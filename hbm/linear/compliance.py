@@ -1,0 +1,250 @@
+"""Contact compliance: displacement of contact and outputs under contact forces and loads, harmonic by harmonic.
+
+The expansion of each system of the model (see `expansion`) at every harmonic of one frequency. Where all harmonics
+share one real system, as they do without cyclic symmetry, products are made with all harmonics at once, coefficients
+as rows.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.linear import all_harmonics
+from tribodyn.hbm.linear.expansion import Expansion
+from tribodyn.reduction.model import ReducedModel
+
+POINTS_KEPT = 4  # frequencies at hand, for the duties of a mission that are solved in turn
+COARSE = 0.1  # share of the contact flexibility from which on a mode counts in the preconditioner
+
+
+class ContactCompliance:
+    """The linear side of a harmonic balance: G_h(w) between contacts, loads and outputs of a reduced model.
+
+    model : reduced model; stiffness : (n_pair, n_component) stuck springs [N/m]
+    excitation : loads whose names are ports; omega_max : largest excitation frequency that will be asked for [rad/s]
+    """
+
+    def __init__(
+        self, model: ReducedModel, stiffness: np.ndarray, basis: HarmonicBasis, excitation: Excitation, omega_max: float
+    ):
+        self.basis = basis
+        self.k = np.asarray(stiffness, float).ravel()
+        self.n_contact = len(self.k)
+        system, _ = model.at_harmonic(basis.harmonics[-1])
+        excitation.check(basis, system.loads)
+        self.output_names = tuple(system.outputs)
+        load_names = sorted({name for _, name in excitation.loads})
+        self.n_load = len(load_names)
+        self._load = np.zeros((len(load_names), len(basis.harmonics)), complex)
+        for (h, name), value in excitation.loads.items():
+            if h in basis.harmonics:
+                self._load[load_names.index(name), basis.harmonics.index(h)] = value
+        self.base = excitation.base
+        self.groups: list[tuple[Expansion, list[int]]] = []
+        seen = [model.at_harmonic(h) for h in basis.harmonics]
+        sharing: dict[int, list[int]] = {}
+        for position, (system, _) in enumerate(seen):
+            sharing.setdefault(id(system), []).append(position)
+        for positions in sharing.values():
+            system, b = seen[positions[0]]
+            loads = [np.conj(system.loads[name])[None] for name in load_names]
+            outputs = [system.outputs[name][None] for name in self.output_names]
+            ports = np.concatenate([np.asarray(rows) for rows in (b, *loads, *outputs)])
+            s_max = basis.harmonics[positions[-1]] * omega_max
+            self.groups.append((Expansion(system, np.asarray(b), self.k, ports, s_max), positions))
+        self.error = max(e.error for e, _ in self.groups)
+        self.shared_real = len(self.groups) == 1 and not np.iscomplexobj(self.groups[0][0].w0)
+        self.coarse = self._coarse_modes()
+        self._points: dict[float, CompliancePoint] = {}
+        self._active: tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray]]] | None = None
+
+    def restricted(self, basis: HarmonicBasis) -> ContactCompliance:
+        """The same for fewer of the harmonics; the expansions are shared."""
+        old = self.basis.harmonics
+        other = object.__new__(ContactCompliance)
+        other.__dict__.update(self.__dict__)
+        other.basis = basis
+        other._active, other._points = None, {}
+        other._load = self._load[:, [old.index(h) for h in basis.harmonics]]
+        other.base = None if self.base is None else self.basis.transfer(self.base, basis)
+        kept = [(e, [basis.harmonics.index(old[p]) for p in ps if old[p] in basis.harmonics]) for e, ps in self.groups]
+        other.groups = [(expansion, positions) for expansion, positions in kept if positions]
+        other.shared_real = len(other.groups) == 1 and not np.iscomplexobj(other.groups[0][0].w0)
+        return other
+
+    def _coarse_modes(self) -> np.ndarray:
+        """(n_contact, r) shapes Q of sqrt(k) x, orthonormal, that carry the contact flexibility but for a small share.
+
+        The contact patch moves nearly as a rigid body; what is left is so stiff beside the contact springs that it
+        hardly couples the pairs.
+        """
+        n, root = self.n_contact, np.sqrt(self.k)
+        shapes = [root[:, None] * e.b[:n] / np.sqrt(e.lam) for e, _ in self.groups]
+        parts = [part for b in shapes for part in ((b.real, b.imag) if np.iscomplexobj(b) else (b,))]
+        columns = np.concatenate(parts, axis=1)
+        left, size, _ = np.linalg.svd(columns, full_matrices=False)
+        return np.ascontiguousarray(left[:, size**2 > COARSE])
+
+    def on_rows(self, rows: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """W_0 and modes of each group at some contact rows, single precision; the last ones are kept."""
+        if self._active is None or not np.array_equal(self._active[0], rows):
+            n, of = self.n_contact, [e for e, _ in self.groups]
+            if len(rows) == n:
+                self._active = (rows, [(e.w0_single, e.b_single) for e in of])
+            else:
+                self._active = (rows, [(e.w0_single[np.ix_(rows, rows)], e.b_single[rows]) for e in of])
+        return self._active[1]
+
+    def at(self, omega: float) -> CompliancePoint:
+        """The compliance at one excitation frequency [rad/s]; the last POINTS_KEPT ones are kept."""
+        point = self._points.pop(omega, None) or CompliancePoint(self, omega)
+        self._points[omega] = point
+        if len(self._points) > POINTS_KEPT:
+            del self._points[next(iter(self._points))]
+        return point
+
+    def port_force(self, g: np.ndarray | None) -> np.ndarray:
+        """(n_port, n_harmonic) complex port forces: g [N] at the contacts alone, or the excitation where g is None."""
+        if g is not None:
+            contact, load = self.basis.to_complex(g), np.zeros_like(self._load)
+        else:
+            base = np.zeros((self.n_contact, self.basis.n_coeff)) if self.base is None else self.base
+            contact, load = self.basis.to_complex(self.k[:, None] * base), self._load
+        return np.concatenate([contact, load, np.zeros((len(self.output_names), load.shape[1]))])
+
+
+class CompliancePoint:
+    """Contact compliance at one frequency.
+
+    x_lin : (n_contact, n_coeff) relative displacement of the stuck, closed structure under the excitation [m]
+    outputs_lin : (n_output, n_coeff) its outputs [m]
+    """
+
+    def __init__(self, compliance: ContactCompliance, omega: float):
+        self.compliance = compliance
+        self.omega = omega
+        basis = compliance.basis
+        self._harmonics = np.asarray(basis.harmonics, float)
+        self.ports = [
+            [expansion.at(1j * basis.harmonics[p] * omega) for p in positions]
+            for expansion, positions in compliance.groups
+        ]
+        n, stop = compliance.n_contact, compliance.n_contact + compliance.n_load
+        excited = slice(n, stop) if compliance.base is None else slice(0, stop)
+        ports = self._through_ports(compliance.port_force(None)[excited], excited)
+        x, self.outputs_lin = basis.to_real(ports[:n]), basis.to_real(ports[stop:])
+        self.x_lin = x if compliance.base is None else x - compliance.base
+
+    def _through_ports(self, force: np.ndarray, columns: slice = slice(None), rows: slice = slice(None)) -> np.ndarray:
+        first = self.compliance.groups[0][0]
+        out = np.zeros((len(range(*rows.indices(first.n_port))), force.shape[1]), complex)
+        for (_, positions), ports in zip(self.compliance.groups, self.ports, strict=True):
+            for p, port in zip(positions, ports, strict=True):
+                if force[:, p].any():
+                    out[:, p] = port.apply(force[:, p], columns, rows)
+        return out
+
+    def apply(self, g: np.ndarray) -> np.ndarray:
+        """G g: (n_contact, n_coeff) relative displacement [m] under contact forces g (n_contact, n_coeff) [N]."""
+        if self.compliance.shared_real:
+            return self._apply_shared_real(g)
+        contacts, basis = slice(0, self.compliance.n_contact), self.compliance.basis
+        return basis.to_real(self._through_ports(basis.to_complex(g), contacts, contacts))
+
+    def _apply_shared_real(self, g: np.ndarray) -> np.ndarray:
+        """The same for one real system: every matrix meets all harmonics in one real product."""
+        n, x = self.compliance.n_contact, self.compliance.groups[0][0]
+        rows = np.ascontiguousarray(g.T)
+        moved = rows @ x.columns[:n]
+        higher = rows.astype(np.float32) @ x.single[:n]
+        y = self.modal(moved[:, x.n_port :], len(x.e))
+        still = self.compliance.basis.has_static
+        return all_harmonics.gathered(y @ x.left, moved, higher, n, x.n_port, x.unit, self._ratio, still)
+
+    @cached_property
+    def _ratio(self) -> np.ndarray:
+        """(n_dynamic,) h w over the largest one asked for."""
+        return self.omega / self.compliance.groups[0][0].s_unit * np.array(self.compliance.basis.dynamic)
+
+    def modal(self, forces: np.ndarray, n_e: int) -> np.ndarray:
+        """Modal displacements (n_coeff, m + n_e m) from modal forces, of one real system; see `all_harmonics`."""
+        has_static = self.compliance.basis.has_static
+        z = all_harmonics.modal_forces(forces, n_e, self._ratio, has_static)
+        for amplitude, port in zip(z, self.ports[0], strict=True):
+            amplitude[:] = port.through_core(amplitude)
+        return all_harmonics.modal_rows(z, n_e, self._ratio, has_static)
+
+    def outputs(self, g: np.ndarray) -> np.ndarray:
+        """(n_output, n_coeff) outputs under contact forces g alone [m]."""
+        c = self.compliance
+        contacts, outputs = slice(0, c.n_contact), slice(c.n_contact + c.n_load, None)
+        return c.basis.to_real(self._through_ports(c.basis.to_complex(g), contacts, outputs))
+
+    def slope(self, g: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+        """d / d omega of contact displacement and outputs under g alone, or under the excitation where g is None."""
+        c = self.compliance
+        force = c.port_force(g)
+        moved = np.zeros_like(force)
+        for (_, positions), ports in zip(c.groups, self.ports, strict=True):
+            for p, port in zip(positions, ports, strict=True):
+                moved[:, p] = 1j * self._harmonics[p] * port.slope(force[:, p])
+        return c.basis.to_real(moved[: c.n_contact]), c.basis.to_real(moved[c.n_contact + c.n_load :])
+
+    def jacobian_product(self, rows: np.ndarray) -> JacobianProduct:
+        """The product with G restricted to contact rows (active ones), to the accuracy a Newton direction needs."""
+        return JacobianProduct(self, rows)
+
+    def coarse_part(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """U (n_rows, r) and A (r n_coeff, r n_coeff) with G ~ U A U^T on contact rows; r may be 0."""
+        c = self.compliance
+        root = np.sqrt(c.k[rows])[:, None]
+        shapes = c.coarse[rows]
+        return np.divide(shapes, root, out=np.zeros(shapes.shape), where=root > 0), self._coarse_compliance
+
+    @cached_property
+    def _coarse_compliance(self) -> np.ndarray:
+        """Q^T sqrt(k) G sqrt(k) Q by the modes alone, on all coefficients; Q from `ContactCompliance.coarse`."""
+        c, basis = self.compliance, self.compliance.basis
+        weighted = c.coarse.T * np.sqrt(c.k)
+        blocks = np.zeros((len(weighted), basis.n_coeff, len(weighted), basis.n_coeff))
+        for (expansion, positions), ports in zip(c.groups, self.ports, strict=True):
+            modes = weighted @ expansion.b[: c.n_contact]
+            for p, port in zip(positions, ports, strict=True):
+                amplitude = modes @ port.through_core(modes.conj().T)  # acts on X_h = a_h - i b_h
+                cosine, *sine = np.flatnonzero(basis.order == basis.harmonics[p])
+                blocks[:, cosine, :, cosine] = amplitude.real
+                for column in sine:
+                    blocks[:, column, :, column] = amplitude.real
+                    blocks[:, cosine, :, column] = amplitude.imag
+                    blocks[:, column, :, cosine] = -amplitude.imag
+        size = len(weighted) * basis.n_coeff
+        return blocks.reshape(size, size)
+
+
+class JacobianProduct:
+    """G restricted to active rows, as exact as a Newton direction needs: W_0 and modes, single precision."""
+
+    def __init__(self, point: CompliancePoint, rows: np.ndarray):
+        self._point = point
+        self._compliance = point.compliance
+        self._parts = self._compliance.on_rows(rows)
+
+    def __call__(self, d: np.ndarray) -> np.ndarray:
+        """G d for d (n_active, n_coeff)."""
+        c = self._compliance
+        if c.shared_real:
+            w0, b = self._parts[0]
+            rows = d.T.astype(np.float32, order="C")
+            y = self._point.modal(rows @ b, 0)
+            return (rows @ w0 + y.astype(np.float32) @ b.T).T
+        force = c.basis.to_complex(d).astype(np.complex64)
+        moved = np.empty_like(force)
+        for (w0, b), ports, (_, positions) in zip(self._parts, self._point.ports, c.groups, strict=True):
+            for port, p in zip(ports, positions, strict=True):
+                f = force[:, p]
+                moved[:, p] = w0 @ f + b @ port.through_core(b.conj().T @ f)
+        return c.basis.to_real(moved)

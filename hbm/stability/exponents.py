@@ -1,0 +1,258 @@
+"""Stability of periodic solutions: Floquet exponents by Hill's method, or multipliers of the integrated motion.
+
+Hill: a perturbation exp(lambda t) p(t), p periodic, of the modal coordinates of the stuck structure obeys
+
+    (lambda + w D)^2 eta + C (lambda + w D) eta + Lambda eta = Phi^T dg,    D = d / d(w t) on Fourier coefficients,
+    dx = Phi eta + W_0 dg,    dg = dg/dx dx,
+
+so the contact is eliminated exactly and what is left is a small quadratic eigenproblem. Modes that are not kept follow
+statically (W_0), and the contact law answers as to a steady vibration (its derivative by alternating frequency/time):
+exact where lambda = 0, so that a fold is where an exponent passes zero, and an approximation for laws with memory
+where it is not. Floquet multipliers of the integrated motion (method "floquet") make neither assumption.
+Source  Hill's method and the choice of exponents by their centre: Lazarus and Thomas 2010; Guillot et al. 2020; the
+elimination of the contact is ours
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.continuation import parameter
+from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.continuation.parameter import Parameter
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.stability import floquet
+from tribodyn.hbm.threads import single
+
+MARGIN = 1e-6  # real parts up to this times omega count as zero
+FEWEST_MODES, MOST_MODES = 20, 30  # friction makes modes far above the excitation flutter, too
+SAME = 0.02  # relative to omega: how far truncation may drive copies of one exponent apart
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Floquet exponents of one periodic solution.
+
+    omega : [rad/s]
+    exponents : (n,) complex, growth rates lambda [1/s], largest real part first; imaginary parts within (-w/2, w/2]
+    method : "hill" or "floquet"
+    """
+
+    omega: float
+    exponents: np.ndarray
+    method: str
+
+    @property
+    def multipliers(self) -> np.ndarray:
+        """(n,) complex factors exp(lambda T) by which perturbations change over one period."""
+        return np.exp(self.exponents * 2 * np.pi / self.omega)
+
+    @property
+    def n_unstable(self) -> int:
+        """Number of exponents that grow."""
+        return int(np.sum(self.exponents.real > MARGIN * self.omega))
+
+    @property
+    def stable(self) -> bool:
+        """Whether no perturbation grows."""
+        return self.n_unstable == 0
+
+    @property
+    def crossing(self) -> str:
+        """What the leading exponent does when its real part passes zero: "fold", "flip" or "Neimark-Sacker"."""
+        share = abs(self.exponents[0].imag) / self.omega
+        return "fold" if share < 1e-3 else "flip" if share > 0.5 - 1e-3 else "Neimark-Sacker"
+
+
+@dataclass(frozen=True)
+class Bifurcation:
+    """A change of stability between two points of a branch.
+
+    position : between the points, counted from 0: 3.4 is 40 % of the way from point 3 to point 4
+    value : of the parameter there, by linear interpolation: [rad/s] where the branch was followed in frequency
+    kind : "fold" (multiplier +1), "flip" (-1) or "Neimark-Sacker" (a complex pair)
+    """
+
+    position: float
+    value: float
+    kind: str
+
+    @property
+    def frequency(self) -> float:
+        """Frequency [Hz], of a branch that was followed in frequency."""
+        return self.value / (2 * np.pi)
+
+
+@dataclass(frozen=True)
+class BranchStability:
+    """A branch with its stability.
+
+    stable : (n_point,) bool, False also where the point did not converge
+    leading : (n_point,) complex, exponent with the largest real part [1/s], nan where the point did not converge
+    bifurcations : in the order of the branch
+    """
+
+    stable: np.ndarray
+    leading: np.ndarray
+    bifurcations: tuple[Bifurcation, ...]
+
+
+@single
+def stability(
+    balance: HarmonicBalance, state: State, method: str = "hill", n_modes: int | None = None, top: int | None = None
+) -> Stability:
+    """Stability of one solution.
+
+    state : converged; method : "hill", or "floquet" for small models, by time integration
+    n_modes : modes that move dynamically in Hill's method, by default those below three times the highest harmonic,
+        at least FEWEST_MODES and at most MOST_MODES of them
+    top : highest harmonic of the perturbation in Hill's method, by default that of the balance
+    Raises  ValueError for unknown methods and for models whose harmonics see different systems
+    """
+    if balance.model.per_harmonic is not None:
+        raise ValueError(
+            "stability needs one system for all harmonics: perturbations of a cyclic part, or with a displacement "
+            "prescribed in harmonic 0 alone, see other systems than the solution does"
+        )
+    if method == "floquet":
+        return Stability(state.omega, _sorted(floquet.exponents(balance, state), state.omega), method)
+    if method != "hill":
+        raise ValueError(f"no stability method '{method}': there are hill, floquet")
+    return Stability(state.omega, _sorted(_hill(balance, state, n_modes, top), state.omega), method)
+
+
+@single
+def mark(
+    problem: HarmonicBalance | Parameter, branch: Branch, method: str = "hill", n_modes: int | None = None
+) -> BranchStability:
+    """Stability of every converged point of a branch, and the bifurcations between neighbouring points.
+
+    problem : what the branch was followed with: the balance, or the parameter it was stepped in
+    """
+    path = parameter.of(problem)
+    if path.name != branch.parameter_name:
+        raise ValueError(f"the branch was followed in the {branch.parameter_name}, not in the {path.name}")
+    found: list[Stability | None] = []
+    for value, flat, outcome in zip(branch.parameter, branch.contact, branch.outcome, strict=True):
+        if outcome != CONVERGED:
+            found.append(None)
+            continue
+        balance, omega = path.place(value)
+        state = balance.evaluate(omega, flat.reshape(balance.contact.n_pair, -1, flat.shape[1]))
+        found.append(stability(balance, state, method, n_modes))
+    changes = []
+    for i, (before, after) in enumerate(pairwise(found)):
+        if before is not None and after is not None and before.n_unstable != after.n_unstable:
+            changes.append(_locate(i, before, after, float(branch.parameter[i]), float(branch.parameter[i + 1])))
+    return BranchStability(
+        stable=np.array([s is not None and s.stable for s in found]),
+        leading=np.array([np.nan if s is None else s.exponents[0] for s in found], complex),
+        bifurcations=tuple(changes),
+    )
+
+
+def _locate(i: int, before: Stability, after: Stability, first: float, second: float) -> Bifurcation:
+    """Where the exponents that change sides have, on average, a real part of zero."""
+    low, high = sorted((before.n_unstable, after.n_unstable))
+    r0, r1 = (s.exponents.real[low:high].mean() for s in (before, after))
+    share = float(np.clip(r0 / (r0 - r1), 0.0, 1.0)) if r0 != r1 else 0.5
+    unstable = before if before.n_unstable > after.n_unstable else after
+    crossing = replace(unstable, exponents=unstable.exponents[low:])
+    return Bifurcation(i + share, first + share * (second - first), crossing.crossing)
+
+
+def _sorted(exponents: np.ndarray, omega: float) -> np.ndarray:
+    """Imaginary parts brought into (-w/2, w/2], largest real part first."""
+    turns = np.ceil(exponents.imag / omega - 0.5)
+    exponents = exponents - 1j * omega * turns
+    return exponents[np.lexsort((exponents.imag, -exponents.real))]
+
+
+def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int | None) -> np.ndarray:
+    top = balance.basis.harmonics[-1] if top is None else top
+    n_samples = max(balance.basis.n_samples, 4 * top + 1)
+    basis = HarmonicBasis(tuple(range(top + 1)), n_samples, balance.basis.transitions)
+    expansion = balance.compliance.groups[0][0]
+    frequencies = np.sqrt(expansion.lam)
+    if n_modes is None:
+        n_modes = int(np.clip(np.sum(frequencies < 3 * (top + 1) * state.omega), FEWEST_MODES, MOST_MODES))
+    m = min(n_modes, len(frequencies))
+    n_contact = balance.compliance.n_contact
+    phi, rest = expansion.b[:n_contact, :m], expansion.b[:n_contact, m:]
+    static = expansion.w0[:n_contact, :n_contact] + (rest / expansion.lam[m:]) @ rest.T
+    coupling = _contact_in_modes(_departure_slope(balance, state, basis), phi, static)
+    nc = basis.n_coeff
+    unit = np.eye(nc)
+    turn = np.kron(np.eye(m), basis.rate.T)  # d / d(w t)
+    damping = np.kron(expansion.c[:m, :m] / state.omega, unit)
+    spring = np.kron(np.diag(expansion.lam[:m]), unit) - coupling
+    constant = turn @ turn + damping @ turn + spring / state.omega**2
+    companion = np.block([[np.zeros_like(turn), np.eye(len(turn))], [-constant, -2 * turn - damping]])
+    values, vectors = np.linalg.eig(companion)
+    return _central(values, _centre(vectors[: m * nc], m, basis), 2 * m) * state.omega
+
+
+def _departure_slope(balance: HarmonicBalance, state: State, basis: HarmonicBasis) -> np.ndarray:
+    """dg/dx of every pair with all harmonics of the perturbation: (n_pair, c, n_coeff, c, n_coeff)."""
+    n_pair, c, _ = state.x.shape
+    x = np.zeros((n_pair, c, basis.n_coeff))
+    seen: dict[int, int] = {}
+    for i, h in enumerate(balance.basis.order):
+        if h <= basis.harmonics[-1]:
+            x[:, :, 0 if h == 0 else 2 * h - 1 + seen.get(h, 0)] = state.x[:, :, i]
+            seen[h] = 1
+    jac = balance.contact.cycle(x, basis, balance.memory).jacobian
+    assert jac is not None
+    slope = -jac.reshape(n_pair, c, basis.n_coeff, c, basis.n_coeff)
+    k = balance.compliance.k.reshape(n_pair, c)
+    for j in range(c):
+        for a in range(basis.n_coeff):
+            slope[:, j, a, j, a] += k[:, j]
+    return slope
+
+
+def _contact_in_modes(slope: np.ndarray, phi: np.ndarray, static: np.ndarray) -> np.ndarray:
+    """Phi^T dg of modal displacements, contact flexibility `static` (W_0) in series: (m n_coeff, m n_coeff)."""
+    _, c, nc = slope.shape[:3]
+    active = np.flatnonzero(np.abs(slope).max(axis=(1, 2, 3, 4)) > 0)
+    if len(active) == 0:
+        return np.zeros((phi.shape[1] * nc, phi.shape[1] * nc))
+    rows = (active[:, None] * c + np.arange(c)).ravel()
+    d = slope[active]
+    n, m = len(rows), phi.shape[1]
+    series = np.einsum("ipc,pcadb->iapdb", static[np.ix_(rows, rows)].reshape(n, len(active), c), d).reshape(n * nc, -1)
+    modal = np.kron(phi[rows], np.eye(nc))
+    moved = np.linalg.solve(np.eye(n * nc) - series, modal).reshape(len(active), c * nc, m * nc)
+    return modal.T @ (d.reshape(len(active), c * nc, c * nc) @ moved).reshape(n * nc, m * nc)
+
+
+def _centre(vectors: np.ndarray, m: int, basis: HarmonicBasis) -> np.ndarray:
+    """Mean harmonic of each perturbation, weighted with its square; copies of one exponent are one apart."""
+    shape = vectors.reshape(m, basis.n_coeff, -1)
+    a, b = shape[:, 1::2], shape[:, 2::2]
+    plus = (np.abs(a - 1j * b) ** 2).sum(axis=0) / 4
+    minus = (np.abs(a + 1j * b) ** 2).sum(axis=0) / 4
+    still = (np.abs(shape[:, 0]) ** 2).sum(axis=0)
+    h = np.asarray(basis.dynamic)
+    return h @ (plus - minus) / (still + plus.sum(axis=0) + minus.sum(axis=0))
+
+
+def _central(values: np.ndarray, centre: np.ndarray, wanted: int) -> np.ndarray:
+    """The `wanted` exponents, in units of omega, with the most central perturbations, none of them twice.
+
+    (lambda + i k, centre - k) is the same perturbation as (lambda, centre), for every whole k.
+    """
+    chosen: list[int] = []
+    for i in np.argsort(np.abs(centre), kind="stable"):
+        shift = np.round(values[i].imag - values[chosen].imag)
+        same = np.abs(values[i] - values[chosen] - 1j * shift) < SAME
+        if not np.any(same & (shift != 0) & (np.abs(centre[i] - centre[chosen] + shift) < 0.25)):
+            chosen.append(int(i))
+        if len(chosen) == wanted:
+            break
+    return values[chosen]

@@ -1,0 +1,1 @@
+"""Time integration of the reduced model, and harmonic balance held against it."""

@@ -1,0 +1,180 @@
+"""Where a branch of periodic motions ends in time: the folds of a response curve, found by time integration alone.
+
+At a fold a stable branch of a response curve ends, and the motion leaves it. A truncated balance puts the fold at a
+frequency of its own; here the frequency is bisected at which the integrated motion, started on the stable branch,
+still stays near it. Harmonic balance only says where to begin and which motions there are to fall to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.stability import exponents
+from tribodyn.hbm.time import time_integration
+from tribodyn.hbm.time.time_integration import Options, PeriodicMotion
+
+SEARCH = Options(steps=512, tolerance=1e-7, max_periods=400)
+MARCH = replace(SEARCH, accelerate=False, max_periods=800, patience=800)
+LEFT = 0.3  # change of amplitude, relative, that means that a motion has left its branch
+BESIDE = 2  # points from the fold at which stability says which side of it is the stable one: at it both are neutral
+
+
+@dataclass(frozen=True)
+class FoldInTime:
+    """A fold of the balance and the end of the same branch in time.
+
+    point : of the fold in the branch; omega : of the fold by harmonic balance [rad/s]
+    in_time : last frequency at which the integrated motion stays on the branch [rad/s]; amplitude : there [m]
+    resolution : to which in_time is known, relative
+    outcome : "converged", or why there is no such frequency within the bracket
+    """
+
+    point: int
+    omega: float
+    in_time: float
+    amplitude: float
+    resolution: float
+    outcome: str
+
+
+@dataclass(frozen=True)
+class Coexisting:
+    """A solution that shares its frequency with others, and a plain march in time that began there.
+
+    amplitude : by harmonic balance; in_time : after the march of `periods` [m]; stays : whether it ended where it began
+    growth : largest real part of Hill's exponents [1/s]
+    """
+
+    amplitude: float
+    stable: bool
+    growth: float
+    in_time: float
+    periods: int
+    stays: bool
+
+
+def amplitude_in_time(balance: HarmonicBalance, motion: PeriodicMotion, output: str) -> float:
+    """Vibration amplitude of an output in time integration, as hbm.continuation.branch.amplitude counts it [m]."""
+    return float(np.sqrt(2) * motion.outputs[balance.compliance.output_names.index(output)].std())
+
+
+def march(balance: HarmonicBalance, state: State, omega: float, options: Options = MARCH) -> PeriodicMotion:
+    """Time integration from a balance state, at a frequency [rad/s] that may be another than its own."""
+    return time_integration.integrate(balance, omega, balance.evaluate(omega, state.x), options)
+
+
+def solutions_at(
+    balance: HarmonicBalance, branch: Branch, omega: float, points: tuple[int, int] | None = None
+) -> list[State]:
+    """All solutions of a curve at one frequency [rad/s], in the order of the curve.
+
+    points : first and last point of the stretch that is looked at, the whole curve by default
+    """
+    first, last = (0, len(branch.omega) - 1) if points is None else points
+    beyond = branch.omega[first : last + 1] - omega
+    found = []
+    for i in np.flatnonzero(beyond[:-1] * beyond[1:] < 0):
+        share = beyond[i] / (beyond[i] - beyond[i + 1])
+        x = (1 - share) * branch.contact[first + i] + share * branch.contact[first + i + 1]
+        solution = newton.solve(balance, omega, _shaped(balance, x))
+        if solution.converged:
+            found.append(solution.state)
+    return found
+
+
+def fold_in_time(
+    balance: HarmonicBalance,
+    branch: Branch,
+    fold: int,
+    output: str,
+    options: Options = SEARCH,
+    bracket: float = 0.02,
+    bisections: int = 8,
+) -> FoldInTime:
+    """Bisect for the frequency at which, in time, the stable branch ends that a fold of the balance ends.
+
+    fold : index of the fold's point, one of branch.folds; output : whose amplitude is told
+    bracket : distance to the fold, relative, within which the end is looked for
+    Raises  ValueError where the point is no fold; IntegrationFailed as time integration does
+    """
+    if fold not in branch.folds:
+        raise ValueError(f"point {fold} of the branch is no fold, the folds are {list(branch.folds)}")
+    own, partner = _stable_side(balance, branch, fold)
+    elsewhere = [stretch for stretch in _stretches(branch) if stretch not in (own, partner)]
+    at_fold = balance.evaluate(branch.omega[fold], _shaped(balance, branch.contact[fold]))
+    side = np.sign(branch.omega[fold - 1] - branch.omega[fold])
+    inside, outside = (float(branch.omega[fold] * (1 + s * bracket)) for s in (side, -side))
+    last, stayed, left = float(branch.amplitude(output)[fold]), False, False
+    for _ in range(bisections):
+        omega = 0.5 * (inside + outside)
+        here = solutions_at(balance, branch, omega, own)
+        start = (here[-1] if own[1] == fold else here[0]) if here else at_fold
+        others = [state for stretch in elsewhere for state in solutions_at(balance, branch, omega, stretch)]
+        motion = march(balance, start, omega, options)
+        moved = motion.coefficients(motion.x, balance.basis)
+        near = np.linalg.norm(moved - start.x)
+        if motion.outcome == CONVERGED and all(near < np.linalg.norm(moved - other.x) for other in others):
+            inside, last, stayed = omega, amplitude_in_time(balance, motion, output), True
+        else:
+            outside, left = omega, True
+    hertz = branch.omega[fold] / (2 * np.pi)
+    outcome = CONVERGED
+    if not stayed:
+        outcome = f"no motion stays on the branch within {100 * bracket:g} % of its fold at {hertz:.6g} Hz"
+    elif not left:
+        outcome = f"the motion stays on the branch {100 * bracket:g} % beyond its fold at {hertz:.6g} Hz"
+    return FoldInTime(fold, float(branch.omega[fold]), inside, last, 2 * bracket / 2**bisections, outcome)
+
+
+def coexisting(
+    balance: HarmonicBalance, branch: Branch, low: float, high: float, output: str, frequencies: int = 24
+) -> tuple[float, list[Coexisting]]:
+    """The first frequency between two folds that two stable solutions and an unstable one share, each marched in time.
+
+    low, high : [rad/s]; frequencies : tried between them
+    Returns the frequency [rad/s] and the solutions; nan and none where there are no such three
+    """
+    row = balance.compliance.output_names.index(output)
+    for omega in np.linspace(low, high, frequencies)[1:-1]:
+        states = solutions_at(balance, branch, omega)
+        hill = [exponents.stability(balance, state) for state in states]
+        if [one.stable for one in hill] != [True, False, True]:
+            continue
+        found = []
+        for state, one in zip(states, hill, strict=True):
+            motion = march(balance, state, omega)
+            ours = float(np.linalg.norm(balance.outputs(state)[row, balance.basis.order > 0]))
+            theirs = amplitude_in_time(balance, motion, output)
+            growth, stays = float(one.exponents.real.max()), abs(theirs / ours - 1) < LEFT
+            found.append(Coexisting(ours, one.stable, growth, theirs, motion.periods, stays))
+        return float(omega), found
+    return float("nan"), []
+
+
+def _shaped(balance: HarmonicBalance, x: np.ndarray) -> np.ndarray:
+    return x.reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
+
+
+def _stretches(branch: Branch) -> list[tuple[int, int]]:
+    """First and last point of each stretch of a curve between its folds."""
+    ends = [0, *sorted(branch.folds), len(branch.omega) - 1]
+    return list(pairwise(ends))
+
+
+def _stable_side(balance: HarmonicBalance, branch: Branch, fold: int) -> tuple[tuple[int, int], tuple[int, int]]:
+    """The stretch that ends stable at a fold, and the other one."""
+    stretches: Sequence[tuple[int, int]] = _stretches(branch)
+    before, after = (next(s for s in stretches if s[end] == fold) for end in (1, 0))
+    growth = []
+    for point in (max(fold - BESIDE, before[0]), min(fold + BESIDE, after[1])):
+        state = balance.evaluate(branch.omega[point], _shaped(balance, branch.contact[point]))
+        growth.append(float(exponents.stability(balance, state).exponents.real.max()))
+    return (before, after) if growth[0] <= growth[1] else (after, before)

@@ -1,0 +1,388 @@
+"""Time steps of one period: the linear part exact, the contact solved implicitly in every step.
+
+In modal coordinates of the structure, contact open, a step from t_0 to t_1 = t_0 + h with z = (eta, h v) is
+
+    z_1 = E z_0 + kick - Q (f_0 + f_1) / 2,      x_1 = U eta_1 + rest_1 - W f_1.
+
+E = exp(A h) and the kick of the loads are exact, whatever h is. The contact force f acts with its mean over the step,
+which keeps the second order and the stability of the trapezoidal rule at any contact stiffness and adds no damping.
+Modes far above what a step resolves follow without inertia (W, and `rest` under the loads).
+What is left of a step is x_1 = x_free - A f(x_1) with one constant compliance A for all steps: pair after pair
+(block Gauss-Seidel), and by Newton's method for all of them where the pairs are too stiffly coupled for that.
+A pair that closes within the step is first brought to the instant at which it touches, on the straight line between
+the ends of the step: friction then begins where the contact does, not at the last step before.
+Source  exponential integrators: Hochbruck and Ostermann 2010; trapezoidal rule of the contact: Newmark 1959; pair
+by pair: Jean and Moreau 1999 (non-smooth contact dynamics); the condensation to the contact is ours
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+TOLERANCE = 1e-12  # of the contact residual, relative to the largest contact displacement
+SWEEPS, SLOW = 60, 0.5  # at most of Gauss-Seidel; factor per sweep from which on it is slow
+LOCAL, DAMPED = 40, 20  # iterations of one pair; from which on its steps are halved
+NEWTON = 60
+SEPARATES = 4  # as in hbm.contact.law
+
+
+class Contact(NamedTuple):
+    """The contact that a step meets.
+
+    p : (n_pair, ...) packed parameters; gap : (n_pair,) [m]; normal : position of the component n, -1 without one
+    A : (n_pair * c, n_pair * c) symmetric compliance of a step
+    """
+
+    p: np.ndarray
+    gap: np.ndarray
+    normal: int
+    A: np.ndarray
+
+
+class Linear(NamedTuple):
+    """The linear part of every step of a period.
+
+    E : (2 m, 2 m), Q : (2 m, m); U : (n_contact, m), outputs : (n_output, 2 m + n_contact) of (z, f)
+    kick : (n_step, 2 m), rest : (n_step, n_contact), output_rest : (n_step, n_output) under the loads
+    """
+
+    E: np.ndarray
+    Q: np.ndarray
+    U: np.ndarray
+    outputs: np.ndarray
+    kick: np.ndarray
+    rest: np.ndarray
+    output_rest: np.ndarray
+
+
+class Moving(NamedTuple):
+    """What moves: z (2 m,), x and f (n_pair, c), memory (n_pair, n_state), bits (n_pair,) status after it."""
+
+    z: np.ndarray
+    x: np.ndarray
+    f: np.ndarray
+    memory: np.ndarray
+    bits: np.ndarray
+
+
+class Record(NamedTuple):
+    """One period, at the ends of its steps.
+
+    x, f : (n_step, n_pair, c); y : (n_step, n_output); bits : (n_pair,) all that happened
+    slopes : derivatives of (f, memory) after a step with respect to (x_1, memory before, x_0), as (n_step, n_pair,
+        c + n_state, c + n_state + c), or of length 0 where they are not wanted
+    """
+
+    x: np.ndarray
+    f: np.ndarray
+    y: np.ndarray
+    bits: np.ndarray
+    slopes: np.ndarray
+
+
+@numba.njit(cache=True)
+def room(c, n_state):
+    """Work space of one pair: f, memory, df/dx after `advance`; the other three slopes of the law; two for a touch."""
+    return (
+        np.zeros(c), np.zeros(n_state), np.zeros((c, c)),
+        np.zeros((c, n_state)), np.zeros((n_state, c)), np.zeros((n_state, n_state)),
+        np.zeros(c), np.zeros((n_state, 2 * c + n_state)),
+    )  # fmt: skip
+
+
+@numba.njit(cache=True)
+def advance(step, x0, was_open, x1, s, p, gap, normal, work):
+    """The law of one pair along the straight line from x0 to x1 with memory s before, into `work`.
+
+    Returns the status bits, negative where the pair touches on the way and the law has a memory: `before` in `work`
+    then holds the derivative of that at the touch with respect to (x1, s, x0)
+    """
+    f, memory, J, dfs, dsx, dss, touch, before = work
+    c, n_state = x1.size, s.size
+    for r in range(n_state):
+        memory[r] = s[r]
+    closes = normal >= 0 and was_open and n_state > 0 and x0[normal] < gap < x1[normal]
+    if closes:
+        share = (gap - x0[normal]) / (x1[normal] - x0[normal])
+        for a in range(c):
+            touch[a] = x0[a] + share * (x1[a] - x0[a])
+        touch[normal] = gap
+        clear(J, dfs, dsx, dss)
+        step(touch, memory, p, f, J, dfs, dsx, dss)
+        for r in range(n_state):
+            for b in range(2 * c + n_state):
+                before[r, b] = 0.0
+            for q in range(n_state):
+                before[r, c + q] = dss[r, q]
+            for a in range(c):
+                before[r, a] += share * dsx[r, a]
+                before[r, c + n_state + a] += (1.0 - share) * dsx[r, a]
+                slide = dsx[r, a] * (x1[a] - x0[a]) / (x1[normal] - x0[normal])  # the instant moves, too
+                before[r, normal] -= share * slide
+                before[r, c + n_state + normal] -= (1.0 - share) * slide
+    clear(J, dfs, dsx, dss)
+    bits = step(x1, memory, p, f, J, dfs, dsx, dss)
+    if closes:
+        for a in range(c):
+            for r in range(n_state):
+                for b in range(c):
+                    J[a, b] += dfs[a, r] * before[r, b]
+        return -bits
+    return bits
+
+
+@numba.njit(cache=True)
+def clear(J, dfs, dsx, dss):
+    """Set all slopes of a law to zero."""
+    for M in (J, dfs, dsx, dss):
+        for a in range(M.shape[0]):
+            for b in range(M.shape[1]):
+                M[a, b] = 0.0
+
+
+@numba.njit(cache=True)
+def slopes_of(touched, work, D):
+    """Derivative D of (f, memory) with respect to (x1, memory before, x0), of what `advance` left in `work`."""
+    _, _, J, dfs, dsx, dss, _, before = work
+    c, n_state = dfs.shape
+    D[:] = 0.0
+    D[:c, :c] = J
+    D[c:, :c] = dsx
+    if not touched:
+        D[:c, c : c + n_state] = dfs
+        D[c:, c : c + n_state] = dss
+        return
+    D[:c, c:] = np.dot(dfs, np.ascontiguousarray(before[:, c:]))
+    D[c:] += np.dot(dss, before)
+
+
+@numba.njit(cache=True)
+def solve_small(M, r):
+    """M^-1 r in place of r for a matrix of up to three rows, which is overwritten; without pivots: I + A J."""
+    n = r.size
+    for i in range(n):
+        best = i
+        for j in range(i + 1, n):
+            if abs(M[j, i]) > abs(M[best, i]):
+                best = j
+        if best != i:
+            for q in range(i, n):
+                M[i, q], M[best, q] = M[best, q], M[i, q]
+            r[i], r[best] = r[best], r[i]
+        if M[i, i] == 0.0:
+            continue
+        for j in range(i + 1, n):
+            factor = M[j, i] / M[i, i]
+            for q in range(i + 1, n):
+                M[j, q] -= factor * M[i, q]
+            r[j] -= factor * r[i]
+    for i in range(n - 1, -1, -1):
+        for q in range(i + 1, n):
+            r[i] -= M[i, q] * r[q]
+        if M[i, i] != 0.0:
+            r[i] /= M[i, i]
+
+
+@numba.njit(cache=True)
+def solve_pair(step, x0, was_open, x, s, p, gap, normal, own, b, near, work, M, r):
+    """Newton on x + own f(x) = b for one pair from the guess x, which is overwritten; returns bits, 0: failed."""
+    f, J = work[0], work[2]
+    c = x.size
+    bits = advance(step, x0, was_open, x, s, p, gap, normal, work)
+    for it in range(LOCAL):
+        size = 0.0
+        for a in range(c):
+            r[a] = x[a] - b[a]
+            for q in range(c):
+                r[a] += own[a, q] * f[q]
+            size = max(size, abs(r[a]))
+        if size <= near:
+            return abs(bits)
+        for a in range(c):
+            for q in range(c):
+                M[a, q] = 1.0 if a == q else 0.0
+                for k in range(c):
+                    M[a, q] += own[a, k] * J[k, q]
+        solve_small(M, r)
+        for a in range(c):
+            x[a] -= r[a] if it < DAMPED else 0.5 * r[a]
+        bits = advance(step, x0, was_open, x, s, p, gap, normal, work)
+    return 0
+
+
+@numba.njit(cache=True)
+def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, near, backward, work, M, r, b):
+    """One round of Gauss-Seidel over all pairs; y = A f and everything else moves on in place.
+
+    Returns the largest displacement of a pair, negative where one failed
+    """
+    n_pair, c = x.shape
+    normal, A = contact.normal, contact.A
+    moved = 0.0
+    for turn in range(n_pair):
+        i = n_pair - 1 - turn if backward else turn
+        o = i * c
+        own = A[o : o + c, o : o + c]
+        off = 0.0
+        for a in range(c):
+            b[a] = x_free[o + a] - y[o + a]
+            off = max(off, abs(b[a] - x[i, a]))
+            for q in range(c):
+                b[a] += own[a, q] * f[i, q]
+        if off <= 0.1 * near and bits[i] != 0:
+            continue
+        if bits[i] == SEPARATES and b[normal] < contact.gap[i]:  # and exerts no force
+            for a in range(c):
+                moved = max(moved, abs(x[i, a] - b[a]))
+                x[i, a] = b[a]
+            continue
+        if bits[i] == SEPARATES:
+            x[i] = b
+        bits[i] = solve_pair(
+            step, x0[i], was_open[i], x[i], s[i], contact.p[i], contact.gap[i], normal, own, b, 0.1 * near, work, M, r
+        )
+        if bits[i] == 0:
+            return -1.0
+        moved = max(moved, off)
+        for a in range(c):
+            change = work[0][a] - f[i, a]
+            if change != 0.0:
+                f[i, a] = work[0][a]
+                row = A[o + a]
+                for q in range(y.size):
+                    y[q] += change * row[q]
+    return moved
+
+
+@numba.njit(cache=True)
+def solve_contact(step, contact, x_free, x0, was_open, s, x, f, scale):
+    """Solve x + A f(x) = x_free for all pairs from the guesses x, f, which are overwritten; s is the memory before.
+
+    Returns status bits (n_pair,), rounds spent (negative: failed) and the scale of x
+    """
+    n_pair, c = x.shape
+    n_state = s.shape[1]
+    work, M, r, b = room(c, n_state), np.zeros((c, c)), np.zeros(c), np.zeros(c)
+    bits = np.zeros(n_pair, np.int64)
+    y = times(contact.A, f)
+    before = np.inf
+    slow = 0
+    for it in range(SWEEPS):
+        near = TOLERANCE * scale
+        moved = sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, near, it % 2 == 1, work, M, r, b)
+        scale = max(scale, np.abs(x).max())
+        if 0.0 <= moved <= TOLERANCE * scale:
+            return bits, it + 1, scale
+        slow += moved > SLOW * before
+        if moved < 0.0 or slow > 5:
+            break
+        before = moved
+    return newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits)
+
+
+@numba.njit(cache=True)
+def times(A, f):
+    """A f (n,) for the symmetric A and forces f (n_pair, c), of which many vanish."""
+    y = np.zeros(A.shape[0])
+    c = f.shape[1]
+    for i in range(f.shape[0]):
+        for a in range(c):
+            if f[i, a] != 0.0:
+                row = A[i * c + a]
+                for q in range(y.size):
+                    y[q] += f[i, a] * row[q]
+    return y
+
+
+@numba.njit(cache=True)
+def newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits):
+    """As `solve_contact`, all pairs at once, where they are too stiffly coupled to be solved in turn."""
+    n_pair, c = x.shape
+    A = contact.A
+    J = np.empty((n_pair, c, c))
+    for it in range(NEWTON):
+        for i in range(n_pair):
+            bits[i] = abs(
+                advance(step, x0[i], was_open[i], x[i], s[i], contact.p[i], contact.gap[i], contact.normal, work)
+            )
+            f[i] = work[0]
+            J[i] = work[2]
+        r = x.ravel() - x_free + times(A, f)
+        scale = max(scale, np.abs(x).max())
+        if np.abs(r).max() <= TOLERANCE * scale:
+            return bits, SWEEPS + it + 1, scale
+        full = np.eye(n_pair * c)
+        for i in range(n_pair):
+            o = i * c
+            full[:, o : o + c] += np.dot(np.ascontiguousarray(A[:, o : o + c]), np.ascontiguousarray(J[i]))
+        length = 1.0 if it < NEWTON // 2 else 0.5
+        x -= length * np.linalg.solve(full, r).reshape(x.shape)
+    return bits, -1, scale
+
+
+@numba.njit(cache=True)
+def march(step, contact, linear, moving, record):
+    """March one period; `moving` moves on in place, the record is filled.
+
+    Returns the step that failed or -1, the rounds of the contact solver spent, and the largest |h v|
+    """
+    z, x, f, memory, bits = moving
+    n_pair, c = x.shape
+    m, n_state = linear.Q.shape[1], memory.shape[1]
+    work = room(c, n_state)
+    spent, scale = 0, np.abs(x).max()
+    record.bits[:] = 0
+    f_before = f.copy()
+    of_z = np.ascontiguousarray(linear.outputs[:, : 2 * m])
+    of_f = np.ascontiguousarray(linear.outputs[:, 2 * m :])
+    speed = 0.0
+    for j in range(linear.kick.shape[0]):
+        half_pull = 0.5 * np.dot(f.ravel(), linear.U)
+        z_free = np.dot(linear.E, z) + linear.kick[j] - np.dot(linear.Q, half_pull)
+        x_free = np.dot(linear.U, z_free[:m]) + linear.rest[j]
+        f_new = np.where(f == 0.0, 0.0, 2.0 * f - f_before)
+        x_new = (x_free - times(contact.A, f_new)).reshape(n_pair, c)
+        was_open = bits == SEPARATES
+        _, rounds, scale = solve_contact(step, contact, x_free, x, was_open, memory, x_new, f_new, scale)
+        spent += abs(rounds)
+        if rounds < 0:
+            return j, spent, speed
+        for i in range(n_pair):
+            now = advance(
+                step, x[i], was_open[i], x_new[i], memory[i], contact.p[i], contact.gap[i], contact.normal, work
+            )
+            memory[i] = work[1]
+            if record.slopes.shape[0] > 0:
+                slopes_of(now < 0, work, record.slopes[j, i])
+            bits[i] = abs(now)
+            record.bits[i] |= bits[i]
+        f_before[:] = f
+        x[:], f[:] = x_new, f_new
+        z[:] = z_free - np.dot(linear.Q, 0.5 * np.dot(f.ravel(), linear.U))
+        record.x[j], record.f[j] = x, f
+        record.y[j] = linear.output_rest[j] + np.dot(of_z, z) + np.dot(of_f, f.ravel())
+        speed = max(speed, np.sqrt(np.sum(z[m:] ** 2)))
+    return -1, spent, speed
+
+
+@numba.njit(cache=True)
+def memory_after(step, xs, contact, memory):
+    """Memory (n_pair, n_state) and status after two rounds of a periodic displacement xs (n_step, n_pair, c)."""
+    n_step, n_pair, c = xs.shape
+    s = memory.copy()
+    work = room(c, s.shape[1])
+    bits = np.zeros(n_pair, np.int64)
+    for _ in range(2):
+        for j in range(n_step):
+            for i in range(n_pair):
+                was_open = bits[i] == SEPARATES
+                bits[i] = abs(
+                    advance(
+                        step, xs[j - 1, i], was_open, xs[j, i], s[i], contact.p[i], contact.gap[i], contact.normal, work
+                    )
+                )
+                s[i] = work[1]
+    return s, bits

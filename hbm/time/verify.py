@@ -1,0 +1,124 @@
+"""A harmonic balance solution beside direct time integration of the same model: how far they are apart, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.threads import single
+from tribodyn.hbm.time import time_integration
+from tribodyn.hbm.time.time_integration import Options, PeriodicMotion
+
+ENERGY_FLOOR = 1e-6  # of (largest force x travel, summed over pairs), below which energies do not differ
+
+
+@dataclass(frozen=True)
+class Verification:
+    """Relative differences, balance minus time integration over time integration; outputs by name.
+
+    omega : [rad/s]
+    amplitude : vibration amplitude of each output, all harmonics of the time integration counted
+    waveform : largest difference over the period of each output's vibration, over its largest deflection from the mean
+    mean : difference of the static part of each output, over the vibration amplitude (static over static where none)
+    contact : largest difference over pairs and time of the vibration of x, over its largest deflection
+    energy : dissipated energy of the whole contact; energy_pairs : largest difference of one pair over the whole energy
+    preload : static normal force of the whole contact; zero where the law has none
+    step_error : of the time integration itself, in amplitude and energy, estimated with half the steps (Richardson);
+        nan where no periodic motion was found
+    drift, periods : how periodic the time integration is, and after how many periods
+    outcome : "converged" or the sentence of the time integration
+    motion : the last period
+    """
+
+    omega: float
+    amplitude: dict[str, float]
+    waveform: dict[str, float]
+    mean: dict[str, float]
+    contact: float
+    energy: float
+    energy_pairs: float
+    preload: float
+    step_error: float
+    drift: float
+    periods: int
+    outcome: str
+    motion: PeriodicMotion
+
+    @property
+    def largest(self) -> float:
+        """The largest magnitude among amplitude, energy and preload: what "agrees within one per cent" means."""
+        return max(abs(v) for v in (*self.amplitude.values(), self.energy, self.preload))
+
+
+@single
+def verify(balance: HarmonicBalance, state: State, options: Options | None = None) -> Verification:
+    """Integrate in time from a balance state to the periodic motion nearby and compare.
+
+    state : converged state of the balance; options : of the time integration
+    Raises  what `time_integration.integrate` raises
+    """
+    options = options or Options()
+    motion = time_integration.integrate(balance, state.omega, state, options)
+    functions = balance.basis.functions(state.omega * motion.time)
+    outputs = balance.outputs(state) @ functions.T
+    names = balance.compliance.output_names
+    ours, theirs = _vibration(outputs), _vibration(motion.outputs)
+    x_ours, x_theirs = _vibration(state.x @ functions.T), _vibration(motion.x)
+    floor = energy_floor(motion)
+    energy = balance.energy(state)
+    whole = max(abs(motion.energy.sum()), floor)
+    amplitude = np.array([_relative(a, b) for a, b in zip(_rms(ours), _rms(theirs), strict=True)])
+    means = [
+        _relative(a, b, scale or abs(b))
+        for a, b, scale in zip(
+            outputs.mean(axis=1), motion.outputs.mean(axis=1), np.sqrt(2) * _rms(theirs), strict=True
+        )
+    ]
+    return Verification(
+        omega=state.omega,
+        amplitude=dict(zip(names, amplitude.tolist(), strict=True)),
+        waveform={
+            n: _relative(np.abs(a - b).max(), 0.0, np.abs(b).max()) for n, a, b in zip(names, ours, theirs, strict=True)
+        },
+        mean=dict(zip(names, means, strict=True)),
+        contact=_relative(np.abs(x_ours - x_theirs).max(), 0.0, np.abs(x_theirs).max()),
+        energy=float((energy.sum() - motion.energy.sum()) / whole) if whole > 0 else 0.0,
+        energy_pairs=float(np.abs(energy - motion.energy).max() / whole) if whole > 0 else 0.0,
+        preload=_relative(balance.preload(state), motion.preload),
+        step_error=_step_error(balance, state, options, motion, whole) if motion.outcome == CONVERGED else float("nan"),
+        drift=motion.drift,
+        periods=motion.periods,
+        outcome=motion.outcome,
+        motion=motion,
+    )
+
+
+def _step_error(
+    balance: HarmonicBalance, state: State, options: Options, motion: PeriodicMotion, whole: float
+) -> float:
+    """Error of the time steps in amplitude and energy, from half as many."""
+    coarse = time_integration.integrate(balance, state.omega, state, replace(options, steps=options.steps // 2))
+    rms = zip(_rms(_vibration(coarse.outputs)), _rms(_vibration(motion.outputs)), strict=True)
+    energy = (coarse.energy.sum() - motion.energy.sum()) / whole if whole > 0 else 0.0
+    return float(max(abs(v) / 3 for v in (*(_relative(a, b) for a, b in rms), energy)))
+
+
+def energy_floor(motion: PeriodicMotion) -> float:
+    """Energy [J] below which dissipation is rounding: ENERGY_FLOOR x the sum of largest force x travel."""
+    return ENERGY_FLOOR * float((np.abs(motion.force).max(axis=2) * np.ptp(motion.x, axis=2)).sum())
+
+
+def _vibration(series: np.ndarray) -> np.ndarray:
+    return series - series.mean(axis=-1, keepdims=True)
+
+
+def _rms(series: np.ndarray) -> np.ndarray:
+    return np.sqrt(np.mean(series**2, axis=-1))
+
+
+def _relative(value: float, reference: float, scale: float | None = None) -> float:
+    scale = abs(reference) if scale is None else scale
+    return float((value - reference) / scale) if scale > 0 else float(value != reference)

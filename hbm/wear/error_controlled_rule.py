@@ -1,0 +1,319 @@
+"""Error-controlled wear steps, stable for the stiff coupling of pressure and depth.
+
+dw/dZ = r(w) relaxes a pressure peak thousands of times faster than the contact as a whole wears: explicit steps must
+resolve the former or oscillate from node to node. Here both stages of a second-order, L-stable, stiffly accurate
+Runge-Kutta step are implicit, each of them one balance solve with the gap wearing along (implicit_stage); a first-order
+companion gives the error estimate.
+Source  SDIRK2: Alexander 1977, SIAM J. Numer. Anal. 14(6), gamma = 1 - 1/sqrt(2)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tribodyn.hbm import newton
+from tribodyn.hbm.continuation.operating_point import OperatingPoint
+from tribodyn.hbm.outcome import WearEnd
+from tribodyn.hbm.threads import single
+from tribodyn.hbm.wear.evolution import (
+    WearProblem,
+    WearState,
+    assess,
+    first_at_rest,
+    first_preload,
+    reason_to_stop,
+    row_of,
+    state_of,
+    worn_state,
+)
+from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, WearRow, history, rows_to_go_on
+from tribodyn.hbm.wear.implicit_stage import WearingBalance
+from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
+
+GAMMA = 1 - 1 / np.sqrt(2)
+STEP_RATIO_LIMITS = (0.2, 3.0)  # limits of the ratio of one step to the one before
+ERROR_TREND_POWER = 0.2  # power with which an error that grows from step to step holds the next one back
+# shares of an event's preload between which a step that would pass the event must end: just below it, so that the next
+# step starts beyond it
+EVENT_WINDOW = (0.97, 0.999)
+# of the first preload, where a run ends at the latest: below it the last touch is noise of Newton's tolerance
+LEAST_PRELOAD_SHARE = 1e-4
+# depths of explicit steps over the end of a branch, shares of the tolerance, tried in turn; the longest, 0.81, stays
+# within the tolerance
+EXPLICIT_STEPS = 0.01 * 3.0 ** np.arange(5)
+MAX_CORRECTIONS = 12  # solves of a stage
+GAIN_ACCURACY = 1e-9  # of the depth, for laws whose depth per work is not constant
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """share : local error allowed per step, of the depth scale and of the cycles passed; scale : depth scale [m]."""
+
+    share: float
+    scale: float
+
+
+@single
+def evolve(
+    problem: WearProblem,
+    tolerance: Tolerance,
+    max_steps: int = 10000,
+    on_row: Callable[[WearRow], None] | None = None,
+    resume: WearHistory | None = None,
+) -> WearHistory:
+    """Wear the contact until it is lost, with steps chosen by a local error estimate on depth and on life.
+
+    on_row, resume, return : as for the thesis's rule; `step_error` of a row is its estimate over the tolerance. The
+    last touch of a vibrating contact does not end in finite time: LEAST_PRELOAD_SHARE ends the run where `lost_below`
+    does not.
+    Raises  ValueError where the wear law wears pairs that do no friction work
+    """
+    problem = replace(problem, lost_below=max(problem.lost_below, LEAST_PRELOAD_SHARE))
+    rows = rows_to_go_on(resume)
+    if rows:  # the state after the last step was not kept: take the step again, to the same bits
+        again = rows.pop()
+        state = _step(problem, tolerance, replace(state_of(problem, again), solves=0), rows).after
+        rows.append(again)
+    else:
+        state = assess(problem, np.zeros_like(problem.area), 0.0, None)
+    at_rest = PreloadAtRest(problem)
+    end = WearEnd.STEPS_DONE.say(f" {max_steps} wear steps")
+    while len(rows) < max_steps and state is not None:
+        state = at_rest.of(state)
+        first = (first_preload(problem, rows, state), first_at_rest(rows, state))
+        reason = reason_to_stop(problem, state, *first, rows, tolerance.share * tolerance.scale)
+        if reason:
+            nothing = np.zeros_like(problem.area)
+            rows.append(row_of(problem, state, 0.0, nothing, nothing, 0.0, np.zeros(1 + len(state.points))))
+            end = reason
+        else:
+            taken = _step(problem, tolerance, state, rows)
+            rows.append(taken.row)
+            state, end = taken.after, taken.failure or end
+        if on_row is not None:
+            on_row(rows[-1])
+        if reason:
+            break
+    return history(rows, end)
+
+
+@dataclass(frozen=True)
+class _Taken:
+    """A step: its row, and the state after it, or why there is none."""
+
+    row: WearRow
+    after: WearState | None
+    failure: str = ""
+
+
+def _step(problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow]) -> _Taken:
+    """One accepted step from a state; where an event would be passed, the step ends at it."""
+    smallest = 1e-9 * tolerance.scale / float(state.rate.max())
+    leap = EXPLICIT_STEPS[0] * tolerance.share * tolerance.scale / float(state.rate.max())
+    stride = 10 * leap
+    drift, slopes = np.zeros(len(state.points)), -np.ones(len(state.points))
+    if rows and rows[-1].plan[0] > 0:
+        stride, slopes = float(rows[-1].plan[0]), rows[-1].plan[1:]
+        omega = np.array([point.state.omega for point in state.points])
+        drift = (omega - rows[-1].duty_omega) / (state.cycles - rows[-1].cycles)
+    target = _event(problem, state, rows)
+    solves, longest = state.solves, np.inf
+    while True:
+        searches = [_Search(slope) for slope in slopes]
+        first, second = _stages(problem, state, stride, drift, searches)
+        slopes = np.array([search.slope for search in searches])
+        solves += first.solves + second.solves
+        if second.failure or first.failure:
+            error, longest = np.inf, stride
+        else:
+            error = _error(problem, tolerance, state, stride, first, second)
+        if error <= 1.0:
+            preload = problem.preload(second.points[0].state)
+            if preload >= EVENT_WINDOW[0] * target:
+                break
+            longest = stride
+            stride *= _share_to(target, problem.preload(state.points[0].state), preload)
+        else:
+            stride = min(stride * _growth(error), 0.5 * longest if second.failure else np.inf)
+        if stride < (leap if second.failure else smallest):
+            return _leap(problem, replace(state, solves=solves), leap, second.failure, rows)
+    worn = second.depth - state.depth
+    work = stride * ((1 - GAMMA) * first.work + GAMMA * second.work)
+    trend = (rows[-1].step_error / error) ** ERROR_TREND_POWER if rows and error > 0 else 1.0
+    ratio = float(np.clip(_growth(error) * min(trend, 1.0), *STEP_RATIO_LIMITS))
+    plan = np.array([stride * ratio, *slopes])
+    row = row_of(problem, replace(state, solves=solves), stride, worn, work, error, plan)
+    return _Taken(row, replace(second, solves=0))
+
+
+def _leap(problem: WearProblem, state: WearState, stride: float, failure: str, rows: Sequence[WearRow]) -> _Taken:
+    """An explicit step over the end of a branch, behind which the site is looked for as at the start.
+
+    The response folds, or the tracked peak merges with a valley: no solution follows on the one here. A step that did
+    not get over it, or behind which none was found, is followed by a longer one, up to the tolerance. Where pairs
+    hammer and branches are short, the rule continues in such steps.
+    """
+    nothing = np.zeros_like(problem.area)
+    plan = np.zeros(1 + len(state.points))
+    tried = next((i for i, row in enumerate(reversed(rows)) if row.plan[0] > 0), len(rows))
+    for length in EXPLICIT_STEPS[min(tried, len(EXPLICIT_STEPS) - 1) :] / EXPLICIT_STEPS[0] * stride if failure else ():
+        worn = length * state.rate
+        after = assess(problem, state.depth + worn, state.cycles + length, None)
+        state = replace(state, solves=state.solves + after.solves)
+        if not after.failure:
+            row = row_of(problem, state, length, worn, length * state.work, 1.0, plan)
+            return _Taken(row, replace(after, solves=0))
+        failure = after.failure
+    failed = row_of(problem, state, 0.0, nothing, nothing, 0.0, plan)
+    return _Taken(failed, None, failure or WearEnd.NO_STEP.say())
+
+
+def _event(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) -> float:
+    """The next preload at which a row is wanted [N]: where life is stated to end, and where the run is to end."""
+    first, now = first_preload(problem, rows, state), problem.preload(state.points[0].state)
+    shares = [share for share in (LIFE_SHARE, problem.lost_below) if share > 0]
+    return max((share * first for share in shares if share * first < now), default=0.0)
+
+
+def _share_to(target: float, start: float, end: float) -> float:
+    """Share of a step after which the preload has fallen from start to just below the target, along its logarithm."""
+    aim = np.mean(EVENT_WINDOW) * target
+    return float(np.clip(np.log(start / aim) / np.log(start / max(end, 1e-3 * target)), 0.05, 0.95))
+
+
+def _stages(
+    problem: WearProblem, state: WearState, stride: float, drift: np.ndarray, searches: Sequence[_Search]
+) -> tuple[WearState, WearState]:
+    """Both stages of a step from a state; the second is the state after it."""
+    omega = np.array([point.state.omega for point in state.points])
+    guess = []
+    for duty, point in zip(problem.mission, state.points, strict=True):
+        balance = problem.at_depth(state.depth).with_load(duty.load)
+        guess.append(point.state.x + balance.gap_response(point.state, GAMMA * stride * state.rate))
+    cycles = state.cycles + GAMMA * stride
+    ahead = GAMMA * stride
+    first = _stage(problem, state, state.depth, ahead, cycles, guess, omega + ahead * drift, searches)
+    if first.failure:
+        return first, replace(first, solves=0)
+    base = state.depth + (1 - GAMMA) / GAMMA * (first.depth - state.depth)
+    guess, further = [], []
+    for before, after in zip(state.points, first.points, strict=True):
+        guess.append(before.state.x + (after.state.x - before.state.x) / GAMMA)
+        further.append(before.state.omega + (after.state.omega - before.state.omega) / GAMMA)
+    return first, _stage(problem, first, base, ahead, state.cycles + stride, guess, np.array(further), searches)
+
+
+def _stage(
+    problem: WearProblem,
+    near: WearState,
+    base: np.ndarray,
+    stretch: float,
+    cycles: float,
+    guess: Sequence[np.ndarray],
+    omega: np.ndarray,
+    searches: Sequence[_Search],
+) -> WearState:
+    """Solve depth = base + stretch rate(depth) with every duty at its site; `near` tells the wear per work to try."""
+    duties = problem.mission
+    unworn = [problem.balance.with_load(duty.load) for duty in duties]
+    gain = _gain(problem, near)
+    accuracy = np.array([duty.site.accuracy for duty in duties])
+    x, depth = np.concatenate(guess, axis=1), near.depth + stretch * near.rate
+    solves = rounds = 0
+    for search in searches:
+        search.start()
+    while True:
+        balance = WearingBalance(unworn, [duty.share for duty in duties], base, stretch, gain, depth)
+        solution = newton.solve(balance, tuple(omega), x, duties[0].site.newton)
+        solves, rounds = solves + len(duties), rounds + 1
+        worn_at = solution.state
+        depth = worn_at.depth
+        points, corrections = [], []
+        for w, duty, part in zip(omega, duties, balance.parts(solution.state.x), strict=True):
+            worn = problem.at_depth(depth).with_load(duty.load)
+            state = worn.evaluate(float(w), part)
+            reached = newton.Solution(state, solution.outcome, solution.steps, solution.products, solution.history)
+            points.append(OperatingPoint.of(worn, reached, duty.site.output, 0))
+            if solution.converged:
+                corrections.append(duty.site.correct(worn, state))
+        solves += sum(c.solves for c in corrections)
+        found = worn_state(problem, depth, cycles, points, solves)
+        if not solution.converged:
+            return found
+        after = np.array([s.next(w, c.distance) for s, w, c in zip(searches, omega, corrections, strict=True)])
+        turned = _gain(problem, found)
+        settled = np.all(np.abs(turned - gain) * found.work * stretch <= GAIN_ACCURACY * np.abs(depth).max())
+        if settled and np.all(np.abs(after - omega) <= accuracy * omega):
+            return found
+        if rounds > MAX_CORRECTIONS:
+            lost = f"the site of a duty was not found in {MAX_CORRECTIONS} solves"
+            return replace(found, points=tuple(replace(p, solution=replace(p.solution, outcome=lost)) for p in points))
+        x = solution.state.x + balance.follow(worn_at, after - omega)
+        omega, gain = after, turned
+
+
+def _gain(problem: WearProblem, state: WearState) -> np.ndarray:
+    """(n_pair,) wear depth per friction work [m/J]; a pair at rest is taken to wear as the working ones on average."""
+    gain, area = np.zeros_like(state.rate), problem.area
+    for name, wear in problem.wearing.items():
+        pairs = problem.balance.contact.joint(name).rows
+        rate, work = state.rate[pairs], state.work[pairs]
+        works = work > 0
+        if np.any(rate[~works] > 0):
+            raise ValueError(f'wear law "{wear.law}" wears pairs without friction work: take the thesis\'s rule')
+        own = problem.numbers(name).get("coefficient", np.ones(len(pairs))) / area[pairs]
+        known = works & (own > 0)
+        factor = np.mean(rate[known] / (work[known] * own[known])) if known.any() else 1.0
+        gain[pairs] = np.divide(rate, work, out=factor * own, where=works)
+    return gain
+
+
+class _Search:
+    """The frequency at which a miss vanishes, from the misses so far; the miss falls as the frequency rises."""
+
+    def __init__(self, slope: float):
+        self.slope = slope
+        self.start()
+
+    def start(self) -> None:
+        """Forget the points, at another depth, but not the slope."""
+        self._below: tuple[float, float] | None = None
+        self._above: tuple[float, float] | None = None
+        self._last: tuple[float, float] | None = None
+
+    def next(self, omega: float, miss: float) -> float:
+        """The frequency to try after one that missed by `miss`: secant, kept inside what brackets the zero."""
+        if self._last is not None and omega != self._last[0]:
+            slope = (miss - self._last[1]) / (omega - self._last[0])
+            self.slope = slope if slope < -0.1 else self.slope
+        self._last = (omega, miss)
+        if miss > 0:
+            self._below = self._last
+        else:
+            self._above = self._last
+        trial = omega - miss / self.slope
+        if self._below is not None and self._above is not None:
+            low, high = self._below[0], self._above[0]
+            if not min(low, high) < trial < max(low, high):
+                return 0.5 * (low + high)
+            return trial
+        return float(np.clip(trial, 0.97 * omega, 1.03 * omega))
+
+
+def _error(
+    problem: WearProblem, tolerance: Tolerance, state: WearState, stride: float, first: WearState, second: WearState
+) -> float:
+    """Local error over the tolerance: of the deepest deviation, and of the cycles that the same volume takes."""
+    deviation = (1 - GAMMA) * stride * (first.rate - second.rate)
+    on_depth = np.abs(deviation).max() / tolerance.scale
+    volume = float(problem.area @ (second.depth - state.depth))
+    on_life = abs(float(problem.area @ deviation)) / volume * stride / second.cycles if volume > 0 else 0.0
+    return float(max(on_depth, on_life) / tolerance.share)
+
+
+def _growth(error: float) -> float:
+    """Ratio of the next step to this one by the second order of the error, with a margin."""
+    return float(np.clip(0.85 / np.sqrt(max(error, 1e-10)), *STEP_RATIO_LIMITS))

@@ -1,0 +1,265 @@
+"""What every wear run shares: the problem, the wear rate of one state, and when a run is over."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.contact.law import SEPARATES
+from tribodyn.hbm.continuation.operating_point import OperatingPoint, Site
+from tribodyn.hbm.outcome import CONVERGED, WearEnd
+from tribodyn.hbm.wear import law as wear_law
+from tribodyn.hbm.wear.history import WearRow
+from tribodyn.hbm.wear.law import JointWear
+
+FADING = 1e-3  # share of the first friction work per cycle below which wear may have faded out
+ENDURANCE = 1e12  # cycles: thirty years at 1 kHz, longer than any machine runs
+
+
+@dataclass(frozen=True)
+class Duty:
+    """A part of the mission: `share` of all cycles run at `site`, with the harmonic loads times `load`."""
+
+    site: Site
+    share: float = 1.0
+    load: float = 1.0
+
+
+@dataclass(frozen=True)
+class WearProblem:
+    """What wears, where the cycles are taken, and by which law.
+
+    balance : the unworn problem; mission : its duties, whose shares sum to one
+    wear : how the joints wear, by name; a joint that is not there does not wear. One alone serves all joints
+    area : (n_pair,) [m2], of all joints
+    lost_below : contact counts as lost when the preload falls below this share of its first value; the last touch
+        of a vibrating contact wears ever more slowly, so that the time until it ends has no limit (see README)
+    lost_below_at_rest : the run ends when the preload without the harmonic loads falls to this share of its first
+        value, see hbm.wear.preload_at_rest; None: it is not looked at
+    """
+
+    balance: HarmonicBalance
+    mission: tuple[Duty, ...]
+    wear: JointWear | Mapping[str, JointWear]
+    area: np.ndarray
+    lost_below: float = 0.0
+    lost_below_at_rest: float | None = None
+
+    def __post_init__(self) -> None:
+        shares = [duty.share for duty in self.mission]
+        if not self.mission or min(shares) < 0 or abs(sum(shares) - 1) > 1e-9:
+            raise ValueError(f"the shares of the mission's duties must be >= 0 and sum to 1, not {shares}")
+        if not self.wearing:
+            raise ValueError("no joint wears: give at least one of them a wear law")
+        if self.lost_below_at_rest is not None and (
+            "n" not in self.balance.contact.components or not self.balance.basis.has_static
+        ):
+            raise ValueError("the preload at rest needs a contact with component n and harmonic 0 among those kept")
+
+    @cached_property
+    def wearing(self) -> dict[str, JointWear]:
+        """The joints that wear."""
+        joints = self.balance.contact.joints
+        if isinstance(self.wear, JointWear):
+            return {joint.name: self.wear for joint in joints}
+        return {self.balance.contact.joint(name).name: wear for name, wear in self.wear.items()}
+
+    def numbers(self, joint: str) -> dict[str, np.ndarray]:
+        """The own numbers of a joint's wear law, each (n_pair,) of the joint."""
+        n = len(self.balance.contact.joint(joint).rows)
+        given = self.wearing[joint].numbers
+        return {name: np.array(np.broadcast_to(np.asarray(v, float), (n,))) for name, v in given.items()}
+
+    @cached_property
+    def pairs(self) -> np.ndarray:
+        """Indices of the pairs of the joints that wear."""
+        return np.sort(np.concatenate([self.balance.contact.joint(name).rows for name in self.wearing]))
+
+    def preload(self, state: State) -> float:
+        """Static normal force of the joints that wear [N]."""
+        if len(self.wearing) == len(self.balance.contact.joints):
+            return self.balance.preload(state)
+        preload = self.balance.preload_by_joint(state)
+        return float(sum(preload[name] for name in self.wearing))
+
+    def at_depth(self, depth: np.ndarray) -> HarmonicBalance:
+        """The balance with the gap that a wear depth (n_pair,) [m] has opened."""
+        return self.balance.with_gap(self.balance.contact.gap + depth)
+
+
+@dataclass(frozen=True)
+class WearState:
+    """A worn contact with its solved duties.
+
+    depth : (n_pair,) [m]; cycles : passed before; points : one per duty; pairs : of the joints that wear
+    rate : (n_pair,) wear depth per cycle [m], work : (n_pair,) friction work per cycle [J]; averages over the mission
+    preload_at_rest : [N], nan where it was not asked for; failure_at_rest : why it was not found
+    """
+
+    depth: np.ndarray
+    cycles: float
+    points: tuple[OperatingPoint, ...]
+    rate: np.ndarray
+    work: np.ndarray
+    solves: int
+    pairs: np.ndarray
+    preload_at_rest: float = float("nan")
+    failure_at_rest: str = ""
+
+    @property
+    def failure(self) -> str:
+        """Sentence on the first duty that did not converge, empty where all did."""
+        for point in self.points:
+            if not point.solution.converged:
+                hertz = point.state.omega / (2 * np.pi)
+                return WearEnd.SOLVE_FAILED.say(f" at {hertz:.6g} Hz: {point.solution.outcome}")
+        return self.failure_at_rest
+
+    @property
+    def separated(self) -> bool:
+        """Whether no pair that can wear touches at any moment of any duty."""
+        return all(bool(np.all(point.state.cycle.status[self.pairs] == SEPARATES)) for point in self.points)
+
+
+def assess(problem: WearProblem, depth: np.ndarray, cycles: float, before: WearState | None) -> WearState:
+    """Solve every duty at a wear depth, warm from a neighbouring state, and apply the wear law."""
+    unloaded = problem.at_depth(depth)
+    points = []
+    for i, duty in enumerate(problem.mission):
+        balance = unloaded.with_load(duty.load)
+        if before is None:
+            points.append(duty.site.first(balance))
+        else:
+            points.append(_neighbour(problem, duty, balance, before.points[i], before.depth, depth))
+    return worn_state(problem, depth, cycles, points, sum(point.solves for point in points))
+
+
+def worn_state(
+    problem: WearProblem, depth: np.ndarray, cycles: float, points: Sequence[OperatingPoint], solves: int
+) -> WearState:
+    """The wear law applied to solved duties."""
+    rate, work = np.zeros_like(depth), np.zeros_like(depth)
+    for duty, point in zip(problem.mission, points, strict=True):
+        balance = problem.at_depth(depth).with_load(duty.load)
+        for name, wear in problem.wearing.items():
+            pairs = balance.contact.joint(name).rows
+            of_joint = (problem.area[pairs], problem.numbers(name), depth[pairs])
+            exposure = wear_law.Exposure(balance, point.state, *of_joint, cycles, name)
+            rate[pairs] += duty.share * wear_law.depth_rate(wear.law, exposure)
+            work[pairs] += duty.share * exposure.energy
+    return WearState(depth, cycles, tuple(points), rate, work, solves, problem.pairs)
+
+
+def _neighbour(
+    problem: WearProblem,
+    duty: Duty,
+    balance: HarmonicBalance,
+    known: OperatingPoint,
+    known_depth: np.ndarray,
+    depth: np.ndarray,
+) -> OperatingPoint:
+    omega, opening = known.state.omega, depth - known_depth
+    before = problem.at_depth(known_depth).with_load(duty.load)
+    guess = known.state.x + before.gap_response(before.evaluate(omega, known.state.x), opening)
+    point = duty.site.next(balance, omega, guess)
+    if point.solution.converged:
+        return point
+    x, solves = _carry(before, omega, known.state.x, opening)
+    solves += point.solves
+    again = duty.site.next(balance, omega, x)
+    if not again.solution.converged:  # the neighbour's branch has ended: look as at the start
+        solves += again.solves
+        again = duty.site.first(balance)
+    return OperatingPoint(again.solution, again.amplitude, again.response, again.solves + solves)
+
+
+def _carry(before: HarmonicBalance, omega: float, x: np.ndarray, opening: np.ndarray) -> tuple[np.ndarray, int]:
+    """Follow x at fixed frequency while the gaps open, in steps that halve where Newton fails; x and solves spent."""
+    gap, done, stride, solves = before.contact.gap, 0.0, 0.5, 0
+    while done < 1.0 and stride > 1e-3:
+        reach = min(1.0, done + stride)
+        here, there = before.with_gap(gap + done * opening), before.with_gap(gap + reach * opening)
+        guess = x + here.gap_response(here.evaluate(omega, x), (reach - done) * opening)
+        solution = newton.solve(there, omega, guess)
+        solves += 1
+        if solution.converged:
+            x, done, stride = solution.state.x, reach, 1.5 * stride
+        else:
+            stride *= 0.5
+    return x, solves
+
+
+def reason_to_stop(
+    problem: WearProblem,
+    state: WearState,
+    first_preload: float,
+    first_at_rest: float = float("nan"),
+    rows: Sequence[WearRow] = (),
+    step_depth: float = 0.0,
+) -> str:
+    """Why a run ends at a state, as a sentence; empty where it continues.
+
+    first_preload, first_at_rest : of the unworn contact, vibrating and at rest [N]
+    rows : taken before; step_depth : a depth that is worth wearing [m]: wear has faded out where the deepest pair needs
+        more than ENDURANCE cycles for it
+    """
+    if state.failure:
+        return state.failure
+    share = problem.lost_below_at_rest
+    if share is not None and state.preload_at_rest <= share * first_at_rest:
+        return WearEnd.LOST_AT_REST.say(f" {share:.3g} of its first value")
+    if state.separated:
+        return WearEnd.LOST.say()
+    preload = problem.preload(state.points[0].state)
+    if preload < problem.lost_below * first_preload:
+        return WearEnd.PRELOAD_LOST.say(f" {problem.lost_below:.3g} of its first value")
+    left = f", the contact survives with {state.depth.max():.4g} m worn at most and {preload:.4g} N of preload left"
+    if state.rate.max() <= 0.0:
+        return WearEnd.NO_LOSS.say() if state.work.max() > 0.0 else WearEnd.NO_SLIP.say(left)
+    fading = rows and state.work.sum() < FADING * rows[0].energy.sum()
+    if fading and state.rate.max() * ENDURANCE < step_depth:
+        return WearEnd.FADED.say(left)
+    return ""
+
+
+def row_of(
+    problem: WearProblem,
+    state: WearState,
+    cycles_in_step: float,
+    worn: np.ndarray,
+    work: np.ndarray,
+    step_error: float = 0.0,
+    plan: np.ndarray | None = None,
+) -> WearRow:
+    """The history row of a state, with what its step wears [m] and dissipates [J]."""
+    balance = problem.at_depth(state.depth).with_load(problem.mission[0].load)
+    taken = (cycles_in_step, worn, work, state.solves, step_error, plan, state.preload_at_rest)
+    preload = problem.preload(state.points[0].state)
+    return WearRow.of(balance, state.points, state.depth, state.cycles, preload, *taken)
+
+
+def state_of(problem: WearProblem, row: WearRow) -> WearState:
+    """The state that a row was made from, solved points included, so that a run resumes bit for bit."""
+    points = []
+    for i, duty in enumerate(problem.mission):
+        balance = problem.at_depth(row.depth).with_load(duty.load)
+        x = row.duty_displacement[i].reshape(len(row.depth), -1, balance.basis.n_coeff)
+        state = balance.evaluate(float(row.duty_omega[i]), x)
+        outcome = newton.Solution(state, CONVERGED, 0, 0, ())
+        points.append(OperatingPoint(outcome, row.amplitude, balance.outputs(state), 0))
+    return worn_state(problem, row.depth, row.cycles, points, row.solves)
+
+
+def first_preload(problem: WearProblem, rows: Sequence[WearRow], state: WearState) -> float:
+    """Preload of the unworn contact [N]."""
+    return rows[0].preload if rows else problem.preload(state.points[0].state)
+
+
+def first_at_rest(rows: Sequence[WearRow], state: WearState) -> float:
+    """Preload of the unworn contact at rest [N]; nan where it was not asked for."""
+    return rows[0].preload_at_rest if rows else state.preload_at_rest

@@ -1,0 +1,195 @@
+"""What a wear run returns: the contact and the response, wear step by wear step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tribodyn.hbm.outcome import WearEnd
+
+if TYPE_CHECKING:
+    from tribodyn.hbm.balance import HarmonicBalance
+    from tribodyn.hbm.continuation.operating_point import OperatingPoint
+
+
+LIFE_SHARE = 1e-3  # of the first preload, where the life that is stated ends
+
+
+@dataclass(frozen=True)
+class WearRow:
+    """One wear step; the fields are those of WearHistory, without the row axis.
+
+    worn : (n_pair,) depth that the step wears after this state [m]
+    """
+
+    cycles: float
+    cycles_in_step: float
+    depth: np.ndarray
+    worn: np.ndarray
+    energy: np.ndarray
+    preload: float
+    normal_force: np.ndarray
+    status: np.ndarray
+    omega: float
+    amplitude: float
+    force: np.ndarray
+    response: np.ndarray
+    solves: int
+    step_error: float
+    plan: np.ndarray
+    work: np.ndarray
+    duty_omega: np.ndarray
+    duty_displacement: np.ndarray
+    preload_at_rest: float = float("nan")
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """(n_contact, n_coeff) of the first duty [m]."""
+        return self.duty_displacement[0]
+
+    @classmethod
+    def of(
+        cls,
+        balance: HarmonicBalance,
+        points: Sequence[OperatingPoint],
+        depth: np.ndarray,
+        cycles: float,
+        preload: float,
+        cycles_in_step: float,
+        worn: np.ndarray,
+        work: np.ndarray,
+        solves: int,
+        step_error: float = 0.0,
+        plan: np.ndarray | None = None,
+        preload_at_rest: float = float("nan"),
+    ) -> WearRow:
+        """The row of solved operating points, one per duty; the first one is what the row shows."""
+        point = points[0]
+        state = point.state
+        shape = (-1, state.x.shape[2])
+        normal = np.zeros(len(depth))
+        if "n" in balance.contact.components and balance.basis.has_static:
+            normal = state.cycle.force[:, balance.contact.components.index("n"), 0]
+        return cls(
+            cycles=cycles,
+            cycles_in_step=cycles_in_step,
+            depth=depth,
+            worn=worn,
+            energy=np.maximum(balance.energy(state), 0.0),
+            preload=preload,
+            normal_force=normal,
+            status=state.cycle.status,
+            omega=state.omega,
+            amplitude=point.amplitude,
+            force=state.cycle.force.reshape(shape),
+            response=point.response,
+            solves=solves,
+            step_error=step_error,
+            plan=np.zeros(0) if plan is None else plan,
+            work=work,
+            duty_omega=np.array([p.state.omega for p in points]),
+            duty_displacement=np.stack([p.state.x.reshape(shape) for p in points]),
+            preload_at_rest=preload_at_rest,
+        )
+
+
+@dataclass(frozen=True)
+class WearHistory:
+    """Evolution of a contact under wear; row i is the state solved at the start of wear step i.
+
+    cycles : (n_row,) vibration cycles passed before the row's state
+    cycles_in_step : (n_row,) cycles that the state stands for; 0 in the last row, where contact is lost
+    depth : (n_row, n_pair) total wear depth of the pair, both surfaces together [m]
+    worn : (n_row, n_pair) depth that is worn from this row to the next [m]
+    energy : (n_row, n_pair) dissipated energy per cycle [J]
+    preload : (n_row,) static normal force of all joints that wear [N]
+    normal_force : (n_row, n_pair) mean normal force over the cycle [N]
+    status : (n_row, n_pair) bits over one cycle: 1 sticks, 2 slips, 4 separates
+    omega : (n_row,) frequency of the cycle [rad/s]
+    amplitude : (n_row,) vibration amplitude of the response output [m]
+    force : (n_row, n_pair * n_component, n_coeff) Fourier coefficients at the contact [N]
+    response : (n_row, n_output, n_coeff) Fourier coefficients of the outputs [m]
+    solves : (n_row,) harmonic balance solves spent on the row
+    step_error : (n_row,) estimated local error of the step over its tolerance; 0 where the rule has no estimate
+    plan : (n_row, n_plan) what the rule tries next: cycles, then d (distance to the site) / d omega of every duty;
+        n_plan is 0 where a rule does not plan
+    work : (n_row, n_pair) friction work from this row to the next [J]
+    duty_omega, duty_displacement : (n_row, n_duty) [rad/s], (n_row, n_duty, n_contact, n_coeff) [m]: every duty of a
+        mission; the fields above show the first
+    end : sentence that says why the run ended
+    preload_at_rest : (n_row,) static normal force of the whole contact without the harmonic loads [N]; nan where the
+        end of the run does not depend on it
+    """
+
+    cycles: np.ndarray
+    cycles_in_step: np.ndarray
+    depth: np.ndarray
+    worn: np.ndarray
+    energy: np.ndarray
+    preload: np.ndarray
+    normal_force: np.ndarray
+    status: np.ndarray
+    omega: np.ndarray
+    amplitude: np.ndarray
+    force: np.ndarray
+    response: np.ndarray
+    solves: np.ndarray
+    step_error: np.ndarray
+    plan: np.ndarray
+    work: np.ndarray
+    duty_omega: np.ndarray
+    duty_displacement: np.ndarray
+    end: str
+    preload_at_rest: np.ndarray | None = None
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """(n_row,) frequency of the cycle [Hz]."""
+        return self.omega / (2 * np.pi)
+
+    @property
+    def ended(self) -> WearEnd:
+        """Why the run ended."""
+        return WearEnd.of(self.end)
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """(n_row, n_pair * n_component, n_coeff) Fourier coefficients at the contact, first duty [m]."""
+        return self.duty_displacement[:, 0]
+
+    def rows(self) -> list[WearRow]:
+        """The rows one by one."""
+        names = [f.name for f in fields(WearRow) if getattr(self, f.name) is not None]
+        return [WearRow(**{name: getattr(self, name)[i] for name in names}) for i in range(len(self.cycles))]
+
+
+def cycles_to_preload(history: WearHistory, share: float = LIFE_SHARE) -> float | None:
+    """Cycles after which the preload has fallen to a share of its first value, along log preload; None if it has not.
+
+    This is the life that converges with the wear step. The last touch of a vibrating contact does not end in finite
+    time: near it the work falls with the power 3/2 of what is left to wear.
+    """
+    below = np.flatnonzero(history.preload < share * history.preload[0])
+    if len(below) == 0 or below[0] == 0:
+        return None
+    i = int(below[0])
+    high, low = history.preload[i - 1], max(float(history.preload[i]), 1e-3 * share * float(history.preload[0]))
+    part = np.log(high / (share * history.preload[0])) / np.log(high / low)
+    return float(history.cycles[i - 1] + part * (history.cycles[i] - history.cycles[i - 1]))
+
+
+def rows_to_go_on(interrupted: WearHistory | None) -> list[WearRow]:
+    """Rows of an interrupted run that steps were taken from; the one that ended it is come to again with its reason."""
+    rows = interrupted.rows() if interrupted is not None else []
+    return [row for row in rows if row.cycles_in_step > 0]
+
+
+def history(rows: list[WearRow], end: str) -> WearHistory:
+    """Rows put together."""
+    columns = {f.name: np.array([getattr(r, f.name) for r in rows]) for f in fields(WearRow)}
+    if np.isnan(columns["preload_at_rest"]).all():
+        del columns["preload_at_rest"]
+    return WearHistory(**columns, end=end)

@@ -1,0 +1,257 @@
+"""The implicit wear stage: one harmonic balance solve of all duties, the gaps wearing along.
+
+A pair wears by its own friction work alone, so the implicit stage
+
+    depth_i = base_i + cycles gain_i sum over duties of share E_i(x_i, depth_i)
+
+is solved pair by pair inside the contact law. Its derivative couples the duties of one pair and stays block diagonal
+over pairs, so the Krylov solver sees nothing new, and the stiffness of pressure against depth is gone.
+Source  ours
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tribodyn.hbm.balance import HarmonicBalance, Linearisation
+from tribodyn.hbm.contact.law import ContactCycle
+from tribodyn.hbm.linear.compliance import CompliancePoint
+
+MAX_ITERATIONS = 80
+ROUNDING = 4e-16
+
+
+@dataclass(frozen=True)
+class WornState:
+    """The stage evaluated at one x, over the duties of a pair, then its components; see `WearingBalance`.
+
+    omegas : of the duties [rad/s]; x, cycle, g, residual : as of a `State`; depth : (n_pair,) that goes with x [m]
+    """
+
+    omegas: tuple[float, ...]
+    x: np.ndarray
+    cycle: ContactCycle
+    g: np.ndarray
+    residual: np.ndarray
+    depth: np.ndarray
+
+
+class _Points:
+    """The linear sides of all duties at their frequencies; contact rows run pair, duty, component."""
+
+    def __init__(self, points: Sequence[CompliancePoint], n_component: int):
+        self.points = points
+        self.n_component = n_component
+
+    def split(self, rows: np.ndarray) -> list[np.ndarray]:
+        """Rows (n * n_duty * n_component, n_coeff) duty by duty."""
+        by_duty = rows.reshape(-1, len(self.points), self.n_component, rows.shape[-1])
+        return [np.ascontiguousarray(by_duty[:, i]).reshape(-1, rows.shape[-1]) for i in range(len(self.points))]
+
+    def join(self, parts: Sequence[np.ndarray]) -> np.ndarray:
+        """The inverse of `split`."""
+        n_coeff = parts[0].shape[-1]
+        blocks = [part.reshape(-1, self.n_component, n_coeff) for part in parts]
+        return np.concatenate(blocks, axis=1).reshape(-1, n_coeff)
+
+    def apply(self, g: np.ndarray) -> np.ndarray:
+        """Displacement that a departure g causes, every duty at its frequency."""
+        return self.join([p.apply(part) for p, part in zip(self.points, self.split(g), strict=True)])
+
+    def jacobian_product(self, rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """`apply` from and to the rows of whole pairs."""
+        products = [p.jacobian_product(self._own_rows(rows)) for p in self.points]
+        return lambda v: self.join([f(part) for f, part in zip(products, self.split(v), strict=True)])
+
+    def _own_rows(self, rows: np.ndarray) -> np.ndarray:
+        """Contact rows of one duty that belong to rows of whole pairs."""
+        pairs = rows.reshape(-1, len(self.points) * self.n_component)[:, 0] // (len(self.points) * self.n_component)
+        return (pairs[:, None] * self.n_component + np.arange(self.n_component)).ravel()
+
+    def coarse_part(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """That of every duty, one after the other; see `CompliancePoint.coarse_part`."""
+        n_duty = len(self.points)
+        own = self._own_rows(rows)
+        parts = [p.coarse_part(own) for p in self.points]
+        r, size = parts[0][0].shape[1], len(parts[0][1])
+        u = np.zeros((len(own) // self.n_component, n_duty, self.n_component, n_duty, r))
+        a = np.zeros((n_duty, size, n_duty, size))
+        for i, (shapes, compliance) in enumerate(parts):
+            u[:, i, :, i] = shapes.reshape(len(u), self.n_component, r)
+            a[i, :, i] = compliance
+        return u.reshape(len(rows), n_duty * r), a.reshape(n_duty * size, n_duty * size)
+
+
+class WearingBalance:
+    """The balances of a mission over one worn contact, of which every pair wears by its work over `cycles`.
+
+    balances : one per duty, over the same contact and with the gap before any wear; shares : of the cycles
+    base : (n_pair,) depth at no work [m]; cycles : that the stage stands for
+    gain : (n_pair,) depth per friction work [m/J]
+    guess : (n_pair,) depth to look from [m]; each search starts where the last one ended
+    x runs over the duties of a pair, then its components: (n_pair, n_duty * n_component, n_coeff); frequencies are a
+    tuple, one per duty. `hbm.newton` solves it as any `newton.Balance`.
+    reference_stiffness : (n_pair * n_duty * n_component,) stuck springs [N/m]
+    """
+
+    def __init__(
+        self,
+        balances: Sequence[HarmonicBalance],
+        shares: Sequence[float],
+        base: np.ndarray,
+        cycles: float,
+        gain: np.ndarray,
+        guess: np.ndarray,
+    ):
+        self.balances, self.shares, self.base, self.cycles, self.gain = balances, shares, base, cycles, gain
+        self._guess = np.maximum(guess, base)
+        first = balances[0]
+        self._n_component = len(first.contact.components)
+        spread = first.reference_stiffness.reshape(-1, 1, self._n_component)
+        self.reference_stiffness = np.repeat(spread, len(balances), axis=1).ravel()
+        self._normal = first.contact.components.index("n") if "n" in first.contact.components else None
+
+    def at(self, omegas: tuple[float, ...]) -> _Points:
+        """The linear sides at the duties' frequencies [rad/s]."""
+        return _Points([b.at(omega) for b, omega in zip(self.balances, omegas, strict=True)], self._n_component)
+
+    def x_lin(self, omegas: tuple[float, ...]) -> np.ndarray:
+        """Response with every contact stuck and closed [m], as `HarmonicBalance.x_lin`."""
+        parts = [b.x_lin(omega) for b, omega in zip(self.balances, omegas, strict=True)]
+        return self.at(omegas).join(parts)
+
+    def parts(self, x: np.ndarray) -> list[np.ndarray]:
+        """x of every duty from the joined one."""
+        return [np.ascontiguousarray(part) for part in np.split(x, len(self.balances), axis=1)]
+
+    def evaluate(self, omegas: tuple[float, ...], x: np.ndarray) -> WornState:
+        """The balance at x, every pair at the depth that its own work wears."""
+        depth, cycle = self._wear_along(x)
+        flat = x.reshape(-1, x.shape[2])
+        g = self.reference_stiffness[:, None] * flat - cycle.force.reshape(flat.shape)
+        residual = flat - self.x_lin(omegas) - self.at(omegas).apply(g)
+        return WornState(omegas, x, cycle, g, residual, depth)
+
+    def linearise(self, state: WornState) -> Linearisation:
+        """d R / d x at a state."""
+        return Linearisation(self.at(state.omegas), self.reference_stiffness, state.x, state.cycle)
+
+    def follow(self, state: WornState, moves: np.ndarray) -> np.ndarray:
+        """First-order change of x when the duties' frequencies move by `moves` [rad/s], the depths following."""
+        spread = []
+        for balance, omega, part, move in zip(self.balances, state.omegas, self.parts(state.x), moves, strict=True):
+            there = balance.with_gap(balance.contact.gap + state.depth)
+            spread.append(move * there.frequency_slope(there.evaluate(omega, part))[0])
+        moved, _, _ = self.linearise(state).solve(-self.at(state.omegas).join(spread), 1e-4)
+        return moved.reshape(state.x.shape)
+
+    def _wear_along(self, x: np.ndarray) -> tuple[np.ndarray, ContactCycle]:
+        """Depth that goes with x, and the contact cycles at it with their derivative along x and depth."""
+        parts = self.parts(x)
+        depth, samples = self._solve_depth(parts)
+        first = self.balances[0]
+        n_coeff = x.shape[2]
+        width = self._n_component * n_coeff
+        n_pair, n_duty = len(x), len(self.balances)
+        force = np.concatenate([s.cycle.force for s in samples], axis=1)
+        jacobian = np.zeros((n_pair, n_duty * width, n_duty * width))
+        along = np.zeros((n_pair, n_duty * width))
+        column = np.zeros((n_pair, n_duty * width))
+        bend, gain = np.ones(n_pair), self.cycles * self.gain
+        t = first.contact.tangential
+        for i, (share, sample, part) in enumerate(zip(self.shares, samples, parts, strict=True)):
+            rows = slice(i * width, (i + 1) * width)
+            jac = sample.cycle.jacobian
+            assert jac is not None
+            jacobian[:, rows, rows] = jac
+            column[:, rows] = sample.column
+            moved = jac.reshape(*part.shape, width).transpose(0, 3, 1, 2)
+            slope = first.basis.work_per_cycle(moved, part[:, None])[:, :, t].sum(axis=2)
+            turned = np.zeros_like(part)  # the work of f against a unit of each coefficient of x
+            turned[:, t] = -np.pi * (sample.cycle.force @ first.basis.rate)[:, t]
+            along[:, rows] = share * (slope + turned.reshape(n_pair, width))
+            bend = bend + gain * sample.falls
+        slope = gain[:, None] * along / bend[:, None]
+        jacobian -= column[:, :, None] * slope[:, None, :]  # a depth acts as a static shift of the normal displacement
+        status = samples[0].cycle.status.copy()
+        for sample in samples[1:]:
+            status |= sample.cycle.status
+        return depth, ContactCycle(force, jacobian, status)
+
+    def _solve_depth(self, parts: Sequence[np.ndarray]) -> tuple[np.ndarray, list[_Sample]]:
+        """The depth of every pair by Newton's method inside a bracket, and the cycles at it."""
+        size = np.maximum.reduce([np.abs(p).max(axis=(1, 2)) for p in parts])
+        depth, low, high = self._guess.copy(), self.base.copy(), np.full_like(self.base, np.inf)
+        full = self._sample(parts, depth, np.arange(len(depth)))
+        todo = np.arange(len(depth))
+        samples = full
+        for _ in range(MAX_ITERATIONS):
+            gain = self.cycles * self.gain[todo]
+            work = sum(s.work for s in samples)
+            miss = depth[todo] - self.base[todo] - gain * work
+            bend = 1.0 + gain * sum(s.falls for s in samples)
+            low[todo] = np.where(miss < 0, depth[todo], low[todo])
+            high[todo] = np.where(miss > 0, depth[todo], high[todo])
+            here, below, above = depth[todo], low[todo], high[todo]
+            trial = here - miss / np.where(bend > 0, bend, 1.0)
+            scale = np.maximum(np.maximum(np.abs(here), size[todo]), 1e-300)
+            done = (miss == 0) | (np.abs(trial - here) <= ROUNDING * scale) | (above - below <= ROUNDING * scale)
+            middle = np.where(np.isfinite(above), 0.5 * (below + above), here - miss)
+            trial = np.where((trial > below) & (trial < above), trial, middle)
+            if done.all():
+                break
+            todo = todo[~done]
+            depth[todo] = trial[~done]
+            samples = self._sample(parts, depth, todo)
+            full = [whole.updated(todo, part) for whole, part in zip(full, samples, strict=True)]
+        self._guess = depth
+        return depth, full
+
+    def _sample(self, parts: Sequence[np.ndarray], depth: np.ndarray, pairs: np.ndarray) -> list[_Sample]:
+        """Contact cycles of some pairs at a depth, duty by duty, with their share of the work and its derivative."""
+        made = []
+        for share, balance, part in zip(self.shares, self.balances, parts, strict=True):
+            x = part[pairs]
+            contact = balance.contact.taken(pairs).with_gap(balance.contact.gap[pairs] + depth[pairs])
+            cycle = contact.cycle(x, balance.basis, balance.memory[pairs])
+            t = contact.tangential
+            assert cycle.jacobian is not None
+            if self._normal is None or not balance.basis.has_static:
+                column = np.zeros((len(pairs), cycle.jacobian.shape[1]))
+            else:
+                column = cycle.jacobian[:, :, self._normal * balance.basis.n_coeff]
+            work = share * np.maximum(balance.basis.work_per_cycle(cycle.force, x)[:, t].sum(axis=1), 0.0)
+            falls = share * balance.basis.work_per_cycle(column.reshape(x.shape), x)[:, t].sum(axis=1)
+            made.append(_Sample(cycle, column, work, np.where(work > 0, falls, 0.0)))
+        return made
+
+
+@dataclass(frozen=True)
+class _Sample:
+    """Contact cycles of one duty; work [J] and falls = -d work / d depth [N] carry the duty's share.
+
+    column : (n_pair, n_component * n_coeff) d force / d (static normal displacement) = -d force / d depth [N/m]
+    """
+
+    cycle: ContactCycle
+    column: np.ndarray
+    work: np.ndarray
+    falls: np.ndarray
+
+    def updated(self, pairs: np.ndarray, part: _Sample) -> _Sample:
+        """This with the rows of some pairs replaced."""
+        assert self.cycle.jacobian is not None
+        assert part.cycle.jacobian is not None
+        for mine, new in (
+            (self.cycle.force, part.cycle.force),
+            (self.cycle.jacobian, part.cycle.jacobian),
+            (self.cycle.status, part.cycle.status),
+            (self.column, part.column),
+            (self.work, part.work),
+            (self.falls, part.falls),
+        ):
+            mine[pairs] = new
+        return self

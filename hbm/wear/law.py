@@ -1,0 +1,127 @@
+"""Wear laws: what a law file sees and offers, and how it is found by its name.
+
+A law is a module `hbm/wear/<name>.py`, or a file of one's own, with `depth_rate(exposure) -> (n_pair,)`: total wear
+depth of each pair per vibration cycle [m], the sum over both surfaces. Its own numbers, such as a wear coefficient, it
+declares in `class Parameters` with their units, see `tribodyn.declare`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tribodyn import declare
+from tribodyn.found import Kind
+
+if TYPE_CHECKING:
+    from tribodyn.hbm.balance import HarmonicBalance, State
+    from tribodyn.hbm.contact.joint import Joint
+
+
+@dataclass(frozen=True)
+class JointWear:
+    """How a joint wears.
+
+    law : name of a wear law, or path of its file
+    numbers : the law's own, scalars or (n_pair,) of the joint, in the units that the law declares
+    """
+
+    law: str
+    numbers: Mapping[str, np.ndarray | float]
+
+    @classmethod
+    def of(cls, law: str, **numbers: np.ndarray | float) -> JointWear:
+        """A wear law with its numbers, such as coefficient=2e-15.
+
+        Raises  ValueError where there is no such law, or a number is missing, unknown or out of its limits
+        """
+        given = declare.checked(declared(law), numbers, f"wear law '{Path(law).stem}'")
+        return cls(law, given)
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """One vibration cycle as a wear law sees it.
+
+    The law serves one joint; n_pair counts the pairs of that joint.
+    area : (n_pair,) tributary area [m2]; numbers : the law's own by name, each (n_pair,)
+    depth : (n_pair,) wear depth so far [m]; cycles : vibration cycles so far
+    on : name of the joint, the first one by default
+    """
+
+    balance: HarmonicBalance
+    state: State
+    area: np.ndarray
+    numbers: Mapping[str, np.ndarray]
+    depth: np.ndarray
+    cycles: float
+    on: str = ""
+
+    @property
+    def joint(self) -> Joint:
+        """The joint that wears."""
+        contact = self.balance.contact
+        return contact.joint(self.on) if self.on else contact.joints[0]
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """The components that the joint's contact law sees, in the order t1, t2, n."""
+        return self.joint.parameters.components
+
+    @cached_property
+    def energy(self) -> np.ndarray:
+        """(n_pair,) friction work over the cycle, both tangential directions [J]; rounding below zero is cut off."""
+        return np.maximum(self.balance.energy(self.state)[self.joint.rows], 0.0)
+
+    @property
+    def status(self) -> np.ndarray:
+        """(n_pair,) bits of what happened in the cycle, see `hbm.contact.law`."""
+        return self.state.cycle.status[self.joint.rows]
+
+    @cached_property
+    def history(self) -> tuple[np.ndarray, np.ndarray]:
+        """Displacement [m] and contact force [N] over the cycle, both (n_pair, n_component, n_samples)."""
+        balance = self.balance
+        return balance.contact.history_of(self.joint, self.state.x, balance.basis, balance.memory)
+
+    @cached_property
+    def normal_force_times_slip(self) -> np.ndarray:
+        """(n_pair,) integral of N |ds| over the cycle, s the slip path in the contact plane [J]."""
+        if "n" not in self.components:
+            raise ValueError("a wear law that needs the normal force cannot serve a contact without a normal component")
+        x, f = self.history
+        t = self.components.index("n")
+        k = self.joint.parameters.stiffness[:, :t, None]
+        slider = x[:, :t] - np.divide(f[:, :t], k, out=np.zeros_like(f[:, :t]), where=k > 0)
+        step = np.linalg.norm(np.roll(slider, -1, axis=2) - slider, axis=1)
+        # geometric mean: a slider that moved while the pair was apart carried no load on the way
+        normal = np.sqrt(np.maximum(f[:, t] * np.roll(f[:, t], -1, axis=1), 0.0))
+        return np.sum(normal * step, axis=1)
+
+
+KIND = Kind("wear law", "tribodyn.hbm.wear.laws", ("depth_rate",))
+names, file_of, load, declared = KIND.names, KIND.file_of, KIND.load, KIND.declared
+
+
+def depth_rate(name: str, exposure: Exposure) -> np.ndarray:
+    """What the law of this name says of a cycle: (n_pair,) wear depth per cycle [m].
+
+    Raises  ValueError where a law of one's own cannot be run or says what is no depth of every pair
+    """
+    law = load(name)
+    if not name.endswith(".py"):
+        return np.asarray(law.depth_rate(exposure))
+    try:
+        rate = np.asarray(law.depth_rate(exposure), float)
+    except Exception as error:  # of a file of one's own: it may be anything
+        raise ValueError(f"wear law file '{name}' cannot be run: {type(error).__name__}: {error}") from error
+    if rate.shape != exposure.area.shape:
+        raise ValueError(f"wear law file '{name}' gives depths of shape {rate.shape} and not {exposure.area.shape}")
+    if np.isfinite(exposure.energy).all() and not np.isfinite(rate).all():
+        raise ValueError(f"wear law file '{name}' gives depths that are not finite")
+    return rate

@@ -1,0 +1,1 @@
+"""Wear laws, one file each, found by name."""

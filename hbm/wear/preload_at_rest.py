@@ -1,0 +1,45 @@
+"""The preload that is left when the vibration stops, along a wear run.
+
+Two preloads differ. The static force of a vibrating contact is a mean over the cycle: a contact that lifts off in each
+cycle carries a mean force by hammering even where no interference is left. The force without the harmonic loads is the
+interference that wear uses up, and what a torque wrench or a load cell at a standing machine tells.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tribodyn.hbm.continuation.operating_point import AtFrequency
+from tribodyn.hbm.wear.evolution import WearProblem, WearState, assess
+
+
+class PreloadAtRest:
+    """Solves the contact at rest at the depths of a wear run, each from its neighbour.
+
+    Nothing is solved where the problem has no `lost_below_at_rest`. The static solution does not depend on the
+    frequency that it is solved at; that of the first state is taken.
+    """
+
+    def __init__(self, problem: WearProblem):
+        self._problem = problem
+        self._quiet: WearProblem | None = None
+        self._before: WearState | None = None
+
+    def of(self, state: WearState) -> WearState:
+        """The state with its preload at rest [N], or why there is none."""
+        problem = self._problem
+        if problem.lost_below_at_rest is None or state.failure:
+            return state
+        if self._quiet is None:
+            first, output = problem.mission[0], problem.balance.compliance.output_names[0]
+            site = AtFrequency(output, state.points[0].state.omega, first.site.newton)
+            self._quiet = replace(problem, mission=(replace(first, site=site, share=1.0, load=0.0),))
+        self._before = assess(self._quiet, state.depth, 0.0, self._before)
+        solves = state.solves + self._before.solves
+        if self._before.failure:
+            failure = self._before.failure.replace("solve failed", "solve failed at rest", 1)
+            return replace(state, failure_at_rest=failure, preload_at_rest=float(np.nan), solves=solves)
+        preload = problem.preload(self._before.points[0].state)
+        return replace(state, preload_at_rest=preload, solves=solves)

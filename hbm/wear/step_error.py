@@ -1,0 +1,54 @@
+"""What the wear steps of a run cost, told from its own history."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
+
+UNKNOWN = 0.5  # estimated relative error from which on a number of cycles is no statement
+
+
+@dataclass(frozen=True)
+class StepError:
+    """Estimated relative errors by the wear steps: of the cycles for the worn volume, and of the largest depth."""
+
+    cycles: float
+    depth: float
+
+
+def step_error(history: WearHistory, tolerance: float | None = None) -> StepError:
+    """Estimate for a whole run, up to where LIFE_SHARE of the preload is left.
+
+    tolerance : of the error-controlled rule; None for steps at the rate of their beginning, as the thesis takes them
+
+    A step of Z cycles at the rate of its beginning is off by half the change of the rate over the step. The changes of
+    all pairs count without their sign: rates that go back and forth between neighbours are a sign of steps too long.
+    The error-controlled rule has measured each of its steps by a first-order companion of its second-order one; the
+    largest stands for the whole run. On the beam life was off by 0.3 to 0.4 of the tolerance from 10 to 0.1 %.
+    """
+    lost = np.flatnonzero(history.preload < LIFE_SHARE * history.preload[0])
+    last = int(lost[0]) if len(lost) else len(history.cycles) - 1  # row where the counted steps end
+    total = history.energy.sum(axis=1)
+    taken = np.flatnonzero((history.cycles_in_step[:last] > 0) & (total[:last] > 0))
+    if not len(taken):
+        return StepError(0.0, 0.0)
+    cycles = history.cycles_in_step[taken]
+    if tolerance is not None:
+        largest = float(tolerance * history.step_error[taken].max())
+        return StepError(largest, largest)
+    before, after = history.energy[taken], history.energy[taken + 1]
+    change = np.abs(after - before).sum(axis=1) / (total[taken] + total[taken + 1])
+    share, share_after = before / total[taken, None], _shares(after)
+    work = history.work[taken].sum(axis=1)
+    worn = work @ share
+    shift = np.abs(work @ (share_after - share)) / 2
+    return StepError(float(cycles @ change / cycles.sum()), float(shift.max() / worn.max()))
+
+
+def _shares(energy: np.ndarray) -> np.ndarray:
+    """Each pair's share of the work of its row, none where a row has no work."""
+    total = energy.sum(axis=1, keepdims=True)
+    return np.divide(energy, total, out=np.zeros_like(energy), where=total > 0)
