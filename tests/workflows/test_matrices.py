@@ -15,7 +15,7 @@ from tests.helpers.verification_models import random_structure
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import ContactParameters
-from tribodyn.hbm.continuation import natural
+from tribodyn.hbm.continuation.methods import natural
 from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
