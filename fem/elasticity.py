@@ -97,9 +97,7 @@ def symmetric(blocks: np.ndarray) -> np.ndarray:
     return (blocks + blocks.transpose(0, 2, 1, 4, 3)) / 2
 
 
-def of_elements(
-    mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]
-) -> tuple[list[AnyMaterial], np.ndarray]:
+def of_elements(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]) -> tuple[list[AnyMaterial], np.ndarray]:
     """Materials, and for each element of one mesh (n_element,) which of them it has.
 
     Raises  ValueError for a subdomain the mesh lacks, or an element with no or two materials
@@ -135,4 +133,3 @@ def per_element(
     kinds, kind = of_elements(mesh, material)
     values = np.array([[*one.lame, one.rho] for one in kinds if isinstance(one, Material)])
     return values[kind, 0], values[kind, 1], values[kind, 2]
-

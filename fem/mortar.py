@@ -267,9 +267,10 @@ def _place(points: np.ndarray, at: np.ndarray, e: np.ndarray) -> np.ndarray:
         J = np.einsum("nix,ajn,nax->nij", e[open_], slopes, local)
         det = J[:, 0, 0] * J[:, 1, 1] - J[:, 0, 1] * J[:, 1, 0]
         det = np.where(det == 0, np.inf, det)
-        step = np.stack(
-            [J[:, 1, 1] * off[:, 0] - J[:, 0, 1] * off[:, 1], J[:, 0, 0] * off[:, 1] - J[:, 1, 0] * off[:, 0]]
-        ) / det
+        step = (
+            np.stack([J[:, 1, 1] * off[:, 0] - J[:, 0, 1] * off[:, 1], J[:, 0, 0] * off[:, 1] - J[:, 1, 0] * off[:, 0]])
+            / det
+        )
         xi[:, open_] += step
         if first is None:
             first = xi.copy()

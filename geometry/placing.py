@@ -52,4 +52,3 @@ def taken(mesh: Any, node_sets: Mapping[str, np.ndarray], volume: str) -> tuple[
     sets = {name: np.sort(at[at >= 0]) for name, of in node_sets.items() if ((at := number[of]) >= 0).any()}
     result = replace(own, doflocs=locations).with_boundaries(boundaries).with_subdomains(subdomains)
     return result, sets
-

@@ -17,13 +17,13 @@ import scipy.linalg as sla
 
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
-from tribodyn.hbm.anderson import Anderson
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact import compiled_law
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.time import time_step
+from tribodyn.hbm.time.period_search import Period, PeriodSearch
 from tribodyn.hbm.time.time_step import Moving, Record
 
 RESOLVED = 1.0  # omega h of a mode from which on its inertia is left out
@@ -278,25 +278,6 @@ def _exact_step(
     return E, Q, kick
 
 
-class _StateVector:
-    """(eta, v, memory) as one vector whose square is an energy, and back."""
-
-    def __init__(self, stepper: TimeStepper):
-        rate = np.sqrt(np.maximum(stepper.lam, 0.0) + stepper.omega**2)
-        self._stepper = stepper
-        self._shape = stepper.balance.memory.shape
-        spring = np.sqrt(stepper.balance.contact.stiffness[:, : self._shape[1]]).ravel()
-        spring[spring == 0] = 1.0
-        self._weight = np.concatenate([rate, np.full(len(rate), 1 / stepper.h), spring])
-
-    def pack(self, m: Moving) -> np.ndarray:
-        return self._weight * np.concatenate([m.z, m.memory.ravel()])
-
-    def unpack(self, vector: np.ndarray, near: Moving) -> Moving:
-        z, memory = np.split(vector / self._weight, [len(near.z)])
-        return self._stepper.moving(z, memory.reshape(self._shape), near.x, near.f)
-
-
 @single
 def integrate(
     balance: HarmonicBalance,
@@ -327,33 +308,18 @@ def _rest(stepper: TimeStepper) -> Moving:
 
 
 def _to_periodic(stepper: TimeStepper, motion: Moving, options: Options, with_slopes: bool) -> PeriodicMotion:
-    vector = _StateVector(stepper)
-    mixing = Anderson(depth=40)
-    best, best_at = np.inf, 0
-    for periods in range(1, options.max_periods + 1):
-        end, record, spent, speed = stepper.period(motion, with_slopes)
-        if options.accelerate:
-            end = end._replace(memory=stepper.memory_of(record.x))
-        z, image = vector.pack(motion), vector.pack(end)
-        change = float(np.linalg.norm(image - z))
-        drift = change / speed if speed > 0 else change
-        if drift <= options.tolerance:
-            return _result(stepper, record, drift, periods, spent, CONVERGED)
-        if drift > 4 * best:
-            mixing.forget()
-        if drift < 0.9 * best:
-            best, best_at = drift, periods
-        if periods - best_at >= options.patience:
-            break
-        motion = vector.unpack(mixing.propose(z, image), end) if options.accelerate else end
-    hint = "; is the motion stable there?" if periods < options.max_periods else ""
-    outcome = f"not periodic after {periods} periods: drift {drift:.1e}, smallest {best:.1e}{hint}"
-    return _result(stepper, record, drift, periods, spent, outcome)
+    search = PeriodSearch(stepper, options, with_slopes)
+    found = search.mix(motion) if options.accelerate else search.march(motion)
+    if found.drift <= options.tolerance:
+        return _result(stepper, found, search.periods, CONVERGED)
+    hint = "; is the motion stable there?" if search.periods < options.max_periods else ""
+    smallest = search.best.drift
+    outcome = f"not periodic after {search.periods} periods: drift {found.drift:.1e}, smallest {smallest:.1e}{hint}"
+    return _result(stepper, found, search.periods, outcome)
 
 
-def _result(
-    stepper: TimeStepper, record: Record, drift: float, periods: int, spent: int, outcome: str
-) -> PeriodicMotion:
+def _result(stepper: TimeStepper, period: Period, periods: int, outcome: str) -> PeriodicMotion:
+    record = period.record
     components = stepper.balance.contact.components
     before = np.roll(record.x, 1, axis=0), np.roll(record.f, 1, axis=0)
     work = 0.5 * ((record.f + before[1]) * (record.x - before[0])).sum(axis=0)
@@ -368,9 +334,9 @@ def _result(
         energy=work,
         preload=preload,
         status=record.bits,
-        drift=drift,
+        drift=period.drift,
         periods=periods,
-        iterations=spent / stepper.options.steps,
+        iterations=period.rounds / stepper.options.steps,
         outcome=outcome,
         slopes=record.slopes if len(record.slopes) else None,
     )

@@ -145,9 +145,7 @@ def test_cyclic_halves():
     mesh = skfem.MeshHex2(np.stack([r * np.cos(angle), r * np.sin(angle), z]), flat.t)
     mesh = mesh.with_boundaries({"start": lambda x: x[1] < 1e-9, "end": lambda x: x[0] < 1e-9})
     turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])  # carries the start face onto the end face
-    contact, B_2 = pair_halves(
-        mesh, mesh.boundaries["end"], mesh.boundaries["start"], (0, 0, 1), rotation=turn
-    )
+    contact, B_2 = pair_halves(mesh, mesh.boundaries["end"], mesh.boundaries["start"], (0, 0, 1), rotation=turn)
     spin = np.cross([0, 0, 1.0], mesh.doflocs.T).ravel()
     lift = np.tile([0, 0, 1.0], mesh.doflocs.shape[1])
     for same in (spin, lift):  # every sector does the same in its own coordinates

@@ -26,9 +26,7 @@ def test_jenkins_describing_function(amplitude, way, n_samples, tolerance):
     basis = HarmonicBasis((0, 1), n_samples, way)
     x = np.array([[[0.0, amplitude, 0.0]]])
     constant = contact_law.load("jenkins_constant")
-    cycle = aft.cycle(
-        constant, x, ContactParameters.of(("t1",), [[kt]], friction=mu, normal_load=load), basis
-    )
+    cycle = aft.cycle(constant, x, ContactParameters.of(("t1",), [[kt]], friction=mu, normal_load=load), basis)
     assert cycle.force[0, 0] == pytest.approx([0.0, *exact], abs=tolerance * amplitude * kt)
     assert basis.work_per_cycle(cycle.force, x)[0, 0] == pytest.approx(
         4 * mu * load * max(0.0, amplitude - mu * load / kt), abs=10 * tolerance * amplitude * kt * amplitude

@@ -108,9 +108,7 @@ def test_jacobian_through_every_kind_of_transition(name, components):
         x, p, memory = draw(law, components, basis, 100, seed=22)
         direction = np.random.default_rng(1).normal(size=x.shape)
         e = 1e-6
-        plus, minus = (
-            aft.cycle(law, x + s * e * direction, p, basis, memory, jacobian=False).force for s in (1, -1)
-        )
+        plus, minus = (aft.cycle(law, x + s * e * direction, p, basis, memory, jacobian=False).force for s in (1, -1))
         slope = aft.cycle(law, x, p, basis, memory).jacobian @ direction.reshape(100, -1, 1)
         error = np.abs((plus - minus) / (2 * e) - slope.reshape(x.shape)).max(axis=(1, 2))
         assert error.max() < 1e-3  # differences across an event that appears or vanishes

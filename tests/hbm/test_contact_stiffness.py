@@ -110,8 +110,7 @@ def test_partial_slip_traction_and_displacement():
     assert PUNCH.half_width < c < b
     edges = (0, PUNCH.half_width, c, b)
     total = 2 * sum(
-        quad(PUNCH.shear_traction, low, high, args=(LINE_LOAD, shear, friction))[0]
-        for low, high in pairwise(edges)
+        quad(PUNCH.shear_traction, low, high, args=(LINE_LOAD, shear, friction))[0] for low, high in pairwise(edges)
     )
     assert total == pytest.approx(shear, rel=1e-6)
     slipping = np.linspace(1.001 * c, 0.999 * b, 9)

@@ -126,9 +126,7 @@ def test_moving_ground_equals_the_motion_relative_to_it(samples):
     }
     system = type(s)(s.mass, s.stiffness, s.damping, {**s.loads, **extra}, s.outputs)
     extra_loads = {(h, f"ground {h} {part}"): unit for h in (0, 1) for part, unit in (("real", 1.0), ("imag", 1j))}
-    relative = balance_of(
-        ReducedModel(system, model.interface), Excitation({**loads, **extra_loads}), samples=samples
-    )
+    relative = balance_of(ReducedModel(system, model.interface), Excitation({**loads, **extra_loads}), samples=samples)
     ours, theirs = (newton.solve_from_rest(b, OMEGA, TIGHT) for b in (moving, relative))
     assert ours.converged
     assert theirs.converged

@@ -153,9 +153,7 @@ def matrices(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @cases(20)
 @given(spoilt("matrices"))
-def test_a_spoilt_scene_runs_fails_or_is_refused_in_one_sentence(
-    matrices: Path, drawn: tuple[str, list[str]]
-) -> None:
+def test_a_spoilt_scene_runs_fails_or_is_refused_in_one_sentence(matrices: Path, drawn: tuple[str, list[str]]) -> None:
     with tempfile.TemporaryDirectory() as out:
         short = ["--set", "response.points=8", "--set", "wear.max_steps=2"]
         arguments = ["run", str(matrices / "own.toml"), "--out", out, "--no-pictures", *short, *changes(drawn[1])]

@@ -68,9 +68,7 @@ def two_bodies(seed: int = 3) -> ReducedModel:
 
 
 def problem(model: ReducedModel, height: float, force: float, gap=(0.0, 1e-5, -1e-5), kept=(0, 1, 2, 3)):
-    parameters = ContactParameters.of(
-        COMPONENTS, np.full((N_PAIR, 3), 3e5), friction=0.4, gap=np.asarray(gap, float)
-    )
+    parameters = ContactParameters.of(COMPONENTS, np.full((N_PAIR, 3), 3e5), friction=0.4, gap=np.asarray(gap, float))
     excitation = Excitation.of({"height": height}, {1: {"shaker": force}})
     return HarmonicBalance.of(
         model, Joint("contact", "jenkins", parameters), HarmonicBasis(kept, 128), excitation, 2 * OMEGA

@@ -19,9 +19,7 @@ SMALL = ["geometry.n_patch=3", "geometry.n_length=4", "geometry.n_height=1", "re
 SET = [word for override in SMALL for word in ("--set", override)]
 
 
-def test_the_backbone_goes_from_the_stuck_to_the_free_mode(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_the_backbone_goes_from_the_stuck_to_the_free_mode(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     model = modelling.build(read("beam", SMALL), tmp_path, Progress())
     free = linear_modes(model.reduced, n=1)[0][0]
     code, out, err = leave(

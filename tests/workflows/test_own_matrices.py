@@ -32,9 +32,7 @@ def structure(damping_ratio: float | None = 0.02, damping: np.ndarray | None = N
         numbers={"friction": 0.5, "normal_load": 40.0},
     )
     stop = td.Contact("stop", matrices.contact_rows(STOP, ("n",), area=1e-4, gap=1e-4), "unilateral", 0.0, 1e5)
-    return td.reduce(
-        matrices, (rub, stop), loads=LOADS, outputs={"tip": 3, "bow": RUB}, damping_ratio=damping_ratio
-    )
+    return td.reduce(matrices, (rub, stop), loads=LOADS, outputs={"tip": 3, "bow": RUB}, damping_ratio=damping_ratio)
 
 
 def balance(made: td.Structure, force: float = 15.0) -> td.Balance:

@@ -187,7 +187,7 @@ def chosen(known: Sequence[Knob], names: Sequence[str]) -> tuple[Knob, ...]:
     """Knobs by name, all where none is named; raises ValueError for one that the scene does not have."""
     missing = [name for name in names if name not in {knob.name for knob in known}]
     if missing:
-        raise ValueError(f'--knob {missing[0]}: the scene has the knobs {", ".join(knob.name for knob in known)}')
+        raise ValueError(f"--knob {missing[0]}: the scene has the knobs {', '.join(knob.name for knob in known)}")
     return tuple(knob for knob in known if not names or knob.name in names)
 
 

@@ -82,8 +82,6 @@ def _in_si(key: str, number: Number, value: Any) -> int | float:
     return converted
 
 
-
-
 def folder_of(info: ValidationInfo) -> Path | None:
     """The folder of the scene that is being read; None where the scene of a result is, which was checked before."""
     folder: Path | None = (info.context or {}).get("folder")

@@ -64,9 +64,7 @@ class Known(Table):
     left : share of the first preload at which a life and its work end
     """
 
-    of: Literal[
-        "open frequency", "stuck frequency", "preload", "energy", "amplitude", "peak frequency", "life", "work"
-    ]
+    of: Literal["open frequency", "stuck frequency", "preload", "energy", "amplitude", "peak frequency", "life", "work"]
     value: Quantity
     weight: Annotated[Number, Field(gt=0)] = 1.0
     mode: Annotated[StrictInt, Field(ge=1)] | None = None

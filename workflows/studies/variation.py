@@ -117,6 +117,4 @@ def _beside(value: float | None, own: float | None) -> str:
 
 def as_records(rows: Sequence[Varied]) -> list[dict[str, Any]]:
     """For machines, SI units."""
-    return [
-        {"change": row.change, **row.values, "fitted": list(row.fitted), "outcome": row.outcome} for row in rows
-    ]
+    return [{"change": row.change, **row.values, "fitted": list(row.fitted), "outcome": row.outcome} for row in rows]

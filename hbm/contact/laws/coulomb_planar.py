@@ -31,7 +31,6 @@ class Parameters:
     """Coulomb coefficient."""
 
 
-
 def n_state(components: tuple[str, ...]) -> int:
     """The slider position in the plane [m]."""
     return 2

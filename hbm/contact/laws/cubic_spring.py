@@ -24,7 +24,6 @@ class Parameters:
     """Cubic coefficient k_3 of every pair and component."""
 
 
-
 def n_state(components: tuple[str, ...]) -> int:
     """No memory."""
     return 0

@@ -33,7 +33,6 @@ class Parameters:
     """Coulomb coefficient."""
 
 
-
 def n_state(components: tuple[str, ...]) -> int:
     """One slider position per tangential direction [m]."""
     return len(components) - 1

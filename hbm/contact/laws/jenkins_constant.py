@@ -32,7 +32,6 @@ class Parameters:
     """Constant normal load of every pair, 0 for no contact."""
 
 
-
 def n_state(components: tuple[str, ...]) -> int:
     """One slider position per tangential direction [m]."""
     return len(components)

@@ -21,7 +21,6 @@ class Parameters:
     """Worn volume per normal force and slip distance, k = K / H; 1 m3/J is 1/Pa."""
 
 
-
 def depth_rate(exposure: Exposure) -> np.ndarray:
     """(n_pair,) total wear depth per cycle, k (integral of N |ds|) / A [m]."""
     return exposure.numbers["coefficient"] * exposure.normal_force_times_slip / exposure.area

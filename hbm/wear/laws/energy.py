@@ -21,7 +21,6 @@ class Parameters:
     """Worn volume per friction work, alpha."""
 
 
-
 def depth_rate(exposure: Exposure) -> np.ndarray:
     """(n_pair,) total wear depth per cycle, alpha E / A [m]."""
     return exposure.numbers["coefficient"] * exposure.energy / exposure.area

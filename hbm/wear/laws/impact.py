@@ -26,7 +26,6 @@ class Parameters:
     """Worn volume per work of impacts."""
 
 
-
 def depth_rate(exposure: Exposure) -> np.ndarray:
     """(n_pair,) total wear depth per cycle, alpha W / A [m]."""
     return exposure.numbers["coefficient"] * impact_work(exposure) / exposure.area

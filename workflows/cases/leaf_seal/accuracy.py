@@ -145,9 +145,7 @@ def compute(folder: Path) -> Accuracy:
     with threadpool_limits(1):
         responses = {top: with_harmonics(top) for top in HARMONICS}
         finest = responses[HARMONICS[-1]]
-        upper, lower = (
-            fold_in_time(finest.balance, finest.branch, fold, LINER_NODE) for fold in resonance(finest)[:2]
-        )
+        upper, lower = (fold_in_time(finest.balance, finest.branch, fold, LINER_NODE) for fold in resonance(finest)[:2])
         rows = errors(responses, upper, lower)
         hill = responses[HILL]
         folds = [float(hill.branch.omega[i]) for i in resonance(hill)[:2]]

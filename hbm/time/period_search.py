@@ -1,0 +1,143 @@
+"""The search for a motion that repeats itself after a period, by marching whole periods.
+
+A plain march follows the transient until it has died away. Mixing the states of past periods (Anderson) is much
+shorter, and where it is thrown off a periodic motion that a plain march leaves, Newton's method finds that (shooting).
+Source  Newton-Krylov shooting: Sanchez, Net, Garcia-Archilla and Simo 2004
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from tribodyn.hbm.anderson import Anderson
+from tribodyn.hbm.time.time_step import Moving, Record
+
+if TYPE_CHECKING:
+    from tribodyn.hbm.time.time_integration import Options, TimeStepper
+
+THROWN_OFF = 4.0  # drift, over the smallest one, from which on past periods no longer tell where to go
+PROGRESS = 0.9  # drift, over the smallest one, that counts as a better period
+DIFFERENCE = 1e-6  # step of the derivative of a period, relative to the state
+KRYLOV, FORCING = 60, 0.05  # products at most and relative residual of a linear solve
+SHORTEST = 1 / 64  # share of a Newton step
+
+
+@dataclass(frozen=True)
+class Period:
+    """A period that was marched: state vectors before and after it, what moves after it, its record and cost."""
+
+    start: np.ndarray
+    image: np.ndarray
+    end: Moving
+    record: Record
+    rounds: int
+    drift: float
+
+
+class GivenUp(Exception):
+    """No periodic motion within the periods allowed."""
+
+
+class PeriodSearch:
+    """Counts the periods marched and keeps the one that repeats itself best.
+
+    best : the period of least drift so far; periods : marched so far
+    """
+
+    def __init__(self, stepper: TimeStepper, options: Options, with_slopes: bool):
+        self.stepper, self.options, self.with_slopes = stepper, options, with_slopes
+        self.vector = StateVector(stepper)
+        self.periods, self._best_at = 0, 0
+        self.best: Period
+        self._last: Period
+
+    def march(self, motion: Moving) -> Period:
+        """Plain periods until one repeats itself, or the last one."""
+        try:
+            found = self._period(motion)
+            while found.drift > self.options.tolerance:
+                found = self._period(found.end, self.options.patience)
+        except GivenUp:
+            return self._last
+        return found
+
+    def mix(self, motion: Moving) -> Period:
+        """Periods mixed from past ones, then Newton's method where they lead away; the best one where both fail."""
+        mixing = Anderson(depth=40)
+        try:
+            found = self._period(motion)
+            while found.drift > self.options.tolerance:
+                if found.drift > THROWN_OFF * self.best.drift:
+                    found = self._shoot(self.best)
+                    mixing.forget()
+                    continue
+                mixed = self.vector.unpack(mixing.propose(found.start, found.image), found.end)
+                found = self._period(mixed, self.options.patience)
+        except GivenUp:
+            return self.best
+        return found
+
+    def _period(self, motion: Moving, patience: float = np.inf) -> Period:
+        """March one period.
+
+        Raises  GivenUp where no further period is allowed, or the best one was `patience` periods ago
+        """
+        if self.periods >= self.options.max_periods or self.periods - self._best_at >= patience:
+            raise GivenUp
+        end, record, rounds, speed = self.stepper.period(motion, self.with_slopes)
+        if self.options.accelerate:
+            end = end._replace(memory=self.stepper.memory_of(record.x))
+        z, image = self.vector.pack(motion), self.vector.pack(end)
+        change = float(np.linalg.norm(image - z))
+        self._last = Period(z, image, end, record, rounds, change / speed if speed > 0 else change)
+        self.periods += 1
+        if self.periods == 1 or self._last.drift < PROGRESS * self.best.drift:
+            self.best, self._best_at = self._last, self.periods
+        return self._last
+
+    def _shoot(self, here: Period) -> Period:
+        """Newton's method on P(z) - z = 0, its linear systems by GMRES on differences of P, as far as drift falls."""
+        while here.drift > self.options.tolerance:
+            miss = here.image - here.start
+            size = DIFFERENCE * float(np.linalg.norm(here.image))
+
+            def product(v: np.ndarray, here: Period = here, size: float = size) -> np.ndarray:
+                length = float(np.linalg.norm(v)) / size
+                there = self._period(self.vector.unpack(here.start + v / length, here.end))
+                return (there.image - here.image) * length - v
+
+            derivative = LinearOperator((len(miss), len(miss)), product, dtype=float)
+            step = gmres(derivative, -miss, rtol=FORCING, restart=KRYLOV, maxiter=1)[0]
+            share = 1.0
+            while True:
+                there = self._period(self.vector.unpack(here.start + share * step, here.end))
+                if there.drift < (1 - 0.1 * share) * here.drift:
+                    break
+                share *= 0.5
+                if share < SHORTEST:
+                    return here
+            here = there
+        return here
+
+
+class StateVector:
+    """(eta, v, memory) as one vector whose square is an energy, and back."""
+
+    def __init__(self, stepper: TimeStepper):
+        rate = np.sqrt(np.maximum(stepper.lam, 0.0) + stepper.omega**2)
+        self._stepper = stepper
+        self._shape = stepper.balance.memory.shape
+        spring = np.sqrt(stepper.balance.contact.stiffness[:, : self._shape[1]]).ravel()
+        spring[spring == 0] = 1.0
+        self._weight = np.concatenate([rate, np.full(len(rate), 1 / stepper.h), spring])
+
+    def pack(self, m: Moving) -> np.ndarray:
+        return self._weight * np.concatenate([m.z, m.memory.ravel()])
+
+    def unpack(self, vector: np.ndarray, near: Moving) -> Moving:
+        z, memory = np.split(vector / self._weight, [len(near.z)])
+        return self._stepper.moving(z, memory.reshape(self._shape), near.x, near.f)
