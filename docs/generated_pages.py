@@ -27,6 +27,7 @@ from tribodyn.workflows.result import store
 from tribodyn.workflows.scene.fields import Direction, Quantity
 from tribodyn.workflows.scene.matrices import MatrixScene
 from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.scene.structure import StructureScene
 
 ROOT = Path(__file__).parents[1]
 AXES = get_args(Direction)[1]
@@ -43,9 +44,10 @@ def write(folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     pages = {
         "scene_of_a_part": scene_keys(PartScene),
+        "scene_of_bodies": scene_keys(StructureScene, without=PartScene),
         "scene_of_matrices": scene_keys(MatrixScene, without=PartScene),
         "parts": parameters_of(f"tribodyn.geometry.{name}" for name in parts.names()),
-        "continuations": parameters_of(f"{continuation.KIND.package}.{name}" for name in continuation.names()),
+        "continuations": numbers_of(continuation.KIND),
         "contact_laws": numbers_of(contact_law.KIND),
         "wear_laws": numbers_of(wear_law.KIND),
         "commands": commands(app),
@@ -160,13 +162,11 @@ def parameters_of(modules: Iterable[str]) -> str:
     """A section for each module that declares a dataclass of parameters, with defaults and meanings."""
     lines: list[str] = []
     for module in map(importlib.import_module, modules):
-        kind = module.Options if hasattr(module, "Options") else module.Parameters
+        kind = module.Parameters
         lines += [f"## `{module.__name__.rpartition('.')[2]}`", "", _paragraph(_head(module)), ""]
         meanings = _meanings(kind)
         rows = []
         for item in dataclasses.fields(kind):
-            if item.name in ("newton", "guess"):  # given by the program, not by a scene
-                continue
             default = "" if item.default is dataclasses.MISSING or item.default is None else f"`{item.default!r}`"
             rows.append((f"`{item.name}`", default, _paragraph(meanings.get(item.name, ""))))
         lines += _table(("key", "default", "meaning"), rows)
@@ -185,7 +185,7 @@ def numbers_of(kind: Kind) -> str:
             limits = (("at least", own.low), ("above", own.above), ("at most", own.high))
             bounds = [f"{word} {limit:g}" for word, limit in limits if limit is not None]
             meaning = " ".join(filter(None, [_paragraph(own.meaning), _bounds(bounds)]))
-            rows.append((f"`{own.name}`", own.unit or "ratio", default, meaning))
+            rows.append((f"`{own.name}`", own.unit or ("" if own.whole else "ratio"), default, meaning))
         lines += _table(("key", "unit", "default", "meaning"), rows) or ["It has no numbers of its own.", ""]
     return "\n".join(lines)
 

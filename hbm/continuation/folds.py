@@ -19,8 +19,9 @@ from tribodyn.hbm.continuation import bordered
 from tribodyn.hbm.continuation.bordered import BorderFailed, Direction, Metric
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.continuation.curve import CurvePoint
+from tribodyn.hbm.continuation.methods.arc_length import Options
 from tribodyn.hbm.continuation.parameter import FREQUENCY, Parameter
-from tribodyn.hbm.continuation.stepper import Options, Stepper
+from tribodyn.hbm.continuation.stepper import Stepper
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single

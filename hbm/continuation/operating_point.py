@@ -116,7 +116,13 @@ class AtPeak:
         Raises  NoPeak where no maximum lies inside the range: an end of it is no resonance
         """
         step = min(1 / self.n_scan, COARSEST)
-        scan = adaptive.Options(SCAN_TOLERANCE, step, min(5 * step, COARSEST), 1e-3 * step, newton=self.newton)
+        scan = adaptive.Options(
+            tolerance=SCAN_TOLERANCE,
+            step=step,
+            max_step=min(5 * step, COARSEST),
+            min_step=1e-3 * step,
+            newton=self.newton,
+        )
         branch = adaptive.follow(balance, self.start, self.stop, scan)
         best = self._highest_maximum(branch)
         x = branch.contact[best].reshape(balance.contact.n_pair, len(balance.contact.components), balance.basis.n_coeff)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,51 +11,16 @@ from tribodyn.hbm.continuation import bordered
 from tribodyn.hbm.continuation.bordered import BorderFailed, Direction, Metric
 from tribodyn.hbm.continuation.curve import KINK_ANGLE, CurvePoint, Segment, locate_fold
 from tribodyn.hbm.continuation.parameter import Parameter
-from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.newton import Solution
+
+if TYPE_CHECKING:
+    from tribodyn.hbm.continuation.methods.arc_length import Options
 
 LEAST_LENGTH_RATIO = 0.8  # the characteristic length falls to this share per point where the vibration gets small
 LARGEST_MISS = 0.35  # miss of the prediction, in steps, beyond which the step is too long
 CORNER_STEP = 0.1  # longest step in which a corner is looked for
 STEP_TANGENT = 1e-6  # relative accuracy of tangents along the way
 CAP_GROWTH = 1.1  # growth per step of the cap on steps after a rewind
-
-
-@dataclass(frozen=True)
-class Options:
-    """How a curve is followed.
-
-    step, max_step, min_step : arc length of the first, the longest and the shortest step; one is the size of the
-        vibration, or `width` times the range |stop - start| of the parameter
-    angle : turn of the tangent that one step aims at [rad]
-    newton_target : Newton steps that one step aims at; newton_limit : beyond it the step is halved
-    max_points : points after which to end; max_growth : of the response over that of the first point
-    bounds : values of the parameter between which the curve is followed, start and stop if None
-    guess : (n_pair, n_component, n_coeff) neighbour of the first solution [m]; from rest if None
-    fold_tolerance : relative, on the parameter at a fold
-    """
-
-    step: float = 0.05
-    max_step: float = 0.25
-    min_step: float = 1e-6
-    width: float = 0.1
-    angle: float = 0.25
-    newton_target: int = 4
-    newton_limit: int = 12
-    max_points: int = 5000
-    max_growth: float = 1e8
-    bounds: tuple[float, float] | None = None
-    guess: np.ndarray | None = None
-    fold_tolerance: float = 1e-9
-    newton: NewtonOptions = field(default_factory=NewtonOptions)
-
-    def __post_init__(self) -> None:
-        if not 0 < self.min_step <= self.step <= self.max_step:
-            raise ValueError(
-                f"arc length steps must obey 0 < min_step <= step <= max_step, "
-                f"not {self.min_step:g}, {self.step:g}, {self.max_step:g}"
-            )
-        if self.max_points < 2:
-            raise ValueError(f"max_points must be at least 2, not {self.max_points}")
 
 
 class Stepper:

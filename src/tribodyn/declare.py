@@ -18,7 +18,7 @@ import ast
 import importlib.util
 import sys
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, field
+from dataclasses import MISSING, dataclass, field, fields
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -76,9 +76,14 @@ class Number:
         return ""
 
 
+TYPES = ("int", "float")  # fields of other types, such as how Newton's method is set, are not for a scene
+
+
 @cache
 def read(path: Path, kind: str = "Parameters") -> tuple[Number, ...]:
     """The numbers that the class `kind` of a Python file declares, in their order; the file is not run.
+
+    kind : "Parameters" of a part or a law, "Options" of a continuation
 
     Raises  ValueError where the file cannot be read as Python
     """
@@ -91,8 +96,8 @@ def read(path: Path, kind: str = "Parameters") -> tuple[Number, ...]:
         return ()
     numbers = []
     for node, after in zip(found.body, [*found.body[1:], None], strict=True):
-        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
-            numbers.append(_number(node.target.id, node, _text(after)))
+        if isinstance(node, ast.AnnAssign) and ast.unparse(node.annotation) in TYPES:
+            numbers.append(_number(ast.unparse(node.target), node, _text(after)))
     return tuple(numbers)
 
 
@@ -139,6 +144,18 @@ def checked(numbers: tuple[Number, ...], given: Mapping[str, Any], owner: str) -
         if n.fault(values[n.name]):
             raise ValueError(f"{owner}, {n.name}: {n.fault(values[n.name])}")
     return values
+
+
+def require_limits(own: Any, owner: str) -> None:
+    """Raise ValueError where a number of an instance of a class of declared numbers is out of its limits.
+
+    owner : for the sentence, such as "adaptive continuation"
+    """
+    for item in fields(own):
+        if "unit" in item.metadata:
+            fault = Number(item.name, **item.metadata).fault(getattr(own, item.name))
+            if fault:
+                raise ValueError(f"{owner}, {item.name}: {fault}")
 
 
 @cache

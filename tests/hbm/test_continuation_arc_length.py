@@ -195,7 +195,7 @@ def test_derivative_with_respect_to_a_parameter(make):
     tangent = bordered.tangent(path, at, base.state, up, metric, newton.NewtonOptions(), 1e-10)
     slope = (moved.state.flat - back.state.flat) / (2 * change)
     np.testing.assert_allclose(tangent.x / tangent.p, slope, atol=0.01 * np.abs(slope).max())
-    both = natural.follow(path, at, at + change, natural.Options(3))
+    both = natural.follow(path, at, at + change, natural.Options(n_points=3))
     assert both.parameter[-1] == at + change
     np.testing.assert_allclose(both.contact[-1], moved.state.flat, atol=1e-6 * np.abs(base.state.x).max())
 

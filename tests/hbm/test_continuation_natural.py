@@ -16,7 +16,7 @@ def test_a_sweep_jumps_at_the_fold_and_says_so(n_points):
     duffing = Duffing()
     low, high = duffing.folds()
     for start, stop, fold in ((0.5, 5.0, high), (5.0, 0.5, low)):
-        branch = natural.follow(duffing.balance(), start, stop, Options(n_points))
+        branch = natural.follow(duffing.balance(), start, stop, Options(n_points=n_points))
         assert branch.omega[-1] == stop
         assert set(branch.outcome) == {"converged"}
         assert np.all(np.diff(branch.omega) * (stop - start) > 0)
@@ -33,7 +33,7 @@ def test_a_lifting_mass_jumps_both_ways_at_the_folds_of_the_arc_length():
     round_them = arc_length.follow(balance, 0.9, 4.0)
     folds = np.sort(round_them.omega[list(round_them.folds)])
     for start, stop in ((0.9, 4.0), (4.0, 0.9)):
-        branch = natural.follow(balance, start, stop, Options(60))
+        branch = natural.follow(balance, start, stop, Options(n_points=60))
         assert branch.end.startswith("reached")
         assert branch.folds
         for fold in branch.omega[list(branch.folds)]:
@@ -44,6 +44,6 @@ def test_it_jumps_in_the_load_too():
     path = parameter.load(Duffing().balance(), 2.0)
     folds = arc_length.follow(path, 0.0, 12.0)
     for (start, stop), fold in zip(((0.0, 12.0), (12.0, 0.0)), folds.folds, strict=True):
-        branch = natural.follow(path, start, stop, Options(25))
+        branch = natural.follow(path, start, stop, Options(n_points=25))
         assert branch.end.startswith(f"reached load factor {stop:g}; the response jumped at folds: load factor ")
         np.testing.assert_allclose(branch.parameter[list(branch.folds)], folds.parameter[fold], rtol=1e-8)

@@ -88,7 +88,7 @@ def test_tracked_peak_is_that_of_a_fine_sweep(
     balance = balance.with_samples(balance.basis.n_samples, located)
     peak = AtPeak("tip", 250.0, 1200.0, tolerance=1e-7).first(balance)
     omega = peak.state.omega
-    sweep = natural.follow(balance, 0.99 * omega, 1.01 * omega, natural.Options(201))
+    sweep = natural.follow(balance, 0.99 * omega, 1.01 * omega, natural.Options(n_points=201))
     height = sweep.amplitude("tip")
     top = int(height.argmax())
     a, b, c = np.polyfit(sweep.omega[top - 2 : top + 3] / omega - 1, height[top - 2 : top + 3], 2)

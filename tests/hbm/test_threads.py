@@ -32,7 +32,7 @@ def counts() -> set[int]:
 ENTRIES = {
     "newton": lambda b: newton.solve(b, OMEGA, b.stuck(OMEGA)),
     "from rest": lambda b: newton.solve_from_rest(b, OMEGA),
-    "natural": lambda b: natural.follow(b, OMEGA, 1.1 * OMEGA, natural.Options(3)),
+    "natural": lambda b: natural.follow(b, OMEGA, 1.1 * OMEGA, natural.Options(n_points=3)),
     "adaptive": lambda b: adaptive.follow(b, OMEGA, 1.1 * OMEGA),
     "arc length": lambda b: arc_length.follow(b, OMEGA, 1.1 * OMEGA),
 }

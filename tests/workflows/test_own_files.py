@@ -92,13 +92,20 @@ def depth_rate(exposure):
 """
 
 METHOD = """
+from dataclasses import dataclass, field
+
+from tribodyn.declare import number
 from tribodyn.hbm.continuation.methods import natural
+from tribodyn.hbm.newton import NewtonOptions
 
-class Options(natural.Options):
-    pass
+@dataclass(frozen=True)
+class Options:
+    spacing: float = number("Hz", above=0.0)
+    newton: NewtonOptions = field(default_factory=NewtonOptions, kw_only=True)
 
-def follow(problem, start, stop, options=None, on_point=None):
-    return natural.follow(problem, start, stop, options, on_point)
+def follow(problem, start, stop, options, on_point=None):
+    n = 1 + round(abs(stop - start) / (6.283185307179586 * options.spacing))
+    return natural.follow(problem, start, stop, natural.Options(n_points=n, newton=options.newton), on_point)
 """
 
 STUDY = """
@@ -110,7 +117,7 @@ set = [["geometry.n_patch=3"], ["geometry.n_patch=5"]]
 CHANGES = {
     'part = "beam"': 'part = "my_part.py"\nspan = "210 mm"\nn_patch = 3',
     'law = "jenkins"': 'law = "my_law.py"\ncohesion = "20 N"',
-    'method = "natural"': 'method = "my_method.py"',
+    'method = "natural"': 'method = "my_method.py"\noptions = {spacing = "0.12 kHz"}',
     'law = "energy"': 'law = "my_wear.py"\nexponent = 1.1',
     'transitions = "located"': 'transitions = "sampled"',
     "modes = 15": "modes = 4",
@@ -143,6 +150,8 @@ def test_a_scene_runs_with_all_its_own_files(scene: Path) -> None:
     more = td.run(scene, overrides={"contact.cohesion": "2 kN", "wear.max_steps": 0})
     highest, with_more = (np.abs(r.response.response[:, 0, 1:]).max() for r in (result, more))
     assert abs(with_more - highest) > 1e-3 * highest
+    low, high = scene_file.read(str(scene)).scene.response.frequency
+    assert len(result.response.omega) == 1 + round((high - low) / 120.0)
     assert [knob.name for knob in knobs.study_of(scene_file.read(str(scene))).knobs] == ["my_grid"]
 
 
@@ -160,6 +169,10 @@ def test_a_scene_runs_with_all_its_own_files(scene: Path) -> None:
         ("contact.law=../mine/my_law.py", "contact.law: .* is not in the scene's folder"),
         ("wear.law=/etc/hosts.py", "wear.law: .* is not in the scene's folder"),
         ("geometry.part=sub/my_part.py", "geometry.part: .* is not in the scene's folder"),
+        ("response.options.pitch=3", "unknown key response.options.pitch, known here: spacing"),
+        ("response.options=", "response.options.spacing is missing: its numbers here are spacing"),
+        ("response.options.spacing=3 mm", "response.options.spacing: expected a frequency .* which is a length"),
+        ("response.options.spacing=0", "response.options.spacing: expected a value above 0.0, got 0"),
         ("response.method=../my_method.py", "response.method: .* is not in the scene's folder"),
     ],
 )

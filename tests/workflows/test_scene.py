@@ -31,6 +31,13 @@ WRONG = {
     "reduction.cutoff=3 kHz": ["reduction", "either modes", "cutoff"],
     "response.frequency=[600, 300]": ["response", "low below high"],
     "response.frequency=300 Hz": ["response.frequency", "a list"],
+    "response.options.points=9": ["unknown key response.options.points", "did you mean n_points?", "refinements"],
+    "response.options.refinements=2.5": ["response.options.refinements", "whole number"],
+    "response.options.n_points=1": ["response.options.n_points", "at least 2"],
+    'response={group="response",direction="y",frequency=[1,2],method="arc_length",options={angle="3 mm"}}': [
+        "response.options.angle",
+        "an angle",
+    ],
     "solver.tolerance=0": ["solver.tolerance", "above 0"],
     "damping.mass=1 1/s": ["damping", "either modal"],
     "scene.title=3": ["scene.title", "a text in quotes"],

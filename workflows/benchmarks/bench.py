@@ -98,7 +98,7 @@ def _problem() -> Callable[[str], HarmonicBalance]:
 
 def _measure(balance: HarmonicBalance, harmonics: str, threads: int, windows: tuple[int, int]) -> Timing:
     low, high = settings.response_range(scene_file.read("beam", ()).scene)
-    options = natural.Options(POINTS, newton=NewtonOptions(TOLERANCE))
+    options = natural.Options(n_points=POINTS, newton=NewtonOptions(TOLERANCE))
     natural.follow(balance, high, high * 0.999, replace(options, n_points=2))  # compiles outside the clock
     now = process_time if threads == 1 else perf_counter  # other work on the machine does not count
     times = [now()]

@@ -76,8 +76,8 @@ def measure(n_patch: int, points: int = POINTS) -> SizeCost:
         balance = modelling.make_model(scene, part, reduced).balance
         clock.append(time.process_time())
         low, high = settings.response_range(scene)
-        options = natural.Options(points, newton=settings.newton_options(scene))
-        natural.follow(balance, high, 0.999 * high, natural.Options(2))  # compiles outside the clock
+        options = natural.Options(n_points=points, newton=settings.newton_options(scene))
+        natural.follow(balance, high, 0.999 * high, natural.Options(n_points=2))  # compiles outside the clock
         clock.append(time.process_time())
         branch = natural.follow(balance, high, low, options)
         clock.append(time.process_time())

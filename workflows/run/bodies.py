@@ -21,7 +21,7 @@ from tribodyn.geometry import parts, placing
 from tribodyn.geometry.sources import cad, picking
 from tribodyn.workflows.run import decks
 from tribodyn.workflows.scene import structure
-from tribodyn.workflows.scene.schema import Geometry
+from tribodyn.workflows.scene.body import Geometry
 from tribodyn.workflows.scene.structure import AXES, SolidMaterial, StructureScene
 
 

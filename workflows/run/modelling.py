@@ -37,9 +37,11 @@ from tribodyn.workflows.run import bodies, curve, decks, matrix_model, memory, p
 from tribodyn.workflows.run.contact_surfaces import surface_gap
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.contact import Contact, FaceContact
+from tribodyn.workflows.scene.loads import StaticLoad
 from tribodyn.workflows.scene.matrices import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.schema import CENTRIFUGAL, HIGHEST, MeshScene, PartScene, Scene, StaticLoad
+from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, PartScene, Scene
+from tribodyn.workflows.scene.solution import HIGHEST
 from tribodyn.workflows.scene.structure import StructureScene
 
 NO_GAP = 1e-12  # [m], rounding of node positions

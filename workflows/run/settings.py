@@ -17,7 +17,6 @@ from tribodyn.workflows.run import references
 from tribodyn.workflows.scene.own import is_file
 from tribodyn.workflows.scene.schema import Scene
 from tribodyn.workflows.scene.wear import Place
-from tribodyn.workflows.scene.words import unknown_key
 
 OUTPUT = "response"
 
@@ -37,18 +36,11 @@ def check_names(scene: Scene, own_files: bool = True) -> None:
 
 
 def response_options(scene: Scene) -> Any:
-    """Options of the scene's continuation method; raises ValueError for one that it does not have."""
-    kind, given = continuation.load(scene.response.method_name).Options, scene.response.options
-    known = {option.name: option.type for option in fields(kind) if option.name not in ("newton", "guess", "bounds")}
-    for key, value in given.items():
-        if key not in known:
-            raise ValueError(unknown_key(f"response.options.{key}", list(known)))
-        whole = known[key] in (int, "int")
-        if type(value) not in ((int,) if whole else (int, float)):
-            expected = "a whole number" if whole else "a number"
-            raise ValueError(f"response.options.{key}: expected {expected}, got {value!r}")
-    points = {"n_points": scene.response.points} if "n_points" in known else {}
-    return kind(**{**points, "newton": newton_options(scene), **given})
+    """Options of the scene's continuation method; raises ValueError where the method refuses them."""
+    kind = continuation.load(scene.response.method_name).Options
+    general = {"n_points": scene.response.points, "newton": newton_options(scene)}
+    known = {option.name for option in fields(kind)}
+    return kind(**{name: value for name, value in general.items() if name in known} | scene.response.options)
 
 
 def response_range(scene: Scene) -> tuple[float, float]:

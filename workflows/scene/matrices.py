@@ -10,19 +10,11 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
-from tribodyn.workflows.scene.fields import Quantity
-from tribodyn.workflows.scene.schema import (
-    Angle,
-    Contact,
-    Direction,
-    Force,
-    Loads,
-    Number,
-    Reduction,
-    Response,
-    Scene,
-    Table,
-)
+from tribodyn.workflows.scene.contact import Contact
+from tribodyn.workflows.scene.fields import Angle, Direction, Force, Number, Quantity, Table
+from tribodyn.workflows.scene.loads import Loads
+from tribodyn.workflows.scene.schema import Scene
+from tribodyn.workflows.scene.solution import Reduction, Response
 from tribodyn.workflows.scene.units import to_si
 
 Dof = int | tuple[int, int | str]

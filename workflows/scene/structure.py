@@ -10,18 +10,13 @@ from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, ValidationInfo, model_validator
 
+from tribodyn.workflows.scene.body import Geometry, Material, part_parameters
 from tribodyn.workflows.scene.contact import FaceContact
 from tribodyn.workflows.scene.decks import Deck, in_metres
 from tribodyn.workflows.scene.faces import FaceRule, Point
 from tribodyn.workflows.scene.fields import Angle, Direction, Length, Number, Stiffness, Table, quantity
 from tribodyn.workflows.scene.own import folder_of, own_file
-from tribodyn.workflows.scene.schema import (
-    CENTRIFUGAL,
-    Geometry,
-    Material,
-    MeshScene,
-    part_parameters,
-)
+from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene
 from tribodyn.workflows.scene.wear import JointWear
 from tribodyn.workflows.scene.words import unknown_key
 

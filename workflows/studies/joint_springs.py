@@ -23,7 +23,7 @@ from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.relative import relative
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.schema import Output
+from tribodyn.workflows.scene.solution import Output
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tribodyn.declare import number, require_limits
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import parameter
@@ -30,27 +31,25 @@ SLACK = 2.0  # an error estimate may exceed the tolerance by this factor before 
 
 @dataclass(frozen=True)
 class Options:
-    """How points are placed.
+    """How points are placed."""
 
-    tolerance : of the interpolated response, relative to the largest response met so far, for each output
-    step, max_step, min_step : first, longest and shortest step, relative to |stop - start|; a response that still
-        changes abruptly, or is not found, in the shortest step has jumped
-    max_points : points after which to end
-    """
-
-    tolerance: float = 1e-3
-    step: float = 5e-3
-    max_step: float = 0.05
-    min_step: float = 1e-6
-    max_points: int = 5000
-    newton: NewtonOptions = field(default_factory=NewtonOptions)
+    tolerance: float = number(default=1e-3, above=0.0)
+    """Error of the interpolated response, relative to the largest response met so far, for each output."""
+    step: float = number(default=5e-3, above=0.0, high=1.0)
+    """First step, relative to the range."""
+    max_step: float = number(default=0.05, above=0.0, high=1.0)
+    """Longest step, relative to the range."""
+    min_step: float = number(default=1e-6, above=0.0, high=1.0)
+    """Shortest step, relative to the range; a response that is not found in it, or changes abruptly, has jumped."""
+    max_points: int = number(default=5000, low=2)
+    """Points after which to end."""
+    newton: NewtonOptions = field(default_factory=NewtonOptions, kw_only=True)
 
     def __post_init__(self) -> None:
-        if not self.tolerance > 0:
-            raise ValueError(f"the tolerance of adaptive points must be > 0, not {self.tolerance:g}")
-        if not 0 < self.min_step <= self.step <= self.max_step:
+        require_limits(self, "adaptive continuation")
+        if not self.min_step <= self.step <= self.max_step:
             raise ValueError(
-                f"adaptive steps must obey 0 < min_step <= step <= max_step, "
+                f"adaptive steps must obey min_step <= step <= max_step, "
                 f"not {self.min_step:g}, {self.step:g}, {self.max_step:g}"
             )
 

@@ -12,25 +12,65 @@ Source  Keller 1977 (pseudo arc length); step control and kinks ours.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from tribodyn.declare import number, require_limits
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import parameter
 from tribodyn.hbm.continuation.branch import Branch, BranchBuilder
 from tribodyn.hbm.continuation.curve import CurvePoint, Segment
 from tribodyn.hbm.continuation.parameter import Parameter
-from tribodyn.hbm.continuation.stepper import Options, Stepper
+from tribodyn.hbm.continuation.stepper import Stepper
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.threads import single
-
-__all__ = ["Options", "follow", "solve_along_load"]
 
 JUMPS = 10 ** np.arange(-6.0, -2.5)  # of the range, lengths of a step over a gap in the curve, tried in turn
 MAX_JUMPS = 20
 REWINDS = 4  # times that a walk which came back onto its own way goes back to where it went wrong
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a curve is followed. An arc length of one is the size of the vibration, or `width` times the range.
+
+    bounds : values of the parameter between which the curve is followed, start and stop by default
+    guess : (n_pair, n_component, n_coeff) neighbour of the first solution [m]; from rest by default
+    """
+
+    step: float = number(default=0.05, above=0.0)
+    """Arc length of the first step."""
+    max_step: float = number(default=0.25, above=0.0)
+    """Arc length of the longest step."""
+    min_step: float = number(default=1e-6, above=0.0)
+    """Arc length of the shortest step."""
+    width: float = number(default=0.1, above=0.0)
+    """Share of the range of the parameter that counts as an arc length of one."""
+    angle: float = number("rad", default=0.25, above=0.0)
+    """Turn of the tangent that one step aims at."""
+    newton_target: int = number(default=4, low=1)
+    """Newton steps that one step of the curve aims at."""
+    newton_limit: int = number(default=12, low=1)
+    """Newton steps after which the step of the curve is halved."""
+    max_points: int = number(default=5000, low=2)
+    """Points after which to end."""
+    max_growth: float = number(default=1e8, above=1.0)
+    """Response over that of the first point at which the curve is taken to be lost."""
+    fold_tolerance: float = number(default=1e-9, above=0.0)
+    """Relative accuracy of the parameter at a fold."""
+    bounds: tuple[float, float] | None = field(default=None, kw_only=True)
+    guess: np.ndarray | None = field(default=None, kw_only=True)
+    newton: NewtonOptions = field(default_factory=NewtonOptions, kw_only=True)
+
+    def __post_init__(self) -> None:
+        require_limits(self, "continuation by arc length")
+        if not self.min_step <= self.step <= self.max_step:
+            raise ValueError(
+                f"arc length steps must obey min_step <= step <= max_step, "
+                f"not {self.min_step:g}, {self.step:g}, {self.max_step:g}"
+            )
 
 
 @single

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from tribodyn.declare import number, require_limits
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import parameter
@@ -29,17 +30,16 @@ SHORTEST, SLOWEST = 0.03, 0.8  # of Newton's method where a shorter step of the 
 
 @dataclass(frozen=True)
 class Options:
-    """n_points : equidistant values, ends included; refinements : times a failed step may be halved."""
+    """How points are placed."""
 
-    n_points: int = 200
-    refinements: int = 6
-    newton: NewtonOptions = field(default_factory=NewtonOptions)
+    n_points: int = number(default=200, low=2)
+    """Equidistant values, ends included; `response.points` of a scene by default."""
+    refinements: int = number(default=6, low=0)
+    """Times that a step which fails may be halved."""
+    newton: NewtonOptions = field(default_factory=NewtonOptions, kw_only=True)
 
     def __post_init__(self) -> None:
-        if self.n_points < 2 or self.refinements < 0:
-            raise ValueError(
-                f"natural points need n_points >= 2 and refinements >= 0, not {self.n_points}, {self.refinements}"
-            )
+        require_limits(self, "natural continuation")
 
 
 @single

@@ -1,0 +1,210 @@
+"""Tables of a scene about how it is solved: outputs, response, reduction, harmonics, damping, tolerances."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import (
+    Field,
+    PrivateAttr,
+    StrictBool,
+    StrictInt,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+    field_serializer,
+    model_validator,
+)
+
+from tribodyn.declare import read
+from tribodyn.hbm import continuation
+from tribodyn.workflows.scene.fields import (
+    Direction,
+    Frequency,
+    Number,
+    Table,
+    quantity,
+)
+from tribodyn.workflows.scene.own import beside, folder_of, is_file, numbers, own_file
+
+HIGHEST = 15  # harmonic that kept = "auto" may keep
+
+
+class Output(Table):
+    """A displacement that is observed, the mean of a group."""
+
+    group: str
+    """Group whose mean displacement is observed."""
+    direction: Direction
+    """Direction in which it is observed."""
+
+
+class Response(Table):
+    """The frequency response that is computed."""
+
+    frequency: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]]
+    """Range of the response, [low, high]."""
+    references: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]] | None = None
+    """Range in which the linear references are drawn; the same as `frequency` by default."""
+    points: Annotated[StrictInt, Field(ge=2)] = 60
+    """Number of frequency steps of the continuation."""
+    method: str = "natural"
+    """Continuation method: natural, arc_length or adaptive."""
+    stability: StrictBool = False
+    """Mark where the curve is stable and where it bifurcates."""
+    bounds: StrictBool = False
+    """At every point, how far the response depends on the load path of pairs that always stick."""
+    options: dict[str, int | float] = Field(default_factory=dict)
+    """Numbers that the continuation method declares as its own."""
+
+    _own: Path | None = PrivateAttr(None)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _own_options(cls, table: Any, info: ValidationInfo) -> Any:
+        if not isinstance(table, dict) or not isinstance(table.get("options", {}), dict):
+            return table
+        method, folder = table.get("method", cls.model_fields["method"].default), folder_of(info)
+        if not isinstance(method, str) or (is_file(method) and folder is None):
+            return table  # no name of a method, or a file that was checked when the scene was read
+        if is_file(method):
+            assert folder is not None
+            declared = read(beside(folder, method, "response.method"), "Options")
+        else:
+            declared = continuation.declared(method)
+        return table | {"options": numbers("response.options", declared, table.get("options", {}), ())}
+
+    @model_validator(mode="after")
+    def _remember_the_file(self, info: ValidationInfo) -> Self:
+        self._own = own_file(folder_of(info), self.method, "response.method")
+        return self
+
+    @property
+    def method_name(self) -> str:
+        """The continuation for hbm: its name, or the path of the file beside the scene."""
+        return self.method if self._own is None else str(self._own)
+
+    @model_validator(mode="after")
+    def _range(self) -> Response:
+        for key, (low, high) in (("frequency", self.frequency), ("references", self.references or self.frequency)):
+            if low >= high:
+                raise ValueError(f"expected {key} = [low, high] with low below high, got {low:g} Hz and {high:g} Hz")
+        return self
+
+
+class PartResponse(Response, Output):
+    """The displacement whose response is computed."""
+
+    others: dict[str, Output] = Field(default_factory=dict)
+    """Displacements observed besides, by name."""
+
+
+class Reduction(Table):
+    """Craig-Bampton: how many fixed-interface modes, or up to which frequency."""
+
+    method: Literal["craig_bampton"] = "craig_bampton"
+    """Reduction method."""
+    relative: StrictBool = False
+    """Keep the relative displacement of node pairs instead of both nodes."""
+    modes: Annotated[StrictInt, Field(ge=0)] | None = None
+    """Number of fixed-interface modes."""
+    cutoff: Annotated[Frequency, Field(gt=0)] | None = None
+    """Frequency up to which fixed-interface modes are kept, instead of their number."""
+    interface_modes: Annotated[StrictInt, Field(ge=1)] | None = None
+    """Replace the masters by this number of characteristic constraint modes."""
+    interface_keep: tuple[str, ...] | None = None
+    """Groups whose masters stay physical all the same, [] for none (SCC); by default every master that does not belong
+    to the contact stays (SCCe)."""
+
+    @model_validator(mode="after")
+    def _interface(self) -> Reduction:
+        if self.interface_modes is None and self.interface_keep is not None:
+            raise ValueError("expected interface_keep only with interface_modes")
+        return self
+
+    @model_validator(mode="after")
+    def _one_truncation(self) -> Reduction:
+        if (self.modes is None) == (self.cutoff is None):
+            raise ValueError("expected either modes = number or cutoff = frequency, and not both")
+        return self
+
+
+def _kept(value: object, check: ValidatorFunctionWrapHandler) -> tuple[int, ...]:
+    if value == "auto":
+        return ()
+    kept: tuple[int, ...] = check(value)
+    if not kept or list(kept) != sorted(set(kept)) or max(kept) < 1:
+        raise ValueError(f'expected kept as rising harmonic numbers up to 1 or more, or "auto", got {list(kept)}')
+    return kept
+
+
+class Harmonics(Table):
+    """Harmonics of the response that are kept, and time samples of one cycle."""
+
+    kept: Annotated[tuple[Annotated[StrictInt, Field(ge=0)], ...], WrapValidator(_kept)] = (0, 1)
+    """Rising harmonic numbers, or "auto": as many as the response needs at the peak of the unworn contact, so that
+    what is left out changes it by less than `tolerance`, up to `highest`."""
+    tolerance: Annotated[Number, Field(gt=0, ge=1e-10, lt=1)] | None = None
+    """Relative change allowed by kept = "auto"."""
+    highest: Annotated[StrictInt, Field(ge=1)] | None = None
+    """Highest harmonic that kept = "auto" may keep; 15 by default."""
+    samples: Annotated[StrictInt, Field(ge=4, le=65536)] = 128
+    """Time samples of one cycle."""
+    transitions: Literal["sampled", "located"] = "sampled"
+    """"sampled" takes contact forces at equidistant samples; "located" finds the instants of stick, slip, contact and
+    separation."""
+
+    @property
+    def automatic(self) -> bool:
+        """Whether harmonics are chosen."""
+        return not self.kept
+
+    @field_serializer("kept")
+    def _auto(self, kept: tuple[int, ...]) -> tuple[int, ...] | str:
+        return kept or "auto"
+
+    @model_validator(mode="after")
+    def _resolved(self) -> Harmonics:
+        for name in ("tolerance", "highest"):
+            if not self.automatic and getattr(self, name) is not None:
+                raise ValueError(f'expected {name} only with kept = "auto"')
+        top = 3 * ((self.highest or HIGHEST) + 1) // 2 if self.automatic else max(self.kept)
+        if self.samples <= 2 * top:
+            raise ValueError(f"expected more than {2 * top} samples for harmonic {top}, got {self.samples}")
+        return self
+
+
+class Damping(Table):
+    """Structural damping: a ratio for every mode, or Rayleigh's two coefficients."""
+
+    modal: Annotated[Number, Field(ge=0, lt=1)] | None = None
+    """Damping ratio of every mode."""
+    state: Literal["free", "stuck"] = "free"
+    """Whose modes these are: "free" without the contact, or "stuck" with every pair closed."""
+    mass: Annotated[float, quantity("1/s"), Field(ge=0)] | None = None
+    """Rayleigh's coefficient of the mass matrix."""
+    stiffness: Annotated[float, quantity("s"), Field(ge=0)] | None = None
+    """Rayleigh's coefficient of the stiffness matrix."""
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Damping:
+        if self.modal is not None and (self.mass is not None or self.stiffness is not None):
+            raise ValueError("expected either modal, or mass and stiffness, and not both")
+        return self
+
+    @property
+    def given(self) -> bool:
+        """Whether there is any."""
+        return not (self.modal is None and self.mass is None and self.stiffness is None)
+
+
+class Solver(Table):
+    """Tolerances of the solver, and threads of the linear algebra."""
+
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-8
+    """Newton's tolerance on the contact displacement, relative to its size."""
+    krylov: Annotated[Number, Field(gt=0, lt=1)] = 0.1
+    """How exactly each Newton direction is solved, at the least."""
+    threads: Annotated[StrictInt, Field(ge=1)] = 1
+    """Threads of the linear algebra."""
