@@ -61,25 +61,27 @@ def numbers(
 
 
 def _in_si(key: str, number: Number, value: Any) -> int | float:
-    if number.whole:
-        if type(value) is not int:
-            raise ValueError(f"{key}: expected a whole number, got {value!r}")
-        return value
-    if number.unit is None:
-        for unit in ANY_UNIT:
-            try:
-                return to_si(value, unit)
-            except ValueError:
-                continue
-        raise ValueError(f"{key}: expected a length, an angle or a number, got {value!r}")
-    try:
-        converted = to_si(value, number.unit)
-    except ValueError as error:
-        raise ValueError(f"{key}: {error}") from None
-    fault = number.fault(converted)
-    if fault:
+    if number.whole and type(value) is not int:
+        raise ValueError(f"{key}: expected a whole number, got {value!r}")
+    converted = value if number.whole else _converted(key, number, value)
+    if fault := number.fault(converted):
         raise ValueError(f"{key}: {fault}")
     return converted
+
+
+def _converted(key: str, number: Number, value: Any) -> float:
+    """A number in the unit that it declares; one without takes a length, an angle or a pure number."""
+    if number.unit is not None:
+        try:
+            return to_si(value, number.unit)
+        except ValueError as error:
+            raise ValueError(f"{key}: {error}") from None
+    for unit in ANY_UNIT:
+        try:
+            return to_si(value, unit)
+        except ValueError:
+            continue
+    raise ValueError(f"{key}: expected a length, an angle or a number, got {value!r}")
 
 
 def folder_of(info: ValidationInfo) -> Path | None:
