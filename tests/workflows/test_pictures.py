@@ -4,17 +4,25 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
+import imageio_ffmpeg
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
+from PIL import Image
 
 from tests.helpers.pictures import assert_not_blank
 from tests.helpers.synthetic_result import result
-from tribodyn.workflows.pictures import plots, render, view
+from tribodyn.workflows.pictures import animation, plots, render, view
+from tribodyn.workflows.pictures.film_of_cycle import CycleFilm
+from tribodyn.workflows.pictures.film_of_wear import WearFilm
+
+COARSE = 60  # dots per inch: what is drawn is the same, in a tenth of the time
 
 
 def test_curves_and_maps(tmp_path: Path) -> None:
-    written = plots.draw(result(), tmp_path)
+    written = plots.draw(result(), tmp_path, dpi=COARSE)
     names = {"frf", "cycles_per_step", "peak", "preload", "depth", "energy", "status", "hysteresis", "patch"}
     assert {path.stem for path in written} == names
     for path in written:
@@ -22,13 +30,13 @@ def test_curves_and_maps(tmp_path: Path) -> None:
 
 
 def test_a_response_alone_is_drawn_too(tmp_path: Path) -> None:
-    written = plots.draw(replace(result(), wear=None, fields=None, loops=None), tmp_path)
+    written = plots.draw(replace(result(), wear=None, fields=None, loops=None), tmp_path, dpi=COARSE)
     assert [path.stem for path in written] == ["frf"]
     assert_not_blank(written[0])
 
 
 def test_renders(tmp_path: Path) -> None:
-    written = render.draw(result(), tmp_path)
+    written = render.draw(result(), tmp_path, dpi=COARSE)
     assert {path.stem for path in written} == {"part", "contact"}
     for path in written:
         assert_not_blank(path)
@@ -69,3 +77,61 @@ def test_swing_is_that_of_the_harmonics_kept() -> None:
 @pytest.mark.parametrize(("value", "nice"), [(1.0, 1.0), (1.99, 1.0), (2.0, 2.0), (7.0, 5.0), (0.3, 0.2), (5e3, 5e3)])
 def test_factors_are_round(value: float, nice: float) -> None:
     assert view.nice(value) == nice
+
+
+@pytest.mark.parametrize("over", ["wear", "cycle"])
+def test_a_film_is_written_whole(over: Literal["wear", "cycle"], tmp_path: Path) -> None:
+    paths = {path.suffix: path for path in result().animate(over, tmp_path, formats=("mp4", "gif"), images=3)}
+    assert {path.stem for path in paths.values()} == {"wear" if over == "wear" else "cycle_8"}
+    counted, seconds = imageio_ffmpeg.count_frames_and_secs(str(paths[".mp4"]))
+    assert counted == 3
+    assert seconds == pytest.approx(3 / animation.RATE, rel=0.01)
+    with Image.open(paths[".gif"]) as gif:
+        assert gif.n_frames == 3
+        pages = []
+        for number in range(3):
+            gif.seek(number)
+            pages.append(np.asarray(gif.convert("RGB"), int))
+    reader = imageio_ffmpeg.read_frames(str(paths[".mp4"]))
+    width, height = next(reader)["size"]
+    film = [np.frombuffer(image, np.uint8).reshape(height, width, 3).astype(int) for image in reader]
+    for page, image in zip(pages, film, strict=True):  # both show the same
+        assert page.shape == image.shape
+        assert np.abs(page - image).mean() < 4
+    assert np.abs(pages[2] - pages[0]).mean() > 0.05  # and something moves
+
+
+def test_colours_and_camera_of_a_film_are_those_of_its_largest_values() -> None:
+    """The last depth reaches the end of the scale, and the same depth has the same colour in every image."""
+    given = result()
+    assert given.wear is not None
+    made = WearFilm(given, 3)
+    images = list(animation.drawn(made))
+    assert len({image.shape for image in images}) == 1
+    bars = [axes for axes in made.figure.findobj(Axes) if "wear depth" in axes.get_xlabel()]
+    assert bars[0].get_xlim() == (0.0, pytest.approx(1e3 * given.wear.depth.max()))
+    # the view of the unworn contact in the first image is what is drawn for it alone with the same camera
+    again = WearFilm(given, 2)
+    assert np.abs(images[0].astype(int) - next(iter(animation.drawn(again))).astype(int)).mean() < 0.01
+
+
+def test_a_cycle_is_drawn_at_its_instants() -> None:
+    """Mark, line of time and status belong to one instant."""
+    given = result()
+    assert given.loops is not None
+    made = CycleFilm(given, 0, 4)
+    made.show(3)
+    samples = given.loops.force.shape[-1]
+    lines = [line for axes in made.figure.findobj(Axes) for line in axes.lines]
+    loop = next(line for line in lines if len(line.get_xdata()) == samples + 1)
+    mark = next(line for line in lines if line.get_marker() == "o")
+    at = 3 * samples // 4
+    assert (mark.get_xdata()[0], mark.get_ydata()[0]) == (loop.get_xdata()[at], loop.get_ydata()[at])
+    assert [line.get_xdata()[0] for line in lines if len(line.get_xdata()) == 2] == [0.75]
+    with pytest.raises(ValueError, match="no cycle of row 3: it has those of 0, 4, 8"):
+        CycleFilm(given, 3, 4)
+
+
+def test_a_result_without_wear_has_no_film_over_it() -> None:
+    with pytest.raises(ValueError, match="no worn contact with faces"):
+        WearFilm(replace(result(), wear=None), 3)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import tomli_w
@@ -128,6 +128,26 @@ def draw(
         except render.RenderingUnavailable as reason:
             missing = f"no renders: {reason}"
     return written, missing
+
+
+def animate(
+    result: Result,
+    folder: Path,
+    over: Literal["wear", "cycle"],
+    *,
+    row: int | None = None,
+    formats: Sequence[str] = ("mp4",),
+    images: int = 48,
+) -> list[Path]:
+    """Make a film of a result with the factors of exaggeration of its scene, see pictures.animation; returns its files.
+
+    Raises  ValueError: the result has nothing of the kind to show; RenderingUnavailable
+    """
+    from tribodyn.workflows.pictures import animation
+
+    wanted = scene_file.from_json(result.provenance["scene"]).pictures
+    factors = wanted.deformation_scale, wanted.wear_scale
+    return animation.write(result, folder, over, row, formats, images, *factors)
 
 
 def reporter(progress: Report) -> Progress:

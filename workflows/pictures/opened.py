@@ -6,15 +6,17 @@ Body 1 stays; body 2, or the ground where that is not meshed, is turned by half 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame
-from tribodyn.workflows.pictures.style import BODY, BODY_2, STATUS
+from tribodyn.workflows.pictures.style import BODY, BODY_2, EDGE, STATUS
+from tribodyn.workflows.pictures.view import polygons
 from tribodyn.workflows.result.faces import Face, bodies, faces_of
 from tribodyn.workflows.result.result import Patch, Result
 
+AXES = ("t1", "t2", "n")
 MARGIN = 0.35  # of the size of the patch, what is shown around it
 THICK = 0.5  # of its size, how deep the bodies are cut off
 LIFT = 4e-3  # of its size, by which coloured faces lie above their body
@@ -53,7 +55,7 @@ class Opened:
                 points = self._turned(points, 1)
             layers.append(Layer(block.extract_surface(algorithm="dataset_surface"), color=(BODY, BODY_2)[number]))
             layers += paint(patch, points)
-        return View(layers, axes=("t1", "t2", "n"))
+        return View(layers)
 
     def _turned(self, points: np.ndarray, sign: int) -> np.ndarray:
         """Points of body 2 after it is opened; sign : -1 where their n still points as body 1's does."""
@@ -85,15 +87,14 @@ class Opened:
         return cut if cut.n_points else self._block(None, below, depth)
 
 
-class Paint:
+class Paint(Protocol):
     """Layers that show something on a face whose pairs lie at points (n_pair, 3)."""
 
-    def __call__(self, patch: Patch, points: np.ndarray) -> list[Layer]:
-        raise NotImplementedError
+    def __call__(self, patch: Patch, points: np.ndarray) -> list[Layer]: ...
 
 
 @dataclass(frozen=True)
-class Field(Paint):
+class Field:
     """A value for each pair, between two limits of a colour map."""
 
     values: np.ndarray
@@ -103,12 +104,11 @@ class Field(Paint):
     def __call__(self, patch: Patch, points: np.ndarray) -> list[Layer]:
         import pyvista as pv
 
-        faces = np.column_stack([np.full(len(patch.faces), patch.faces.shape[1]), patch.faces]).ravel()
-        return [Layer(pv.PolyData(points, faces), values=self.values, map=self.map, limits=self.limits)]
+        return [Layer(pv.PolyData(points, polygons(patch.faces)), values=self.values, map=self.map, limits=self.limits)]
 
 
 @dataclass(frozen=True)
-class Status(Paint):
+class Status:
     """The status of each pair on its share of the face."""
 
     status: np.ndarray
@@ -123,7 +123,10 @@ class Status(Paint):
             if len(here):
                 quads = np.column_stack([np.full(len(here), 4), np.arange(4 * len(here)).reshape(-1, 4)]).ravel()
                 layers.append(Layer(pv.PolyData(here.reshape(-1, 3), quads), color, edges=False, flat=True))
-        return layers
+        outline = pv.PolyData(points, polygons(patch.faces)).extract_feature_edges(
+            boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
+        )
+        return [*layers, Layer(outline, EDGE, edges=False, flat=True)]
 
 
 def opened(result: Result, aspect: float = 1.3) -> Opened:

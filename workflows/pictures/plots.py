@@ -130,7 +130,7 @@ def amplitude_against_cycles(result: Result) -> Figure:
     """Amplitude and frequency of the cycle that wears, against cycles."""
     wear = _wear(result)
     with axes_of(7.2, 5.6, rows=2) as (figure, (upper, lower)):
-        scale_cycles = _cycle_axis(lower, wear)
+        scale_cycles = cycle_axis(lower, wear)
         unit, scale = length_unit(wear.amplitude.max())
         upper.plot(scale_cycles * wear.cycles, scale * wear.amplitude, ".-", color=BLUE, ms=4)
         upper.set(ylabel=f"amplitude / {unit}", title=titled(result, "response under wear"))
@@ -143,7 +143,7 @@ def preload_against_cycles(result: Result) -> Figure:
     """Static normal force of the contact against cycles."""
     wear = _wear(result)
     with axes_of() as (figure, axes):
-        scale_cycles = _cycle_axis(axes, wear)
+        scale_cycles = cycle_axis(axes, wear)
         unit, scale = ("kN", 1e-3) if wear.preload.max() >= 1e3 else ("N", 1.0)
         axes.plot(scale_cycles * wear.cycles, scale * wear.preload, ".-", color=BLUE, ms=4)
         axes.set(ylabel=f"preload / {unit}", title=titled(result, "preload of the contact"))
@@ -156,7 +156,7 @@ def depth_against_cycles(result: Result) -> Figure:
     wear, patch = _wear(result), result.patch
     assert patch is not None
     with axes_of(7.2, 5.6, rows=2) as (figure, (axes, below)):
-        scale_cycles = _cycle_axis(axes, wear)
+        scale_cycles = cycle_axis(axes, wear)
         unit, scale = length_unit(wear.depth.max())
         x = scale_cycles * wear.cycles
         mean = wear.depth @ patch.area / patch.area.sum()
@@ -167,7 +167,7 @@ def depth_against_cycles(result: Result) -> Figure:
         axes.set(ylabel=f"total wear depth / {unit}", title=titled(result, "wear depth"))
         axes.legend(loc="best", fontsize=9)
         axes.set_xlabel("")
-        _cycle_axis(below, wear)
+        cycle_axis(below, wear)
         below.plot(x, 1e6 * worn_area(wear.depth, patch.area), color=ORANGE)
         below.set(ylabel="worn area / mm²", ylim=(0, 1.05e6 * patch.area.sum()))
     return figure
@@ -186,7 +186,7 @@ def energy_against_cycles(result: Result) -> Figure:
     wear, patch = _wear(result), result.patch
     assert patch is not None
     with axes_of(7.2, 5.6, rows=2, share=False) as (figure, (upper, lower)):
-        scale_cycles = _cycle_axis(upper, wear)
+        scale_cycles = cycle_axis(upper, wear)
         upper.plot(scale_cycles * wear.cycles, wear.energy.sum(1), ".-", color=BLUE, ms=4)
         upper.set(ylabel="energy per cycle / J", title=titled(result, "dissipated energy"))
         spent = np.concatenate([[0.0], np.cumsum(wear.work.sum(1))[:-1]])
@@ -205,7 +205,7 @@ def status_against_cycles(result: Result) -> Figure:
     wear, patch = _wear(result), result.patch
     assert patch is not None
     with axes_of() as (figure, axes):
-        scale = _cycle_axis(axes, wear)
+        scale = cycle_axis(axes, wear)
         shares = [100 * (wear.status == bits) @ patch.area / patch.area.sum() for bits in STATUS]
         present = [k for k, share in enumerate(shares) if share.any()]
         kinds = [(status_name(bits, patch.components), color) for bits, (_, color) in STATUS.items()]
@@ -289,7 +289,7 @@ def shown_cycles(wear: WearHistory) -> float:
     return last
 
 
-def _cycle_axis(axes: Any, wear: WearHistory) -> float:
+def cycle_axis(axes: Any, wear: WearHistory) -> float:
     """Label the axis of cycles, and say where the run ends if that is not drawn; returns the factor of the axis."""
     shown, last = shown_cycles(wear), float(wear.cycles[-1])
     unit, scale = _cycles(shown)

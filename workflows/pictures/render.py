@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from PIL import Image, ImageDraw
 
 from tribodyn.workflows.pictures import opened as book
-from tribodyn.workflows.pictures import render_wheel
+from tribodyn.workflows.pictures import render_wheel, triad
 from tribodyn.workflows.pictures import view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, save, scale_bar, status_legend
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, trimmed
@@ -111,14 +111,13 @@ def part_picture(result: Result, deformation: float | None = None, wear: float |
         points = moving.points(state, scales[-1] * vibration)
         view = moving.view(points, factor * amplitude, (0.0, bars[-1][0]))
         images.append(moving.marked(shoot(view, moving.camera, SIZE), points))
-    images = trimmed(images)
+    images, corner = triad.with_room(trimmed(images))
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         tall = WIDTH * images[0].shape[0] / images[0].shape[1]
         figure = Figure(figsize=(WIDTH * len(states) + 0.2, tall + 1.7), layout="constrained")
         columns = np.atleast_1d(figure.subplots(1, len(states)))
         for axes, state, image, scale, (most, label) in zip(columns, states, images, scales, bars, strict=True):
-            axes.imshow(image)
-            axes.axis("off")
+            show(axes, image, moving.camera, "xyz", corner)
             axes.set_title(f"{state.label}\n{moving.factors(scale)}", fontsize=10)
             scale_bar(figure, axes, MOTION_MAP, 0.0, most, label)
         heading(figure, result, "part at its largest swing, its contact outlined")
@@ -138,11 +137,11 @@ def contact_picture(result: Result, wear: float | None = None) -> Figure:
         figure = Figure(figsize=(WIDTH * len(states) + 0.2, 2.9 * len(rows) + 0.7), layout="constrained")
         grid = figure.subplots(len(rows), len(states), squeeze=False)
         painted = [[_painted(contact, state, name, wear) for state in states] for name in rows]
-        images = trimmed([shoot(view, contact.camera, (900, 690)) for line in painted for view, _ in line])
+        shots = [shoot(view, contact.camera, (900, 690)) for line in painted for view, _ in line]
+        images, corner = triad.with_room(trimmed(shots))
         bars = [bar for line in painted for _, bar in line]
         for axes, image, bar in zip(grid.ravel(), images, bars, strict=True):
-            axes.axis("off")
-            axes.imshow(image)
+            show(axes, image, contact.camera, book.AXES, corner)
             if bar is not None:
                 scale_bar(figure, axes, *bar)
         for axes, state in zip(grid[0], states, strict=True):
@@ -154,6 +153,13 @@ def contact_picture(result: Result, wear: float | None = None) -> Figure:
         told_scale = f", depth in relief × {wear:g}" if worn else ""
         heading(figure, result, f"opened contact: body 1 in front, {other} behind{told_scale}")
     return figure
+
+
+def show(axes: Any, image: np.ndarray, camera: Camera, names: Sequence[str], corner: tuple[float, float]) -> None:
+    """Show an image of a camera with its axes, drawn around a corner [pixels]."""
+    axes.imshow(image)
+    axes.axis("off")
+    triad.draw(axes, camera, names, corner, triad.ROOM * min(image.shape[:2]))
 
 
 def _painted(contact: book.Opened, state: State, name: str, wear: float) -> tuple[View, tuple[Any, ...] | None]:
@@ -206,6 +212,7 @@ class Moving:
 
     def marked(self, image: np.ndarray, points: np.ndarray) -> np.ndarray:
         """An image of this camera with the outline of the contact, hidden or not; points : (n_node, 3) as drawn."""
+        size = image.shape[1], image.shape[0]
         if not len(self.faces) or not len(self.patch.faces):
             return image
         corner = self.patch.faces
@@ -213,10 +220,10 @@ class Moving:
         alone, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
         picture = Image.fromarray(image)
         pen = ImageDraw.Draw(picture)
-        at = [place(self.camera, point, SIZE) for point in points[self.faces[0].nodes]]
+        at = [place(self.camera, point, size) for point in points[self.faces[0].nodes]]
         for i, j in alone[count == 1]:
-            ends = [(at[k][0] * SIZE[0], at[k][1] * SIZE[1]) for k in (i, j)]
-            pen.line(ends, fill=RED, width=4)
+            ends = [(at[k][0] * size[0], at[k][1] * size[1]) for k in (i, j)]
+            pen.line(ends, fill=RED, width=max(round(size[0] / 220), 1))
         return np.asarray(picture)
 
     def factors(self, scale: float) -> str:

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from tribodyn.fem.cyclic import rotation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.travelling_wave import at_sector
+from tribodyn.workflows.pictures import triad
 from tribodyn.workflows.pictures import view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, scale_bar
 from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot
@@ -99,8 +100,10 @@ def wheel_picture(result: Result, wheel: Wheel, deformation: float | None = None
                 values = factor * np.linalg.norm(vibration, axis=-1)[shell.nodes]
                 blade = shell.at(wheel.blade(rest + scale * vibration, n))
                 layers.append(Layer(blade, values=values, map=MOTION_MAP, limits=(0.0, factor * largest), edges=False))
-            axes.imshow(shoot(View(layers), camera, (1000, 1000)))
+            (image,), corner = triad.with_room([shoot(View(layers), camera, (1000, 1000))])
+            axes.imshow(image)
             axes.axis("off")
+            triad.draw(axes, camera, "xyz", corner, triad.ROOM * 1000)
             axes.set_title(f"{state.label}\nvibration × {scale:g}", fontsize=10)
             scale_bar(figure, axes, MOTION_MAP, 0.0, factor * largest, f"vibration at one instant / {unit}")
         heading(figure, result, f"wheel of {wheel.n_sectors} sectors, engine order {wheel.engine_order}")

@@ -48,11 +48,10 @@ class Camera:
 
 @dataclass(frozen=True)
 class View:
-    """Layers, edges besides them, and whether the axes are shown; names : of the axes."""
+    """Layers, and edges besides them."""
 
     layers: list[Layer]
     lines: list[Any] = field(default_factory=list)
-    axes: tuple[str, str, str] | None = ("x", "y", "z")
 
 
 def shoot(view: View, camera: Camera, size: tuple[int, int] = (960, 720)) -> np.ndarray:
@@ -81,11 +80,6 @@ def shoot(view: View, camera: Camera, size: tuple[int, int] = (960, 720)) -> np.
                 plotter.add_mesh(sharp, color=EDGE, line_width=1.6, lighting=False)
     for line in view.lines:
         plotter.add_mesh(line, color="#9aa1ab", line_width=1.2, lighting=False)
-    if view.axes is not None:
-        x, y, z = view.axes
-        plotter.add_axes(
-            xlabel=x, ylabel=y, zlabel=z, viewport=(0, 0, 0.24, 0.28), line_width=3, color=EDGE, label_size=(0.32, 0.16)
-        )
     plotter.enable_parallel_projection()
     plotter.enable_anti_aliasing("ssaa")
     plotter.camera.focal_point = camera.centre

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -295,6 +297,26 @@ class Result:
         if not self.wear_steps or self.patch is None or not len(self.patch.faces):
             raise ValueError("the result holds no worn patch with faces to draw a map on")
         return maps.patch_maps(self, None if rows is None else np.asarray(rows))
+
+    def animate(
+        self,
+        over: Literal["wear", "cycle"],
+        folder: str | PathLike[str],
+        *,
+        row: int | None = None,
+        formats: Sequence[str] = ("mp4",),
+        images: int = 48,
+        deformation: float | None = None,
+        wear: float | None = None,
+    ) -> list[Path]:
+        """Write a film over wear or over one cycle of a row as MP4 or GIF, see pictures.animation; returns its files.
+
+        deformation, wear : factors of exaggeration, chosen by size where None
+        Raises  ValueError where the result has nothing of the kind to show
+        """
+        from tribodyn.workflows.pictures import animation
+
+        return animation.write(self, Path(folder), over, row, formats, images, deformation, wear)
 
     def shown_rows(self) -> np.ndarray:
         """What pictures show: rows of the wear history, or points of the response curve where nothing wears.

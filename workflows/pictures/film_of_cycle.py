@@ -1,0 +1,168 @@
+"""One cycle of a state: the part in motion, the status of every pair at each instant, a hysteresis loop."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch as Swatch
+
+from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS
+from tribodyn.workflows.pictures import opened as book
+from tribodyn.workflows.pictures import triad
+from tribodyn.workflows.pictures.figures import force_unit, heading, length_unit, scale_bar, status_name
+from tribodyn.workflows.pictures.render import Moving, show
+from tribodyn.workflows.pictures.shots import shoot
+from tribodyn.workflows.pictures.style import BLUE, INK, MOTION_MAP, RED, STATUS, STYLE
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.states import instant_status, over_a_cycle, shown_states
+
+INCHES = (12.8, 7.2)
+VIEW = (760, 560)  # pixels
+AT_ONCE = (STICKS, SLIPS, SEPARATES)  # what a pair can do at an instant
+
+
+class CycleFilm:
+    """A film over one cycle of a state: its figure, and how an instant gets into it.
+
+    row : of the wear history, or point of the response; the last that is kept where None
+    count : of images, evenly over the period
+    deformation, wear : factors by which displacement and depth are exaggerated, chosen by size where None
+    Raises  ValueError where nothing is kept of the cycle
+    """
+
+    def __init__(
+        self, result: Result, row: int | None, count: int, deformation: float | None = None, wear: float | None = None
+    ):
+        loops, patch = result.loops, result.patch
+        if loops is None or patch is None:
+            raise ValueError("the result keeps no cycle of a contact: its scene needs pictures.plots = true")
+        states = {state.number: state for state in shown_states(result) if state.number in loops.row.tolist()}
+        row = max(states) if row is None else row
+        if row not in states:
+            raise ValueError(f"the result keeps no cycle of row {row}: it has those of {', '.join(map(str, states))}")
+        self.state, self.count = states[row], count
+        at = loops.row.tolist().index(row)
+        self._status = instant_status(result, at)
+        self._loop = _loop(result, at)
+        self._contact = book.opened(result) if len(patch.faces) else None
+        self._moving = None
+        if self.state.field is not None and result.part is not None and len(patch.faces):
+            self._moving = Moving(result, deformation, wear)
+            _, moved = over_a_cycle(result, self.state.field, count)
+            self._vibration = moved - moved.mean(axis=0)
+            self._factor = self._moving.vibration_scale(self._moving.swing(self.state))
+            self._top = float(self._moving.amplitude(self.state).max())
+        self._wear = self._moving.wear if self._moving is not None else wear or 1.0
+        with mpl.rc_context(STYLE):
+            self.figure = Figure(figsize=INCHES, layout="constrained")
+            self._draw(result)
+
+    @property
+    def name(self) -> str:
+        """Name of the film's files."""
+        return f"cycle_{self.state.number}"
+
+    def show(self, number: int) -> None:
+        """Put an instant into the figure."""
+        sample = number * self._status.shape[1] // self.count
+        for axes, image in zip(self._panels, self._shots(number, sample), strict=True):
+            padded = np.full(axes.images[0].get_array().shape, 255, np.uint8)
+            padded[: VIEW[1]] = image
+            axes.images[0].set_data(padded)
+        x, force = self._loop[:2]
+        self._mark.set_data(x[sample : sample + 1], force[sample : sample + 1])
+        share = number / self.count
+        self._now.set_xdata([share, share])
+        self._clock.set_text(f"{share:.2f} of the period")
+
+    def _draw(self, result: Result) -> None:
+        assert result.patch is not None
+        views = [name for name, there in (("part", self._moving), ("contact", self._contact)) if there is not None]
+        if views:
+            upper, lower = self.figure.subfigures(2, 1, height_ratios=[1.9, 1])
+            self._panels = list(np.atleast_1d(upper.subplots(1, len(views))))
+            self._start(upper, views)
+        else:
+            lower, self._panels = self.figure.subfigures(1, 1), []
+        left, right = lower.subplots(1, 2, width_ratios=[1, 1.6])
+        self._draw_loop(left, result)
+        self._draw_status(right, result)
+        at = f"{self.state.label}, {self.state.omega / (2 * np.pi):.4g} Hz"
+        heading(self.figure, result, f"one cycle, {at}")
+        self._clock = self.figure.text(0.99, 0.985, "", ha="right", va="top", fontsize=11)
+
+    def _start(self, figure: Any, views: list[str]) -> None:
+        for axes, name, image in zip(self._panels, views, self._shots(0, 0), strict=True):
+            (shown,), corner = triad.with_room([image])
+            if name == "part" and self._moving is not None:
+                show(axes, shown, self._moving.camera, "xyz", corner)
+                unit, factor = length_unit(self._top)
+                label = f"distance from the mean position / {unit}"
+                scale_bar(figure, axes, MOTION_MAP, 0.0, factor * self._top, label)
+                axes.set_title(self._moving.factors(self._factor), fontsize=10)
+            elif self._contact is not None:
+                show(axes, shown, self._contact.camera, book.AXES, corner)
+                other = "body 2" if len(self._contact.faces) > 1 else "ground"
+                axes.set_title(f"opened contact: body 1 in front, {other} behind", fontsize=10)
+
+    def _shots(self, number: int, sample: int) -> list[np.ndarray]:
+        found = []
+        if self._moving is not None:
+            vibration = self._vibration[number]
+            points = self._moving.points(self.state, self._factor * vibration)
+            values = np.linalg.norm(vibration, axis=1)
+            view = self._moving.view(points, values, (0.0, self._top))
+            found.append(self._moving.marked(shoot(view, self._moving.camera, VIEW), points))
+        if self._contact is not None:
+            paint = book.Status(self._status[:, sample])
+            found.append(shoot(self._contact.view(self.state.depth, self._wear, paint), self._contact.camera, VIEW))
+        return found
+
+    def _draw_loop(self, axes: Any, result: Result) -> None:
+        x, force, label_x, label_f = self._loop
+        axes.plot(np.append(x, x[0]), np.append(force, force[0]), color=BLUE)
+        self._mark = axes.plot([], [], "o", color=RED, ms=7, zorder=5)[0]
+        axes.set_xlabel(label_x, fontsize=10)
+        axes.set_ylabel(label_f, fontsize=10)
+        axes.locator_params(nbins=5)
+
+    def _draw_status(self, axes: Any, result: Result) -> None:
+        """Status of every pair over the period, pairs in the order of their contact."""
+        patch = result.patch
+        assert patch is not None
+        colors = [STATUS[bits][1] for bits in AT_ONCE]
+        norm = BoundaryNorm([0.5, 1.5, 3.0, 5.0], 3)
+        axes.imshow(
+            self._status, aspect="auto", cmap=ListedColormap(colors), norm=norm, interpolation="nearest",
+            extent=(0, 1, len(self._status) - 0.5, -0.5),
+        )  # fmt: skip
+        self._now = axes.axvline(0, color=INK, lw=1.2)
+        axes.grid(False)
+        axes.set_xlabel("share of the period", fontsize=10)
+        axes.set_ylabel("contact pair", fontsize=10)
+        present = [bits for bits in AT_ONCE if (self._status == bits).any()]
+        swatches = [Swatch(facecolor=STATUS[b][1], label=status_name(b, patch.components)) for b in present]
+        axes.legend(handles=swatches, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
+
+
+def _loop(result: Result, at: int) -> tuple[np.ndarray, np.ndarray, str, str]:
+    """Displacement and force of the pair and direction that work most, or whose force swings most; and their labels."""
+    loops, patch = result.loops, result.patch
+    assert loops is not None
+    assert patch is not None
+    displacement, force = loops.displacement[at], loops.force[at]
+    tangential = [c for c, name in enumerate(patch.components) if name != "n"]
+    if tangential:
+        work = np.abs(np.sum(force * np.gradient(displacement, axis=-1), axis=-1))[:, tangential]
+    else:
+        work, tangential = np.ptp(force, axis=-1), [0]
+    pair, place = np.unravel_index(int(np.argmax(work)), work.shape)
+    component = tangential[int(place)]
+    x, f = displacement[pair, component], force[pair, component]
+    x = x - (x.max() + x.min()) / 2
+    (unit_x, scale_x), (unit_f, scale_f) = length_unit(float(x.max())), force_unit(float(np.abs(f).max()))
+    return scale_x * x, scale_f * f, f"{patch.components[component]} / {unit_x}", f"force at pair {pair} / {unit_f}"

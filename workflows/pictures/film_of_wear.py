@@ -1,0 +1,150 @@
+"""The contact over wear: depth in relief, status and pressure of the opened contact, with the course of the wear."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize, PowerNorm
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from tribodyn.workflows.pictures import opened as book
+from tribodyn.workflows.pictures import triad
+from tribodyn.workflows.pictures.figures import force_unit, heading, length_unit, pressure_unit, status_legend
+from tribodyn.workflows.pictures.plots import cycle_axis, shown_cycles
+from tribodyn.workflows.pictures.render import show
+from tribodyn.workflows.pictures.shots import shoot
+from tribodyn.workflows.pictures.style import BLUE, ORANGE, PRESSURE_MAP, RED, STYLE, WEAR_MAP
+from tribodyn.workflows.pictures.view import wear_scale
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.states import State, state_of
+
+INCHES = (12.8, 7.2)
+VIEW = (640, 490)  # pixels
+ROOT = 1 / 3  # power of the scale of pressure: the first pressures are many times the last
+PANELS = ("depth", "status", "pressure")
+
+
+class WearFilm:
+    """A film over wear: its figure, and how a state gets into it.
+
+    images : wear states at the most, evenly chosen among the rows that curves show
+    wear : factor by which the depth is exaggerated, chosen by size where None
+    Raises  ValueError where the result has no worn contact with faces
+    """
+
+    def __init__(self, result: Result, images: int, wear: float | None = None):
+        patch, history = result.patch, result.wear
+        if patch is None or history is None or not result.wear_steps or not len(patch.faces):
+            raise ValueError("the result holds no worn contact with faces: there is no film over wear")
+        last = int(np.flatnonzero(history.cycles <= shown_cycles(history))[-1])
+        rows = np.unique(np.linspace(0, last, images).round().astype(int))
+        self.states = [state_of(result, int(row)) for row in rows]
+        depth = np.stack([state.depth for state in self.states])
+        self._pressure_top = max(float(_pressure(state).max()) for state in self.states)
+        self._depth_top = float(depth.max())
+        self.scale = wear or wear_scale(patch, depth)
+        self.contact = book.opened(result)
+        with mpl.rc_context(STYLE):
+            self.figure = Figure(figsize=INCHES, layout="constrained")
+            upper, lower = self.figure.subfigures(2, 1, height_ratios=[1.8, 1])
+            self._panels = dict(zip(PANELS, upper.subplots(1, 3), strict=True))
+            present = {int(bits) for s in self.states if s.status is not None for bits in s.status}
+            status_legend(upper, present, patch.components)
+            self._bars(upper)
+            self._marks = _curves(result, lower.subplots(1, 3), rows)
+            other = "body 2" if len(self.contact.faces) > 1 else "ground"
+            heading(
+                self.figure, result, f"wear of the contact, body 1 in front, {other} behind, relief × {self.scale:g}"
+            )
+            self._start()
+
+    @property
+    def count(self) -> int:
+        """Number of images."""
+        return len(self.states)
+
+    @property
+    def name(self) -> str:
+        """Name of the film's files."""
+        return "wear"
+
+    def show(self, number: int) -> None:
+        """Put a state into the figure."""
+        state = self.states[number]
+        for name, axes in self._panels.items():
+            image = np.full(axes.images[0].get_array().shape, 255, np.uint8)
+            image[: VIEW[1]] = self._shot(state, name)
+            axes.images[0].set_data(image)
+        self._panels["depth"].set_title(state.label, fontsize=12)
+        for mark, x, y in self._marks:
+            mark.set_data(x[number : number + 1], y[number : number + 1])
+
+    def _start(self) -> None:
+        images, corner = triad.with_room([self._shot(self.states[-1], name) for name in PANELS])
+        for axes, image in zip(self._panels.values(), images, strict=True):
+            show(axes, image, self.contact.camera, book.AXES, corner)
+            axes.set_title(" ", fontsize=12)
+
+    def _shot(self, state: State, name: str) -> np.ndarray:
+        view = self.contact.view(state.depth, self.scale, self._paint(state, name))
+        return shoot(view, self.contact.camera, VIEW)
+
+    def _paint(self, state: State, name: str) -> book.Paint:
+        if name == "status":
+            return book.Status(np.zeros(len(state.depth), int) if state.status is None else state.status)
+        if name == "depth":
+            return book.Field(state.depth, (0.0, self._depth_top), WEAR_MAP)
+        return book.Field(np.maximum(_pressure(state), 0) ** ROOT, (0.0, self._pressure_top**ROOT), PRESSURE_MAP)
+
+    def _bars(self, figure: Any) -> None:
+        unit, factor = length_unit(self._depth_top)
+        _bar(
+            figure,
+            self._panels["depth"],
+            Normalize(0, factor * self._depth_top),
+            WEAR_MAP,
+            f"total wear depth / {unit}",
+        )
+        unit, factor = pressure_unit(self._pressure_top)
+        norm = PowerNorm(ROOT, 0, factor * self._pressure_top)
+        _bar(figure, self._panels["pressure"], norm, PRESSURE_MAP, f"mean pressure / {unit}")
+
+
+def _pressure(state: State) -> np.ndarray:
+    return np.zeros(len(state.depth)) if state.pressure is None else state.pressure
+
+
+def _bar(figure: Any, axes: Any, norm: Normalize, map_: str, label: str) -> None:
+    bar = figure.colorbar(ScalarMappable(norm, map_), ax=axes, location="bottom", shrink=0.8, aspect=28)
+    bar.set_label(label, fontsize=10)
+    bar.ax.tick_params(labelsize=9)
+    bar.locator = MaxNLocator(4)
+    bar.update_ticks()
+
+
+def _curves(result: Result, panels: Any, rows: np.ndarray) -> list[tuple[Any, np.ndarray, np.ndarray]]:
+    """Depth, amplitude and preload against cycles, each with a mark; returns mark, x and y of the rows."""
+    wear = result.wear
+    assert wear is not None
+    depth, found = wear.depth.max(axis=1), []
+    (unit_d, d), (unit_a, a) = length_unit(depth.max()), length_unit(wear.amplitude.max())
+    unit_f, f = force_unit(wear.preload.max())
+    for axes, label, values, color in zip(
+        panels,
+        (f"largest total depth / {unit_d}", f"amplitude / {unit_a}", f"preload / {unit_f}"),
+        (d * depth, a * wear.amplitude, f * wear.preload),
+        (BLUE, ORANGE, BLUE),
+        strict=True,
+    ):
+        scale = cycle_axis(axes, wear)
+        axes.plot(scale * wear.cycles, values, color=color, lw=1.2)
+        axes.set_ylabel(label, fontsize=10)
+        axes.locator_params(axis="x", nbins=5)
+        mark = axes.plot([], [], "o", color=RED, ms=7, zorder=5)[0]
+        found.append((mark, scale * wear.cycles[rows], values[rows]))
+    panels[1].set_yscale("log" if wear.amplitude.max() > 30 * wear.amplitude.min() > 0 else "linear")
+    return found
