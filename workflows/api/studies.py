@@ -33,6 +33,10 @@ from tribodyn.workflows.accuracy.published import published_wear_steps
 from tribodyn.workflows.pictures.maps import draw_field, draw_status, patch_maps
 from tribodyn.workflows.pictures.plots import axes_of as plot_axes
 from tribodyn.workflows.pictures.plots import length_unit
+from tribodyn.workflows.pictures.wheel_diagrams import campbell as plot_campbell
+from tribodyn.workflows.pictures.wheel_diagrams import nodal_diameters as plot_nodal_diameters
+from tribodyn.workflows.pictures.wheel_diagrams import safe as plot_safe
+from tribodyn.workflows.pictures.wheel_diagrams import shades
 from tribodyn.workflows.result.result import Patch, References, Result
 from tribodyn.workflows.result.whole_file import replacing as write_whole
 from tribodyn.workflows.run import memory, pipeline, references, settings, wear_run
@@ -50,6 +54,8 @@ from tribodyn.workflows.studies.joint_springs import JointSprings, joint_springs
 from tribodyn.workflows.studies.mistuning import Mistuned
 from tribodyn.workflows.studies.mistuning import picture as plot_mistuned
 from tribodyn.workflows.studies.mistuning import write as write_mistuned
+from tribodyn.workflows.studies.modes import follow_backbone
+from tribodyn.workflows.studies.modes import picture as plot_backbone
 from tribodyn.workflows.studies.supports import support_wear, support_work
 from tribodyn.workflows.studies.variation import Varied, changed, vary
 from tribodyn.workflows.studies.wheel import Wheel, campbell, critical_speeds
@@ -103,6 +109,7 @@ __all__ = [
     "fold_in_time",
     "follow_adaptive",
     "follow_arc_length",
+    "follow_backbone",
     "follow_response",
     "identify",
     "impact_work",
@@ -117,10 +124,15 @@ __all__ = [
     "patch_maps",
     "peak_memory",
     "plot_axes",
+    "plot_backbone",
+    "plot_campbell",
     "plot_mistuned",
+    "plot_nodal_diameters",
+    "plot_safe",
     "published_wear_steps",
     "reaction",
     "result_of",
+    "shades",
     "solutions_at",
     "state_at",
     "support_wear",

@@ -9,7 +9,7 @@ from typing import Any
 
 import tomli_w
 
-from tribodyn.workflows.designs import cluster, design, pool
+from tribodyn.workflows.designs import cluster, design, life_picture, pool
 from tribodyn.workflows.designs.journal import Journal
 from tribodyn.workflows.designs.study_file import Study
 from tribodyn.workflows.designs.table import StudyTable, table, write
@@ -30,7 +30,7 @@ def run(
     scheduler: str = "",
     resume: bool = False,
 ) -> StudyTable:
-    """Do the runs of a study, and leave study.csv, study.h5 and study.png in `folder`.
+    """Do the runs of a study, and leave study.csv, study.h5, study.png, and life.png of five lives or more.
 
     workers : processes, as many as there are cores by default; scheduler : see cluster.finished, none by default
     resume : take the rows that `folder` holds of the same runs
@@ -70,6 +70,8 @@ def run(
         assert found is not None
         if found.count("complete"):
             found.plot().savefig(folder / "study.png")
+            if life_picture.possible(found):
+                found.plot_distribution().savefig(folder / "life.png")
     return found
 
 

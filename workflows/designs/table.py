@@ -68,6 +68,12 @@ class StudyTable:
 
         return pandas.DataFrame(dict(self.columns)).set_index(RUN)
 
+    def plot_distribution(self, number: str = "life_cycles") -> Figure:
+        """A number of the runs on Weibull paper, see designs.life_picture; raises ValueError where they are few."""
+        from tribodyn.workflows.designs import life_picture
+
+        return life_picture.picture(self, number)
+
     def plot(self) -> Figure:
         """Response against each of the keys that vary, see designs.picture."""
         from tribodyn.workflows.designs import picture

@@ -10,7 +10,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch as Swatch
 
-from tribodyn.hbm.law import SEPARATES, SLIPS, STICKS
+from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
 from tribodyn.workflows.pictures import opened as book
 from tribodyn.workflows.pictures import triad
 from tribodyn.workflows.pictures.figures import force_unit, heading, length_unit, scale_bar, status_name

@@ -14,13 +14,13 @@ from matplotlib.ticker import MaxNLocator
 from tribodyn.workflows.pictures import opened as book
 from tribodyn.workflows.pictures import triad
 from tribodyn.workflows.pictures.figures import force_unit, heading, length_unit, pressure_unit, status_legend
-from tribodyn.workflows.pictures.plots import cycle_axis, shown_cycles
+from tribodyn.workflows.pictures.plots import cycle_axis
 from tribodyn.workflows.pictures.render import show
 from tribodyn.workflows.pictures.shots import shoot
 from tribodyn.workflows.pictures.style import BLUE, ORANGE, PRESSURE_MAP, RED, STYLE, WEAR_MAP
 from tribodyn.workflows.pictures.view import wear_scale
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.states import State, state_of
+from tribodyn.workflows.result.states import State, shown_cycles, state_of
 
 INCHES = (12.8, 7.2)
 VIEW = (640, 490)  # pixels

@@ -14,7 +14,7 @@ from matplotlib.tri import Triangulation
 from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, status_legend
 from tribodyn.workflows.pictures.style import PRESSURE_MAP, STATUS, STYLE, WEAR_MAP
 from tribodyn.workflows.result.result import Patch, Result
-from tribodyn.workflows.result.states import shown_states, state_of
+from tribodyn.workflows.result.states import shown_cycles, shown_states, state_of
 
 
 def patch_maps(result: Result, rows: np.ndarray | None = None, scale: Literal["column", "shared"] = "column") -> Figure:
@@ -68,6 +68,34 @@ def patch_maps(result: Result, rows: np.ndarray | None = None, scale: Literal["c
         if told:
             status_legend(figure, {int(b) for s in states if s.status is not None for b in s.status}, patch.components)
         heading(figure, result, "contact patch")
+    return figure
+
+
+def status_maps(result: Result, count: int = 8) -> Figure:
+    """Status over the cycle at up to `count` wear steps, evenly chosen among the rows that curves show."""
+    patch, wear = result.patch, result.wear
+    assert patch is not None
+    assert wear is not None
+    last = int(np.flatnonzero(wear.cycles <= shown_cycles(wear))[-1])
+    rows = np.unique(np.linspace(0, last, count).round().astype(int))
+    columns = min(len(rows), 4)
+    lines = -(-len(rows) // columns)
+    aspect = float(np.clip(np.ptp(patch.flat[:, 1]) / np.ptp(patch.flat[:, 0]), 0.25, 2.0))
+    with mpl.rc_context({**STYLE, "axes.grid": False}):
+        figure = Figure(figsize=(2.5 * columns + 0.4, lines * (2.2 * aspect + 0.6) + 1.0), layout="constrained")
+        grid = figure.subplots(lines, columns, squeeze=False)
+        for axes, row in zip(grid.ravel(), rows, strict=False):
+            draw_status(axes, patch, wear.status[row])
+            axes.set_title(state_of(result, int(row)).label, fontsize=10)
+        for axes in grid.ravel()[len(rows) :]:
+            axes.axis("off")
+        for axes in grid.ravel()[: len(rows)]:
+            axes.locator_params(nbins=4)
+            axes.tick_params(labelsize=9)
+            axes.set(xlabel="t1 / mm", ylabel="t2 / mm")
+            axes.label_outer(remove_inner_ticks=False)
+        status_legend(figure, {int(bits) for row in rows for bits in wear.status[row]}, patch.components)
+        heading(figure, result, "contact status over wear")
     return figure
 
 

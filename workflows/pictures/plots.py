@@ -17,10 +17,9 @@ from tribodyn.workflows.pictures import maps
 from tribodyn.workflows.pictures.figures import axes_of, force_unit, heading, length_unit, save, status_name, titled
 from tribodyn.workflows.pictures.style import BLUE, CYCLE, GREEN, GREY, INK, ORANGE, RED, STATUS, STYLE, WEAR_MAP
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.states import has_states, state_of
+from tribodyn.workflows.result.states import has_states, shown_cycles, state_of
 
 BIFURCATIONS = {"fold": "o", "flip": "s", "Neimark-Sacker": "D"}  # markers
-FAINT = 1e-3  # share of the first preload below which a touch is faint
 
 
 def draw(result: Result, folder: Path, formats: Sequence[str] = ("png",), dpi: int | None = None) -> list[Path]:
@@ -44,6 +43,7 @@ def figures(result: Result) -> dict[str, Callable[[Result], Figure]]:
         ("hysteresis", hysteresis_loops, result.loops is not None and has_friction(result)),
         ("normal", normal_loops, result.loops is not None and not has_friction(result)),
         ("patch", maps.patch_maps, mapped),
+        ("status_maps", maps.status_maps, mapped and worn),
     ]
     return {name: function for name, function, possible in every if possible}
 
@@ -233,11 +233,12 @@ def output_amplitudes(result: Result) -> Figure:
     return figure
 
 
-def hysteresis_loops(result: Result) -> Figure:
-    """Tangential loops in chosen states (columns) of the pairs that dissipate most in one of them (rows)."""
+def hysteresis_loops(result: Result, pairs: Sequence[int] | None = None) -> Figure:
+    """Tangential loops in chosen states (columns) of some pairs (rows), those that dissipate most by default."""
     patch = result.patch
     assert patch is not None
-    return _loops(result, [c for c, name in enumerate(patch.components) if name != "n"], "hysteresis loops by pair")
+    components = [c for c, name in enumerate(patch.components) if name != "n"] or [0]
+    return _loops(result, components, "hysteresis loops by pair", pairs)
 
 
 def normal_loops(result: Result) -> Figure:
@@ -245,14 +246,16 @@ def normal_loops(result: Result) -> Figure:
     return _loops(result, [0], "normal force over approach by pair")
 
 
-def _loops(result: Result, components: list[int], what: str) -> Figure:
+def _loops(result: Result, components: list[int], what: str, asked: Sequence[int] | None = None) -> Figure:
     loops, patch = result.loops, result.patch
     assert loops is not None
     assert patch is not None
     states = [state_of(result, int(row)) for row in loops.row]
     work = np.abs(np.sum(loops.force * np.gradient(loops.displacement, axis=-1), axis=-1))[:, :, components].sum(axis=2)
     swing = work if components != [0] or len(patch.components) > 1 else np.ptp(loops.force[:, :, 0], axis=-1)
-    pairs = list(dict.fromkeys(int(np.argmax(one)) for one in swing))
+    pairs = list(dict.fromkeys(int(np.argmax(one)) for one in swing)) if asked is None else list(asked)
+    if not all(0 <= pair < len(patch.area) for pair in pairs):
+        raise ValueError(f"pairs {pairs}: this contact has pairs 0 to {len(patch.area) - 1}")
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(2.7 * len(states) + 0.4, 2.3 * len(pairs) + 0.6), layout="constrained")
         grid = figure.subplots(len(pairs), len(states), squeeze=False)
@@ -278,15 +281,6 @@ def _loops(result: Result, components: list[int], what: str) -> Figure:
 def _wear(result: Result) -> WearHistory:
     assert result.wear is not None
     return result.wear
-
-
-def shown_cycles(wear: WearHistory) -> float:
-    """Cycles up to which curves are drawn: all, unless a last faint touch takes more than half of them."""
-    last = float(wear.cycles[-1])
-    faint = np.flatnonzero(wear.preload < FAINT * wear.preload[0])
-    if len(faint) and 0 < wear.cycles[faint[0]] < 0.5 * last:
-        return 1.15 * float(wear.cycles[faint[0]])
-    return last
 
 
 def cycle_axis(axes: Any, wear: WearHistory) -> float:

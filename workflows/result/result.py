@@ -279,13 +279,24 @@ class Result:
             raise ValueError(f'no wear plot "{what}": there are {", ".join(draw)}')
         return draw[what](self)
 
-    def plot_hysteresis(self) -> Figure:
-        """Friction force against displacement of some pairs over a cycle; raises ValueError where none are kept."""
+    def plot_hysteresis(self, pairs: Sequence[int] | None = None) -> Figure:
+        """Force against displacement of some pairs over a cycle, those that dissipate most by default.
+
+        Raises  ValueError where no loops are kept, or for a pair that there is not
+        """
         from tribodyn.workflows.pictures import plots
 
         if self.loops is None:
             raise ValueError("the result holds no hysteresis loops: its scene needs [wear] and pictures.plots = true")
-        return plots.hysteresis_loops(self)
+        return plots.hysteresis_loops(self, pairs)
+
+    def plot_status(self, count: int = 8) -> Figure:
+        """Maps of the contact status over wear; raises ValueError where nothing was worn or the patch has no faces."""
+        from tribodyn.workflows.pictures import maps
+
+        if not self.wear_steps or self.patch is None or not len(self.patch.faces):
+            raise ValueError("the result holds no worn patch with faces to draw a map on")
+        return maps.status_maps(self, count)
 
     def plot_patch(self, rows: Sequence[int] | None = None) -> Figure:
         """Maps of wear depth, contact status and pressure on the patch at wear rows, those of the pictures by default.

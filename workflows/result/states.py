@@ -8,8 +8,10 @@ import numpy as np
 
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.result.result import Result
 
+FAINT = 1e-3  # share of the first preload below which a touch is faint
 CLOSE = 1e-9  # of the largest force: what counts as none, and as being on the friction limit times 1000
 
 
@@ -74,6 +76,15 @@ def state_of(result: Result, number: int) -> State:
             pressure = result.loops.force[at, :, patch.components.index("n")].mean(axis=-1) / patch.area
     none = np.zeros(len(patch.area))
     return State(f"{omega / (2 * np.pi):.4g} Hz", number, omega, 0.0, none, status, pressure, field)
+
+
+def shown_cycles(wear: WearHistory) -> float:
+    """Cycles up to which curves are drawn: all, unless a last faint touch takes more than half of them."""
+    last = float(wear.cycles[-1])
+    faint = np.flatnonzero(wear.preload < FAINT * wear.preload[0])
+    if len(faint) and 0 < wear.cycles[faint[0]] < 0.5 * last:
+        return 1.15 * float(wear.cycles[faint[0]])
+    return last
 
 
 def counted(number: float) -> str:

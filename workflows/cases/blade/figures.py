@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from tribodyn import Result, patch_maps, plot_axes
-from tribodyn.style import BLUE, GREY, INK, ORANGE, RED, WEAR_MAP
+from tribodyn import Result, patch_maps, plot_axes, plot_nodal_diameters, shades
+from tribodyn.style import BLUE, GREY, INK, ORANGE, RED
 
 if TYPE_CHECKING:
     from tribodyn.workflows.cases.blade.study import Curve, Worn
@@ -19,48 +18,13 @@ MILLI = 1e3
 SHOWN_DIAMETERS = 15  # in the thesis's figure 4.11
 
 
-def shades(count: int) -> list[Any]:
-    """Colours from dark to light for a series of curves."""
-    return [mpl.colormaps[WEAR_MAP](x) for x in np.linspace(0.0, 0.92, max(count, 2))[:count]]
-
-
 def diagram_figure(families: Mapping[str, np.ndarray]) -> Figure:
-    """Frequencies over nodal diameters, free and stuck (figure 4.11).
+    """Frequencies over nodal diameters, free and stuck (figure 4.11), and how far the thesis shows them.
 
     families : "free" and "stuck" (n_diameter, family) [Hz]
     """
-    with plot_axes(7.2, 4.8) as (figure, axes):
-        diameters = np.arange(len(families["stuck"]))
-        for state, style, color in (("free", "o--", GREY), ("stuck", "o-", BLUE)):
-            for i, values in enumerate(families[state].T):
-                axes.plot(diameters, values, style, color=color, ms=3.5, label=f"shrouds {state}" if i == 0 else None)
-        axes.axvline(SHOWN_DIAMETERS, color=INK, lw=0.8, ls=":", label="shown in the thesis up to here")
-        axes.set(xlabel="nodal diameter", ylabel="frequency / Hz", title="Nodal diameters")
-        axes.set_ylim(0, 1.25 * families["stuck"].max())
-        axes.legend(loc="upper left", fontsize=9)
-    return figure
-
-
-def campbell_figure(
-    speeds: np.ndarray, found: Mapping[str, np.ndarray], critical: Mapping[int, Sequence[float]]
-) -> Figure:
-    """Frequencies of the waves of several engine orders over the speed, with the lines of these orders.
-
-    speeds : (n_speed,) [Hz]; found : "free" and "stuck" (n_speed, n_order, family) [Hz]
-    critical : engine order -> speeds [Hz] at which it meets its first stuck frequency
-    """
-    with plot_axes(7.2, 4.8) as (figure, axes):
-        rpm = 60 * speeds
-        axes.plot(rpm, found["free"][:, 0, 0], "--", color=GREY, label="free")
-        top = 1.5 * float(found["stuck"][:, :, 0].max())
-        for i, (order, color) in enumerate(zip(critical, shades(len(critical)), strict=True)):
-            axes.plot(rpm, found["stuck"][:, i, 0], color=color, label=f"stuck, engine order {order}")
-            axes.plot(rpm, order * speeds, ":", color=color, lw=1)
-            for speed in critical[order]:
-                axes.plot(60 * speed, order * speed, "o", color=RED, ms=6, zorder=4)
-        axes.set(xlabel="speed / rpm", ylabel="frequency / Hz", title="Campbell diagram, first mode", ylim=(0, top))
-        axes.set_xlim(0, rpm[-1])
-        axes.legend(loc="upper left", fontsize=8, ncols=2)
+    figure = plot_nodal_diameters(families)
+    figure.axes[0].axvline(SHOWN_DIAMETERS, color=INK, lw=0.8, ls=":")
     return figure
 
 

@@ -30,6 +30,7 @@ from tribodyn import (
     delta_max,
     follow_adaptive,
     linear_references,
+    plot_campbell,
     published_wear_steps,
     read_scene,
     result_of,
@@ -248,7 +249,7 @@ def run(
             met = {o: critical_speeds(speeds, found["stuck"][:, i, 0], o) for i, o in enumerate(chosen)}
             for order, at in met.items():
                 say(f"engine order {order}: critical at {', '.join(f'{60 * s:.0f}' for s in at) or 'no'} rpm, stuck")
-            drawn["campbell"] = blade_figures.campbell_figure(speeds, found, met)
+            drawn["campbell"] = plot_campbell(speeds, found, chosen, met)
         by_order = orders(blade, extent)
         drawn["orders"] = blade_figures.orders_figure(by_order)
         by_load = forces(blade, extent)

@@ -1,0 +1,112 @@
+"""Pictures of the field: what an engine order excites, where it meets a mode, lives on Weibull paper."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.helpers.pictures import assert_not_blank
+from tests.helpers.synthetic_result import result
+from tribodyn.workflows.cases.blade.few_sectors import FEW_SECTORS
+from tribodyn.workflows.command import main as cli
+from tribodyn.workflows.designs import life_picture
+from tribodyn.workflows.designs.table import StudyTable
+from tribodyn.workflows.pictures import wheel_diagrams
+
+
+@pytest.mark.parametrize("n_sectors", [7, 8])
+def test_an_engine_order_excites_the_diameter_that_its_samples_have(n_sectors: int) -> None:
+    """A wave sampled at the sectors, decomposed by a discrete Fourier transform."""
+    for order in range(3 * n_sectors):
+        samples = np.exp(2j * np.pi * order * np.arange(n_sectors) / n_sectors)
+        place = int(np.argmax(np.abs(np.fft.fft(samples))))
+        assert wheel_diagrams.diameter_of(order, n_sectors) == min(place, n_sectors - place)
+
+
+def test_meetings_are_modes_on_lines_of_engine_orders() -> None:
+    frequency = np.array([[100.0, 400.0], [120.0, 420.0], [150.0, 450.0]])  # of diameters 0, 1, 2 of four sectors
+    found = wheel_diagrams.meetings(frequency, 4, 30.0, 60.0)
+    low = {(3, 1, 0)}  # 120 Hz by order 3; diameter 0 needs orders 4, 8, ..., diameter 2 needs 2, 6, ...
+    high = {(7, 1, 1), (8, 0, 1), (9, 1, 1), (10, 2, 1), (11, 1, 1), (12, 0, 1), (13, 1, 1), (14, 2, 1)}
+    assert {(m.engine_order, m.diameter, m.family) for m in found} == low | high
+    for m in found:
+        assert 30.0 <= m.speed <= 60.0
+        assert m.engine_order * m.speed == pytest.approx(frequency[m.diameter, m.family])
+
+
+def test_the_command_draws_the_modes_of_a_wheel(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    changes = [word for text in (*FEW_SECTORS, "geometry.n_span=3") for word in ("--set", text)]
+    speeds = ["--from", "3000rpm", "--to", "9000rpm", "--speeds", "2", "--families", "2", "--order", "1", "2"]
+    cli.main(["wheel", "blade", *changes, *speeds, "--out", str(tmp_path), "--json"])
+    said = json.loads(capsys.readouterr().out)
+    assert {Path(name).name for name in said["files"]} == {
+        "nodal_diameters.csv", "nodal_diameters.png", "safe.png", "campbell.png",
+    }  # fmt: skip
+    for name in said["files"]:
+        if name.endswith(".png"):
+            assert_not_blank(Path(name))
+    stuck, free = (np.array(said["families_hz"][state]) for state in ("stuck", "free"))
+    assert stuck.shape == (5, 2)
+    assert (stuck >= free * (1 - 1e-9)).all()  # springs can only stiffen
+    for met in said["met"]["stuck"]:
+        assert met["diameter"] == wheel_diagrams.diameter_of(met["engine_order"], 8)
+        assert 50.0 <= met["speed"] <= 150.0
+
+
+def test_a_part_without_a_wheel_has_no_diagrams(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["wheel", "beam"])
+    assert stop.value.code == 2
+    assert "has no [wheel]" in capsys.readouterr().err
+
+
+def of_lives(lives: np.ndarray) -> StudyTable:
+    columns = {
+        "run": np.arange(1, len(lives) + 1),
+        "status": np.array(["complete"] * len(lives), dtype=object),
+        "sentence": np.array([""] * len(lives), dtype=object),
+        "load": np.ones(len(lives)),
+        "life_cycles": lives,
+    }
+    return StudyTable("made_up", columns, ("load",))
+
+
+def test_a_weibull_distribution_is_found_again() -> None:
+    shares = (np.arange(400) + 0.5) / 400
+    lives = 2e6 * (-np.log(1 - shares)) ** (1 / 1.8)
+    law = life_picture.fitted(lives)
+    assert law.shape == pytest.approx(1.8, rel=0.02)
+    assert law.scale == pytest.approx(2e6, rel=0.01)
+    assert law.quantile(0.1) == pytest.approx(np.quantile(lives, 0.1), rel=0.02)
+    values, below = life_picture.ranks(lives)
+    assert np.abs(below - shares).max() < 1e-3
+    assert (values == lives).all()
+
+
+def test_lives_are_drawn_on_weibull_paper_and_not_fitted_where_some_are_missing(tmp_path: Path) -> None:
+    lives = 1e6 * np.random.default_rng(1).weibull(2.0, 30)
+    figure = of_lives(lives).plot_distribution()
+    figure.savefig(tmp_path / "life.png", dpi=60)
+    assert_not_blank(tmp_path / "life.png")
+    assert len(figure.axes[0].lines) == 4
+    line = figure.axes[0].lines[1]  # the fit is straight on this paper
+    assert len(line.get_xdata()) == 2
+    lives[3] = np.nan
+    axes = of_lives(lives).plot_distribution().axes[0]
+    assert len(axes.lines) == 2
+    assert "1 runs without, not fitted" in axes.get_title(loc="left")
+    with pytest.raises(ValueError, match="4 runs have a life_cycles, a distribution needs 5"):
+        of_lives(lives[:4] * 0 + 1).plot_distribution()
+
+
+def test_status_over_wear_and_loops_of_chosen_pairs() -> None:
+    given = result()
+    assert given.wear is not None
+    figure = given.plot_status(5)
+    assert len([axes for axes in figure.axes if axes.collections]) == 5
+    assert len(given.plot_hysteresis([0, 2]).axes) == 6
+    with pytest.raises(ValueError, match="this contact has pairs 0 to"):
+        given.plot_hysteresis([1000])

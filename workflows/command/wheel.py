@@ -1,0 +1,72 @@
+"""The word of the command `tribodyn` that shows the modes of a wheel."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from tribodyn.workflows.command.words import Json, Overrides, make_room, quantity
+
+Orders = Annotated[tuple[int, ...], Parameter(name="--order", negative=(), consume_multiple=True)]
+Formats = Annotated[tuple[str, ...], Parameter(name="--format", negative=(), consume_multiple=True)]
+
+
+def wheel(
+    scene: str,
+    *,
+    slow: Annotated[str | None, Parameter(name="--from")] = None,
+    fast: Annotated[str | None, Parameter(name="--to")] = None,
+    order: Orders = (),
+    families: int = 4,
+    speeds: int = 7,
+    overrides: Overrides = (),
+    formats: Formats = ("png",),
+    out: Path | None = None,
+    as_json: Json = False,
+) -> None:
+    """Show the modes of a wheel: nodal diameters, and SAFE and Campbell diagrams of a range of speeds.
+
+    Contact free and stuck, at the scene's speed; the Campbell diagram has the modes at each speed.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene with a [wheel], or a .toml file.
+    slow
+        Lowest speed of the SAFE diagram, such as 3000rpm.
+    fast
+        Highest speed of the SAFE diagram, and of the Campbell diagram; no such diagrams by default.
+    order
+        Engine orders of the Campbell diagram; that of the scene by default.
+    families
+        Modes of each nodal diameter.
+    speeds
+        Speeds of the Campbell diagram, from rest to the highest.
+    formats
+        png, pdf or svg, can be repeated.
+    out
+        Folder of tables and pictures; results/NAME by default.
+    as_json
+        Print JSON for machines.
+    """
+    from tribodyn.workflows.scene import scene_file
+    from tribodyn.workflows.studies import wheel_modes
+
+    make_room(out)
+    if slow is not None and fast is None:
+        raise ValueError("--from: give --to, the highest speed, too")
+    ends = [None if text is None else quantity(name, text, "Hz") for name, text in (("--from", slow), ("--to", fast))]
+    file = scene_file.read(scene, overrides)
+    found = wheel_modes.study(file, ends[0], ends[1], order, families, speeds)
+    written = wheel_modes.write(found, out or Path("results") / file.name, formats)
+    if as_json:
+        print(json.dumps({**found.record(), "files": [str(path) for path in written]}, indent=2))
+        return
+    for line in (*found.lines(), *written):
+        print(line)
+
+
+COMMANDS = (wheel,)
