@@ -53,7 +53,7 @@ def test_the_long_commands_of_a_page_run(page: Path, tmp_path: Path) -> None:
 def test_the_first_command_draws_what_is_shown(after_the_first_command: Path) -> None:
     pictures = after_the_first_command / "results/beam/pictures"
     curves = {"frf", "cycles_per_step", "peak", "preload", "depth", "energy", "status", "hysteresis"}
-    assert {path.stem for path in pictures.glob("*.png")} == curves | {"patch", "part", "contact"}
+    assert {path.stem for path in pictures.glob("*.png")} == curves | {"patch", "status_maps", "part", "contact"}
     with Image.open(ROOT / "docs/figures/beam_patch.png") as shown, Image.open(pictures / "patch.png") as made:
         size = shown.width // 8, shown.height // 8
         assert abs(shown.width / shown.height / (made.width / made.height) - 1) < 0.02

@@ -83,7 +83,8 @@ class CycleFilm:
         assert result.patch is not None
         views = [name for name, there in (("part", self._moving), ("contact", self._contact)) if there is not None]
         if views:
-            upper, lower = self.figure.subfigures(2, 1, height_ratios=[1.9, 1])
+            halves: Any = self.figure.subfigures(2, 1, height_ratios=[1.9, 1])
+            upper, lower = halves
             self._panels = list(np.atleast_1d(upper.subplots(1, len(views))))
             self._start(upper, views)
         else:

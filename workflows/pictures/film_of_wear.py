@@ -50,7 +50,8 @@ class WearFilm:
         self.contact = book.opened(result)
         with mpl.rc_context(STYLE):
             self.figure = Figure(figsize=INCHES, layout="constrained")
-            upper, lower = self.figure.subfigures(2, 1, height_ratios=[1.8, 1])
+            halves: Any = self.figure.subfigures(2, 1, height_ratios=[1.8, 1])
+            upper, lower = halves
             self._panels = dict(zip(PANELS, upper.subplots(1, 3), strict=True))
             present = {int(bits) for s in self.states if s.status is not None for bits in s.status}
             status_legend(upper, present, patch.components)
