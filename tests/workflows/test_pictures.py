@@ -36,7 +36,7 @@ def test_a_response_alone_is_drawn_too(tmp_path: Path) -> None:
 
 
 def test_renders(tmp_path: Path) -> None:
-    written = render.draw(result(), tmp_path, dpi=COARSE)
+    written = render.draw(result(), tmp_path, dpi=100)
     assert {path.stem for path in written} == {"part", "contact"}
     for path in written:
         assert_not_blank(path)

@@ -138,6 +138,7 @@ def animate(
     row: int | None = None,
     formats: Sequence[str] = ("mp4",),
     images: int = 48,
+    dpi: int = 100,
 ) -> list[Path]:
     """Make a film of a result with the factors of exaggeration of its scene, see pictures.animation; returns its files.
 
@@ -147,7 +148,7 @@ def animate(
 
     wanted = scene_file.from_json(result.provenance["scene"]).pictures
     factors = wanted.deformation_scale, wanted.wear_scale
-    return animation.write(result, folder, over, row, formats, images, *factors)
+    return animation.write(result, folder, over, row, formats, images, dpi, *factors)
 
 
 def reporter(progress: Report) -> Progress:

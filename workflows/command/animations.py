@@ -20,6 +20,7 @@ def animate(
     row: int | None = None,
     formats: Formats = ("mp4",),
     images: int = 48,
+    dpi: int = 100,
     out: Path | None = None,
 ) -> None:
     """Make films of a result: its contact over wear, its part and the status of its pairs over one cycle.
@@ -36,6 +37,8 @@ def animate(
         mp4 or gif, or both.
     images
         Images of a film, at the most.
+    dpi
+        Dots per inch of a film of 12.8 by 7.2 inches.
     out
         Folder of the films; pictures/ beside the result by default.
     """
@@ -44,7 +47,7 @@ def animate(
     make_room(out)
     loaded, folder = scenes.load(result), out or scenes.result_file(result).parent / "pictures"
     for what in over:
-        for path in scenes.animate(loaded, folder, what, row=row, formats=formats, images=images):
+        for path in scenes.animate(loaded, folder, what, row=row, formats=formats, images=images, dpi=dpi):
             print(path)
 
 

@@ -34,6 +34,7 @@ def write(
     row: int | None = None,
     formats: Sequence[str] = ("mp4",),
     images: int = IMAGES,
+    dpi: int = DPI,
     deformation: float | None = None,
     wear: float | None = None,
 ) -> list[Path]:
@@ -42,24 +43,27 @@ def write(
     over : "wear" shows depth, status and pressure of the opened contact at the wear steps; "cycle" shows part and
         status by pair over one cycle of a state
     row : of the wear history, or point of the response, whose cycle is shown; the last that is kept by default
+    dpi : dots per inch; a film is 12.8 by 7.2 inches
     deformation, wear : factors by which displacement and depth are exaggerated, chosen by size where None
     Raises  ValueError: the result has nothing of the kind to show; RenderingUnavailable
     """
     if images < 2:
         raise ValueError(f"a film of {images} images: ask for 2 at least")
+    if not 20 <= dpi <= 400:
+        raise ValueError(f"--dpi {dpi}: give a film 20 to 400 dots per inch")
     if over not in ("wear", "cycle"):
         raise ValueError(f'no film over "{over}": take wear or cycle')
     check()
     made = WearFilm(result, images, wear) if over == "wear" else CycleFilm(result, row, images, deformation, wear)
     folder.mkdir(parents=True, exist_ok=True)
-    return film.write(drawn(made), folder / made.name, formats, RATE)
+    return film.write(drawn(made, dpi), folder / made.name, formats, RATE)
 
 
-def drawn(made: WearFilm | CycleFilm) -> Iterator[np.ndarray]:
+def drawn(made: WearFilm | CycleFilm, dpi: int = DPI) -> Iterator[np.ndarray]:
     """The images (height, width, 3) of a film, all with the layout of the first."""
     with mpl.rc_context(STYLE):
         canvas = FigureCanvasAgg(made.figure)
-        made.figure.set_dpi(DPI)
+        made.figure.set_dpi(dpi)
         for number in range(made.count):
             made.show(number)
             canvas.draw()

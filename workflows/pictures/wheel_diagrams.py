@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from tribodyn.workflows.pictures.figures import axes_of
-from tribodyn.workflows.pictures.style import BLUE, CYCLE, GREY, INK, RED, WEAR_MAP
+from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, PAPER, RED, WEAR_MAP
 
 Families = Mapping[str, np.ndarray]
 """Frequencies (n_diameter, family) [Hz] of the nodal diameters from 0 on, by the state of the contact."""
@@ -119,11 +119,9 @@ def safe(families: Families, n_sectors: int, slow: float, fast: float) -> Figure
         for speed, style in ((slow, "-"), (fast, "--")):
             label = f"engine orders at {60 * speed:.5g} rpm"
             axes.plot(
-                places[there], orders[there] * speed, style, color=CYCLE[1], lw=1, label=label, zorder=1,
+                places[there], orders[there] * speed, style, color=ORANGE, lw=1, label=label, zorder=1,
             )  # fmt: skip
-        axes.vlines(
-            places[there], orders[there] * slow, orders[there] * fast, color=CYCLE[1], lw=5, alpha=0.35, zorder=1
-        )
+        axes.vlines(places[there], orders[there] * slow, orders[there] * fast, color=ORANGE, lw=5, alpha=0.35, zorder=1)
         for state, values in families.items():
             _families(axes, values, *STATES[state])
         rings = [meeting for values in families.values() for meeting in meetings(values, n_sectors, slow, fast)]
@@ -134,8 +132,9 @@ def safe(families: Families, n_sectors: int, slow: float, fast: float) -> Figure
         for order, place in zip(orders[there], places[there], strict=True):
             if order * fast < top and order <= max(n_sectors // 2, 1):
                 axes.annotate(
-                    f"{order}", (place, order * fast), (0, 4), textcoords="offset points", ha="center", fontsize=8
-                )
+                    f"{order}", (place, order * fast), (-9, 3), textcoords="offset points", ha="center", fontsize=8,
+                    color=INK, bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
+                )  # fmt: skip
         axes.set(xlabel="nodal diameter", ylabel="frequency / Hz", title=f"SAFE diagram of {n_sectors} sectors")
         axes.set_xlim(-0.5, most + 0.5)
         axes.set_ylim(0, top)

@@ -317,6 +317,7 @@ class Result:
         row: int | None = None,
         formats: Sequence[str] = ("mp4",),
         images: int = 48,
+        dpi: int = 100,
         deformation: float | None = None,
         wear: float | None = None,
     ) -> list[Path]:
@@ -327,7 +328,7 @@ class Result:
         """
         from tribodyn.workflows.pictures import animation
 
-        return animation.write(self, Path(folder), over, row, formats, images, deformation, wear)
+        return animation.write(self, Path(folder), over, row, formats, images, dpi, deformation, wear)
 
     def shown_rows(self) -> np.ndarray:
         """What pictures show: rows of the wear history, or points of the response curve where nothing wears.
