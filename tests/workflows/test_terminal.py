@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 import time
 from pathlib import Path
@@ -74,3 +75,24 @@ def test_a_notebook_shows_numbers_response_and_part() -> None:
     assert 'src="data:image/png;base64,' in html
     assert "<iframe" in html
     assert "mesh3d" in html
+
+
+def test_the_bar_of_a_terminal_counts_compiling_apart_and_shows_what_goes_on(tmp_path: Path) -> None:
+    """On a terminal: share, time left without compiling, peak, preload and depth; the log has lines besides."""
+    console = Console(record=True, force_terminal=True, width=220, file=io.StringIO())
+    with progress.Progress(console, tmp_path / "run.log").track("wear") as advance:
+        time.sleep(0.2)
+        advance(0.25, "step 3, peak 500 Hz and 1 mm, preload 20 N, depth 0.3 mm")
+        time.sleep(0.2)
+    said = console.export_text(styles=False)
+    left = re.search(r"25%.* (\d+) s left; step 3, peak 500 Hz and 1 mm, preload 20 N, depth 0.3 mm", said)
+    assert left is not None
+    assert int(left.group(1)) <= 3
+    assert (tmp_path / "run.log").read_text().splitlines()[-1].split(" ", 1)[1].startswith("wear: 0.")
+
+
+def test_the_time_left_is_that_of_the_steady_work() -> None:
+    start = time.perf_counter() - 70.0
+    assert progress.time_left(0.5, start, 60.0) == "10 s left (compiled for 60 s, once)"
+    assert progress.time_left(0.01, start, 60.0) == "(compiled for 60 s, once)"
+    assert progress.time_left(1.0, start, 0.0) == "0 s left"

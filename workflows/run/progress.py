@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 
 NOTE_EVERY = 15.0  # seconds between lines where there is no terminal to draw a bar on
@@ -39,15 +39,25 @@ class Progress:
             yield self._lines(name, start) if self._log else lambda share, note: None
         elif self._console.is_terminal:
             columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-            left = (TextColumn("left"), TimeRemainingColumn(), TextColumn("{task.fields[note]}"))
-            with Bar(*columns, *left, console=self._console, transient=True) as bar:
-                task = bar.add_task(name, total=1.0, note="")
-                yield lambda share, note: bar.update(task, completed=min(share, 1.0), note=note)
+            told, before = TextColumn("{task.fields[left]}{task.fields[note]}"), compiled()
+            with Bar(*columns, told, console=self._console, transient=True) as bar:
+                task = bar.add_task(name, total=1.0, left="", note="")
+                log = self._lines(name, start, on_console=False) if self._log else None
+
+                def advance(share: float, note: str) -> None:
+                    left = time_left(share, start, compiled() - before)
+                    gap = "; " if left and note else ""
+                    bar.update(task, completed=min(share, 1.0), left=left, note=gap + note)
+                    if log is not None:
+                        log(share, note)
+
+                yield advance
         else:
             yield self._lines(name, start)
         self.say(f"{name}: {time.perf_counter() - start:.1f} s")
 
-    def _lines(self, name: str, start: float) -> Callable[[float, str], None]:
+    def _lines(self, name: str, start: float, on_console: bool = True) -> Callable[[float, str], None]:
+        """Lines from time to time; on_console : whether they go to the console too."""
         last, before = start, compiled()
 
         def advance(share: float, note: str) -> None:
@@ -55,10 +65,9 @@ class Progress:
             now, compiling = time.perf_counter(), compiled() - before
             if now - last >= NOTE_EVERY and share > 0:
                 last = now
-                steady = max(now - start - compiling, 0.0)
-                left = f", {steady * (1 / min(share, 1.0) - 1):.0f} s left" if share >= FORESEEN else ""
-                apart = f" (compiled for {compiling:.0f} s, once)" if compiling >= 1 else ""
-                self.say(f"{name}: {min(share, 1.0):.0%}{left}{apart}; {note}".rstrip("; "))
+                left = time_left(share, start, compiling)
+                said = f"{name}: {min(share, 1.0):.0%}{', ' if left else ''}{left}; {note}".rstrip("; ")
+                (self.say if on_console else self._write)(said)
 
         return advance
 
@@ -67,8 +76,23 @@ class Progress:
         if self._console is not None:
             self._console.print(text, highlight=False)
         if self._log is not None:
-            with self._log.open("a", encoding="utf-8") as file:
-                file.write(f"{datetime.now().astimezone().isoformat(timespec='seconds')} {text}\n")
+            self._write(text)
+
+    def _write(self, text: str) -> None:
+        assert self._log is not None
+        with self._log.open("a", encoding="utf-8") as file:
+            file.write(f"{datetime.now().astimezone().isoformat(timespec='seconds')} {text}\n")
+
+
+def time_left(share: float, start: float, compiling: float) -> str:
+    """Seconds left when a share of the work is done, compiling told apart, since it happens once.
+
+    start : of the work, as time.perf_counter tells; compiling : seconds spent on it since then
+    """
+    steady = max(time.perf_counter() - start - compiling, 0.0)
+    left = f"{steady * (1 / min(share, 1.0) - 1):.0f} s left" if share >= FORESEEN else ""
+    apart = f"(compiled for {compiling:.0f} s, once)" if compiling >= 1 else ""
+    return " ".join(filter(None, [left, apart]))
 
 
 Callback = Callable[[str, float | None], None]
