@@ -20,6 +20,8 @@ from tribodyn.geometry.sources.raw import RawMesh
 ENDINGS = (".step", ".stp", ".iges", ".igs", ".brep")
 _NO_NAME = "Open CASCADE"  # how its writer calls what has no name
 ELEMENTS_ALONG = 10  # on the longest edge of the box, where no size is asked for
+AROUND = 8  # elements around a full turn of a curved face, down to the part FINEST of the least size
+FINEST = 4
 
 
 @dataclass(frozen=True)
@@ -112,13 +114,15 @@ def _meshed(gmsh: Any, path: Path, shapes: Mapping[str, int], sizes: Sizes) -> R
         constant(size, VolumesList=[shapes[name]], SurfacesList=around)
     for face, size in sizes.faces.items():
         constant(size, SurfacesList=[face])
-    gmsh.option.setNumber("Mesh.MeshSizeMax", max(everywhere, *sizes.bodies.values(), *sizes.faces.values(), 0.0))
+    asked = [everywhere, *sizes.bodies.values(), *sizes.faces.values()]
+    gmsh.option.setNumber("Mesh.MeshSizeMax", max(asked))
+    gmsh.option.setNumber("Mesh.MeshSizeMin", min(asked) / FINEST)
+    gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)  # points of a CAD file have the size 0, which asks for the least
+    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", AROUND)
     if fields:
         least = model.mesh.field.add("Min")
         model.mesh.field.setNumbers(least, "FieldsList", fields)
         model.mesh.field.setAsBackgroundMesh(least)
-    else:
-        gmsh.option.setNumber("Mesh.MeshSizeMin", everywhere / 4)
     try:
         model.mesh.generate(3)
         model.mesh.setOrder(2)
