@@ -16,6 +16,8 @@ VANISHING = 1e-6  # size of x, relative to the start, below which a solution cou
 RAMP_STEPS = 12  # Newton steps in one step of the load ramp
 FORCE_ACCURACY = 1e-4  # of the contact forces, wanted where these stretch their springs far less than x is large
 EASIER = "more damping, a softer contact, fewer harmonics or a larger static load make it easier"
+FORCE_UNKNOWN = 1e-2  # error of the contact forces from which on a small residual is no solution
+HELD = 1e-3  # contact force over that of the stuck contact from which on the structure leans on it
 FINEST = 1e-12  # residual over the displacement that is asked for at most
 
 
@@ -159,7 +161,17 @@ def solve(
         if step > 1 and error > max(options.slowest * history[-3], options.tolerance):
             return Solved(state, f"slow descent at relative residual {error:.1e}", step, products, tuple(history))
     outcome = CONVERGED if error <= options.tolerance else f"not converged in {options.max_steps} steps: {error:.1e}"
+    off = error * FORCE_ACCURACY / _finer(balance, state, x_lin, least)
+    if error <= options.tolerance and off > FORCE_UNKNOWN and _leans(balance, state, x_lin):
+        far = float(np.abs(state.x).max())
+        outcome = f"the contact slides away, {far:.1e} m, and its forces are known to {off:.0%} only: nothing holds it there"
     return Solved(state, outcome, len(history) - 1, products, tuple(history))
+
+
+def _leans(balance: Balance[Frequency, Evaluated], state: Evaluated, x_lin: np.ndarray) -> bool:
+    """Whether the contact carries a share of what the stuck one would."""
+    stuck = balance.reference_stiffness[:, None] * x_lin.reshape(state.g.shape)
+    return float(np.linalg.norm(state.cycle.force)) > HELD * float(np.linalg.norm(stuck))
 
 
 def _finer(balance: Balance[Frequency, Evaluated], state: Evaluated, x_lin: np.ndarray, least: float) -> float:

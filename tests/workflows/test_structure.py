@@ -84,6 +84,24 @@ def test_a_joint_between_two_bodies_carries_what_presses_them(tmp_path: Path) ->
     assert [joint.name for joint in model.balance.contact.joints] == ["lap"]
 
 
+def test_a_body_that_slides_away_is_no_solution(tmp_path: Path) -> None:
+    """Where all pairs slip nothing holds the free block in the mean: a residual small beside its drift says nothing."""
+    outcomes = []
+    for force in (10, 60, 120, 240):
+        pulled = BLOCKS.replace('group = "lower.x_max"\ndirection = "x"\nvalue = "20 N"', DRIVEN.format(force))
+        balance = built(pulled, tmp_path).balance
+        omega = 2 * np.pi * 4e3
+        solved = newton.solve(balance, omega, balance.stuck(omega))
+        outcomes.append(solved.outcome)
+        if solved.converged:
+            assert balance.preload(solved.state) == pytest.approx(0.5e6 * 0.04 * 0.014, rel=1e-2)
+    assert outcomes[0] == "converged"
+    assert any("slides away" in outcome for outcome in outcomes)
+
+
+DRIVEN = 'group = "upper.x_max"\ndirection = "y"\nvalue = "{} N"'
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
