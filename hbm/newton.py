@@ -164,7 +164,7 @@ def solve(
     off = error * FORCE_ACCURACY / _finer(balance, state, x_lin, least)
     if error <= options.tolerance and off > FORCE_UNKNOWN and _leans(balance, state, x_lin):
         far = float(np.abs(state.x).max())
-        outcome = f"the contact slides away, {far:.1e} m, and its forces are known to {off:.0%} only: nothing holds it there"
+        outcome = f"the contact slides away, {far:.1e} m, and its forces are known to {off:.0%} only: nothing holds it"
     return Solved(state, outcome, len(history) - 1, products, tuple(history))
 
 

@@ -117,7 +117,7 @@ def _meshed(gmsh: Any, path: Path, shapes: Mapping[str, int], sizes: Sizes) -> R
     asked = [everywhere, *sizes.bodies.values(), *sizes.faces.values()]
     gmsh.option.setNumber("Mesh.MeshSizeMax", max(asked))
     gmsh.option.setNumber("Mesh.MeshSizeMin", min(asked) / FINEST)
-    gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)  # points of a CAD file have the size 0, which asks for the least
+    gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)  # those of a CAD file are 0, which asks for the least one
     gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", AROUND)
     if fields:
         least = model.mesh.field.add("Min")
