@@ -45,24 +45,25 @@ def load(name: str) -> ModuleType:
     return importlib.import_module(f"tribodyn.geometry.{name}")
 
 
-def coarser(part: ModuleType, parameters: Any, ratio: float) -> dict[str, int]:
-    """Fewer elements along every edge of a part.
+def rescaled(part: ModuleType, parameters: Any, ratio: float) -> dict[str, int]:
+    """Fewer or more elements along every edge of a part.
 
-    parameters : of the part; ratio : of the counts that the part lists in MESH, below 1
-    Returns the new counts by name, the nearest that the part accepts; empty where it lists none or none can be reduced
+    parameters : of the part; ratio : of the new counts to those that the part lists in MESH, below or above 1
+    Returns the new counts by name, the nearest that the part accepts; empty where it lists none or none can be changed
     """
-    fewer: dict[str, int] = {}
+    changed: dict[str, int] = {}
     for name in getattr(part, "MESH", ()):
         count = getattr(parameters, name)
         wanted = max(1, round(count * ratio))
-        for candidate in sorted(range(1, count), key=lambda n: (abs(n - wanted), n)):
+        others = range(1, count) if ratio < 1 else range(count + 1, 2 * wanted)
+        for candidate in sorted(others, key=lambda n: (abs(n - wanted), n)):
             try:
                 parameters = replace(parameters, **{name: candidate})
             except ValueError:
                 continue
-            fewer[name] = candidate
+            changed[name] = candidate
             break
-    return fewer
+    return changed
 
 
 def _is_part(file: Path) -> bool:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from tribodyn.reduction.foreign import from_arrays, read_matrices
     from tribodyn.workflows.api.designs import study
     from tribodyn.workflows.api.own_matrices import Balance, Contact, Cycle, Structure, reduce, wear_law
-    from tribodyn.workflows.api.scenes import build, load, plan, read_scene, run, scene_names
+    from tribodyn.workflows.api.scenes import build, load, plan, read_scene, run, run_to_accuracy, scene_names
     from tribodyn.workflows.api.studies import (
         CONVERGED,
         OUTPUT,
@@ -148,6 +148,7 @@ _HOME: dict[str, tuple[str, ...]] = {
     "read_scene": ("tribodyn.workflows.api.scenes",),
     "reduce": ("tribodyn.workflows.api.own_matrices",),
     "run": ("tribodyn.workflows.api.scenes",),
+    "run_to_accuracy": ("tribodyn.workflows.api.scenes",),
     "scene_names": ("tribodyn.workflows.api.scenes",),
     "study": ("tribodyn.workflows.api.designs",),
     "wear_law": ("tribodyn.workflows.api.own_matrices",),
@@ -338,6 +339,7 @@ __all__ = [
     "reduce",
     "result_of",
     "run",
+    "run_to_accuracy",
     "scene_names",
     "shades",
     "solutions_at",

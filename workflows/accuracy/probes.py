@@ -25,7 +25,7 @@ from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import delta_max, free_deflection
-from tribodyn.workflows.scene.scene_file import SceneFile, read
+from tribodyn.workflows.scene.scene_file import SceneFile, parse
 from tribodyn.workflows.scene.schema import PartScene
 
 CLIMB = (3, 5, 7, 9)  # highest harmonics that the estimate climbs through: each start is near enough for Newton
@@ -165,11 +165,11 @@ def coarser(file: SceneFile) -> SceneFile | None:
     if not isinstance(scene, PartScene) or scene.geometry.part is None:
         return None
     part = parts.load(scene.geometry.part)
-    fewer = parts.coarser(part, part.Parameters(**scene.geometry.parameters), COARSER)
+    fewer = parts.rescaled(part, part.Parameters(**scene.geometry.parameters), COARSER)
     if not fewer:
         return None
     texts = [f"geometry.{name}={count}" for name, count in fewer.items()]
-    return read(str(file.folder / f"{file.name}.toml"), (*file.overrides, *texts))
+    return parse(file.text, f"{file.name}.toml", (*file.overrides, *texts), file.folder)
 
 
 def on_coarser_mesh(file: SceneFile, harmonics: tuple[int, ...]) -> tuple[Answers, float] | None:

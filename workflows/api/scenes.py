@@ -10,6 +10,8 @@ from typing import Any, Literal
 import numpy as np
 import tomli_w
 
+from tribodyn.workflows.accuracy import refinement
+from tribodyn.workflows.accuracy.refinement import Promise
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import checkpoint, modelling, pipeline, planning
@@ -94,6 +96,36 @@ def run(
     if pictures:
         draw(result, place / "pictures")
     return result
+
+
+def run_to_accuracy(
+    source: Source,
+    accuracy: str,
+    folder: str | PathLike[str] | None = None,
+    *,
+    overrides: Overrides = (),
+    progress: Report = None,
+    resume: bool = False,
+) -> tuple[Result, Promise]:
+    """Run a scene with finer and finer settings until its own verdict's errors are below the wanted one.
+
+    accuracy : such as "1 %", "1 % of energy and peak frequency", "1 % of life given harmonics"
+    folder : where result.h5 of the last run is kept, and those of all runs in rounds/1, rounds/2, ...
+    resume : take the runs that the folder holds already
+    Returns the last result and what may be promised of it; `kept` says whether all that was asked for is
+    Raises  ValueError: the accuracy or the scene asks for what cannot be; SolveFailed: folder keeps what was computed
+    """
+    file, report = read_scene(source, overrides), reporter(progress)
+
+    def one(current: SceneFile, number: int) -> Result:
+        place = None if folder is None else Path(folder) / "rounds" / str(number)
+        return run(current, place, progress=progress, resume=resume and place is not None)
+
+    result, promise = refinement.to_accuracy(file, accuracy, one, report.say)
+    if folder is not None:
+        store.set_aside(Path(folder) / "result.h5")
+        store.save(Path(folder) / "result.h5", result)
+    return result, promise
 
 
 def load(path: str | PathLike[str]) -> Result:

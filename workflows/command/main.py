@@ -69,11 +69,12 @@ def run(
     scene
         Name of a scene (see `tribodyn list`) or a .toml file.
     accuracy
-        Relative error wanted, of as much as can be promised, such as "1 %", or of what is named, "1 % of energy": the
-        cheapest settings that promise it are taken; without depth or life in it nothing is worn. "1 % of life given
-        harmonics" leaves a knob as the scene has it, and its error out.
+        Relative error wanted, such as "1 %", or of what is named, "1 % of energy": the scene is run with finer and
+        finer settings until the errors that its own verdict measures are below that; exit code 3 where they do not
+        get there. Without depth or life in it nothing is worn. "1 % of life given harmonics" leaves a setting as the
+        scene has it, and its error out.
     table
-        The trade to go by; results/NAME/trade.json or the one that comes with the program by default.
+        A trade of this scene to choose the settings by instead, the cheapest that it promises.
     out
         Folder of the result; results/NAME by default.
     resume
@@ -92,15 +93,19 @@ def run(
 
     make_room(out)
     progress = console_progress(quiet, log)
-    if accuracy is None:
-        file = scene_file.read(scene, overrides)
-    else:
-        file, promise = tuned(scene, overrides, accuracy, table)
-        progress.say(promise.sentence)
+    file = scene_file.read(scene, overrides)
+    if accuracy is None and table is not None:
+        raise ValueError("--table is the trade that --accuracy goes by: give --accuracy, too")
+    if accuracy is not None and table is not None:
+        file, choice = tuned(scene, overrides, accuracy, table)
+        progress.say(choice.sentence)
     folder = out or Path("results") / file.name
     path = folder / "result.h5"
     try:
-        result = scenes.run(file, folder, progress=progress, resume=resume)
+        if accuracy is not None and table is None:
+            result, promise = scenes.run_to_accuracy(file, accuracy, folder, progress=progress, resume=resume)
+        else:
+            result, promise = scenes.run(file, folder, progress=progress, resume=resume), None
     except KeyboardInterrupt:
         raise KeyboardInterrupt(_kept(path, scene, file.overrides)) from None
     except SolveFailed as failure:
@@ -110,6 +115,8 @@ def run(
     progress.say(f"result: {path}")
     if pictures:
         _draw(result, folder / "pictures", tell=progress.say)
+    if promise is not None and not promise.kept:
+        raise RuntimeError(f"{promise.sentence}; the result is kept in {path}")
 
 
 def _kept(path: Path, scene: str, overrides: Sequence[str]) -> str:
