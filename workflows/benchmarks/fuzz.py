@@ -68,16 +68,17 @@ class Tried:
 
 
 def keys(scene: str, overrides: Sequence[str] = ()) -> list[str]:
-    """Every key of a scene, "section.key", those at their defaults included."""
-    return sorted(_names(scene_file.read(scene, overrides).scene.model_dump(), ""))
+    """Every section and key of a scene, "section.key", those at their defaults included."""
+    return sorted(set(_names(scene_file.read(scene, overrides).scene.model_dump(), "")))
 
 
 def _names(table: dict[str, Any], above: str) -> Iterator[str]:
     for name, value in table.items():
-        if isinstance(value, dict) and value:
-            yield from _names(value, f"{above}{name}.")
-        else:
+        own = name == "parameters"  # of a part: keys of the table around them
+        if not own:
             yield f"{above}{name}"
+        if isinstance(value, dict):
+            yield from _names(value, above if own else f"{above}{name}.")
 
 
 def cases(scene: str, overrides: Sequence[str], runs: int | None = None, seed: int = 0) -> list[tuple[str, str]]:
