@@ -15,7 +15,7 @@ from tribodyn.fem.matching import TOLERANCE, facing_partners, partners
 from tribodyn.fem.mortar_contact import ROUNDING, mortar_halves
 from tribodyn.fem.surface import Surface, facet_nodes, surface
 
-REACH = 0.1  # farthest opening at which two faces still meet unless told, as a part of the length of the first
+REACH = 0.1  # default of the farthest opening at which two faces still meet, as a part of the length of the first
 PAIRINGS = ("auto", "nodes", "mortar")
 
 
@@ -127,7 +127,7 @@ def facing_halves(
     gap : opening before loading [m], one or (n_pair,); None takes that of the geometry, interference negative
     pairing : "nodes" pairs matching nodes, "mortar" weighs both faces over the surface they share, "auto" pairs nodes
         where every facet of face 1 has its like on face 2
-    reach : farthest opening at which the faces still meet [m], a tenth of the length of face 1 unless told
+    reach : farthest opening at which the faces still meet [m], a tenth of the length of face 1 by default
     Other arguments and returns as `pair_halves`
     Raises  ValueError where the faces do not meet, or do not match where nodes are to be paired
     """

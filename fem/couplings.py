@@ -20,7 +20,7 @@ from tribodyn.fem.mortar import common, side, tabulate
 from tribodyn.fem.mortar_contact import apart
 from tribodyn.fem.springs import shares
 
-REACH = 0.1  # farthest opening that a tie bridges unless told, as a part of the length of its first face
+REACH = 0.1  # default of the farthest opening that a tie bridges, as a part of the length of its first face
 COVERED = 1e-3  # part of a node's own share of its face below which it is not tied
 SMALL = 1e-13  # of a coefficient that is left out
 

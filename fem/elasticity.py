@@ -23,7 +23,7 @@ def assemble(mesh: Any, material: Any, order: int | None = None) -> tuple[csr_ma
 
     mesh : scikit-fem MeshHex2 or MeshTet2, or an assembly of such
     material : one for the whole mesh, or subdomain name -> material; of an assembly one, or body name -> these
-    order : quadrature order, 5 unless told
+    order : quadrature order, 5 by default
     Returns M [kg], K [N/m], each (3 n_node, 3 n_node), symmetric to the last bit
     """
     found = [_assemble(piece.mesh, one, order) for piece, one in materials_of(mesh, material)]

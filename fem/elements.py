@@ -39,7 +39,7 @@ def connectivity(mesh: Any) -> np.ndarray:
 def batches(mesh: Any, order: int | None = None) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
     """Yield (elements, N, grad N, weight) for up to 256 elements at a time.
 
-    order : polynomial order of the quadrature rule, 5 unless told
+    order : polynomial order of the quadrature rule, 5 by default
     Yields elements (n_e,), N (n_q, n_a) [-], gradient (n_e, n_q, 3, n_a) [1/m], weight |J| w (n_e, n_q) [m3]
     Raises  ValueError where an element is folded
     """

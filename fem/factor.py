@@ -30,7 +30,7 @@ def factorise(K: Any, definite: bool = True, solver: str | None = None) -> Facto
     """Factorise a sparse symmetric real matrix once, for many right-hand sides.
 
     K : (n, n) scipy.sparse; definite : K is positive definite (False for a shifted, indefinite matrix)
-    solver : "pardiso" or "superlu", the best available unless told
+    solver : "pardiso" or "superlu", the best available by default
     Raises  ValueError where K is singular, as when a body can still move rigidly; MemoryError
     """
     K = csr_matrix(K)
@@ -70,11 +70,11 @@ def softest_residual(K: Any, solve: Callable[[np.ndarray], np.ndarray]) -> float
 def pardiso_available() -> bool:
     """Whether pypardiso and its MKL library load.
 
-    MKL chooses its kernels by where arrays happen to lie in memory, and rounds by that, unless told otherwise before it
-    loads.
+    MKL chooses its kernels by where arrays happen to lie in memory, and rounds by that; the variable
+    set here, before it loads, forbids it.
     """
     os.environ.setdefault("MKL_CBWR", "AUTO")
-    # pypardiso searches the whole environment, a second of processor at each solver, unless told where MKL lies
+    # pypardiso searches the whole environment, a second of processor at each solver, if it is not told where MKL lies
     for path in sorted(Path(sys.prefix).glob("lib/libmkl_rt*")) + sorted(Path(sys.prefix).glob("Library/bin/mkl_rt*")):
         os.environ.setdefault("PYPARDISO_MKL_RT", str(path))
     try:

@@ -21,7 +21,7 @@ def modes(
     """The n lowest modes, mass-normalised.
 
     K, M : (N, N) sparse or dense symmetric [N/m], [kg], M positive definite, K positive semidefinite
-    sigma : shift [rad^2/s^2] below the wanted modes; unless told 0, or a little below where K is singular
+    sigma : shift [rad^2/s^2] below the wanted modes; by default 0, or a little below where K is singular
     factor : factorisation of K - sigma M that exists already
     Returns omega (n,) ascending [rad/s], 0 for rigid-body modes to rounding; phi (N, n) [1/sqrt(kg)], each with its
         first large entry positive

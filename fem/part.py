@@ -29,7 +29,7 @@ class Contact:
     vertices_only : pairs at the element corners only
     plane : (3,) towards a ground that is a plane, turned about t1 by inclination [rad]; see `plane_contact`
     pairing, reach : see `facing_halves`
-    joint : name of the joint that it belongs to, that of the face unless told
+    joint : name of the joint that it belongs to, that of the face by default
     turn : (3, 3) rotation from a sector of a wheel to the next one, whose opposite face is met; None for the same body
     """
 
@@ -164,7 +164,7 @@ def build(
 
     mesh, node_sets : as geometry.mesh.read gives them, or an Assembly and its node sets
     material : one, or subdomain name -> material; of an assembly one, or body name -> these
-    order : quadrature order, 5 unless told; springs : joints that give way, to the ground or between sets
+    order : quadrature order, 5 by default; springs : joints that give way, to the ground or between sets
     held : motions that are held besides the clamps; constraints : DOFs that follow others; masses : on points or sets
     Raises  ValueError where a name is unknown or a group is empty, one sentence
     """

@@ -32,7 +32,7 @@ def sector_maps(sector: Sector) -> list[csr_matrix]:
 def assemble(sector: Sector, stiffness: Sequence[float] | None = None) -> tuple[SecondOrderSystem, ContactInterface]:
     """All sectors of the wheel in one real system, with the contacts between all neighbours.
 
-    stiffness : (N,) factor on the stiffness of each sector, 1 for all unless told: stiffness mistuning
+    stiffness : (N,) factor on the stiffness of each sector, 1 for all by default: stiffness mistuning
     Returns the system, dense where the sector's is, loads and outputs named "<name>@<sector>"; the interface: pairs of
         sector 0 against sector N - 1, then of sector 1 against 0, and so on, in the turned frames of each
     Raises  ValueError where there is not one positive factor per sector

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numba
 import numpy as np
 
-FEW = 16  # products for which room is made at first
+FIRST_ROOM = 16  # products for which memory is taken at first; most directions need fewer
 
 
 def gmres(
@@ -27,7 +27,7 @@ def gmres(
     if beta == 0.0:
         return np.zeros_like(b), 0, 0.0
     size = min(max_products, len(b))
-    v = np.empty((min(size, FEW) + 1, len(b)))
+    v = np.empty((min(size, FIRST_ROOM) + 1, len(b)))
     h = np.zeros((size, size))
     v[0] = b / beta
     cs, sn = np.zeros(size), np.zeros(size)

@@ -12,13 +12,13 @@ from tribodyn.hbm.contact.law import ContactCycle
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
 
-VANISHING = 1e-6  # size of x, relative to the start, below which a solution counts as zero
-RAMP_STEPS = 12  # Newton steps in one step of the load ramp
+ZERO_SIZE = 1e-6  # size of x, relative to the start, below which a solution counts as zero
+RAMP_STEPS = 12  # Newton steps in one step of the load ramp; beyond it a shorter step costs less
 FORCE_ACCURACY = 1e-4  # of the contact forces, wanted where these stretch their springs far less than x is large
-EASIER = "more damping, a softer contact, fewer harmonics or a larger static load make it easier"
+CURES = "more damping, a softer contact, fewer harmonics or a larger static load make it easier"
+LEAST_TOLERANCE = 1e-12  # residual over displacement that rounding still lets through
 FORCE_UNKNOWN = 1e-2  # error of the contact forces from which on a small residual is no solution
 HELD = 1e-3  # contact force over that of the stuck contact from which on the structure leans on it
-FINEST = 1e-12  # residual over the displacement that is asked for at most
 
 
 class Evaluation(Protocol):
@@ -122,7 +122,7 @@ def solve(
     options = options or NewtonOptions()
     x_lin = balance.x_lin(omega)
     state = balance.evaluate(omega, start)
-    least = VANISHING * float(np.linalg.norm(start))
+    least = ZERO_SIZE * float(np.linalg.norm(start))
     error = relative_residual(state, x_lin, least)
     history = [error]
     forcing = 1e-3
@@ -182,7 +182,7 @@ def _finer(balance: Balance[Frequency, Evaluated], state: Evaluated, x_lin: np.n
     scale = max(float(np.linalg.norm(state.x)), float(np.linalg.norm(x_lin)), least)
     if size == 0.0 or scale == 0.0:
         return np.inf
-    return max(FORCE_ACCURACY * size / scale, FINEST)
+    return max(FORCE_ACCURACY * size / scale, LEAST_TOLERANCE)
 
 
 def _search(
@@ -245,5 +245,5 @@ def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptio
                     return Solution(last.state, CONVERGED, steps, products, last.history)
             else:
                 stride *= 0.5
-    outcome = f"{first.outcome}; load ramp stopped at {factor:.0%}: {EASIER}"
+    outcome = f"{first.outcome}; load ramp stopped at {factor:.0%}: {CURES}"
     return Solution(first.state, outcome, steps, products, first.history)

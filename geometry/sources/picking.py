@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 SMOOTH = np.cos(np.radians(30.0))  # facets that meet at less belong to one face
-ALONG = 5.0  # degrees to which a facet faces a direction, unless told
+ALONG = 5.0  # default angle within which a facet faces a direction [deg]
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,7 @@ def _pieces(raw: RawMesh) -> np.ndarray:
 
 
 def build(raw: RawMesh, elements: np.ndarray | None = None) -> Body:
-    """One body out of elements of a file, all of them unless told."""
+    """One body out of elements of a file, all of them by default."""
     cells, number = _chosen(raw, elements)
     fulls = [split.full(block, raw.points) for block in cells]
     kinds = {id(VOLUMES[block.kind][0]) for block in cells}

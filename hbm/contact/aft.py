@@ -13,13 +13,13 @@ from tribodyn.hbm.contact.compiled_law import pointer
 from tribodyn.hbm.contact.law import ContactCycle, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 
-PERIODIC = 1e-13  # drift of the memory over a cycle, relative to its largest size in the cycle
-FIRST_CYCLES = 4  # marched before Newton is tried on the memory
+PERIODIC_DRIFT = 1e-13  # of the memory over a cycle, relative to its largest size in the cycle: some hundred roundings
+FIRST_CYCLES = 4  # marched before Newton is tried on the memory; most memories repeat after two
 NEWTON_CYCLES = 30
 MAX_CYCLES = 500
-FINE = 1024  # samples that stand for located transitions where a force over time is asked for
-NEAR = 1e-6  # relative drift from which Newton only polishes
-ISOLATED = 1e-10  # least contraction per cycle of a memory that does not depend on its start
+PLOT_SAMPLES = 1024  # that stand for located transitions where a force over time is asked for
+POLISH_DRIFT = 1e-6  # relative drift below which Newton only polishes: one step more reaches PERIODIC_DRIFT
+LEAST_CONTRACTION = 1e-10  # per cycle, of a memory that does not depend on its start: less is rounding
 
 Turn = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
 
@@ -107,12 +107,13 @@ def history(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Periodic displacement and force over one period, for loops and checks.
 
-    Where the basis locates transitions the cycle is marched on at least FINE samples, of which every n-th is given.
+    Where the basis locates transitions the cycle is marched on at least PLOT_SAMPLES samples, of which every n-th is
+    given.
     Returns (n_pair, n_component, n_samples) displacement [m] and force [N]
     """
     if memory is None:
         memory = np.zeros((parameters.n_pair, law.n_state(parameters.components)))
-    every = 1 if basis.transitions == "sampled" else -(-FINE // basis.n_samples)
+    every = 1 if basis.transitions == "sampled" else -(-PLOT_SAMPLES // basis.n_samples)
     fine = HarmonicBasis(basis.harmonics, every * basis.n_samples)
     samples = fine.to_time(x)
     force = _plain_march(law, samples, parameters.packed(), memory)
@@ -130,7 +131,7 @@ def _plain_march(law: ModuleType, samples: np.ndarray, p: np.ndarray, memory: np
     for _ in range(FIRST_CYCLES):
         before, size = s.copy(), np.full(len(s), np.finfo(float).tiny)
         _follow(pointer(law.step), samples, p, s, size, force)
-        if np.all(np.abs(s - before) <= PERIODIC * size[:, None]):
+        if np.all(np.abs(s - before) <= PERIODIC_DRIFT * size[:, None]):
             return force
     return None
 
@@ -200,7 +201,7 @@ def _repeat(turn: Turn, i: np.ndarray, s: np.ndarray, ds: np.ndarray, n_cycles: 
         if len(i) == 0:
             break
         s[i], ds[i], _, drift = turn(i, s[i], ds[i])
-        i = i[drift > PERIODIC]
+        i = i[drift > PERIODIC_DRIFT]
     return i
 
 
@@ -217,14 +218,14 @@ def _newton(turn: Turn, i: np.ndarray, s: np.ndarray, ds: np.ndarray) -> np.ndar
             break
         after, after_ds, slope, drift = turn(i, trial, trial_ds)
         left, size, right = np.linalg.svd(np.eye(s.shape[1]) - slope)
-        inverse = right.transpose(0, 2, 1) @ (left.transpose(0, 2, 1) / np.maximum(size, ISOLATED)[..., None])
+        inverse = right.transpose(0, 2, 1) @ (left.transpose(0, 2, 1) / np.maximum(size, LEAST_CONTRACTION)[..., None])
         trial_ds = trial_ds + inverse @ (after_ds - trial_ds)
-        done = drift <= PERIODIC
-        isolated = size[:, -1] > ISOLATED
+        done = drift <= PERIODIC_DRIFT
+        isolated = size[:, -1] > LEAST_CONTRACTION
         good = done & (isolated | closing)
         s[i[good]], ds[i[good]] = trial[good], trial_ds[good]
         rejected.append(i[done & ~good])
-        closing = isolated & (drift < NEAR)
+        closing = isolated & (drift < POLISH_DRIFT)
         trial = trial + (inverse @ (after - trial)[..., None])[..., 0]
         i, trial, trial_ds, closing = i[~done], trial[~done], trial_ds[~done], closing[~done]
     return np.concatenate([i, *rejected])

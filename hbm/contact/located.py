@@ -28,8 +28,8 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 
 TURN = 2 * math.pi
 STICK = 0.0  # kinds of segment; slip is the sign of T
-CELLS = 8  # per highest harmonic, of the grid on which roots are isolated
-COLUMNS = 6  # of a segment: start, stop, kind, w, origin (-1: memory), d w / d N at the origin
+CELLS_PER_HARMONIC = 8  # of the grid on which roots are isolated: a polynomial of degree H has at most 2 H roots
+SEGMENT_COLUMNS = 6  # of a segment: start, stop, kind, w, origin (-1: memory), d w / d N at the origin
 
 
 def cycle(
@@ -67,7 +67,7 @@ def cycle(
 def _grid(harmonics: tuple[int, ...]) -> np.ndarray:
     """(n_coeff, 5 * n_cell) values, slopes, curvatures in the middle of equal cells; values, slopes at their ends."""
     basis = HarmonicBasis((0, *harmonics), 2 * harmonics[-1] + 1)
-    right = TURN * np.arange(1, CELLS * harmonics[-1] + 1) / (CELLS * harmonics[-1])
+    right = TURN * np.arange(1, CELLS_PER_HARMONIC * harmonics[-1] + 1) / (CELLS_PER_HARMONIC * harmonics[-1])
     middle, end = basis.functions(right - 0.5 * right[0]), basis.functions(right)
     slope = basis.rate.T  # coefficients of x' = c @ R, so functions of x' = functions @ R^T
     return np.concatenate([middle, middle @ slope, middle @ slope @ slope, end, end @ slope]).T.copy()
@@ -81,7 +81,7 @@ def _cycle(x, load, x_grid, load_grid, normal, k, mu, memory, hs, skip, force, j
     room = 4 * hs[-1] + 16  # a polynomial has at most 2 H roots
     contact, closed = np.empty(room), np.empty(room, np.bool_)
     edges, touching, at_edge = np.empty(3 * room), np.empty(3 * room, np.bool_), np.empty((3 * room, 4))
-    segments = np.empty((6 * room, COLUMNS))
+    segments = np.empty((6 * room, SEGMENT_COLUMNS))
     span, table = np.empty((2, 2 * hs[-1] + 1)), np.empty((2, 2, 2 * hs[-1] + 1))
     slope = np.empty((2, m, m))  # of the force with respect to u and N
     n_tangential = n_comp - 1 if normal else n_comp

@@ -6,7 +6,7 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
 
-FINE = 8  # times the samples, of a law that cannot locate its transitions
+FINER = 8  # times the samples, for a law that cannot locate its transitions: the error falls with their square
 
 
 def sampling_error(balance: HarmonicBalance, omega: float, x: np.ndarray) -> float:
@@ -15,7 +15,7 @@ def sampling_error(balance: HarmonicBalance, omega: float, x: np.ndarray) -> flo
     balance : solved at omega [rad/s] by x (n_pair, n_component, n_coeff) [m]
     The solution is put into a balance that locates its transitions, on more samples, and one Newton step is taken.
     """
-    fine = balance.with_samples(max(FINE * balance.basis.n_samples, 128), balance.contact.locates)
+    fine = balance.with_samples(max(FINER * balance.basis.n_samples, 128), balance.contact.locates)
     here, there = balance.evaluate(omega, x, jacobian=False), fine.evaluate(omega, x)
     linear = fine.linearise(there)
     step = linear.solve(-there.residual, 1e-3)[0]

@@ -14,9 +14,9 @@ from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED
 
 KINK_ANGLE = 0.75  # turn between neighbouring points beyond which they lie on either side of a kink [rad]
-FOLD_TIGHTER = 1e-3  # Newton tolerance at folds, relative to that of other points
+FOLD_NEWTON_SHARE = 1e-3  # of Newton's tolerance elsewhere: near a fold the state goes as the root of the parameter
 FOLD_TRIALS = 80
-SHARP = 1e-10  # relative accuracy of tangents at folds
+FOLD_TANGENT_ACCURACY = 1e-10  # relative; the sign of their frequency part says where the fold is
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +173,7 @@ def locate_fold(path: Parameter, segment: Segment, options: NewtonOptions, toler
     tolerance : relative, on the parameter
     Returns the fold, also where it is a kink with tangents of either sign beside it; None where a solve fails
     """
-    tight = replace(options, tolerance=max(FOLD_TIGHTER * options.tolerance, 1e-13))
+    tight = replace(options, tolerance=max(FOLD_NEWTON_SHARE * options.tolerance, 1e-13))
     metric = segment.metric
     try:
         ends = [replace(p, tangent=_sharp_tangent(path, p, metric, tight)) for p in (segment.start, segment.end)]
@@ -185,7 +185,7 @@ def locate_fold(path: Parameter, segment: Segment, options: NewtonOptions, toler
             solution, value = bordered.correct(path, guess, segment.along, metric, tight)
             if min(solution.history) > options.tolerance:
                 return None
-            tangent = bordered.tangent(path, value, solution.state, segment.along, metric, tight, SHARP)
+            tangent = bordered.tangent(path, value, solution.state, segment.along, metric, tight, FOLD_TANGENT_ACCURACY)
             point = CurvePoint.of(value, replace(solution, outcome=CONVERGED), tangent, fold=True)
             if tangent.p * segment.start.tangent.p > 0:  # Illinois: halve the weight of an end that stays
                 segment, weight = Segment(point, segment.end, metric), [1.0, 0.5 * weight[1]]
@@ -205,7 +205,7 @@ def _sharp_tangent(path: Parameter, point: CurvePoint, metric: Metric, options: 
     balance, omega = path.place(point.value)
     flat = point.place.x
     state = balance.evaluate(omega, flat.reshape(balance.contact.n_pair, -1, flat.shape[-1]))
-    return bordered.tangent(path, point.value, state, point.tangent, metric, options, SHARP)
+    return bordered.tangent(path, point.value, state, point.tangent, metric, options, FOLD_TANGENT_ACCURACY)
 
 
 def _corner_value(segment: Segment) -> float:

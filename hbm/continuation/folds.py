@@ -26,11 +26,13 @@ from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
 
-WIDTH = 0.1  # frequency that counts as one, relative
-DIFFERENCE = 1e-4  # step along the surface by which the scalar is differentiated
-TANGENT = 1e-10  # relative accuracy of tangents
-KEEP = 1e-5  # the scalar at a fold; its frequency is off by the square of it
-NEAREST, SEARCH = 1e-3, 8  # arc length of the first step in the search for a fold, and its steps either way
+FREQUENCY_SCALE = 0.1  # relative change of frequency that is as long as one of the whole state; it sets the steps alone
+# Step along the surface by which the scalar is differentiated: the square root of Newton's tolerance, where the errors
+# of truncation and of the solves are alike.
+DIFFERENCE_STEP = 1e-4
+ACCURACY = 1e-10  # of tangents, relative; finer than DIFFERENCE_STEP needs by the factor that differencing loses
+FOLD_RESIDUAL = 1e-5  # of the scalar at a fold; the frequency is off by its square, which is below Newton's tolerance
+SEARCH_STEP, SEARCH_STEPS = 1e-3, 8  # arc length of the first step in the search for a fold, and steps either way
 
 
 @dataclass(frozen=True)
@@ -166,7 +168,7 @@ class _Surface:
 
     def __init__(self, path: Parameter, options: FoldOptions, omega: float, span: float):
         self._path, self._options = path, options
-        self._width, self._span = WIDTH * omega, options.width * span
+        self._width, self._span = FREQUENCY_SCALE * omega, options.width * span
         self._newton = replace(options.newton, tolerance=max(1e-3 * options.newton.tolerance, 1e-13), max_steps=15)
 
     def _metric(self, flat: np.ndarray, balance: HarmonicBalance) -> Metric:
@@ -190,7 +192,7 @@ class _Surface:
             scalar, slopes = self._slopes(value, point.place, along, across, metric)
         except BorderFailed as reason:
             raise NoFold(str(reason)) from None
-        shares = (-slopes[1], slopes[0]) if abs(scalar) <= KEEP and slopes[0] != 0 else (0.0, 1.0)
+        shares = (-slopes[1], slopes[0]) if abs(scalar) <= FOLD_RESIDUAL and slopes[0] != 0 else (0.0, 1.0)
         sign = -1.0 if shares[1] * sense < 0 else 1.0
         tangent = along * shares[0] + across * shares[1]
         return self._unit(_Fold(value, solution, along, tangent, shares[1]), metric, sign)
@@ -229,7 +231,7 @@ class _Surface:
             solution = self._solved(response, guess, along, metric)
             here = Direction(solution.state.flat, solution.state.omega)
             try:
-                along = bordered.tangent(response, here.p, solution.state, along, metric, self._newton, TANGENT)
+                along = bordered.tangent(response, here.p, solution.state, along, metric, self._newton, ACCURACY)
                 across = self._across(value, solution, along, metric)
                 scalar, slopes = self._slopes(value, here, along, across, metric)
             except BorderFailed as reason:
@@ -240,7 +242,7 @@ class _Surface:
             line = np.array([-slopes[1], slopes[0]]) / size
             if trial == 0:
                 row = line
-            if abs(scalar) <= KEEP:
+            if abs(scalar) <= FOLD_RESIDUAL:
                 tangent = along * float(line[0]) + across * float(line[1])
                 return _Fold(value, solution, along, tangent, float(line[1]))
             matrix = np.array([slopes, row])
@@ -264,7 +266,7 @@ class _Surface:
         state = balance.evaluate(guess.p, guess.x.reshape(balance.contact.n_pair, -1, guess.x.shape[-1]))
         border = metric.unit(Direction(np.where(balance.basis.order > 0, guess.x, 0.0), 0.0))
         try:
-            return bordered.tangent(response, guess.p, state, border, metric, self._newton, TANGENT)
+            return bordered.tangent(response, guess.p, state, border, metric, self._newton, ACCURACY)
         except BorderFailed as reason:
             raise NoFold(str(reason)) from None
 
@@ -273,7 +275,7 @@ class _Surface:
         state, response = solution.state, self._response(value)
         force = replace(self._path, omega=state.omega).slope(value, state)
         linear, slope = response.make(value).linearise(state), response.slope(state.omega, state)
-        return bordered.solve(linear, slope, along, metric, (-force, 0.0), TANGENT, self._newton.max_products)[0]
+        return bordered.solve(linear, slope, along, metric, (-force, 0.0), ACCURACY, self._newton.max_products)[0]
 
     def _slopes(
         self, value: float, here: Direction, along: Direction, across: Direction, metric: Metric
@@ -284,12 +286,12 @@ class _Surface:
             response = self._response(v)
             balance = response.make(v)
             state = balance.evaluate(place.p, place.x.reshape(balance.contact.n_pair, -1, place.x.shape[-1]))
-            return bordered.tangent(response, place.p, state, along, metric, self._newton, TANGENT).p / metric.width
+            return bordered.tangent(response, place.p, state, along, metric, self._newton, ACCURACY).p / metric.width
 
         reach = 1.0 / max(metric.norm(across), 1.0 / self._span)  # change of the parameter that counts as one
         central = scalar(value, here)
-        one = (scalar(value, here + along * DIFFERENCE) - central) / DIFFERENCE
-        step = DIFFERENCE * reach
+        one = (scalar(value, here + along * DIFFERENCE_STEP) - central) / DIFFERENCE_STEP
+        step = DIFFERENCE_STEP * reach
         two = (scalar(value + step, here + across * step) - central) / step
         return central, (one, two)
 
@@ -306,9 +308,9 @@ class _Surface:
         response = self._response(value)
         solution = self._solved(response, guess, along, metric)
         omega = solution.state.omega
-        options = Options(step=NEAREST, width=1.0, newton=self._options.newton)
+        options = Options(step=SEARCH_STEP, width=1.0, newton=self._options.newton)
         ways = [Stepper(response, options, solution, omega, omega + self._width, along * sign) for sign in (1.0, -1.0)]
-        for _ in range(SEARCH):
+        for _ in range(SEARCH_STEPS):
             for way in ways:
                 for part in way.advance():
                     if part.end.fold:

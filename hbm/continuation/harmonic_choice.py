@@ -21,12 +21,12 @@ from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.threads import single
 
-ACCURACY = 1e-3  # of the linear solves behind the estimate
+LINEAR_ACCURACY = 1e-3  # of the linear solves behind the estimate, which is of first order itself
 # an output that vibrates less than this share of the largest vibration is measured against that share
 LEAST_VIBRATION_SHARE = 1e-2
 # useful harmonics in a row, the smallest first, after which no more are tried for dropping
 USEFUL_IN_A_ROW = 3
-SAFETY = 0.5  # share of the tolerance that the harmonics left out may use up when the set grows
+ALLOWED_SHARE = 0.5  # of the tolerance, that the harmonics left out may use: the estimate sees each on its own
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ def estimate(wide: HarmonicBalance, kept: tuple[int, ...], omega: float, x: np.n
 
     def change(of: set[int]) -> np.ndarray:
         own = np.isin(wide.basis.order, list(of))
-        moved, _, _ = linear.solve(np.where(own, -state.residual, 0.0), ACCURACY)
+        moved, _, _ = linear.solve(np.where(own, -state.residual, 0.0), LINEAR_ACCURACY)
         return point.outputs(linear.departure_slope(moved)) + np.where(own, direct, 0.0)
 
     absent = set(wide.basis.harmonics) - set(kept)
@@ -245,7 +245,7 @@ class _Trial:
             rest = np.array([found.shares[h] for h in allowed])
             remaining = np.sqrt(np.cumsum(rest[::-1] ** 2))[::-1]  # of this one and all smaller ones
             for h, left in zip(allowed, remaining, strict=True):
-                if left > SAFETY * options.tolerance:
+                if left > ALLOWED_SHARE * options.tolerance:
                     wanted[h] = max(wanted.get(h, 0.0), found.shares[h])
         first = sorted(wanted, key=lambda h: -wanted[h])
         return set(first[: max(2, len(self.kept))])  # a rough solution tells little about the rest

@@ -20,9 +20,12 @@ from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
 
-EASY, HARD = 3, 7  # Newton steps up to which the next step grows, and from which it shrinks
-EMPHASIS = 5.0  # of the logarithm of frequency and of the damping ratio beside that of the amplitude, in arc length
-CORNER = 1e-2  # of the longest step, below which any turn is taken as a corner of the curve
+# Newton steps up to which the next step grows, and from which it shrinks; this moves the points, not the curve.
+FEW_NEWTON_STEPS, MANY_NEWTON_STEPS = 3, 7
+# Weight of log frequency and of the damping ratio in the arc length, beside that of log amplitude: they change by a few
+# per cent where the amplitude changes by decades.
+FREQUENCY_WEIGHT = 5.0
+CORNER_STEP = 1e-2  # share of the longest step below which any turn is taken as a corner of the curve
 
 
 @dataclass(frozen=True)
@@ -114,7 +117,7 @@ def _walk(problem: FreeVibration, start: float, goal: float, options: BackboneOp
     longest = abs(goal - start) / max(options.n_points - 1, 1)
     step, tangent = longest, np.sign(goal - start) * fixed
     weight = np.ones(len(fixed))
-    weight[-3:-1] = EMPHASIS**2
+    weight[-3:-1] = FREQUENCY_WEIGHT**2
     while len(solved) < options.max_points:
         here = solved[-1][0].coordinates
         ahead = here + step * tangent
@@ -124,7 +127,7 @@ def _walk(problem: FreeVibration, start: float, goal: float, options: BackboneOp
         found = _newton(problem, problem.evaluate(ahead), fixed if last else weight * tangent, options.newton)
         turned = found[0].coordinates - here
         size = np.sqrt(turned @ (weight * turned))
-        smooth = turned @ (weight * tangent) > 0.5 * size or step < CORNER * longest
+        smooth = turned @ (weight * tangent) > 0.5 * size or step < CORNER_STEP * longest
         if found[1] != CONVERGED or not smooth:
             step *= 0.5
             if step < options.min_step * longest:
@@ -136,7 +139,10 @@ def _walk(problem: FreeVibration, start: float, goal: float, options: BackboneOp
         if (found[0].coordinates[-1] - start) * (goal - start) < 0:
             return solved, "came back to where it began"
         tangent = turned / size
-        step = min(longest, 1.6 * step) if found[2] <= EASY else 0.6 * step if found[2] >= HARD else step
+        if found[2] <= FEW_NEWTON_STEPS:
+            step = min(longest, 1.6 * step)
+        elif found[2] >= MANY_NEWTON_STEPS:
+            step *= 0.6
     return solved, f"stopped after {options.max_points} points"
 
 

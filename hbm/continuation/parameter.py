@@ -14,7 +14,7 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance, State
 
 FREQUENCY, LOAD = "frequency", "load factor"
-DIFFERENCE = 1e-6  # finite-difference step, in units of `Parameter.scale`
+DIFFERENCE_STEP = 1e-6  # of central differences, in units of `Parameter.scale`: near the cube root of rounding
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Parameter:
         """(n_contact, n_coeff) d R / d value at fixed x: closed form for the frequency, central difference else."""
         if self.omega is None:
             return self.make(value).frequency_slope(state)[0]
-        step = DIFFERENCE * self.scale
+        step = DIFFERENCE_STEP * self.scale
         high = self.make(value + step).evaluate(self.omega, state.x, jacobian=False)
         low = self.make(value - step).evaluate(self.omega, state.x, jacobian=False)
         return (high.residual - low.residual) / (2 * step)

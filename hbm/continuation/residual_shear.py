@@ -28,7 +28,8 @@ from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.threads import single
 
 START_OFFSET = 1e4  # times the largest travel of a slider that the unloaded cycle allows
-LINEAR = 1e-9  # deviation of the vibrating force of a stuck pair from its spring, relative to the largest
+# Relative deviation of the vibrating force of a stuck pair from that of its spring: rounding and Newton leave less.
+SPRING_DEVIATION = 1e-9
 
 
 @dataclass(frozen=True)
@@ -118,7 +119,7 @@ def stuck(balance: HarmonicBalance, state: State) -> np.ndarray:
     t = _check(balance)
     linear = balance.contact.stiffness[:, t, None] * state.x[:, t, 1:]
     error = np.abs(state.cycle.force[:, t, 1:] - linear).max(axis=2)
-    held = error <= LINEAR * np.abs(balance.contact.stiffness[:, t, None] * state.x[:, t]).max()
+    held = error <= SPRING_DEVIATION * np.abs(balance.contact.stiffness[:, t, None] * state.x[:, t]).max()
     return held & balance.contact.sees[:, t]
 
 

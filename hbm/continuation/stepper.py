@@ -17,10 +17,11 @@ if TYPE_CHECKING:
     from tribodyn.hbm.continuation.methods.arc_length import Options
 
 LEAST_LENGTH_RATIO = 0.8  # the characteristic length falls to this share per point where the vibration gets small
-LARGEST_MISS = 0.35  # miss of the prediction, in steps, beyond which the step is too long
+# Miss of the prediction, in steps, beyond which the step is too long: two legs that meet in a right angle miss by more.
+LARGEST_MISS = 0.35
 CORNER_STEP = 0.1  # longest step in which a corner is looked for
-STEP_TANGENT = 1e-6  # relative accuracy of tangents along the way
-CAP_GROWTH = 1.1  # growth per step of the cap on steps after a rewind
+TANGENT_ACCURACY = 1e-6  # relative; a tangent here only predicts, and the prediction is off by far more
+CAP_GROWTH = 1.1  # growth per step of the cap on steps after a rewind; slow, so that the wrong turn is passed first
 
 
 class Stepper:
@@ -66,7 +67,7 @@ class Stepper:
     def _tangent(self, value: float, solution: Solution, border: Direction) -> Direction | None:
         try:
             return bordered.tangent(
-                self._path, value, solution.state, border, self._metric, self._options.newton, STEP_TANGENT
+                self._path, value, solution.state, border, self._metric, self._options.newton, TANGENT_ACCURACY
             )
         except BorderFailed:
             return None
@@ -163,7 +164,7 @@ class Stepper:
         state = balance.evaluate(omega, ahead.x.reshape(balance.contact.n_pair, -1, ahead.x.shape[-1]))
         o = self._options.newton
         try:
-            leg = bordered.tangent(self._path, ahead.p, state, self._here.tangent, self._metric, o, STEP_TANGENT)
+            leg = bordered.tangent(self._path, ahead.p, state, self._here.tangent, self._metric, o, TANGENT_ACCURACY)
         except BorderFailed:
             return []
         return [leg, leg * -1.0]

@@ -18,7 +18,7 @@ from tribodyn.hbm.linear.expansion import Expansion
 from tribodyn.reduction.model import ReducedModel
 
 POINTS_KEPT = 4  # frequencies at hand, for the duties of a mission that are solved in turn
-COARSE = 0.1  # share of the contact flexibility from which on a mode counts in the preconditioner
+PRECONDITIONED_SHARE = 0.1  # of the contact flexibility, from which on a mode counts in the preconditioner
 
 
 class ContactCompliance:
@@ -87,7 +87,7 @@ class ContactCompliance:
         parts = [part for b in shapes for part in ((b.real, b.imag) if np.iscomplexobj(b) else (b,))]
         columns = np.concatenate(parts, axis=1)
         left, size, _ = np.linalg.svd(columns, full_matrices=False)
-        return np.ascontiguousarray(left[:, size**2 > COARSE])
+        return np.ascontiguousarray(left[:, size**2 > PRECONDITIONED_SHARE])
 
     def on_rows(self, rows: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """W_0 and modes of each group at some contact rows, single precision; the last ones are kept."""

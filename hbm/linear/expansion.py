@@ -22,13 +22,13 @@ from scipy.sparse import csr_matrix
 
 from tribodyn.fem.system import SecondOrderSystem
 
-RESOLUTION = 5e-10  # relative error of the expansion aimed at, at the highest frequency asked for
+WANTED_ERROR = 5e-10  # relative, of the expansion at the highest frequency asked for: below Newton's tolerance
 ROUNDING = 1e-7  # largest error that may be rounding
-CANDIDATES = ((24, 3), (48, 3), (96, 3), (96, 4), (192, 4), (192, 6))  # modes and powers of s tried in turn
+TRUNCATIONS = ((24, 3), (48, 3), (96, 3), (96, 4), (192, 4), (192, 6))  # modes and powers of s tried in turn
 ALL_MODES_BELOW = 1500  # coordinates up to which all modes are computed at once
-N_PROBE, FEW = 2, 64  # forces that measure the error, and ports at which candidates are compared
-SPARSE = 0.05  # share of entries of the port rows up to which zeros are left out of products
-NO_DISTANCE = 1e-13  # of a frequency from an undamped resonance, relative: the response is rounding alone
+N_PROBE, COMPARED_PORTS = 2, 64  # forces that measure the error, and ports at which truncations are compared
+SPARSE_SHARE = 0.05  # of entries of the port rows, up to which zeros are left out of products: above it dense is faster
+RESONANCE_DISTANCE = 1e-13  # of a frequency from an undamped resonance, relative: the response is rounding alone
 
 
 class SingularStuckSystem(ValueError):
@@ -70,7 +70,7 @@ class Expansion:
         )
         try:
             factor = sla.cho_factor(stuck)
-            lam, phi = _modes(stuck, mass, n if n < ALL_MODES_BELOW else CANDIDATES[-1][0])
+            lam, phi = _modes(stuck, mass, n if n < ALL_MODES_BELOW else TRUNCATIONS[-1][0])
         except np.linalg.LinAlgError:
             raise loose from None
         # a rigid mode comes out of the eigenvalue problem as rounding of the stiffest ones, of either sign
@@ -81,14 +81,14 @@ class Expansion:
         force = ports.conj().T @ probe
         exact = ports @ np.linalg.solve(stuck + s * damping + s * s * mass, force)
         del stuck
-        few = np.linspace(0, len(ports) - 1, min(len(ports), FEW)).astype(int)
+        few = np.linspace(0, len(ports) - 1, min(len(ports), COMPARED_PORTS)).astype(int)
         before = np.inf
-        for m, order in (c for c in CANDIDATES if c[0] < len(lam)):  # tried between the probe and a few ports
+        for m, order in (c for c in TRUNCATIONS if c[0] < len(lam)):  # tried between the probe and a few ports
             self._build(lam[:m], phi[:, :m], factor, order, np.concatenate([force.conj().T, ports[few]]))
             moved = self.at(s).apply(np.eye(N_PROBE), slice(0, N_PROBE))[N_PROBE:]
             error = float(np.abs(moved - exact[few]).max() / np.abs(exact).max())
             # near a resonance rounding of the direct solve itself is what remains: more modes would not help
-            if error <= RESOLUTION or 0.5 * before < error < ROUNDING:
+            if error <= WANTED_ERROR or 0.5 * before < error < ROUNDING:
                 break
             before = error
         else:
@@ -118,7 +118,7 @@ class Expansion:
         self.single = np.empty((p, p * (order - 1)), np.complex64 if np.iscomplexobj(y) else np.float32)
         self.higher = [self.single[:, p * k : p * (k + 1)] for k in range(order - 1)]
         self.t = np.empty((n_e, m, m), y.dtype)
-        at_ports = csr_matrix(ports) if np.count_nonzero(ports) < SPARSE * ports.size else ports
+        at_ports = csr_matrix(ports) if np.count_nonzero(ports) < SPARSE_SHARE * ports.size else ports
         self.w0[:] = at_ports @ y[:, :p]
         self.b[:] = at_ports @ phi
         # the largest compliance, so that no unit of length or force leaves the range of single precision
@@ -142,7 +142,7 @@ class Expansion:
             core = core - s ** (k + 2) * t
         core = core + np.diag(self.lam + s * s)
         factor, pivots, _ = sla.lapack.zgetrf(core)
-        if s != 0 and np.abs(np.diag(factor)).min() < NO_DISTANCE * abs(s) ** 2:
+        if s != 0 and np.abs(np.diag(factor)).min() < RESONANCE_DISTANCE * abs(s) ** 2:
             raise UndampedResonance(
                 f"the stuck structure has an undamped resonance at {abs(s) / (2 * np.pi):.6g} Hz, where its response "
                 "is infinite: give it damping or take another frequency"

@@ -13,8 +13,8 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.harmonics import HarmonicBasis
 
-ON_CIRCLE = 1e-6  # distance from the unit circle within which a root is an instant
-GRAZING = 1e-13  # overlap, relative to the largest amplitude, that is none
+CIRCLE_DISTANCE = 1e-6  # from the unit circle, within which a root is an instant: a double root is good to 1e-8
+NO_OVERLAP = 1e-13  # relative to the largest amplitude: rounding
 
 
 @dataclass(frozen=True)
@@ -91,12 +91,12 @@ def sign_changes(basis: HarmonicBasis, coefficients: np.ndarray, level: float = 
         return np.empty(0)
     polynomial[np.abs(polynomial) < 1e-15 * size] = 0.0
     roots = np.roots(polynomial[::-1])
-    angles = np.sort(np.angle(roots[np.abs(np.abs(roots) - 1) < ON_CIRCLE]) % (2 * np.pi))
+    angles = np.sort(np.angle(roots[np.abs(np.abs(roots) - 1) < CIRCLE_DISTANCE]) % (2 * np.pi))
     if len(angles) < 2:
         return np.empty(0)
     between = 0.5 * (angles + np.append(angles[1:], angles[0] + 2 * np.pi))
     value = basis.functions(between) @ coefficients - level
-    real = np.abs(value) > GRAZING * size  # else two roots that rounding has torn apart
+    real = np.abs(value) > NO_OVERLAP * size  # else two roots that rounding has torn apart
     side = np.sign(value[real])
     if len(side) == 0:
         return np.empty(0)

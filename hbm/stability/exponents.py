@@ -29,9 +29,9 @@ from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.stability import floquet
 from tribodyn.hbm.threads import single
 
-MARGIN = 1e-6  # real parts up to this times omega count as zero
+NEUTRAL_GROWTH = 1e-6  # over omega: real parts up to it count as zero, for the solution is no better than that
 FEWEST_MODES, MOST_MODES = 20, 30  # friction makes modes far above the excitation flutter, too
-SAME = 0.02  # relative to omega: how far truncation may drive copies of one exponent apart
+COPY_DISTANCE = 0.02  # over omega: how far truncation may drive copies of one exponent apart
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Stability:
     @property
     def n_unstable(self) -> int:
         """Number of exponents that grow."""
-        return int(np.sum(self.exponents.real > MARGIN * self.omega))
+        return int(np.sum(self.exponents.real > NEUTRAL_GROWTH * self.omega))
 
     @property
     def stable(self) -> bool:
@@ -250,7 +250,7 @@ def _central(values: np.ndarray, centre: np.ndarray, wanted: int) -> np.ndarray:
     chosen: list[int] = []
     for i in np.argsort(np.abs(centre), kind="stable"):
         shift = np.round(values[i].imag - values[chosen].imag)
-        same = np.abs(values[i] - values[chosen] - 1j * shift) < SAME
+        same = np.abs(values[i] - values[chosen] - 1j * shift) < COPY_DISTANCE
         if not np.any(same & (shift != 0) & (np.abs(centre[i] - centre[chosen] + shift) < 0.25)):
             chosen.append(int(i))
         if len(chosen) == wanted:

@@ -7,8 +7,8 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.time.time_integration import Options, PeriodicMotion, TimeStepper, integrate
 
-LARGEST = 900  # state variables up to which the monodromy matrix is formed
-DEAD = 1e-10  # multipliers below this belong to the time stepping, not to the structure
+MAX_STATES = 900  # up to which the monodromy matrix is formed, whose eigenvalues are dense work
+LEAST_MULTIPLIER = 1e-10  # smaller ones belong to the time stepping, not to the structure
 
 
 def exponents(balance: HarmonicBalance, state: State, options: Options | None = None) -> np.ndarray:
@@ -20,13 +20,13 @@ def exponents(balance: HarmonicBalance, state: State, options: Options | None = 
     options = options or Options()
     stepper = TimeStepper(balance, state.omega, options)
     size = 2 * len(stepper.lam) + balance.memory.size + 2 * len(stepper.static)
-    if size > LARGEST:
+    if size > MAX_STATES:
         raise ValueError(f"{size} state variables are too many for Floquet multipliers: use the method hill")
     motion = integrate(balance, state.omega, state, options, with_slopes=True)
     if motion.outcome != "converged":
         raise ValueError(f"no periodic motion near this state: {motion.outcome}")
     multipliers = np.linalg.eigvals(monodromy(stepper, motion))
-    multipliers = multipliers[np.abs(multipliers) > DEAD]
+    multipliers = multipliers[np.abs(multipliers) > LEAST_MULTIPLIER]
     return np.log(multipliers.astype(complex)) * state.omega / (2 * np.pi)
 
 

@@ -21,10 +21,10 @@ from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.time_integration import Options, PeriodicMotion
 
-SEARCH = Options(steps=512, tolerance=1e-7, max_periods=400)
-MARCH = replace(SEARCH, accelerate=False, max_periods=800, patience=800)
-LEFT = 0.3  # change of amplitude, relative, that means that a motion has left its branch
-BESIDE = 2  # points from the fold at which stability says which side of it is the stable one: at it both are neutral
+SEARCH_OPTIONS = Options(steps=512, tolerance=1e-7, max_periods=400)
+MARCH_OPTIONS = replace(SEARCH_OPTIONS, accelerate=False, max_periods=800, patience=800)
+DEPARTURE = 0.3  # relative change of amplitude that means that a motion has left its branch; on it a few per cent
+POINTS_BESIDE = 2  # from the fold, where stability says which side is the stable one: at the fold both are neutral
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def amplitude_in_time(balance: HarmonicBalance, motion: PeriodicMotion, output: 
     return float(np.sqrt(2) * motion.outputs[balance.compliance.output_names.index(output)].std())
 
 
-def march(balance: HarmonicBalance, state: State, omega: float, options: Options = MARCH) -> PeriodicMotion:
+def march(balance: HarmonicBalance, state: State, omega: float, options: Options = MARCH_OPTIONS) -> PeriodicMotion:
     """Time integration from a balance state, at a frequency [rad/s] that may be another than its own."""
     return time_integration.integrate(balance, omega, balance.evaluate(omega, state.x), options)
 
@@ -95,7 +95,7 @@ def fold_in_time(
     branch: Branch,
     fold: int,
     output: str,
-    options: Options = SEARCH,
+    options: Options = SEARCH_OPTIONS,
     bracket: float = 0.02,
     bisections: int = 8,
 ) -> FoldInTime:
@@ -153,7 +153,7 @@ def coexisting(
             motion = march(balance, state, omega)
             ours = float(np.linalg.norm(balance.outputs(state)[row, balance.basis.order > 0]))
             theirs = amplitude_in_time(balance, motion, output)
-            growth, stays = float(one.exponents.real.max()), abs(theirs / ours - 1) < LEFT
+            growth, stays = float(one.exponents.real.max()), abs(theirs / ours - 1) < DEPARTURE
             found.append(Coexisting(ours, one.stable, growth, theirs, motion.periods, stays))
         return float(omega), found
     return float("nan"), []
@@ -174,7 +174,7 @@ def _stable_side(balance: HarmonicBalance, branch: Branch, fold: int) -> tuple[t
     stretches: Sequence[tuple[int, int]] = _stretches(branch)
     before, after = (next(s for s in stretches if s[end] == fold) for end in (1, 0))
     growth = []
-    for point in (max(fold - BESIDE, before[0]), min(fold + BESIDE, after[1])):
+    for point in (max(fold - POINTS_BESIDE, before[0]), min(fold + POINTS_BESIDE, after[1])):
         state = balance.evaluate(branch.omega[point], _shaped(balance, branch.contact[point]))
         growth.append(float(exponents.stability(balance, state).exponents.real.max()))
     return (before, after) if growth[0] <= growth[1] else (after, before)

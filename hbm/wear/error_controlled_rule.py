@@ -29,7 +29,7 @@ from tribodyn.hbm.wear.evolution import (
     state_of,
     worn_state,
 )
-from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, WearRow, history, rows_to_go_on
+from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, WearRow, history, rows_to_resume
 from tribodyn.hbm.wear.implicit_stage import WearingBalance
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
 
@@ -72,7 +72,7 @@ def evolve(
     Raises  ValueError where the wear law wears pairs that do no friction work
     """
     problem = replace(problem, lost_below=max(problem.lost_below, LEAST_PRELOAD_SHARE))
-    rows = rows_to_go_on(resume)
+    rows = rows_to_resume(resume)
     if rows:  # the state after the last step was not kept: take the step again, to the same bits
         again = rows.pop()
         state = _step(problem, tolerance, replace(state_of(problem, again), solves=0), rows).after

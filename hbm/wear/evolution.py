@@ -17,8 +17,8 @@ from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.hbm.wear.law import JointWear
 
-FADING = 1e-3  # share of the first friction work per cycle below which wear may have faded out
-ENDURANCE = 1e12  # cycles: thirty years at 1 kHz, longer than any machine runs
+FADED_SHARE = 1e-3  # share of the first friction work per cycle below which wear may have faded out
+ENDLESS = 1e12  # cycles: thirty years at 1 kHz, longer than any machine runs
 
 
 @dataclass(frozen=True)
@@ -206,7 +206,7 @@ def reason_to_stop(
 
     first_preload, first_at_rest : of the unworn contact, vibrating and at rest [N]
     rows : taken before; step_depth : a depth that is worth wearing [m]: wear has faded out where the deepest pair needs
-        more than ENDURANCE cycles for it
+        more than ENDLESS cycles for it
     """
     if state.failure:
         return state.failure
@@ -221,8 +221,8 @@ def reason_to_stop(
     left = f", the contact survives with {state.depth.max():.4g} m worn at most and {preload:.4g} N of preload left"
     if state.rate.max() <= 0.0:
         return WearEnd.NO_LOSS.say() if state.work.max() > 0.0 else WearEnd.NO_SLIP.say(left)
-    fading = rows and state.work.sum() < FADING * rows[0].energy.sum()
-    if fading and state.rate.max() * ENDURANCE < step_depth:
+    fading = rows and state.work.sum() < FADED_SHARE * rows[0].energy.sum()
+    if fading and state.rate.max() * ENDLESS < step_depth:
         return WearEnd.FADED.say(left)
     return ""
 

@@ -181,7 +181,7 @@ def cycles_to_preload(history: WearHistory, share: float = LIFE_SHARE) -> float 
     return float(history.cycles[i - 1] + part * (history.cycles[i] - history.cycles[i - 1]))
 
 
-def rows_to_go_on(interrupted: WearHistory | None) -> list[WearRow]:
+def rows_to_resume(interrupted: WearHistory | None) -> list[WearRow]:
     """Rows of an interrupted run that steps were taken from; the one that ended it is come to again with its reason."""
     rows = interrupted.rows() if interrupted is not None else []
     return [row for row in rows if row.cycles_in_step > 0]

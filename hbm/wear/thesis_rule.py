@@ -20,7 +20,7 @@ from tribodyn.hbm.wear.evolution import (
     row_of,
     state_of,
 )
-from tribodyn.hbm.wear.history import WearHistory, WearRow, history, rows_to_go_on
+from tribodyn.hbm.wear.history import WearHistory, WearRow, history, rows_to_resume
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
 
 
@@ -41,7 +41,7 @@ def evolve(
     """
     if not step_depth > 0:
         raise ValueError("the wear step must be a positive depth")
-    rows = rows_to_go_on(resume)
+    rows = rows_to_resume(resume)
     before = state_of(problem, rows[-1]) if rows else None
     depth = rows[-1].depth + rows[-1].worn if rows else np.zeros_like(problem.area)
     cycles = rows[-1].cycles + rows[-1].cycles_in_step if rows else 0.0

@@ -21,7 +21,7 @@ def mesh_fields(result: Result, row: int | None = None) -> pv.UnstructuredGrid:
         static        displacement at rest under the static loads and the mean contact forces [m]
         vibration     displacement from there at the instant of the largest swing [m]
         amplitude     largest distance from the mean position over the cycle [m]
-        wear_depth    total depth of the pair at the node, nan off the patch [m]
+        wear_depth    total depth of the pair at the node in that state, nan off the patch [m]
     Raises  ValueError where the result keeps no mesh or no field at the row
     """
     import pyvista as pv
@@ -39,17 +39,17 @@ def mesh_fields(result: Result, row: int | None = None) -> pv.UnstructuredGrid:
     grid.point_data["static"] = view.at_rest(displacement, result.harmonics)
     grid.point_data["vibration"] = view.swing(displacement, result.harmonics)
     grid.point_data["amplitude"] = np.linalg.norm(vibration, axis=1).max(axis=1)
-    if result.patch is not None:
+    if result.patch is not None and result.wear is not None:
         depth = np.full(len(part.points), np.nan)
-        depth[result.patch.nodes] = result.depth_after(row)
+        depth[result.patch.nodes] = result.wear.depth[row]
         grid.point_data["wear_depth"] = depth
     return grid
 
 
 def patch_fields(result: Result, row: int = -1) -> pv.PolyData:
-    """The faces of the contact patch with what a wear row says of each pair.
+    """The faces of the contact patch with what a wear row says of each pair, all of it of the one state that it solved.
 
-    Point data (n_pair,): wear_depth [m], gap [m] before loading, pressure [Pa] mean over the cycle, energy [J] friction
+    Point data (n_pair,): wear_depth [m] of that state, gap [m] before loading, pressure [Pa] mean over the cycle, energy [J] friction
     work of one cycle, status (bits of hbm.contact.law: 1 sticks, 2 slips, 4 separates)
     Raises  ValueError where the result has no worn patch with faces
     """
@@ -61,7 +61,7 @@ def patch_fields(result: Result, row: int = -1) -> pv.PolyData:
     if not -len(wear.cycles) <= row < len(wear.cycles):
         raise ValueError(f"the result has no wear row {row}: it has 0 to {len(wear.cycles) - 1}")
     surface = pv.PolyData(patch.points, view.polygons(patch.faces))
-    surface.point_data["wear_depth"] = result.depth_after(row)
+    surface.point_data["wear_depth"] = wear.depth[row]
     surface.point_data["gap"] = patch.gap
     surface.point_data["pressure"] = wear.normal_force[row] / patch.area
     surface.point_data["energy"] = wear.energy[row]

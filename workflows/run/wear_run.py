@@ -11,7 +11,7 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import WearProblem
-from tribodyn.hbm.wear.history import WearHistory, WearRow, history, rows_to_go_on
+from tribodyn.hbm.wear.history import WearHistory, WearRow, history, rows_to_resume
 from tribodyn.hbm.wear.law import JointWear
 from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.result import Result
@@ -34,7 +34,7 @@ def wear_down(
     assert scene.wear is not None
     assert result.patch is not None
     patch, wear = result.patch, scene.wear
-    rows = rows_to_go_on(result.wear)
+    rows = rows_to_resume(result.wear)
     to_wear = float(patch.area @ patch.free_deflection)
 
     def on_row(row: WearRow) -> None:

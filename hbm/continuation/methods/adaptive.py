@@ -19,14 +19,18 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import parameter
 from tribodyn.hbm.continuation.branch import Branch, BranchBuilder
 from tribodyn.hbm.continuation.methods.arc_length import solve_along_load
-from tribodyn.hbm.continuation.methods.natural import DEGREE, extrapolate
+from tribodyn.hbm.continuation.methods.natural import EXTRAPOLATION_DEGREE, extrapolate
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.threads import single
 
-KINK = 0.3  # least share of the miss of extrapolation that counts as error of interpolation, as next to a kink
-JUMP = 1e3  # error estimate in the shortest step, relative to the tolerance, beyond which the response has jumped
-SLACK = 2.0  # an error estimate may exceed the tolerance by this factor before the step is taken back
+# Least share of the miss of extrapolation that counts as error of interpolation. On a smooth curve the share follows
+# from the fourth derivative and may vanish; next to a kink that formula does not hold, and a third is on the safe side.
+LEAST_ERROR_SHARE = 0.3
+# Error estimate in the shortest step, over the tolerance, beyond which the response has jumped: a step that is shorter
+# than the first by thousands of times cannot be that wrong on one and the same curve.
+JUMP_ERROR = 1e3
+REJECTED_ERROR = 2.0  # error estimate, over the tolerance, that takes a step back; one solve is worth a factor of two
 
 
 @dataclass(frozen=True)
@@ -98,7 +102,7 @@ def interpolate(branch: Branch, values: np.ndarray) -> np.ndarray:
     """
     order = np.argsort(branch.parameter)
     known, response = branch.parameter[order], branch.response[order]
-    window = min(DEGREE + 1, len(known))
+    window = min(EXTRAPOLATION_DEGREE + 1, len(known))
     first = np.clip(np.searchsorted(known, values) - window // 2, 0, len(known) - window)
     pieces = [(slice(i, i + window), value) for i, value in zip(first, values, strict=True)]
     return np.stack([extrapolate(known[piece], list(response[piece]), value) for piece, value in pieces])
@@ -139,12 +143,12 @@ class _Sweep:
             response = self._outputs(value, solution)
             error = self._error(value, response)
             step = abs((value - here) / self._span)
-            if error > SLACK and step > 1.001 * self._options.min_step:
+            if error > REJECTED_ERROR and step > 1.001 * self._options.min_step:
                 self._ahead.append((value, solution))
                 self._step = max(step * self._factor(error), self._options.min_step)
                 continue
-            self._accept(value, solution, response, jumped=error > JUMP)
-            if error <= JUMP:
+            self._accept(value, solution, response, jumped=error > JUMP_ERROR)
+            if error <= JUMP_ERROR:
                 self._step = float(np.clip(step * self._factor(error), self._options.min_step, self._options.max_step))
             return ""
 
@@ -165,7 +169,7 @@ class _Sweep:
         return False
 
     def _factor(self, error: float) -> float:
-        return float(np.clip(0.9 * max(error, 1e-12) ** (-1 / (DEGREE + 1)), 0.2, 2.0))
+        return float(np.clip(0.9 * max(error, 1e-12) ** (-1 / (EXTRAPOLATION_DEGREE + 1)), 0.2, 2.0))
 
     def _solve(self, here: float) -> tuple[float, Solution]:
         """The next point: the stop or one solved ahead where it is near, else one solved anew."""
@@ -174,21 +178,21 @@ class _Sweep:
             return self._ahead.pop()
         if abs(self._stop - here) <= 1.2 * abs(value - here):
             value = self._stop
-        known = max(self._clean, len(self._builder.value) - DEGREE - 1)
+        known = max(self._clean, len(self._builder.value) - EXTRAPOLATION_DEGREE - 1)
         guess = extrapolate(np.array(self._builder.value[known:]), self._builder.x[known:], value)
         return value, newton.solve(*self._path.place(value), guess, self._options.newton)
 
     def _error(self, value: float, response: np.ndarray) -> float:
         """Estimated error of interpolation in the step to a value, relative to the tolerance."""
-        first = max(self._clean, len(self._builder.value) - DEGREE - 1)
+        first = max(self._clean, len(self._builder.value) - EXTRAPOLATION_DEGREE - 1)
         known = np.array(self._builder.value[first:])
-        if len(known) < DEGREE:  # too few points to tell: the first steps are short anyway
+        if len(known) < EXTRAPOLATION_DEGREE:  # too few points to tell: the first steps are short anyway
             return 1.0
         missed = self._size(response - extrapolate(known, self._response[first:], value))
         window = np.append(known[1:], value)  # of the polynomial that interpolates here, at worst
         between = np.linspace(known[-1], value, 9)[1:-1]
         share = np.abs(np.prod(between[:, None] - window, axis=1)).max() / np.abs(np.prod(value - known))
-        share = max(share, KINK)
+        share = max(share, LEAST_ERROR_SHARE)
         scale = np.maximum(self._largest, self._size(response))
         with np.errstate(divide="ignore", invalid="ignore"):
             relative = np.where(scale > 0, missed / scale, 0.0)

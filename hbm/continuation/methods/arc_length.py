@@ -27,9 +27,10 @@ from tribodyn.hbm.continuation.stepper import Stepper
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.threads import single
 
-JUMPS = 10 ** np.arange(-6.0, -2.5)  # of the range, lengths of a step over a gap in the curve, tried in turn
-MAX_JUMPS = 20
-REWINDS = 4  # times that a walk which came back onto its own way goes back to where it went wrong
+# Steps of the parameter over a gap in the curve, shares of its range, tried in turn; a longer one could miss a peak.
+GAP_STEPS = 10 ** np.arange(-6.0, -2.5)
+MAX_GAPS = 20  # a curve with more is none
+MAX_REWINDS = 4  # times that a walk which came back onto its own way goes back, to four times shorter steps
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ def follow(
     if not first.converged:
         return builder.finish(f"ended at {path.say(start)}: {first.outcome}")
     walk = _Walk(path, options, builder, Stepper(path, options, first, start, stop), bounds, abs(stop - start))
-    while (end := walk.go_on()) is None:
+    while (end := walk.advance()) is None:
         if on_point is not None:
             done = len(builder.value)
             share = abs(builder.value[-1] - start) / abs(stop - start)
@@ -160,7 +161,7 @@ class _Walk:
         places = ", ".join(self._path.say(value) for value in self._jumps)
         return f"; stepped over gaps in the curve at {places}" if places else ""
 
-    def go_on(self) -> str | None:
+    def advance(self) -> str | None:
         """One step more; the sentence that ends the branch, or None."""
         builder, path = self._builder, self._path
         if len(builder.value) >= self._options.max_points:
@@ -183,7 +184,7 @@ class _Walk:
     def _jump(self) -> bool:
         """Step over a gap in the curve, its parameter moving on as before; whether there is a solution behind."""
         here, span, sense = self._builder.value[-1], self._bounds[1] - self._bounds[0], self._stepper.sense
-        for share in JUMPS if len(self._jumps) < MAX_JUMPS else ():
+        for share in GAP_STEPS if len(self._jumps) < MAX_GAPS else ():
             value = here + sense * share * span
             if sense == 0 or not self._bounds[0] < value < self._bounds[1]:
                 break
@@ -230,7 +231,7 @@ class _Walk:
             for sense in (-1.0, 1.0):
                 if not any(p.passes(self._path, old[index].start, sense, newton_options) for p in near):
                     continue
-                if self._rewinds == REWINDS:
+                if self._rewinds == MAX_REWINDS:
                     return f"ended at {here}: the curve came back onto itself"
                 self._rewinds += 1
                 index = index if sense < 0 else max(index - 2, 0)

@@ -22,10 +22,11 @@ from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
 
-DEGREE = 2  # of the extrapolating polynomial
-APART = 0.5  # least distance of its points, in steps
-ROUND_FOLDS = 200  # points by arc length on the way round folds
-SHORTEST, SLOWEST = 0.03, 0.8  # of Newton's method where a shorter step of the continuation is left to try
+EXTRAPOLATION_DEGREE = 2  # higher ones amplify the kinks of the contact
+LEAST_SPACING = 0.5  # of the points extrapolated from, in steps: closer ones amplify what Newton leaves
+MAX_FOLD_POINTS = 200  # by arc length on the way round folds, after which the sweep looks from rest
+# Newton's method gives up early where a shorter step of the continuation is left to try, which costs less.
+TRIAL_SHORTEST, TRIAL_SLOWEST = 0.03, 0.8
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ def follow(
 
 def _step(path: Parameter, builder: BranchBuilder, value: float, options: Options, halvings: int) -> Solution:
     """One step to `value`, through points in between where it fails."""
-    hasty = replace(options.newton, shortest=SHORTEST, slowest=SLOWEST)
+    hasty = replace(options.newton, shortest=TRIAL_SHORTEST, slowest=TRIAL_SLOWEST)
     patience = hasty if halvings > 0 else options.newton
     solution = newton.solve(*path.place(value), predict(builder, value), patience)
     if not solution.converged and halvings > 0:
@@ -101,7 +102,7 @@ def _by_arc_length(
         width=arc_length.Options.width * abs((stop - origin) / (value - here)),
         bounds=(min(origin, value), max(origin, value)),
         guess=builder.x[-2],
-        max_points=ROUND_FOLDS,
+        max_points=MAX_FOLD_POINTS,
         newton=options.newton,
     )
     curve = arc_length.follow(path, here, value, way)
@@ -129,10 +130,10 @@ def predict(builder: BranchBuilder, value: float) -> np.ndarray:
     Points closer together than half of the step, as halved steps leave them, would blow up their differences; those
     before a fold lie on another leg of the curve.
     """
-    apart = APART * abs(value - builder.value[-1])
+    apart = LEAST_SPACING * abs(value - builder.value[-1])
     chosen = [len(builder.value) - 1]
     for i in reversed(range(builder.folds[-1] + 1 if builder.folds else 0, chosen[0])):
-        if len(chosen) > DEGREE:
+        if len(chosen) > EXTRAPOLATION_DEGREE:
             break
         if abs(builder.value[i] - builder.value[chosen[-1]]) >= apart:
             chosen.append(i)
