@@ -116,6 +116,17 @@ if TYPE_CHECKING:
         write_mistuned,
         write_whole,
     )
+    from tribodyn.workflows.api.whole_scenes import (
+        benchmark,
+        check_promise,
+        compare_wear_steps,
+        converge,
+        fit,
+        folds,
+        track,
+        trade,
+        verify,
+    )
     from tribodyn.workflows.designs.table import StudyTable
     from tribodyn.workflows.result.result import Result
     from tribodyn.workflows.result.store import ResultError
@@ -244,6 +255,22 @@ _HOME |= dict.fromkeys(
     ("tribodyn.workflows.api.studies",),
 )
 
+# of whole scenes; see tribodyn.workflows.api.whole_scenes
+_HOME |= dict.fromkeys(
+    (
+        "benchmark",
+        "check_promise",
+        "compare_wear_steps",
+        "converge",
+        "fit",
+        "folds",
+        "track",
+        "trade",
+        "verify",
+    ),
+    ("tribodyn.workflows.api.whole_scenes",),
+)
+
 __all__ = [
     "CONVERGED",
     "OUTPUT",
@@ -291,22 +318,28 @@ __all__ = [
     "WearHistory",
     "Wheel",
     "__version__",
+    "benchmark",
     "build",
     "build_wheel",
     "campbell",
     "changed",
     "chatter",
+    "check_promise",
     "coexisting",
+    "compare_wear_steps",
     "contact_laws",
     "contact_patch",
     "continuations",
+    "converge",
     "critical_speeds",
     "cycle_at",
     "cycles_to_preload",
     "delta_max",
     "draw_field",
     "draw_status",
+    "fit",
     "fold_in_time",
+    "folds",
     "follow_adaptive",
     "follow_arc_length",
     "follow_backbone",
@@ -347,7 +380,10 @@ __all__ = [
     "study",
     "support_wear",
     "support_work",
+    "track",
+    "trade",
     "vary",
+    "verify",
     "verify_in_time",
     "wear",
     "wear_law",

@@ -43,7 +43,7 @@ def read_scene(source: Source, overrides: Overrides = (), *, folder: str | PathL
     folder : where relative file names of a dict begin, the current folder by default
     Raises  SceneError: one sentence that names the key and what is expected
     """
-    texts = _texts(overrides)
+    texts = override_texts(overrides)
     if isinstance(source, SceneFile):
         return scene_file.parse(source.text, f"{source.name}.toml", (*source.overrides, *texts), source.folder)
     if isinstance(source, Mapping):
@@ -190,15 +190,16 @@ def reporter(progress: Report) -> Progress:
     return progress if isinstance(progress, Progress) else CallbackProgress(progress)
 
 
-def _texts(overrides: Overrides) -> list[str]:
+def override_texts(overrides: Overrides) -> tuple[str, ...]:
+    """Changes of keys as the texts "section.key=value" of the command line."""
     if isinstance(overrides, str):
         raise ValueError(f'overrides is "{overrides}": give a list of texts "section.key=value" or a dict')
     if not isinstance(overrides, Mapping):
-        return list(overrides)
-    return [
+        return tuple(overrides)
+    return tuple(
         f"{key}=" if value is None else f"{key}={tomli_w.dumps({'v': _plain(value)}).partition('=')[2].strip()}"
         for key, value in overrides.items()
-    ]
+    )
 
 
 def _plain(value: Any) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import shlex
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -207,14 +206,14 @@ def verify(
         Print JSON for machines.
     """
     from tribodyn.workflows.accuracy import verification
-    from tribodyn.workflows.api import scenes
+    from tribodyn.workflows.api import scenes, whole_scenes
     from tribodyn.workflows.run.failure import SolveFailed
     from tribodyn.workflows.run.progress import Progress, console_progress
 
     make_room(out)
-    omega = None if at is None else 2 * math.pi * quantity("--at", at, "Hz")
+    hertz = None if at is None else quantity("--at", at, "Hz")
     progress = Progress() if as_json else console_progress()
-    found = verification.compare(scenes.load(result), omega, row, overrides, steps, progress)
+    found = whole_scenes.verify(result, hertz, row=row, steps=steps, overrides=overrides, progress=progress)
     folder = out or scenes.result_file(result).parent / "pictures"
     folder.mkdir(parents=True, exist_ok=True)
     picture = folder / f"verify_{found.hertz:.6g}Hz{'' if row is None else f'_row{row}'}.png"

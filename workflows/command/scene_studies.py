@@ -55,15 +55,14 @@ def folds(scene: str, *, within: str = "2 %", overrides: Overrides = (), as_json
     as_json
         Print JSON for machines.
     """
+    from tribodyn.workflows.api import whole_scenes
     from tribodyn.workflows.run.progress import Progress, console_progress
-    from tribodyn.workflows.scene import scene_file
-    from tribodyn.workflows.studies import folds as study
 
     bracket = quantity("--within", within, "")
     if not 0 < bracket < 1:
         raise ValueError(f"--within {within}: give a share between 0 and 100 %")
-    file = scene_file.read(scene, overrides)
-    found = study.find(file, Progress() if as_json else console_progress(), bracket)
+    progress = Progress() if as_json else console_progress()
+    found = whole_scenes.folds(scene, bracket, overrides=overrides, progress=progress)
     if as_json:
         print(json.dumps(found.record(), indent=2))
         return

@@ -35,14 +35,15 @@ def bench(
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.benchmarks import bench as benchmark
-
     if scaling:
         make_room(out, PICTURE)
         _scaling(quick, out, as_json)
         return
-    rows = benchmark.run(quick, aside)
-    print(json.dumps(benchmark.as_records(rows), indent=2) if as_json else benchmark.as_text(rows))
+    from tribodyn.workflows.api.whole_scenes import benchmark
+    from tribodyn.workflows.benchmarks import bench as shown
+
+    rows = benchmark(quick, progress=aside)
+    print(json.dumps(shown.as_records(rows), indent=2) if as_json else shown.as_text(rows))
 
 
 def _scaling(quick: bool, out: Path, as_json: bool) -> None:
@@ -92,16 +93,17 @@ def trade(
     if most < 1:
         raise ValueError(f"--most {most}: a knob needs one setting at least")
     from tribodyn.workflows.accuracy import accuracy, knob_trade, promise, trade_picture, trade_table, wear_steps
+    from tribodyn.workflows.api import whole_scenes
 
     if knob == ("wear_step",):
         make_room(out, PICTURE)
-        table = wear_steps.compare(scene, aside, overrides)
+        table = whole_scenes.compare_wear_steps(scene, overrides=overrides, progress=aside)
         if out is not None:
             wear_steps.picture(table).savefig(out)
         print(json.dumps(wear_steps.as_records(table), indent=2) if as_json else wear_steps.as_text(table))
         return
     if check is not None:
-        kept = promise.check(scene, overrides, check, out, aside)
+        kept = whole_scenes.check_promise(scene, check, table=out, overrides=overrides, progress=aside)
         print(json.dumps(promise.as_record(kept), indent=2) if as_json else promise.as_text(kept))
         if not kept.kept:
             sys.exit(1)
@@ -109,7 +111,13 @@ def trade(
     make_room(out, (".json",))
     path = out or Path("results") / Path(scene).stem / "trade.json"
     earlier = trade_table.load(path) if knob and path.exists() else None
-    found = knob_trade.run(scene, knob, overrides, aside, most, lambda table: trade_table.save(table, path), earlier)
+
+    def keep(table: trade_table.Trade) -> None:
+        trade_table.save(table, path)
+
+    found = whole_scenes.trade(
+        scene, knob, most=most, overrides=overrides, progress=aside, keep=keep, earlier=earlier
+    )
     trade_picture.picture(found).savefig(path.with_suffix(".png"))
     if as_json:
         print(json.dumps(knob_trade.as_records(found), indent=2))
@@ -135,9 +143,10 @@ def converge(
         Print JSON for machines.
     """
     from tribodyn.workflows.accuracy import converge as study
+    from tribodyn.workflows.api import whole_scenes
 
     make_room(out)
-    found = study.run(scene, overrides, most, aside)
+    found = whole_scenes.converge(scene, most=most, overrides=overrides, progress=aside)
     folder = out or Path("results") / found[0].scene
     folder.mkdir(parents=True, exist_ok=True)
     pictures = [folder / f"converge_{one.scene}_{one.ladder}.png" for one in found]
@@ -210,6 +219,7 @@ def track(
     as_json
         Print JSON for machines.
     """
+    from tribodyn.workflows.api import whole_scenes
     from tribodyn.workflows.run.progress import Progress, console_progress
     from tribodyn.workflows.scene import scene_file
     from tribodyn.workflows.studies import tracking
@@ -218,9 +228,8 @@ def track(
     unit = tracking.UNITS[against]
     ends = quantity("--from", start, unit), quantity("--to", stop, unit)
     file = scene_file.read(scene, overrides)
-    most = points if points is not None else (21 if fold is None else 500)
     progress = Progress() if as_json else console_progress()
-    found = tracking.follow(file, against, *ends, fold, most, worn, progress)
+    found = whole_scenes.track(file, against, *ends, fold=fold, points=points, worn=worn, progress=progress)
     folder = out or Path("results") / file.name
     folder.mkdir(parents=True, exist_ok=True)
     tracking.write(found, folder / "track.csv")
@@ -302,9 +311,9 @@ def identify(scene: str, task: Path, *, overrides: Overrides = (), as_json: Json
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.studies import fit_file
+    from tribodyn.workflows.api import whole_scenes
 
-    found, changes = fit_file.run(scene, overrides, fit_file.read(task), aside)
+    found, changes = whole_scenes.fit(scene, task, overrides=overrides, progress=aside)
     if as_json:
         print(json.dumps({**found.record(), "set": changes}, indent=2))
     else:

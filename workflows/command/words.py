@@ -19,9 +19,10 @@ Flag = Annotated[bool, Parameter(negative=())]
 PICTURE = (".png", ".pdf", ".svg")
 
 
-def aside(sentence: str) -> None:
-    """Progress of a study, beside what it prints."""
-    print(sentence, file=sys.stderr, flush=True)
+def aside(sentence: str, share: float | None = None) -> None:
+    """Progress of a study, beside what it prints; shares of a stage are not shown."""
+    if share is None:
+        print(sentence, file=sys.stderr, flush=True)
 
 
 def quantity(name: str, text: str, unit: str) -> float:

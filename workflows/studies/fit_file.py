@@ -103,7 +103,12 @@ def read(path: Path) -> Task:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise SceneError(f"{path.name} is not valid TOML: {error}") from None
-    return scene_file.checked(Task, data, path.name)
+    return parse(data, path.name)
+
+
+def parse(tables: Mapping[str, Any], name: str = "fit") -> Task:
+    """Check the tables of a fit; name : for the sentence of a SceneError."""
+    return scene_file.checked(Task, dict(tables), name)
 
 
 def run(

@@ -1,0 +1,145 @@
+"""Studies of a whole scene from Python, as the commands of the same names make them: each returns its numbers.
+
+A scene is named as on the command line, by its name or the path of its .toml file; `overrides` are as for `run`.
+Frequencies are in Hz, all else is in SI units. `progress` is called with a sentence and the share done, or None.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any, Literal
+
+from tribodyn.workflows.accuracy import converge as grids
+from tribodyn.workflows.accuracy import knob_trade, promise, verification, wear_steps
+from tribodyn.workflows.accuracy.converge import Study as GridStudy
+from tribodyn.workflows.accuracy.promise import Check
+from tribodyn.workflows.accuracy.trade_table import Trade
+from tribodyn.workflows.accuracy.verification import Comparison
+from tribodyn.workflows.accuracy.wear_steps import WearStepTable
+from tribodyn.workflows.api.scenes import Overrides, Report, Source, load, override_texts, read_scene, reporter
+from tribodyn.workflows.benchmarks.bench import Timing
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.studies import fit_file, tracking
+from tribodyn.workflows.studies import folds as fold_study
+from tribodyn.workflows.studies.folds import FoldsFound
+from tribodyn.workflows.studies.identification import Identification
+from tribodyn.workflows.studies.tracking import Track
+
+Place = str | PathLike[str]
+
+
+def verify(
+    result: Result | Place,
+    at: float | None = None,
+    *,
+    row: int | None = None,
+    steps: int | None = None,
+    overrides: Overrides = (),
+    progress: Report = None,
+) -> Comparison:
+    """Hold a result against time integration of the same reduced model with the same contact law.
+
+    at : frequency [Hz], the peak of the response or the frequency of the row by default
+    row : wear row whose depth the contact has, unworn by default; steps : per period, 256 or 32 a harmonic by default
+    Returns both motions and their difference; `found.outcome` says whether the integrated motion became periodic
+    """
+    held = result if isinstance(result, Result) else load(result)
+    omega = None if at is None else 2 * math.pi * at
+    return verification.compare(held, omega, row, override_texts(overrides), steps, reporter(progress))
+
+
+def track(
+    source: Source,
+    against: Literal["load", "gap", "stiffness", "friction", "wear"],
+    start: float,
+    stop: float,
+    *,
+    fold: int | None = None,
+    points: int | None = None,
+    worn: Place | None = None,
+    overrides: Overrides = (),
+    progress: Report = None,
+) -> Track:
+    """Follow the resonance peak, or a fold of the response, while one number of the scene goes from start to stop.
+
+    against : factor on harmonic loads, contact springs or friction; opening [m] added to every gap; share of the depth
+        of the result `worn`
+    fold : number of the fold, 1 for that of the highest frequency; the peak by default
+    points : values of the peak, 21 by default, or the most that a line of folds may have, 500 by default
+    """
+    most = points if points is not None else (21 if fold is None else 500)
+    place = None if worn is None else Path(worn)
+    file = read_scene(source, overrides)
+    return tracking.follow(file, against, start, stop, fold, most, place, reporter(progress))
+
+
+def folds(source: Source, within: float = 0.02, *, overrides: Overrides = (), progress: Report = None) -> FoldsFound:
+    """The folds of a scene's response by harmonic balance, and where the same branches end in time integration.
+
+    within : relative distance to a fold within which its end in time is looked for
+    """
+    return fold_study.find(read_scene(source, overrides), reporter(progress), within)
+
+
+def trade(
+    scene: Place,
+    knobs: Sequence[str] = (),
+    *,
+    most: int = 99,
+    overrides: Overrides = (),
+    progress: Report = None,
+    keep: Callable[[Trade], None] = lambda trade: None,
+    earlier: Trade | None = None,
+) -> Trade:
+    """What each knob of a scene costs and what it is worth, against where it tends to on the same scene.
+
+    knobs : all that the scene has by default; most : settings of each knob, the finest ones
+    keep : called with what is there after each knob; earlier : table whose other knobs are taken over
+    """
+    texts = override_texts(overrides)
+    return knob_trade.run(fspath(scene), knobs, texts, reporter(progress).say, most, keep, earlier)
+
+
+def compare_wear_steps(scene: Place, *, overrides: Overrides = (), progress: Report = None) -> WearStepTable:
+    """Cost and error of wear steps by both rules, as `tribodyn trade SCENE --knob wear_step`."""
+    return wear_steps.compare(fspath(scene), reporter(progress).say, override_texts(overrides))
+
+
+def check_promise(
+    scene: Place, accuracy: str, *, table: Place | None = None, overrides: Overrides = (), progress: Report = None
+) -> Check:
+    """Run what a trade chooses for an accuracy such as "1 % of life", against a run that is finer in every knob."""
+    by = None if table is None else Path(table)
+    return promise.check(fspath(scene), override_texts(overrides), accuracy, by, reporter(progress).say)
+
+
+def converge(
+    scene: Place, *, most: float = 99, overrides: Overrides = (), progress: Report = None
+) -> tuple[GridStudy, ...]:
+    """Refine contact grid and mesh of a scene that has a study of its grids, up to `most` nodes along the patch."""
+    return grids.run(fspath(scene), override_texts(overrides), most, reporter(progress).say)
+
+
+def fit(
+    scene: Place, task: Place | Mapping[str, Any], *, overrides: Overrides = (), progress: Report = None
+) -> tuple[Identification, list[str]]:
+    """Fit named numbers of a scene to measured ones, as `tribodyn identify`.
+
+    task : file of the fit, or its tables as a dict
+    Returns what was found with its errors, and the overrides that put it into the scene
+    """
+    asked = fit_file.parse(task) if isinstance(task, Mapping) else fit_file.read(Path(task))
+    return fit_file.run(fspath(scene), override_texts(overrides), asked, reporter(progress).say)
+
+
+def benchmark(quick: bool = True, *, progress: Report = None) -> list[Timing]:
+    """Time the solver beside the dense algorithm of the thesis on the beam scene.
+
+    quick : harmonics 0+1 and 0+3 on one thread
+    """
+    from tribodyn.workflows.benchmarks import bench
+
+    return bench.run(quick, reporter(progress).say)
