@@ -18,6 +18,10 @@ SINGULAR = 0.5
 NO_MEMORY = -2  # error code of PARDISO
 
 
+class SingularStiffness(ValueError):
+    """A body can move rigidly, or the matrix is singular to working precision."""
+
+
 class Factor(Protocol):
     """name : of the solver; solve : (n,) or (n, k) right-hand sides -> solution of the same shape."""
 
@@ -31,7 +35,7 @@ def factorise(K: Any, definite: bool = True, solver: str | None = None) -> Facto
 
     K : (n, n) scipy.sparse; definite : K is positive definite (False for a shifted, indefinite matrix)
     solver : "pardiso" or "superlu", the best available by default
-    Raises  ValueError where K is singular, as when a body can still move rigidly; MemoryError
+    Raises  SingularStiffness where K is singular, as when a body can still move rigidly; MemoryError
     """
     K = csr_matrix(K)
     if solver is None:
@@ -44,7 +48,7 @@ def factorise(K: Any, definite: bool = True, solver: str | None = None) -> Facto
     except (RuntimeError, ArithmeticError):
         regular = False
     if not regular:
-        raise ValueError(
+        raise SingularStiffness(
             "the stiffness matrix is singular to working precision: some body can move rigidly, or is too thin; "
             "clamp it, or keep some of its nodes as masters"
         )

@@ -14,11 +14,12 @@ import numpy as np
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import all_harmonics
-from tribodyn.hbm.linear.expansion import Expansion
+from tribodyn.hbm.linear.expansion import Expansion, UnbalancedLoad
 from tribodyn.reduction.model import ReducedModel
 
 POINTS_KEPT = 4  # frequencies at hand, for the duties of a mission that are solved in turn
 PRECONDITIONED_SHARE = 0.1  # of the contact flexibility, from which on a mode counts in the preconditioner
+UNBALANCED = 1e-7  # of the static loads, on a motion that nothing resists, taken for rounding
 
 
 class ContactCompliance:
@@ -56,11 +57,22 @@ class ContactCompliance:
             ports = np.concatenate([np.asarray(rows) for rows in (b, *loads, *outputs)])
             s_max = basis.harmonics[positions[-1]] * omega_max
             self.groups.append((Expansion(system, np.asarray(b), self.k, ports, s_max), positions))
+            if basis.has_static and 0 in positions:
+                self._check_balance(self.groups[-1][0])
         self.error = max(e.error for e, _ in self.groups)
         self.shared_real = len(self.groups) == 1 and not np.iscomplexobj(self.groups[0][0].w0)
         self.coarse = self._coarse_modes()
         self._points: dict[float, CompliancePoint] = {}
         self._active: tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray]]] | None = None
+
+    def _check_balance(self, expansion: Expansion) -> None:
+        """Raise UnbalancedLoad where static loads push a rigid motion of a structure that nothing holds."""
+        loads = slice(self.n_contact, self.n_contact + self.n_load)
+        pushed = expansion.b[loads, : expansion.rigid.shape[1]] * self._load[:, :1]
+        if np.abs(pushed.sum(axis=0)).max(initial=0.0) > UNBALANCED * np.abs(pushed).max(initial=0.0):
+            each = np.abs(expansion.b[loads]) * np.abs(self._load[:, :1])
+            if np.abs(pushed.sum(axis=0)).max() > UNBALANCED * each.max():
+                raise UnbalancedLoad(expansion.rigid)
 
     def restricted(self, basis: HarmonicBasis) -> ContactCompliance:
         """The same for fewer of the harmonics; the expansions are shared."""
@@ -83,7 +95,7 @@ class ContactCompliance:
         hardly couples the pairs.
         """
         n, root = self.n_contact, np.sqrt(self.k)
-        shapes = [root[:, None] * e.b[:n] / np.sqrt(e.lam) for e, _ in self.groups]
+        shapes = [root[:, None] * e.b[:n] * np.sqrt(e.still) for e, _ in self.groups]
         parts = [part for b in shapes for part in ((b.real, b.imag) if np.iscomplexobj(b) else (b,))]
         columns = np.concatenate(parts, axis=1)
         left, size, _ = np.linalg.svd(columns, full_matrices=False)

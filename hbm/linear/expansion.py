@@ -7,6 +7,10 @@ the load nor on wear. Its lowest modes Phi carry the dynamics; the rest is expan
     W_k = -W_0 (C W_(k-1) + M W_(k-2)),    L(s) = (I - s W(s) C) Phi,
     S(s) = Lambda + s C_m + s^2 - s^2 Phi^H C W(s) C Phi,
 
+A structure that nothing holds has rigid modes R, K_s R = 0 and B R = 0. With K_s + c M R R^H M in its place every
+matrix above exists and R are modes like the others; their true Lambda, zero, stands in S. At s = 0 they cannot move:
+the static loads must be in equilibrium.
+
 which holds for any Hermitian damping matrix; the error falls like (|s| / omega_next)^order and is measured against a
 direct solve. What s multiplies is small beside W_0 and Phi: single precision keeps it exact enough.
 Source  block elimination of modal coordinates (ours); static correction of truncated modes as in MacNeal 1971.
@@ -29,10 +33,25 @@ ALL_MODES_BELOW = 1500  # coordinates up to which all modes are computed at once
 N_PROBE, COMPARED_PORTS = 2, 64  # forces that measure the error, and ports at which truncations are compared
 SPARSE_SHARE = 0.05  # of entries of the port rows, up to which zeros are left out of products: above it dense is faster
 RESONANCE_DISTANCE = 1e-13  # of a frequency from an undamped resonance, relative: the response is rounding alone
+RIGID = 1e3  # squared frequency of a mode over rounding from which on it is looked whether it is rigid
+GAP = 1e-10  # squared frequency of a rigid mode over that of the first elastic one, at the most
+MOST_RIGID = 24  # those of four bodies that nothing joins
+RESISTED = 1e-6  # displacement at the contacts beside that elsewhere from which on a motion is not free of them
 
 
 class SingularStuckSystem(ValueError):
     """The structure can move as a rigid body even with every contact stuck."""
+
+
+class UnbalancedLoad(SingularStuckSystem):
+    """The static loads push a structure that nothing holds; shapes : (n, r) its rigid motions."""
+
+    def __init__(self, shapes: np.ndarray):
+        super().__init__(
+            "the part can move as a rigid body even with all contacts stuck, and its static loads are not in "
+            "equilibrium: balance them, clamp the part or add a spring"
+        )
+        self.shapes = shapes
 
 
 class UndampedResonance(ValueError):
@@ -50,7 +69,8 @@ class Expansion:
     w0_single, b_single : those of the contacts in single precision
     higher : order - 1 matrices (n_port, n_port) W_k s_max^k / unit, views of `single`, which holds them side by side
     error : relative, at s_max, against a direct solve
-    Raises  SingularStuckSystem
+    rigid : (n, r) motions that nothing resists, mass-normalised; the first r modes
+    Raises  SingularStuckSystem where a motion that nothing resists moves the contacts
     """
 
     def __init__(
@@ -68,19 +88,40 @@ class Expansion:
             "the part can move as a rigid body even with all contacts stuck: clamp it, add a spring, "
             "or raise the contact stiffness"
         )
+        count = n if n < ALL_MODES_BELOW else TRUNCATIONS[-1][0]
+        self.rigid = np.zeros((n, 0))
+        # a rigid mode comes out of the eigenvalue problem as rounding of the stiffest ones, of either sign
+        rounding = n * np.finfo(float).eps * np.max(np.diag(stuck).real / np.diag(mass).real)
         try:
             factor = sla.cho_factor(stuck)
-            lam, phi = _modes(stuck, mass, n if n < ALL_MODES_BELOW else TRUNCATIONS[-1][0])
+            lam, phi = _modes(stuck, mass, count)
         except np.linalg.LinAlgError:
-            raise loose from None
-        # a rigid mode comes out of the eigenvalue problem as rounding of the stiffest ones, of either sign
-        if lam[0] <= n * np.finfo(float).eps * np.max(np.diag(stuck).real / np.diag(mass).real):
-            raise loose
+            lam = np.zeros(1)
+        if lam[0] <= RIGID * rounding:
+            try:
+                self.rigid, shift = _rigid(stuck, mass)
+            except np.linalg.LinAlgError:
+                if lam[0] <= rounding:
+                    raise loose from None
+        if self.rigid.shape[1]:
+            try:
+                if np.abs(b @ self.rigid).max(initial=0.0) > RESISTED * np.abs(self.rigid).max():
+                    raise loose
+                held = mass @ self.rigid
+                stuck = stuck + shift * held @ held.conj().T
+                factor = sla.cho_factor(stuck)
+                lam, phi = _modes(stuck, mass, count)
+            except np.linalg.LinAlgError:
+                raise loose from None
+            phi[:, : self.rigid.shape[1]] = self.rigid  # the lowest ones, and no others are as low
         s = 1j * s_max
         probe = np.random.default_rng(0).normal(size=(self.n_port, N_PROBE))
         force = ports.conj().T @ probe
-        exact = ports @ np.linalg.solve(stuck + s * damping + s * s * mass, force)
-        del stuck
+        free = stuck + s * damping + s * s * mass
+        if self.rigid.shape[1]:
+            free = free - shift * held @ held.conj().T
+        exact = ports @ np.linalg.solve(free, force)
+        del stuck, free
         few = np.linspace(0, len(ports) - 1, min(len(ports), COMPARED_PORTS)).astype(int)
         before = np.inf
         for m, order in (c for c in TRUNCATIONS if c[0] < len(lam)):  # tried between the probe and a few ports
@@ -130,7 +171,9 @@ class Expansion:
             y_before, y = y, -quasi_static(damping @ y + mass @ y_before)
             self.higher[k][:] = at_ports @ y[:, :p] * (self.s_unit ** (k + 1) / self.unit)
         self.left = np.ascontiguousarray(self.columns[:, p:].T)
-        self.lam = lam
+        r = self.rigid.shape[1]
+        self.lam = np.concatenate([np.zeros(r), lam[r:]])
+        self.still = np.concatenate([np.zeros(r), 1 / lam[r:]])
         self.c = phi.conj().T @ cphi
         n = self._n_contact
         self.w0_single, self.b_single = (a.astype(self.single.dtype) for a in (self.w0[:n, :n], self.b[:n]))
@@ -148,6 +191,28 @@ class Expansion:
                 "is infinite: give it damping or take another frequency"
             )
         return PortCompliance(self, s, factor, pivots)
+
+
+def _rigid(stiffness: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, float]:
+    """Mass-normalised motions (n, r) that nothing resists, and a squared frequency between them and the others.
+
+    Raises  LinAlgError where there are none, or the mass is not positive
+    """
+    squares, shapes = sla.eigh(stiffness, mass, subset_by_index=(0, min(len(mass), MOST_RIGID + 1) - 1))
+    largest = float(np.max(np.diag(stiffness).real / np.diag(mass).real)) or 1.0
+    size = np.maximum.accumulate(np.abs(squares))
+    gaps = [r for r in range(1, len(squares) + 1) if size[r - 1] <= GAP * (squares[r] if r < len(squares) else largest)]
+    if not gaps or gaps[-1] > MOST_RIGID:
+        raise np.linalg.LinAlgError
+    r = gaps[-1]
+    above = float(squares[r]) if r < len(squares) else largest
+    # two steps of inverse iteration take the rounding of the stiff modes out of the shapes
+    factor = sla.cho_factor(stiffness + 0.3 * above * mass)
+    R = shapes[:, :r]
+    for _ in range(2):
+        R = sla.cho_solve(factor, mass @ R)
+        R = R @ np.linalg.inv(np.linalg.cholesky(R.conj().T @ mass @ R)).conj().T
+    return R, 0.3 * above
 
 
 def _modes(stiffness: np.ndarray, mass: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -180,7 +245,7 @@ class PortCompliance:
     def through_core(self, z: np.ndarray) -> np.ndarray:
         """S(s)^-1 z for modal forces z (n_mode, ...)."""
         if self.s == 0:
-            return (z.T / self.expansion.lam).T
+            return (z.T * self.expansion.still).T
         solution: np.ndarray = sla.lapack.zgetrs(self.factor, self.pivots, z)[0]
         return solution.reshape(z.shape)
 

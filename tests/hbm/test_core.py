@@ -14,7 +14,7 @@ from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.compliance import ContactCompliance
-from tribodyn.hbm.linear.expansion import SingularStuckSystem
+from tribodyn.hbm.linear.expansion import SingularStuckSystem, UnbalancedLoad
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.reference import DenseBalance
 from tribodyn.reduction.model import ReducedModel
@@ -97,7 +97,14 @@ def test_tracked_peak_is_that_of_a_fine_sweep(
 
 
 def test_a_loose_part_is_refused(model: ReducedModel) -> None:
-    loose = SecondOrderSystem(np.eye(4), np.zeros((4, 4)), None, {}, {"x": np.eye(4)[0]})
+    """Where what nothing holds moves the contact, or a static load pushes it."""
+    loads = {"push": np.eye(4)[3]}
+    loose = SecondOrderSystem(np.eye(4), np.zeros((4, 4)), None, loads, {"x": np.eye(4)[3]})
     contact = ReducedModel(loose, interface(np.eye(3, 4), ("t1", "t2", "n")))
+    basis = HarmonicBasis((0, 1), 16)
+    with pytest.raises(UnbalancedLoad, match="not in equilibrium"):
+        ContactCompliance(contact, np.ones((1, 3)), basis, Excitation({(0, "push"): 1.0}), 2.0)
+    free = ContactCompliance(contact, np.ones((1, 3)), basis, Excitation({(1, "push"): 1.0}), 2.0)
+    assert free.at(1.5).outputs_lin[0] == pytest.approx([0.0, -1 / 1.5**2, 0.0], abs=1e-14)
     with pytest.raises(SingularStuckSystem, match="rigid body"):
-        ContactCompliance(contact, np.ones((1, 3)), HarmonicBasis((0, 1), 16), Excitation(), 1.0)
+        ContactCompliance(contact, np.array([[1.0, 1.0, 0.0]]), basis, Excitation(), 2.0)

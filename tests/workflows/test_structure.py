@@ -216,6 +216,69 @@ def test_a_free_structure_is_the_limit_of_one_on_weak_springs(tmp_path: Path) ->
     assert np.abs(weak - none).max() < 1e-6 * np.abs(none).max()
 
 
+FREE = (
+    BLOCKS.replace('fixed = ["x_min"]\n', "")
+    .replace('length = "100 mm"\nn_length = 4', 'length = "40 mm"\nn_length = 2')
+    .replace('width = "14 mm"\n', "")
+    .replace('["55 mm", "3 mm", "10 mm"]', '["0 mm", "0 mm", "10 mm"]')
+)
+BACK = '[loads.static.back]\ngroup = "lower.z_min"\npressure = "0.5 MPa"\n'
+QUIET = ("pictures.renders=false", "pictures.plots=false", "verdict.enabled=false")
+
+
+def test_a_free_structure_of_two_bodies_is_the_limit_of_one_on_weak_springs(tmp_path: Path) -> None:
+    weak = "".join(
+        f'[springs.{body}_{axis}]\ngroup = "{body}"\ndirection = "{axis}"\nstiffness = "1 N/m"\n'
+        for body in ("lower", "upper")
+        for axis in "xyz"
+    )
+    found = []
+    for text in (FREE + BACK, FREE + BACK + weak):
+        balance = built(text.replace('value = "20 N"', 'value = "450 N"'), tmp_path, "damping=").balance
+        omega = 2 * np.pi * 5e3
+        solved = newton.solve(balance, omega, balance.stuck(omega), newton.NewtonOptions(tolerance=1e-12, krylov=1e-6))
+        assert solved.converged
+        assert (solved.state.cycle.status != law.STICKS).any()
+        found.append(balance.outputs(solved.state)[0, 1:])  # its static place is anywhere
+    assert np.abs(found[0] - found[1]).max() < 1e-6 * np.abs(found[1]).max()
+
+
+def test_a_free_part_without_contact_responds_as_its_modes_say(tmp_path: Path) -> None:
+    bar(tmp_path)
+    text = BAR.replace('fixed = ["clamp"]\n', "")
+    model = built(text, tmp_path, "loads.static=", "damping=", "reduction.modes=20")
+    assert model.part is not None
+    system, omega = model.part.system, 2 * np.pi * 800.0
+    K, M = system.stiffness.toarray(), system.mass.toarray()
+    expected = 900.0 * system.outputs["response"] @ np.linalg.solve(K - omega**2 * M, system.loads["shake"])
+    assert model.balance.at(omega).outputs_lin[0, 1] == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (FREE, r"nothing holds lower and upper, .* \(0, 0, -400\) N with \(.*\) N m about .* mm: balance them"),
+        (BAR.replace('fixed = ["clamp"]\n', ""), r"nothing holds the structure, .* \(0, 0, -2000\) N .*\(0, 200, 0\)"),
+    ],
+)
+def test_static_loads_that_nothing_balances_are_refused_with_their_resultant(
+    tmp_path: Path, text: str, said: str
+) -> None:
+    bar(tmp_path)
+    with pytest.raises(ValueError, match=said):
+        built(text, tmp_path)
+
+
+def test_a_free_structure_wears(tmp_path: Path) -> None:
+    wear = '[wear]\ncoefficient = 1e-12\nrule = "thesis"\nstep = "0.5 um"\nmax_steps = 1\nat = "5 kHz"\n'
+    text = FREE.replace('value = "20 N"', 'value = "450 N"') + BACK + wear
+    result = pipeline.run(scene_file.parse(text, "scene.toml", QUIET, tmp_path), None, Progress())
+    assert result.finished
+    assert result.wear is not None
+    assert result.wear.work.sum() > 0
+    assert result.wear.preload == pytest.approx(400.0, rel=1e-6)
+
+
 STACK = """
 [scene]
 title = "Two bars that a bolt holds together"

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from tribodyn.fem import part as fem_part
+from tribodyn.fem.assembly import Assembly
 from tribodyn.fem.bolts import Elongation
 from tribodyn.fem.constraints import Clamp, NoMeanRotation
 from tribodyn.fem.elements import coordinates
@@ -29,6 +30,7 @@ from tribodyn.hbm.contact.stiffness import rectangular_punch
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.linear.expansion import UnbalancedLoad
 from tribodyn.reduction.damping import modal_damping, rayleigh
 from tribodyn.reduction.held import hold
 from tribodyn.reduction.linear import stuck_stiffness
@@ -87,7 +89,12 @@ def build(file: SceneFile, folder: Path | None, progress: Progress, chosen: tupl
         with progress.stage("reduction"):
             reduced = reduce_part(file.mesh_scene, part)
     with progress.stage("choice of harmonics" if scene.harmonics.automatic and not chosen else "contact compliance"):
-        model = make_model(scene, part, reduced, chosen)
+        try:
+            model = make_model(scene, part, reduced, chosen)
+        except UnbalancedLoad as unbalanced:
+            if part is None or reduced.basis is None:
+                raise
+            raise ValueError(unbalanced_load(excite(scene, None), part, reduced.basis @ unbalanced.shapes)) from None
     if model.choice is not None:
         progress.say(model.choice.outcome)
     return model
@@ -323,6 +330,38 @@ def excite(scene: Scene, base: np.ndarray | None) -> Excitation:
     for name, load in scene.loads.harmonic.items():
         loads[load.harmonic, name] = load.amplitude * np.exp(1j * load.phase)
     return Excitation(loads, base)
+
+
+def unbalanced_load(excitation: Excitation, part: Part, motions: np.ndarray) -> str:
+    """What is wrong with static loads that push the rigid motions (n_free, r) of a structure, with their resultant."""
+    force = np.zeros(len(part.free))
+    for (harmonic, name), value in excitation.loads.items():
+        if harmonic == 0 and name in part.system.loads:
+            force += np.real(value) * part.system.loads[name]
+    moved = np.linalg.norm(part.field(motions), axis=(1, 2))
+    loose = moved > 1e-6 * moved.max()
+    names = [""]
+    if isinstance(part.mesh, Assembly):
+        names = [body.name for body in part.mesh.bodies if body.name and loose[part.node_sets[body.name]].any()]
+    centre = part.points[loose].mean(axis=0)
+    arm = part.points - centre
+    shifts = np.broadcast_to(np.eye(3)[:, None, :], (3, len(arm), 3))
+    turns = np.stack([np.cross(axis, arm) for axis in np.eye(3)])
+    full = np.concatenate([shifts, turns]) * loose[:, None]
+    for node, turn in part.mesh.points.values() if isinstance(part.mesh, Assembly) else ():
+        full[:3, turn], full[3:, turn] = 0.0, np.eye(3) * loose[node]
+    resultant = full.reshape(6, -1)[:, part.free] @ force
+
+    def said(values: np.ndarray, least: float) -> str:
+        return f"({', '.join(f'{v if abs(v) > least else 0.0:.4g}' for v in values)})"
+
+    size, reach = float(np.abs(force).sum()), float(np.abs(arm).max())
+    where = said(1e3 * centre, 1e-6 * reach)
+    return (
+        f"nothing holds {' and '.join(filter(None, names)) or 'the structure'}, and the static loads on it are not in "
+        f"equilibrium: their resultant is {said(resultant[:3], 1e-9 * size)} N with "
+        f"{said(resultant[3:], 1e-9 * size * reach)} N m about {where} mm: balance them, clamp it or add a spring"
+    )
 
 
 def ground_motion(scene: MeshScene, part: Part, basis: HarmonicBasis) -> np.ndarray | None:

@@ -9,7 +9,9 @@ import numpy as np
 
 from tribodyn.fem import cyclic
 from tribodyn.fem import part as fem_part
+from tribodyn.fem.assembly import pieces
 from tribodyn.fem.cyclic import Sector
+from tribodyn.fem.factor import SingularStiffness
 from tribodyn.fem.interface import COMPONENTS
 from tribodyn.fem.matching import Mismatch
 from tribodyn.fem.material import Material
@@ -68,7 +70,13 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
     # a shank sees the whole static shape of the faces that it pulls at, which no few modes have
     shanks = [np.flatnonzero(row) for name, row in part.system.outputs.items() if name.startswith(BOLTS)]
     extra = np.concatenate([[], *held, *shanks]).astype(int)
-    reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, extra)
+    try:
+        reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, extra)
+    except SingularStiffness:  # a body that no support, joint or load has a master on
+        if wanted.relative:
+            raise
+        extra = np.union1d(extra, anchors(part))
+        reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, extra)
     if wanted.interface_modes is not None:
         masters = reduced.info.master_dofs
         touched = np.flatnonzero(np.abs(np.asarray(reduced.interface.B)[:, : len(masters)]).max(axis=0))
@@ -78,6 +86,24 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
             keep = np.union1d(np.intersect1d(np.concatenate([[], *named]), masters), extra)
         reduced = interface_modes(reduced, wanted.interface_modes, keep.astype(int), apart=extra)
     return reduced if back is None else replace(reduced, basis=back @ reduced.basis)
+
+
+def anchors(part: Part) -> np.ndarray:
+    """Free DOFs of three nodes far apart on every body, without which it cannot move rigidly."""
+    found = []
+    moves = np.full(3 * len(part.points), -1)
+    moves[part.free] = np.arange(len(part.free))
+    for piece in pieces(part.mesh):
+        nodes = piece.node + np.arange(piece.mesh.doflocs.shape[1])
+        nodes = nodes[(moves.reshape(-1, 3)[nodes] >= 0).all(axis=1)]
+        if len(nodes) < 3:
+            continue
+        x = part.points[nodes]
+        first = int(np.linalg.norm(x - x.mean(axis=0), axis=1).argmax())
+        second = int(np.linalg.norm(x - x[first], axis=1).argmax())
+        third = int(np.linalg.norm(np.cross(x - x[first], x[second] - x[first]), axis=1).argmax())
+        found.append(moves.reshape(-1, 3)[nodes[[first, second, third]]].ravel())
+    return np.concatenate([[], *found]).astype(int)
 
 
 def sector(scene: MeshScene, part: Part) -> Sector:
