@@ -19,6 +19,13 @@ from tribodyn.hbm.outcome import CONVERGED
 
 SCAN_TOLERANCE = 0.03  # of the response between the points of the first search
 COARSEST = 0.05  # longest step of the first search, share of its range
+# highest harmonic of the search for higher peaks: contacts that lift bend a curve of many harmonics so much that a scan
+# of it takes longer than a wear step, and a peak that is found is solved with all of them
+SCANNED = 3
+# amplitude over that of the tracked peak, from which on another one has overtaken it: what fewer harmonics miss of a
+# peak is less, and a peak that emerges passes this at once
+OVERTAKES = 1.2
+APART = 1e-3  # relative distance of frequencies from which on two peaks are two
 
 
 class NoPeak(ValueError):
@@ -84,6 +91,10 @@ class AtFrequency:
             solution, solves = arc_length.solve_along_load(balance, self.omega, self.newton), 2
         return OperatingPoint.of(balance, solution, self.output, solves)
 
+    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> OperatingPoint | None:
+        """None: the frequency is given."""
+        return None
+
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
         """The distance of a state to the fixed frequency."""
         return Correction(self.omega - state.omega, np.zeros_like(state.x), 0)
@@ -134,6 +145,27 @@ class AtPeak:
     def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
         """Refine from a neighbouring peak."""
         return self._refine(balance, omega, x, 2e-4 * omega)
+
+    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> OperatingPoint | None:
+        """The higher peak that a sweep with rising frequency meets, None where the tracked one is the highest.
+
+        point : the tracked peak
+        """
+        needed = max((h for h, _ in balance.excitation.loads), default=0)
+        few = balance.with_harmonics(tuple(h for h in balance.basis.harmonics if h <= max(SCANNED, needed)))
+        try:
+            scanned = self.first(few)
+        except NoPeak:
+            return None
+        if not self._is_higher(scanned, point):
+            return None
+        x = few.basis.transfer(scanned.state.flat, balance.basis).reshape(point.state.x.shape)
+        found = self.next(balance, scanned.state.omega, x)
+        return replace(found, solves=found.solves + scanned.solves) if self._is_higher(found, point) else None
+
+    def _is_higher(self, found: OperatingPoint, point: OperatingPoint) -> bool:
+        apart = abs(found.state.omega - point.state.omega) > APART * point.state.omega
+        return apart and found.solution.converged and found.amplitude > OVERTAKES * point.amplitude
 
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
         """The distance of a state to the peak, by its slope and as though one mode responded."""
@@ -259,6 +291,13 @@ class BesidePeak:
         at_peak = self.peak.next(balance, omega / self.ratio, solution.state.x)
         found = self._beside(balance, at_peak)
         return replace(found, solves=found.solves + solves)
+
+    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> OperatingPoint | None:
+        """The cycle at the ratio to a peak that has overtaken the tracked one, None where none has."""
+        omega = point.state.omega
+        back, _ = self._walk(balance, omega, omega / self.ratio, point.state.x)
+        peak = self.peak.overtaken(balance, self.peak.next(balance, omega / self.ratio, back.state.x))
+        return self._beside(balance, peak) if peak is not None else None
 
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
         """The distance of a state to the ratio times the frequency of the peak, which is found from it."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -34,6 +35,7 @@ from tribodyn.hbm.wear.implicit_stage import WearingBalance
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
 
 GAMMA = 1 - 1 / np.sqrt(2)
+TURN = 2 * np.pi
 STEP_RATIO_LIMITS = (0.2, 3.0)  # limits of the ratio of one step to the one before
 ERROR_TREND_POWER = 0.2  # power with which an error that grows from step to step holds the next one back
 # shares of an event's preload between which a step that would pass the event must end: just below it, so that the next
@@ -44,6 +46,10 @@ LEAST_PRELOAD_SHARE = 1e-4
 # depths of explicit steps over the end of a branch, shares of the tolerance, tried in turn; the longest, 0.81, stays
 # within the tolerance
 EXPLICIT_STEPS = 0.01 * 3.0 ** np.arange(5)
+OVERTAKING_ACCURACY = 0.5  # share of the tolerance, of the cycles, within which a jump to another peak is located
+LOOKED_AT = 0.97  # ratio of preloads, counted from the first, at which higher peaks are looked for
+LARGEST_SHIFT = 0.1  # of a frequency in one step: a peak that moves further is another one
+SHIFTED = f"the tracked peak moves by more than {LARGEST_SHIFT:.0%} in the shortest step"
 MAX_CORRECTIONS = 12  # solves of a stage
 GAIN_ACCURACY = 1e-9  # of the depth, for laws whose depth per work is not constant
 
@@ -97,7 +103,17 @@ def evolve(
             on_row(rows[-1])
         if reason:
             break
-    return history(rows, end)
+    return history(rows, end + _jumps(rows))
+
+
+def _jumps(rows: Sequence[WearRow]) -> str:
+    """What to say of frequencies that moved on to another peak between rows; empty where none did."""
+    said = [
+        f"; the response jumped from {a.omega / TURN:.5g} to {b.omega / TURN:.5g} Hz at {b.cycles:.3g} cycles"
+        for a, b in pairwise(rows)
+        if abs(b.omega / a.omega - 1) > LARGEST_SHIFT
+    ]
+    return "".join(said)
 
 
 @dataclass(frozen=True)
@@ -121,32 +137,79 @@ def _step(problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Se
         drift = (omega - rows[-1].duty_omega) / (state.cycles - rows[-1].cycles)
     target = _event(problem, state, rows)
     solves, longest = state.solves, np.inf
+    stays = 0.0  # stride after which the tracked peak is still the highest
+    jumped: tuple[float, WearState, WearState, float, tuple[OperatingPoint, ...]] | None = None  # ... and where not
+    higher: tuple[OperatingPoint, ...] | None = None
     while True:
         searches = [_Search(slope) for slope in slopes]
         first, second = _stages(problem, state, stride, drift, searches)
         slopes = np.array([search.slope for search in searches])
         solves += first.solves + second.solves
-        if second.failure or first.failure:
+        lost = bool(second.failure or first.failure) or _shift(state, second) > LARGEST_SHIFT
+        if lost:
             error, longest = np.inf, stride
         else:
             error = _error(problem, tolerance, state, stride, first, second)
         if error <= 1.0:
             preload = problem.preload(second.points[0].state)
             if preload >= EVENT_WINDOW[0] * target:
-                break
+                found = _overtaken(problem, second) if jumped or _is_due(problem, state, second, rows) else None
+                solves += sum(point.solves for point in found or ())
+                if found is not None:
+                    jumped = (stride, first, second, error, found)
+                elif jumped is None:
+                    break
+                else:
+                    stays = stride
+                if jumped[0] - stays <= OVERTAKING_ACCURACY * tolerance.share * second.cycles:
+                    break
+                stride = 0.5 * (stays + jumped[0])
+                continue
             longest = stride
             stride *= _share_to(target, problem.preload(state.points[0].state), preload)
+        elif jumped is not None:
+            break
         else:
-            stride = min(stride * _growth(error), 0.5 * longest if second.failure else np.inf)
-        if stride < (leap if second.failure else smallest):
-            return _leap(problem, replace(state, solves=solves), leap, second.failure, rows)
+            stride = min(stride * _growth(error), 0.5 * longest if lost else np.inf)
+        if stride < (leap if lost else smallest):
+            failure = second.failure or (SHIFTED if lost else "")
+            return _leap(problem, replace(state, solves=solves), leap, failure, rows)
+    if jumped is not None:
+        stride, first, second, error, higher = jumped
     worn = second.depth - state.depth
     work = stride * ((1 - GAMMA) * first.work + GAMMA * second.work)
     trend = (rows[-1].step_error / error) ** ERROR_TREND_POWER if rows and error > 0 else 1.0
     ratio = float(np.clip(_growth(error) * min(trend, 1.0), *STEP_RATIO_LIMITS))
     plan = np.array([stride * ratio, *slopes])
+    if higher is not None:
+        second, plan = worn_state(problem, second.depth, second.cycles, higher, 0), np.zeros(1 + len(slopes))
     row = row_of(problem, replace(state, solves=solves), stride, worn, work, error, plan)
     return _Taken(row, replace(second, solves=0))
+
+
+def _is_due(problem: WearProblem, state: WearState, second: WearState, rows: Sequence[WearRow]) -> bool:
+    """Whether higher peaks are looked for after a step from a state: each time the preload has fallen by some share."""
+    first = first_preload(problem, rows, state)
+    shares = np.array([problem.preload(s.points[0].state) for s in (state, second)]) / (first or 1.0)
+    if np.any(shares <= 0):
+        return True
+    before, after = np.floor(np.log(shares) / np.log(LOOKED_AT))
+    return bool(before != after)
+
+
+def _shift(state: WearState, second: WearState) -> float:
+    """Largest relative change of a duty's frequency in a step."""
+    return max(abs(b.state.omega / a.state.omega - 1) for a, b in zip(state.points, second.points, strict=True))
+
+
+def _overtaken(problem: WearProblem, state: WearState) -> tuple[OperatingPoint, ...] | None:
+    """The duties of a state, those at a peak that another one has overtaken at that one; None where none has."""
+    moved = []
+    for duty, point in zip(problem.mission, state.points, strict=True):
+        moved.append(duty.site.overtaken(problem.at_depth(state.depth).with_load(duty.load), point))
+    if not any(moved):
+        return None
+    return tuple(new or old for new, old in zip(moved, state.points, strict=True))
 
 
 def _leap(problem: WearProblem, state: WearState, stride: float, failure: str, rows: Sequence[WearRow]) -> _Taken:

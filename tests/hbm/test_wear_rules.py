@@ -330,3 +330,46 @@ def test_a_contact_that_outlives_its_wear_is_told_with_what_is_left() -> None:
 def test_a_law_that_takes_nothing_off_is_not_called_a_contact_at_rest() -> None:
     worn = thesis_rule.evolve(wear_problem(wear=JointWear.of("energy", coefficient=0.0)), 5e-7)
     assert worn.ended is WearEnd.NO_LOSS
+
+
+def test_a_peak_is_overtaken_by_a_higher_one_that_a_sweep_meets(problem: WearProblem) -> None:
+    site = AtPeak("tip", 250.0, 1200.0)
+    highest = site.first(problem.balance)
+    lower = AtPeak("tip", 500.0, 545.0).first(problem.balance)
+    assert lower.amplitude < highest.amplitude / 2
+    found = site.overtaken(problem.balance, lower)
+    assert found is not None
+    assert found.state.omega == pytest.approx(highest.state.omega, rel=1e-4)
+    assert site.overtaken(problem.balance, highest) is None
+    beside = BesidePeak(site, 1.01)
+    moved = beside.overtaken(problem.balance, beside.next(problem.balance, 1.01 * lower.state.omega, lower.state.x))
+    assert moved is not None
+    assert moved.state.omega == pytest.approx(1.01 * highest.state.omega, rel=1e-4)
+
+
+LEAP_DEPTH, SECOND = 2e-5, 520.0  # depth [m] from which on a second place is the higher one, and its frequency [rad/s]
+
+
+class TwoPlaces(AtFrequency):
+    """A fixed frequency that another one overtakes at a given depth."""
+
+    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> OperatingPoint | None:
+        deep = balance.contact.gap.max() >= LEAP_DEPTH
+        return AtFrequency("tip", SECOND).first(balance) if deep and point.state.omega == self.omega else None
+
+    def correct(self, balance: HarmonicBalance, state: State) -> Correction:
+        return Correction(0.0, np.zeros_like(state.x), 0)
+
+
+def test_the_jump_to_a_peak_that_overtakes_is_located_and_said(problem: WearProblem) -> None:
+    tolerance = error_controlled_rule.Tolerance(0.02, 1e-4)
+    worn = error_controlled_rule.evolve(wear_problem(mission=(Duty(TwoPlaces("tip", 420.0)),)), tolerance)
+    after = int(np.flatnonzero(worn.omega == SECOND)[0])
+    assert np.all(worn.omega[after:] == SECOND)
+    stays = error_controlled_rule.evolve(problem, tolerance)
+    exact = float(np.interp(LEAP_DEPTH, stays.depth.max(axis=1), stays.cycles))
+    assert worn.cycles[after] == pytest.approx(exact, rel=0.03)
+    assert worn.depth[after].max() >= LEAP_DEPTH
+    assert worn.ended.lost
+    jump = f"jumped from {420 / (2 * np.pi):.5g} to {SECOND / (2 * np.pi):.5g} Hz at {worn.cycles[after]:.3g} cycles"
+    assert jump in worn.end

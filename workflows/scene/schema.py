@@ -30,7 +30,6 @@ from tribodyn.workflows.scene.words import unknown_key
 CENTRIFUGAL = "centrifugal"
 
 
-
 class Heading(Table):
     """What the scene is and where its numbers come from."""
 

@@ -36,9 +36,7 @@ def follow(file: SceneFile, start: float, stop: float, mode: int, points: int, p
     return found
 
 
-def follow_backbone(
-    file: SceneFile, start: float, stop: float, *, mode: int = 0, points: int = 40
-) -> Backbone:
+def follow_backbone(file: SceneFile, start: float, stop: float, *, mode: int = 0, points: int = 40) -> Backbone:
     """The backbone of a scene between two amplitudes [m], without telling what goes on, see `follow`."""
     return follow(file, start, stop, mode, points, Progress())
 
