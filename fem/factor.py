@@ -43,7 +43,7 @@ def factorise(K: Any, definite: bool = True, solver: str | None = None) -> Facto
     elif solver not in ("pardiso", "superlu"):
         raise ValueError(f"no solver '{solver}': there are pardiso, superlu")
     try:
-        factor: Factor = Pardiso(K, definite) if solver == "pardiso" else SuperLU(K)
+        factor: Factor = Pardiso(K, definite) if solver == "pardiso" else SuperLU(K, definite)
         regular = softest_residual(K, factor.solve) < SINGULAR
     except (RuntimeError, ArithmeticError):
         regular = False
@@ -121,7 +121,7 @@ class Pardiso:
 class SuperLU:
     """SuperLU in symmetric mode after a METIS nested dissection."""
 
-    def __init__(self, K: csr_matrix) -> None:
+    def __init__(self, K: csr_matrix, definite: bool = False) -> None:
         import pymetis
 
         self.name = "SuperLU after METIS"
@@ -131,6 +131,8 @@ class SuperLU:
         self._order = np.asarray(order)
         permuted = csc_matrix(K[self._order][:, self._order])
         self._lu = splu(permuted, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        if definite and not (self._lu.U.diagonal() > 0).all():
+            raise ArithmeticError("a pivot is not positive")
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """Solution of the same shape as rhs, (n,) or (n, k)."""

@@ -10,7 +10,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
 from tribodyn.fem.factor import factorise
-from tribodyn.fem.modes import DENSE_BELOW, modes
+from tribodyn.fem.modes import DENSE_BELOW, frequencies, modes
 
 
 def hermitian_modes(K: Any, M: Any, n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -42,4 +42,4 @@ def hermitian_modes(K: Any, M: Any, n: int) -> tuple[np.ndarray, np.ndarray]:
             v0=np.random.default_rng(0).standard_normal(size).astype(complex),
         )
     order = np.argsort(values)
-    return np.sqrt(np.clip(values[order], 0, None)), phi[:, order]
+    return frequencies(values[order], K, M), phi[:, order]

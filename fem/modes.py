@@ -7,12 +7,20 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import issparse
-from scipy.sparse.linalg import LinearOperator, eigsh
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
 from tribodyn.fem.factor import Factor, factorise
 
 DENSE_BELOW = 400
+RESTARTS = 300  # of the Lanczos iteration; a sound mesh needs some ten
+NEGATIVE = 1e-10  # squared frequency below zero over the largest of a single DOF that is no rounding any more
+UNSTABLE = "the structure is unstable at rest"
+CURE = "its speed or its static load is beyond divergence or buckling; lower it"
+
+
+class StaticDivergence(ValueError):
+    """The structure is unstable at rest."""
 
 
 def modes(
@@ -25,7 +33,8 @@ def modes(
     factor : factorisation of K - sigma M that exists already
     Returns omega (n,) ascending [rad/s], 0 for rigid-body modes to rounding; phi (N, n) [1/sqrt(kg)], each with its
         first large entry positive
-    Raises  ValueError where n is not between 1 and N
+    Raises  ValueError where n is not between 1 and N, or the iteration does not converge; StaticDivergence where a
+        squared frequency is negative beyond rounding
     """
     size = K.shape[0]
     if not 1 <= n <= size:
@@ -36,17 +45,35 @@ def modes(
         if factor is None:
             factor, sigma = _factorise_shifted(K, M, sigma)
         with threadpool_limits(1):  # two BLAS pools that wait for each other make this many times slower
-            values, phi = eigsh(
-                K,
-                k=n,
-                M=M,
-                sigma=sigma or 0.0,
-                OPinv=LinearOperator(K.shape, matvec=factor.solve, dtype=float),
-                v0=np.random.default_rng(0).standard_normal(size),
-            )
+            try:
+                values, phi = eigsh(
+                    K,
+                    k=n,
+                    M=M,
+                    sigma=sigma or 0.0,
+                    OPinv=LinearOperator(K.shape, matvec=factor.solve, dtype=float),
+                    v0=np.random.default_rng(0).standard_normal(size),
+                    maxiter=RESTARTS,
+                )
+            except ArpackNoConvergence as trouble:
+                raise ValueError(
+                    f"the natural frequencies are not found in {RESTARTS} restarts, {len(trouble.eigenvalues)} of {n} "
+                    "are: the part is too thin or its elements are badly shaped; mesh it with better shaped ones"
+                ) from None
         order = np.argsort(values)
         values, phi = values[order], phi[:, order]
-    return np.sqrt(np.clip(values, 0, None)), phi * _signs(phi)
+    return frequencies(values, K, M), phi * _signs(phi)
+
+
+def frequencies(values: np.ndarray, K: Any, M: Any) -> np.ndarray:
+    """Frequencies (n,) [rad/s] of eigenvalues omega^2 of K, M; 0 where they are zero to rounding.
+
+    Raises  StaticDivergence where one is negative
+    """
+    stiffest = float(np.max(np.abs(K.diagonal()) / np.abs(M.diagonal())))
+    if values.min() < -NEGATIVE * stiffest:
+        raise StaticDivergence(f"{UNSTABLE}, omega^2 = {values.min():.3g} rad2/s2: {CURE}")
+    return np.sqrt(np.clip(values, 0, None))
 
 
 def _factorise_shifted(K: Any, M: Any, sigma: float | None) -> tuple[Factor, float]:
@@ -57,7 +84,11 @@ def _factorise_shifted(K: Any, M: Any, sigma: float | None) -> tuple[Factor, flo
         return factorise(K), 0.0
     except ValueError:
         sigma = -1e-9 * float(np.max(K.diagonal() / M.diagonal()))
+    try:
         return factorise(K - sigma * M), sigma
+    except ValueError:
+        factorise(K, definite=False)  # singular is another matter
+        raise StaticDivergence(f"{UNSTABLE}, omega^2 is negative: {CURE}") from None
 
 
 def _dense(matrix: Any) -> np.ndarray:

@@ -16,9 +16,10 @@ from scipy.sparse import csr_matrix, identity, kron
 
 from tribodyn.fem.elasticity import assemble, per_element, symmetric
 from tribodyn.fem.elements import batches, connectivity, scatter
-from tribodyn.fem.factor import factorise
+from tribodyn.fem.factor import SingularStiffness, factorise
 from tribodyn.fem.loads import Centrifugal, unit
 from tribodyn.fem.material import Material
+from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.part import Part
 
 
@@ -35,13 +36,20 @@ def prestressed(
     softening : `spin_softening` at that speed over the free DOFs [N/m], 0 where it does not spin
     tie : (n_free, m) what q = tie z the equilibrium is looked for in, such as fem.cyclic.seam_map of index 0
     Returns the part with stiffness K + softening + geometric stiffness of the stress under the force
-    Raises  ValueError where the part can move rigidly
+    Raises  ValueError where the part can move rigidly, StaticDivergence where it is beyond buckling or divergence
     """
     K = part.system.stiffness + softening
     T = identity(K.shape[0], format="csr") if tie is None else tie
     u = part.field(T @ factorise(csr_matrix(T.T @ K @ T), definite=False).solve(T.T @ force))
-    stress_stiffness = part.restricted(geometric_stiffness(part.mesh, material, u))
-    return replace(part, system=replace(part.system, stiffness=csr_matrix(K + stress_stiffness)))
+    stressed = csr_matrix(K + part.restricted(geometric_stiffness(part.mesh, material, u)))
+    try:
+        factorise(csr_matrix(T.T @ stressed @ T))
+    except SingularStiffness:
+        raise StaticDivergence(
+            "under its static load or speed the part is unstable at rest: its stress and spin softening outweigh its "
+            "stiffness; lower the load or the speed"
+        ) from None
+    return replace(part, system=replace(part.system, stiffness=stressed))
 
 
 def spinning(

@@ -8,9 +8,10 @@ import skfem
 
 from tribodyn.fem.constraints import Clamp
 from tribodyn.fem.elasticity import assemble
+from tribodyn.fem.factor import SingularStiffness, factorise
 from tribodyn.fem.loads import Centrifugal, NodalForce
 from tribodyn.fem.material import Material
-from tribodyn.fem.modes import modes
+from tribodyn.fem.modes import StaticDivergence, modes
 from tribodyn.fem.part import Contact, build
 from tribodyn.fem.prestress import geometric_stiffness, prestressed, spin_softening
 
@@ -79,3 +80,27 @@ def test_rotating_cantilever():
         # edgewise the section is twice as deep: rest frequency 2 * 3.5160, speed parameter half as large
         stiffened = {2: 3.6817, 6: 4.7973, 12: 7.3604}[speed] * 2
         assert omega[edge.index(True)] / unit_flap == pytest.approx(np.sqrt(stiffened**2 - speed**2), rel=3e-3)
+
+
+def test_beyond_buckling_and_divergence_there_is_no_frequency():
+    """The cantilever that points inward at the rim is pressed by its own centrifugal force and falls over."""
+    part = beam()
+    euler = np.pi**2 * SOFT.E * (2 * DEPTH * DEPTH**3 / 12) / (4 * LENGTH**2)
+    prestressed(part, SOFT, -0.99 * euler * part.system.loads["pull"])
+    with pytest.raises(StaticDivergence, match="unstable at rest"):
+        prestressed(part, SOFT, -1.01 * euler * part.system.loads["pull"])
+    M, K = part.system.mass, part.system.stiffness
+    low = modes(K, M, 1)[0][0] ** 2
+    for solve in (lambda k: modes(k, M, 2), lambda k: modes(k.toarray(), M.toarray(), 2)):
+        with pytest.raises(StaticDivergence, match=r"omega\^2 (= -|is negative)"):
+            solve(K - 1e4 * low * M)
+
+
+@pytest.mark.parametrize("solver", ["superlu", None])
+def test_a_definite_factorisation_refuses_an_indefinite_matrix(solver):
+    part = beam()
+    M, K = part.system.mass, part.system.stiffness
+    low = modes(K, M, 1)[0][0] ** 2
+    factorise(K - 0.9 * low * M, solver=solver)
+    with pytest.raises(SingularStiffness):
+        factorise(K - 1.1 * low * M, solver=solver)
