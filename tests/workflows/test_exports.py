@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree
 
 import meshio
 import numpy as np
@@ -14,6 +15,8 @@ import pyuff
 import pyvista as pv
 import xarray as xr
 from scipy.io import loadmat
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridReader
 
 from tests.helpers.synthetic_result import result
 from tribodyn.reduction import foreign
@@ -133,6 +136,46 @@ def test_a_cycle_is_the_sum_of_its_harmonics(series: Path) -> None:
     np.testing.assert_allclose(quarter.point_data["displacement"], terms[..., 0] + terms[..., 2], atol=1e-15)
 
 
+def test_the_contact_over_a_cycle_has_forces_and_status_of_its_instants(series: Path) -> None:
+    """Read by VTK itself, as ParaView does; forces are vectors along x, y, z."""
+    given = result()
+    loops, patch = given.loops, given.patch
+    assert loops is not None
+    assert patch is not None
+    listing = ElementTree.parse(series / "contact_cycle_4.pvd")
+    entries = [(float(e.attrib["timestep"]), series / e.attrib["file"]) for e in listing.iter("DataSet")]
+    np.testing.assert_allclose([time for time, _ in entries], np.arange(vtk.INSTANTS) / vtk.INSTANTS)
+    instant = 5
+    sample = instant * loops.force.shape[-1] // vtk.INSTANTS
+    reader = vtkXMLPolyDataReader()
+    reader.SetFileName(str(entries[instant][1]))
+    reader.Update()
+    fields = reader.GetOutput().GetPointData()
+    force = vtk_to_numpy(fields.GetArray("contact_force"))
+    np.testing.assert_allclose(np.einsum("pcx,px->pc", patch.frames, force), loops.force[1, :, :, sample], atol=1e-9)
+    moved = vtk_to_numpy(fields.GetArray("relative_displacement"))
+    np.testing.assert_allclose(
+        np.einsum("pcx,px->pc", patch.frames, moved), loops.displacement[1, :, :, sample], atol=1e-15
+    )
+    status = vtk_to_numpy(fields.GetArray("status_now"))
+    np.testing.assert_array_equal(status, states.instant_status(given, 1)[:, sample])
+
+
+def test_vtk_itself_reads_the_worn_part(series: Path) -> None:
+    given = result()
+    assert given.part is not None
+    assert given.wear is not None
+    reader = vtkXMLUnstructuredGridReader()
+    reader.SetFileName(str(series / "part_wear" / "part_wear_0008.vtu"))
+    reader.Update()
+    grid = reader.GetOutput()
+    assert grid.GetNumberOfCells() == len(given.part.cells)
+    worn = vtk_to_numpy(grid.GetPointData().GetArray("worn_off"))
+    np.testing.assert_allclose(vtk_to_numpy(grid.GetPoints().GetData()) - worn, given.part.points, atol=1e-15)
+    assert np.linalg.norm(worn, axis=1).max() == pytest.approx(0.5 * given.wear.depth[8].max())
+    assert vtk_to_numpy(grid.GetFieldData().GetArray("cycles"))[0] == given.wear.cycles[8]
+
+
 def _read(listing: Path, number: int) -> pv.DataSet:
     reader = pv.PVDReader(listing)
     reader.set_active_time_point(number)
@@ -190,6 +233,14 @@ def test_reduced_matrices_are_those_of_the_run(small: Result, tmp_path: Path) ->
     free = np.sort(np.linalg.eigvals(np.linalg.solve(npz.mass.toarray(), npz.stiffness.toarray())).real)
     np.testing.assert_allclose(np.sqrt(free[:2]) / (2 * np.pi), small.facts.free_hz[:2], rtol=1e-6)
     assert (tmp_path / "abaqus" / "reduced.inp") in written
+    for letter in "MKC":  # the format itself: row node, its degree of freedom, column node, its degree, value
+        lines = np.loadtxt(tmp_path / "abaqus" / f"reduced_{letter}.inp", delimiter=",")
+        assert (lines[:, [1, 3]] == 1).all()
+        assert (lines[:, 0] >= lines[:, 2]).all()
+        lower = np.zeros_like(wanted[letter])
+        lower[lines[:, 0].astype(int) - 1, lines[:, 2].astype(int) - 1] = lines[:, 4]
+        again = lower + np.tril(lower, -1).T
+        np.testing.assert_allclose(again, wanted[letter], rtol=1e-12, atol=1e-12 * np.abs(wanted[letter]).max())
     assert "STIFFNESS=K, MASS=M, VISCOUS DAMPING=C" in (tmp_path / "abaqus" / "reduced.inp").read_text()
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import tribodyn as td
 from tests.helpers.synthetic_result import result
 from tribodyn.workflows.pictures import plots
 from tribodyn.workflows.report import page
@@ -22,6 +23,8 @@ from tribodyn.workflows.report.solid import solid
 from tribodyn.workflows.result import faces
 
 selenium = pytest.importorskip("selenium.webdriver")
+Keys = pytest.importorskip("selenium.webdriver.common.keys").Keys
+Select = pytest.importorskip("selenium.webdriver.support.select").Select
 CHROMIUM = next(
     (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
 )
@@ -43,8 +46,8 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def browser(written: Path) -> Iterator[Any]:
-    """A headless Chromium that has opened the report, cut off from any network."""
+def chromium() -> Iterator[Any]:
+    """A headless Chromium, cut off from any network."""
     if CHROMIUM is None:
         if os.environ.get("TRIBODYN_BROWSER") == "required":
             pytest.fail("no Chromium on this machine: apt-get install chromium chromium-driver")
@@ -60,10 +63,21 @@ def browser(written: Path) -> Iterator[Any]:
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     driver = selenium.Chrome(options=options, service=selenium.ChromeService(shutil.which("chromedriver")))
     driver.set_script_timeout(120)
-    driver.get(written.as_uri())
-    _until(driver, "return window.reportReady === true")
     yield driver
     driver.quit()
+
+
+@pytest.fixture
+def browser(chromium: Any, written: Path) -> Any:
+    """The browser with the report of two results."""
+    if chromium.current_url != written.as_uri():
+        opened(chromium, written)
+    return chromium
+
+
+def opened(driver: Any, path: Path) -> None:
+    driver.get(path.as_uri())
+    _until(driver, "return window.reportReady === true")
 
 
 def _until(driver: Any, script: str, seconds: float = 90.0) -> None:
@@ -150,7 +164,7 @@ def test_the_slider_shows_the_depth_of_every_state(browser: Any) -> None:
         depths.append(browser.execute_script(face, section))
     np.testing.assert_allclose(depths, 1e6 * given.wear.depth[[0, 4, 8]], rtol=1e-4)
     browser.execute_script(
-        "const s = arguments[0].querySelector('.field'); s.value = 'status'; s.dispatchEvent(new Event('input'))",
+        "const s = arguments[0].querySelector('.field'); s.value = 'status'; s.dispatchEvent(new Event('change'))",
         section,
     )
     assert "slip-separation" in section.find_element("css selector", ".legend").text
@@ -173,6 +187,76 @@ def test_nothing_is_wider_than_the_window(width: int, browser: Any, tmp_path: Pa
     browser.save_screenshot(str(tmp_path / "page.png"))
     assert (tmp_path / "page.png").stat().st_size > 10_000
     browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+SMALL = {
+    "beam": (
+        "geometry.n_patch=3", "geometry.n_length=2", "geometry.n_height=1", "reduction.modes=3", "response.points=6",
+        "wear.tolerance=20 %", "wear.max_steps=4",
+    ),
+    "leaf_seal": ("geometry.n_column=7", "geometry.pin_column=2", "response.points=6"),
+    "blade": ("geometry.n_along=2", "geometry.n_up=2", "response.points=8", "wear.step=20 %", "wear.max_steps=3"),
+    "rig": (
+        "geometry.n_contact_length=3", "geometry.n_contact_width=3", "reduction.modes=4", "harmonics.kept=[0, 1]",
+        "wear.max_steps=2",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_the_report_of_each_case_is_clicked_zoomed_and_turned(
+    name: str, chromium: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A small run of each scene that comes along, without its figures but one, which are looked at elsewhere."""
+    monkeypatch.setattr(page, "_renders", lambda found: {})
+    monkeypatch.setattr(plots, "figures", lambda found: {"frf": plots.frequency_response})
+    result = td.run(name, overrides=(*SMALL[name], "verdict.enabled=false"))
+    path = page.write([(name, result, None)], tmp_path / f"{name}.html")
+    assert path.stat().st_size < page.LARGEST
+    opened(chromium, path)
+    charts = chromium.find_elements("css selector", ".chart")
+    assert len(charts) >= (1 if result.wear is None else 6)
+    for chart in charts:
+        chromium.execute_script("arguments[0].scrollIntoView({block: 'center'})", chart)
+        before = chromium.execute_script("return arguments[0]._fullLayout.xaxis.range.map(Number)", chart)
+        plot = chart.find_element("css selector", ".nsewdrag")
+        drag(chromium, plot, 80, 5)
+        after = chromium.execute_script("return arguments[0]._fullLayout.xaxis.range.map(Number)", chart)
+        assert after[1] - after[0] < 0.8 * (before[1] - before[0]), chart.get_attribute("data-chart")
+    entries = charts[0].find_elements("css selector", ".legendtoggle")
+    visible = "return arguments[0].data.map(t => String(t.visible))"
+    shown = chromium.execute_script(visible, charts[0])
+    entries[0].click()
+    time.sleep(0.5)  # a click waits for a second one
+    assert chromium.execute_script(visible, charts[0]) != shown
+    solid = chromium.find_element("css selector", "#part-0 .solid")
+    chromium.execute_script("arguments[0].scrollIntoView({block: 'center'})", solid)
+    eye = "return Object.values(arguments[0]._fullLayout.scene._scene.getCamera().eye)"
+    before = chromium.execute_script(eye, solid)
+    drag(chromium, solid, 120, 30)
+    assert np.linalg.norm(np.subtract(chromium.execute_script(eye, solid), before)) > 0.1
+    slider = chromium.find_element("css selector", "#part-0 .state")
+    label = chromium.find_element("css selector", "#part-0 .label")
+    first = label.text
+    slider.send_keys(Keys.END)
+    assert label.text != first
+    field = chromium.find_element("css selector", "#part-0 .field")
+    Select(field).select_by_visible_text("status")
+    _until(chromium, "return document.querySelector('#part-0 .legend').textContent !== ''", 20)
+    assert not [entry for entry in chromium.get_log("browser") if entry["level"] == "SEVERE"]
+    for width in (400, 1280):
+        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600}
+        chromium.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        time.sleep(0.3)
+        assert chromium.execute_script("return document.documentElement.scrollWidth") <= width
+    chromium.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def drag(driver: Any, element: Any, right: int, down: int) -> None:
+    selenium.ActionChains(driver).move_to_element(element).click_and_hold().move_by_offset(
+        right, down
+    ).release().perform()
+    time.sleep(0.4)
 
 
 def test_it_prints(browser: Any) -> None:

@@ -32,7 +32,8 @@ def animate(
     over
         wear or cycle, or both.
     row
-        Wear row, or point of a response that does not wear, whose cycle is shown; the last that is kept by default.
+        Wear row, or point of a response that does not wear, whose cycle is shown; by default that whose contact works
+        most.
     formats
         mp4 or gif, or both.
     images

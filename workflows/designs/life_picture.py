@@ -72,9 +72,11 @@ def picture(found: StudyTable, number: str = "life_cycles") -> Figure:
         axes.set_xscale("log")
         axes.set_yticks(_paper(np.array(TICKS)), [f"{100 * tick:g} %" for tick in TICKS])
         axes.set_ylim(_paper(0.5 * share[0]), _paper(1 - 0.5 * (1 - share[-1])))
-        without = done - len(values)
+        without, lost = done - len(values), len(column) - done
         axes.set(xlabel=LABELS.get(number, number), ylabel="share of the runs below")
-        axes.set_title(f"{found.name}: distribution" + (f"; {without} runs without, not fitted" if without else ""))
+        said = f"; {without} runs without, not fitted" if without else ""
+        said += f"; {lost} of {len(column)} runs not complete" if lost else ""
+        axes.set_title(f"{found.name}: distribution{said}")
         axes.legend(loc="upper left", fontsize=9)
         axes.axhline(_paper(0.5), color=GREY, lw=0.6)
     return figure

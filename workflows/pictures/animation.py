@@ -42,7 +42,7 @@ def write(
 
     over : "wear" shows depth, status and pressure of the opened contact at the wear steps; "cycle" shows part and
         status by pair over one cycle of a state
-    row : of the wear history, or point of the response, whose cycle is shown; the last that is kept by default
+    row : of the wear history, or point of the response, whose cycle is shown; that whose contact works most by default
     dpi : dots per inch; a film is 12.8 by 7.2 inches
     deformation, wear : factors by which displacement and depth are exaggerated, chosen by size where None
     Raises  ValueError: the result has nothing of the kind to show; RenderingUnavailable

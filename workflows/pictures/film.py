@@ -12,7 +12,7 @@ import numpy as np
 from PIL import Image
 
 FORMATS = ("mp4", "gif")
-COLOURS = 128  # of a GIF, chosen from its last image, which has all that is shown
+COLOURS = 128  # of a GIF, chosen from its first, middle and last image
 
 
 def write(images: Iterable[np.ndarray], stem: Path, formats: Sequence[str], rate: float) -> list[Path]:
@@ -36,7 +36,8 @@ def write(images: Iterable[np.ndarray], stem: Path, formats: Sequence[str], rate
             if "gif" in paths:
                 kept.append(Image.fromarray(image))
     if kept:
-        palette = kept[-1].quantize(COLOURS)
+        some = [np.asarray(kept[i]) for i in (0, len(kept) // 2, -1)]
+        palette = Image.fromarray(np.concatenate(some)).quantize(COLOURS)
         pages = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in kept]
         # hundredths of a second are the unit of the format
         pages[0].save(

@@ -14,6 +14,7 @@ from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
 from tribodyn.workflows.pictures import opened as book
 from tribodyn.workflows.pictures import triad
 from tribodyn.workflows.pictures.figures import force_unit, heading, length_unit, scale_bar, status_name
+from tribodyn.workflows.pictures.plots import has_friction, loop_size
 from tribodyn.workflows.pictures.render import Moving, show
 from tribodyn.workflows.pictures.shots import shoot
 from tribodyn.workflows.pictures.style import BLUE, INK, MOTION_MAP, RED, STATUS, STYLE
@@ -28,7 +29,7 @@ AT_ONCE = (STICKS, SLIPS, SEPARATES)  # what a pair can do at an instant
 class CycleFilm:
     """A film over one cycle of a state: its figure, and how an instant gets into it.
 
-    row : of the wear history, or point of the response; the last that is kept where None
+    row : of the wear history, or point of the response; that whose contact works most where None
     count : of images, evenly over the period
     deformation, wear : factors by which displacement and depth are exaggerated, chosen by size where None
     Raises  ValueError where nothing is kept of the cycle
@@ -41,7 +42,8 @@ class CycleFilm:
         if loops is None or patch is None:
             raise ValueError("the result keeps no cycle of a contact: its scene needs pictures.plots = true")
         states = {state.number: state for state in shown_states(result) if state.number in loops.row.tolist()}
-        row = max(states) if row is None else row
+        if row is None:
+            row = int(loops.row[np.argmax((loop_size(result) * _drawn_components(result)).sum(axis=(1, 2)))])
         if row not in states:
             raise ValueError(f"the result keeps no cycle of row {row}: it has those of {', '.join(map(str, states))}")
         self.state, self.count = states[row], count
@@ -92,8 +94,8 @@ class CycleFilm:
         left, right = lower.subplots(1, 2, width_ratios=[1, 1.6])
         self._draw_loop(left, result)
         self._draw_status(right, result)
-        at = f"{self.state.label}, {self.state.omega / (2 * np.pi):.4g} Hz"
-        heading(self.figure, result, f"one cycle, {at}")
+        hertz = "" if result.wear is None else f", {self.state.omega / (2 * np.pi):.4g} Hz"
+        heading(self.figure, result, f"one cycle, {self.state.label}{hertz}")
         self._clock = self.figure.text(0.99, 0.985, "", ha="right", va="top", fontsize=11)
 
     def _start(self, figure: Any, views: list[str]) -> None:
@@ -151,19 +153,19 @@ class CycleFilm:
 
 
 def _loop(result: Result, at: int) -> tuple[np.ndarray, np.ndarray, str, str]:
-    """Displacement and force of the pair and direction that work most, or whose force swings most; and their labels."""
+    """Displacement and force of the pair and direction whose loop says most, and their labels."""
     loops, patch = result.loops, result.patch
     assert loops is not None
     assert patch is not None
-    displacement, force = loops.displacement[at], loops.force[at]
-    tangential = [c for c, name in enumerate(patch.components) if name != "n"]
-    if tangential:
-        work = np.abs(np.sum(force * np.gradient(displacement, axis=-1), axis=-1))[:, tangential]
-    else:
-        work, tangential = np.ptp(force, axis=-1), [0]
-    pair, place = np.unravel_index(int(np.argmax(work)), work.shape)
-    component = tangential[int(place)]
-    x, f = displacement[pair, component], force[pair, component]
+    size = loop_size(result)[at] * _drawn_components(result)
+    pair, component = (int(place) for place in np.unravel_index(int(np.argmax(size)), size.shape))
+    x, f = loops.displacement[at, pair, component], loops.force[at, pair, component]
     x = x - (x.max() + x.min()) / 2
     (unit_x, scale_x), (unit_f, scale_f) = length_unit(float(x.max())), force_unit(float(np.abs(f).max()))
     return scale_x * x, scale_f * f, f"{patch.components[component]} / {unit_x}", f"force at pair {pair} / {unit_f}"
+
+
+def _drawn_components(result: Result) -> np.ndarray:
+    """(n_component,) 1 for the components that loops are drawn of, 0 for the others: not n where there is friction."""
+    assert result.patch is not None
+    return np.array([float(name != "n" or not has_friction(result)) for name in result.patch.components])

@@ -246,25 +246,35 @@ def normal_loops(result: Result) -> Figure:
     return _loops(result, [0], "normal force over approach by pair")
 
 
+def loop_size(result: Result) -> np.ndarray:
+    """How much the loops of every state, pair and component say (n_field, n_pair, n_component).
+
+    The work of the loop [J] where there is friction, else the swing of the force [N]
+    """
+    loops = result.loops
+    assert loops is not None
+    if has_friction(result):
+        x = loops.displacement
+        return np.abs(np.sum(loops.force * (np.roll(x, -1, axis=-1) - np.roll(x, 1, axis=-1)), axis=-1)) / 2
+    return np.asarray(np.ptp(loops.force, axis=-1))
+
+
 def _loops(result: Result, components: list[int], what: str, asked: Sequence[int] | None = None) -> Figure:
     loops, patch = result.loops, result.patch
     assert loops is not None
     assert patch is not None
     states = [state_of(result, int(row)) for row in loops.row]
-    work = np.abs(np.sum(loops.force * np.gradient(loops.displacement, axis=-1), axis=-1))[:, :, components].sum(axis=2)
-    swing = work if components != [0] or len(patch.components) > 1 else np.ptp(loops.force[:, :, 0], axis=-1)
-    pairs = list(dict.fromkeys(int(np.argmax(one)) for one in swing)) if asked is None else list(asked)
+    size = loop_size(result)[:, :, components]
+    pairs = list(dict.fromkeys(int(np.argmax(one)) for one in size.sum(axis=2))) if asked is None else list(asked)
     if not all(0 <= pair < len(patch.area) for pair in pairs):
         raise ValueError(f"pairs {pairs}: this contact has pairs 0 to {len(patch.area) - 1}")
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(2.7 * len(states) + 0.4, 2.3 * len(pairs) + 0.6), layout="constrained")
         grid = figure.subplots(len(pairs), len(states), squeeze=False)
         for line, pair in enumerate(pairs):
-            # the direction in which this pair moves most
-            moves = [np.ptp(loops.displacement[:, pair, c], axis=-1).max() for c in components]
-            component = components[int(np.argmax(moves))]
             for column, state in enumerate(states):
                 axes = grid[line, column]
+                component = components[int(np.argmax(size[column, pair]))]
                 x, force = loops.displacement[column, pair, component], loops.force[column, pair, component]
                 x = x - (x.max() + x.min()) / 2  # the static offset says nothing about the loop
                 (unit_x, scale_x), (unit_f, scale_f) = length_unit(x.max()), force_unit(np.abs(force).max())

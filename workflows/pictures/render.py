@@ -9,7 +9,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -45,16 +45,21 @@ def check() -> None:
     Raises  RenderingUnavailable
     """
     _choose_window()
-    try:
-        done = subprocess.run([sys.executable, "-c", PROBE], capture_output=True, timeout=300, check=False)
-        works = done.returncode == 0
-    except (OSError, subprocess.TimeoutExpired):
-        works = False
-    if not works:
+    if not _works(PROBE):
         raise RenderingUnavailable(
             "rendering without a screen does not work here: install the system libraries "
             f"{SYSTEM_LIBRARIES} (on Debian: apt-get install -y --no-install-recommends {SYSTEM_LIBRARIES})"
         )
+
+
+@cache
+def _works(probe: str) -> bool:
+    """Whether a program of pyvista comes to its end here."""
+    try:
+        done = subprocess.run([sys.executable, "-c", probe], capture_output=True, timeout=300, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return done.returncode == 0
 
 
 def _choose_window() -> None:

@@ -56,7 +56,7 @@ function viewer(holder) {
         text: isStatus ? values.map((v) => (solid.status[v] || ["none"])[0]) : values.map(String), hoverinfo: "text",
         lighting: { ambient: 1, diffuse: 0, specular: 0 } });
     });
-    holder.querySelector(".label").textContent = state.label + ", depth drawn × " + solid.factor;
+    holder.querySelector(".label").textContent = state.label + (solid.worn ? ", depth drawn × " + solid.factor : "");
     holder.querySelector(".legend").innerHTML = !isStatus ? "" : [...new Set(values)].sort().map((bits) => {
       const [name, color] = solid.status[bits] || ["none", "#ffffff"];
       return '<span><i style="background:' + color + '"></i>' + name + "</span>";
@@ -64,14 +64,16 @@ function viewer(holder) {
     return found;
   }
 
+  const far = plot.clientWidth < 1.3 * plot.clientHeight ? 2.1 : 1.25;  // so that the part fits a narrow page too
   const axis = { showbackground: false, gridcolor: "#e6e8eb", color: "#4a515c" };
   const layout = { margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: "kept", scene: { uirevision: "kept",
     aspectmode: "manual", aspectratio: { x: solid.extent[0], y: solid.extent[1], z: solid.extent[2] },
     xaxis: { ...axis, title: { text: "x / mm" } }, yaxis: { ...axis, title: { text: "y / mm" } },
-    zaxis: { ...axis, title: { text: "z / mm" } }, camera: { projection: { type: "orthographic" }, eye: xyz(solid.camera[0]), up: xyz(solid.camera[1]) } } };
+    zaxis: { ...axis, title: { text: "z / mm" } }, camera: { projection: { type: "orthographic" }, eye: xyz(solid.camera[0].map((v) => far * v)), up: xyz(solid.camera[1]) } } };
   const draw = () => Plotly.react(plot, traces(), layout, config);
   Plotly.newPlot(plot, traces(), layout, config);
-  for (const control of [slider, field, open]) control.addEventListener("input", draw);
+  slider.addEventListener("input", draw);
+  for (const control of [field, open]) control.addEventListener("change", draw);
 }
 
 document.querySelectorAll("[data-solid]").forEach(viewer);

@@ -116,9 +116,15 @@ def _title(result: Result) -> str:
 
 
 def _table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
+    """A table; on a narrow page the rows of one with a head are stacked, each cell behind the name of its column."""
     top = f"<thead><tr>{''.join(f'<th>{escape(h)}</th>' for h in head)}</tr></thead>" if head else ""
-    body = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
-    return f'<div class="scroll"><table>{top}<tbody>{body}</tbody></table></div>'
+    lines = []
+    for row in rows:
+        names = [f' data-head="{escape(name)}"' if name else "" for name in head] or [""] * len(row)
+        cells = (f"<td{name}>{escape(cell)}</td>" for name, cell in zip(names, row, strict=True))
+        lines.append(f"<tr>{''.join(cells)}</tr>")
+    kind = ' class="wide"' if head else ""
+    return f'<div class="scroll"><table{kind}>{top}<tbody>{"".join(lines)}</tbody></table></div>'
 
 
 def _verdict(result: Result) -> str:
@@ -137,7 +143,17 @@ def _verdict(result: Result) -> str:
             ))  # fmt: skip
         head = ("quantity", "value (SI)", "total relative error", "dominated by", "", "why")
         said += _table(rows, head)
-    return said + _table([(name, value) for name, value in summary.lines(result)])
+    return said + _table(_not_told_elsewhere(summary.lines(result)))
+
+
+def _not_told_elsewhere(lines: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
+    """The lines of a summary without verdict and error budget, which the page has as tables of their own."""
+    kept, inside = [], False
+    for name, value in lines:
+        inside = name in ("verdict", "error budget") or (inside and name.startswith(" "))
+        if not inside:
+            kept.append((name, value))
+    return kept
 
 
 def _number(value: Any) -> str:

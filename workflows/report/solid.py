@@ -32,12 +32,16 @@ def solid(result: Result) -> dict[str, Any] | None:
     faces = faces_of(result)
     size = float(np.sqrt(patch.area.sum()))
     factor = wear_scale(patch, np.stack([state.depth for state in states]))
-    found: dict[str, Any] = {"factor": factor, "open": plain(1e3 * 0.8 * size * patch.frames[:, 2].mean(axis=0))}
+    found: dict[str, Any] = {
+        "worn": result.wear is not None,
+        "factor": factor,
+        "open": plain(1e3 * 0.8 * size * patch.frames[:, 2].mean(axis=0)),
+    }
     nodes = np.zeros(0, int)
     points = patch.points if part is None else part.points
     found["extent"] = plain(np.ptp(points, axis=0) / np.ptp(points, axis=0).max())
     towards, up = looking(points, patch)
-    found["camera"] = [plain(1.9 * towards / np.linalg.norm(towards)), plain(up)]
+    found["camera"] = [plain(towards / np.linalg.norm(towards)), plain(up)]
     if part is not None:
         nodes, triangles = _surface(result)
         body = bodies(part)
@@ -79,7 +83,9 @@ def _states(result: Result) -> list[State]:
 
 def _fields(result: Result, state: State) -> dict[str, list[Any]]:
     assert result.patch is not None
-    found = {"total wear depth / µm": plain(1e6 * state.depth, 5)}
+    found: dict[str, list[Any]] = {}
+    if result.wear is not None or state.pressure is None:
+        found["total wear depth / µm"] = plain(1e6 * state.depth, 5)
     if state.pressure is not None:
         found["mean pressure / MPa"] = plain(1e-6 * state.pressure, 5)
     if result.wear is not None and len(result.wear.cycles):

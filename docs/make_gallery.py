@@ -1,0 +1,204 @@
+"""Make the gallery of the site: every scene that comes along, every kind of picture, films, screenshots of reports.
+
+    ./tribodyn gallery                       runs every scene as it is shipped, half an hour
+    ./tribodyn gallery --results FOLDER      takes FOLDER/NAME/result.h5 where they are complete
+
+Leaves docs/gallery/pictures/*.png and *.gif, docs/gallery/pictures.md that shows them, and the figures that other pages
+take from the same runs. Screenshots need Chromium and chromedriver.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from PIL import Image
+
+import tribodyn as td
+from tribodyn.workflows.api import scenes
+
+HERE = Path(__file__).parent
+PICTURES = HERE / "gallery" / "pictures"
+PAGE = HERE / "gallery" / "pictures.md"
+DPI, FILM_DPI, FILM_IMAGES = 100, 55, 16
+COLOURS = 256  # of a picture on the site
+WIDTHS = {"phone": 400, "desk": 1280}
+ELSEWHERE = {("beam", "patch"): "beam_patch", ("beam", "frf"): "beam_frf", ("blade", "wheel"): "blade_wheel"}
+
+KINDS = {
+    "frf": "Response between its free and stuck references, and the path of the peak under wear.",
+    "outputs": "Amplitude of every observed output.",
+    "cycles_per_step": "Cycles that each wear step stands for.",
+    "peak": "Amplitude and frequency of the cycle that wears.",
+    "preload": "Static normal force of the contact.",
+    "depth": "Depth and worn area.",
+    "energy": "Friction work per cycle, and worn volume against it.",
+    "status": "Share of the patch in each contact status.",
+    "hysteresis": "Loops of the pairs that dissipate most.",
+    "normal": "Normal force over approach.",
+    "patch": "Depth, status and mean pressure on the patch, each column on its own scale.",
+    "status_maps": "Contact status over wear.",
+    "part": "The part at its largest swing; the contact is outlined.",
+    "contact": "Both faces of the contact, opened like a book.",
+    "wheel": "All blades at one instant.",
+    "film_wear": "Depth, status and pressure over wear.",
+    "film_cycle": "One cycle: the part in motion and the status of every pair.",
+    "report_phone": "The top of the report at the width of a phone.",
+    "report_desk": "The top of the report at the width of a desk.",
+    "nodal_diameters": "Frequencies over nodal diameters, contact free and stuck.",
+    "safe": "SAFE diagram: which modes an engine order meets in a range of speeds.",
+    "campbell": "Campbell diagram of some engine orders.",
+    "backbone": "Frequency and damping of a nonlinear mode against its amplitude.",
+    "life": "Lives of a study of drawn loads and frictions on Weibull paper.",
+    "study": "Peak, amplitude, depth and life of the same study against what was drawn.",
+}
+
+CHANGED = {"rig": ("verdict.enabled=false",)}  # its verdict takes longer than all else here
+COARSE_BEAM = ("geometry.n_patch=5", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=4")
+STUDY = {
+    "study": {
+        "scene": "beam", "design": "latin_hypercube", "runs": 16, "seed": 1,
+        "set": [
+            "geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "reduction.modes=3", "verdict=",
+            "wear.tolerance=20 %",
+        ],
+    },
+    "vary": {
+        "contact.friction": {"distribution": "normal", "mean": 0.5, "cov": "10 %"},
+        "loads.static.press.value": {"distribution": "lognormal", "median": "20 kN", "cov": 0.1},
+    },
+}  # fmt: skip
+
+
+def main() -> None:
+    """Make everything; a result that is complete already is taken."""
+    words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    words.add_argument("--results", type=Path, default=Path("results/gallery"), help="folder of the results")
+    words.add_argument("--only", nargs="*", default=None, help="names of scenes, or studies; all by default")
+    given = words.parse_args()
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    for name in [*td.scene_names(), "studies"]:
+        if given.only is None or name in given.only:
+            print(name, flush=True)
+            with TemporaryDirectory() as folder:
+                for picture in studies(Path(folder)) if name == "studies" else of_scene(name, given.results / name):
+                    print(f"  {picture.name}, {picture.stat().st_size / 1e3:.0f} kB", flush=True)
+    write_page()
+
+
+def of_scene(name: str, folder: Path) -> Iterator[Path]:
+    """Run a scene, and draw all that its result has."""
+    result = td.run(name, folder, overrides=CHANGED.get(name, ()), resume=(folder / "result.h5").exists())
+    with TemporaryDirectory() as place:
+        start, spent = time.perf_counter(), time.process_time()
+        written, missing = scenes.draw(result, Path(place), dpi=DPI)
+        if missing:
+            print(f"  {missing}")
+        seconds, processor = time.perf_counter() - start, time.process_time() - spent
+        print(f"  {len(written)} pictures, {seconds:.0f} s, {processor:.0f} s of processor")
+        for path in written:
+            yield small(path, f"{name}_{path.stem}")
+            if (name, path.stem) in ELSEWHERE:
+                shutil.copy(
+                    PICTURES / f"{name}_{path.stem}.png", HERE / "figures" / f"{ELSEWHERE[name, path.stem]}.png"
+                )
+        for over in ("wear", "cycle"):
+            if over == "cycle" or result.wear_steps:
+                spent = time.process_time()
+                (film,) = scenes.animate(
+                    result, Path(place), over, formats=("gif",), images=FILM_IMAGES, dpi=FILM_DPI,
+                    row=0 if over == "cycle" and result.wear_steps else None,
+                )  # fmt: skip
+                print(f"  film over {over}: {(time.process_time() - spent) / FILM_IMAGES:.2f} s of processor an image")
+                yield Path(shutil.copy(film, PICTURES / f"{name}_film_{over}.gif"))
+        yield from screenshots(name, folder / "result.h5", Path(place))
+
+
+def screenshots(name: str, file: Path, place: Path) -> Iterator[Path]:
+    """The top of the report at two widths."""
+    from tribodyn.workflows.report import page
+
+    report = page.write([(name, td.load(file), file)], place / "report.html")
+    print(f"  report: {report.stat().st_size / 1e6:.1f} MB")
+    chromium = next((path for word in ("chromium", "google-chrome") if (path := shutil.which(word))), None)
+    if chromium is None:
+        print("  no Chromium here: no screenshots")
+        return
+    from selenium import webdriver
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    for word in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--enable-unsafe-swiftshader"):
+        options.add_argument(word)
+    browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(shutil.which("chromedriver")))
+    try:
+        browser.set_page_load_timeout(300)
+        for word, width in WIDTHS.items():
+            size = {"width": width, "height": 1500, "deviceScaleFactor": 1, "mobile": width < 600}
+            browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+            browser.get(report.resolve().as_uri())
+            end = time.monotonic() + 300
+            while not browser.execute_script("return window.reportReady === true") and time.monotonic() < end:
+                time.sleep(0.5)
+            time.sleep(3)
+            path = place / f"report_{word}.png"
+            browser.save_screenshot(str(path))
+            yield small(path, f"{name}_report_{word}")
+    finally:
+        browser.quit()
+
+
+def studies(folder: Path) -> Iterator[Path]:
+    """What the studies draw: modes of the blade's wheel, a backbone of the beam, lives of a drawn beam."""
+    wheel = td.build_wheel(td.read_scene("blade"))
+    families = {state: wheel.diagram(range(21), 4, state == "stuck") for state in ("free", "stuck")}
+    orders = (1, 2, 3, 5, 8, 12, 20)
+    speeds, waves = td.campbell(wheel, 150.0, 5, orders, 1)
+    critical = {o: td.critical_speeds(speeds, waves["stuck"][:, i, 0], o) for i, o in enumerate(orders)}
+    bone = td.follow_backbone(td.read_scene("beam", COARSE_BEAM), 1e-6, 2e-3)
+    table = td.study(STUDY, folder / "study", workers=1)
+    for name, figure in {
+        "blade_nodal_diameters": td.plot_nodal_diameters(families),
+        "blade_safe": td.plot_safe(families, wheel.n_sectors, 110.0, 120.0),
+        "blade_campbell": td.plot_campbell(speeds, waves, orders, critical),
+        "beam_backbone": td.plot_backbone(bone),
+        "beam_study": table.plot(),
+        "beam_life": table.plot_distribution(),
+    }.items():
+        path = folder / f"{name}.png"
+        figure.savefig(path, dpi=DPI)
+        yield small(path, name)
+    shutil.copy(PICTURES / "blade_campbell.png", HERE / "figures" / "blade_campbell.png")
+
+
+def small(path: Path, name: str) -> Path:
+    """A picture with few colours, as the site has it."""
+    there = PICTURES / f"{name}.png"
+    with Image.open(path) as image:
+        image.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(there, optimize=True)
+    return there
+
+
+def write_page() -> None:
+    """The page of all pictures that are there, scene by scene."""
+    lines = [
+        "# Every picture of every scene", "",
+        "The scenes that come with tribodyn, as they are shipped, in every kind of picture that it draws.",
+        "One command made them all, and this page:", "", "```text", "./tribodyn gallery", "```", "",
+        "Each is drawn by `tribodyn run` and `render`, `animate`, `report`, `wheel`, `backbone` or `study`.", "",
+    ]  # fmt: skip
+    for name in td.scene_names():
+        lines += [f"## {name.replace('_', ' ')}", ""]
+        for kind, caption in KINDS.items():
+            for ending in (".png", ".gif"):
+                if (PICTURES / f"{name}_{kind}{ending}").exists():
+                    lines += [f"![{name}: {caption}](pictures/{name}_{kind}{ending})", "", caption, ""]
+    PAGE.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
