@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.workflows.pictures.plots import loop_size
 from tribodyn.workflows.pictures.style import CYCLE, GREY, INK
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import state_of
@@ -39,9 +40,9 @@ def _chart(data: list[Chart], x: str, y: str, log: bool = False) -> Chart:
         "margin": {"l": 60, "r": 12, "t": 10, "b": 45},
         "paper_bgcolor": "white",
         "plot_bgcolor": "white",
-        "height": 380,
+        "height": 330 + 20 * max(len(data), 2),
         "font": {"color": INK},
-        "legend": {"orientation": "h", "y": -0.25},
+        "legend": {"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"},
         "hovermode": "closest",
         "colorway": list(CYCLE),
     }
@@ -108,13 +109,14 @@ def _loops(results: Sequence[tuple[str, Result]]) -> Chart:
         loops, patch = result.loops, result.patch
         if loops is None or patch is None:
             continue
-        tangential = [c for c, component in enumerate(patch.components) if component != "n"] or [0]
+        drawn = [c for c, component in enumerate(patch.components) if component != "n"] or [0]
+        size = loop_size(result)[:, :, drawn]
+        busiest = int(np.argmax(size.sum(axis=(1, 2))))
         for at, row in enumerate(loops.row):
-            swing = np.ptp(loops.displacement[at][:, tangential], axis=-1).max(axis=1)
-            for pair in np.argsort(-swing)[:LOOPS]:
-                c = tangential[int(np.argmax(np.ptp(loops.displacement[at, pair, tangential], axis=-1)))]
+            for rank, pair in enumerate(np.argsort(-size[at].sum(axis=1))[:LOOPS]):
+                c = drawn[int(np.argmax(size[at, pair]))]
                 x, f = loops.displacement[at, pair, c], loops.force[at, pair, c]
                 label = f"{name}: {state_of(result, int(row)).label}, pair {pair}, {patch.components[c]}"
-                shown = {"visible": True if pair == np.argmax(swing) else "legendonly"}
+                shown = {"visible": True if (at, rank) == (busiest, 0) else "legendonly"}
                 data.append(_line(label, 1e6 * np.append(x, x[0]), np.append(f, f[0]), **shown))
     return _chart(data, "relative displacement / µm", "contact force / N")

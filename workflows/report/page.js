@@ -19,7 +19,7 @@ function viewer(holder) {
   const solid = data.solids[Number(holder.dataset.solid)];
   const plot = holder.querySelector(".solid"), slider = holder.querySelector(".state");
   const field = holder.querySelector(".field"), open = holder.querySelector(".open");
-  slider.max = solid.states.length - 1;
+  slider.max = slider.value = solid.states.length - 1;
   for (const name of Object.keys(solid.states[0].fields)) field.add(new Option(name, name));
   const other = new Set(solid.body ? solid.body.other : []);
   if (!other.size) holder.querySelector(".opener").hidden = true;
@@ -64,12 +64,12 @@ function viewer(holder) {
     return found;
   }
 
-  const far = plot.clientWidth < 1.3 * plot.clientHeight ? 2.1 : 1.25;  // so that the part fits a narrow page too
+  const zoom = plot.clientWidth < 1.3 * plot.clientHeight ? 1 : 1.7;  // a parallel view is zoomed by its ratios alone
   const axis = { showbackground: false, gridcolor: "#e6e8eb", color: "#4a515c" };
   const layout = { margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: "kept", scene: { uirevision: "kept",
-    aspectmode: "manual", aspectratio: { x: solid.extent[0], y: solid.extent[1], z: solid.extent[2] },
+    aspectmode: "manual", aspectratio: xyz(solid.extent.map((v) => zoom * v)),
     xaxis: { ...axis, title: { text: "x / mm" } }, yaxis: { ...axis, title: { text: "y / mm" } },
-    zaxis: { ...axis, title: { text: "z / mm" } }, camera: { projection: { type: "orthographic" }, eye: xyz(solid.camera[0].map((v) => far * v)), up: xyz(solid.camera[1]) } } };
+    zaxis: { ...axis, title: { text: "z / mm" } }, camera: { projection: { type: "orthographic" }, eye: xyz(solid.camera[0]), up: xyz(solid.camera[1]) } } };
   const draw = () => Plotly.react(plot, traces(), layout, config);
   Plotly.newPlot(plot, traces(), layout, config);
   slider.addEventListener("input", draw);

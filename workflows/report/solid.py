@@ -41,7 +41,7 @@ def solid(result: Result) -> dict[str, Any] | None:
     points = patch.points if part is None else part.points
     found["extent"] = plain(np.ptp(points, axis=0) / np.ptp(points, axis=0).max())
     towards, up = looking(points, patch)
-    found["camera"] = [plain(towards / np.linalg.norm(towards)), plain(up)]
+    found["camera"] = [plain(1.9 * towards / np.linalg.norm(towards)), plain(up)]
     if part is not None:
         nodes, triangles = _surface(result)
         body = bodies(part)
