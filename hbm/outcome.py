@@ -1,31 +1,37 @@
-"""Why a curve or a wear run ended: members of an enumeration that carry the beginning of the sentence a user reads.
+"""Why a curve or a wear run ended: members of enumerations that carry the beginning of the sentence a user reads.
 
-A result keeps the sentence; what decides asks for the member, which is read back from it here and nowhere else.
+What decides asks for the member; the sentence is made from it and is never read back.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import Enum
-from typing import Self
+from typing import Generic, Self, TypeVar
 
 CONVERGED = "converged"
 """The outcome of a solve that reached its tolerance; any other outcome is a sentence on what went wrong."""
 
+Kind = TypeVar("Kind", bound="End")
+
+
+@dataclass(frozen=True)
+class Outcome(Generic[Kind]):
+    """How something ended. kind : the member; detail : what the sentence says after the member's words."""
+
+    kind: Kind
+    detail: str = ""
+
+    def __str__(self) -> str:
+        return self.kind.value + self.detail
+
 
 class End(Enum):
-    """An end; its value is how its sentence begins, and no value begins like another one of its kind."""
+    """An end; its value is how its sentence begins."""
 
-    def say(self, detail: str = "") -> str:
-        """The sentence, with details after the member's words."""
-        return self.value + detail
-
-    @classmethod
-    def of(cls, sentence: str) -> Self:
-        """The member that a sentence tells; raises ValueError for one that none tells."""
-        for member in cls:
-            if sentence.startswith(member.value):
-                return member
-        raise ValueError(f'"{sentence}" is no {cls.__name__}')
+    def say(self, detail: str = "") -> Outcome[Self]:
+        """The outcome of this kind, with details after the member's words."""
+        return Outcome(self, detail)
 
 
 class BranchEnd(End):

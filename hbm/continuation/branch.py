@@ -1,4 +1,4 @@
-"""What a continuation returns: solution points, and for each an outcome that is a sentence."""
+"""What a continuation returns: solution points, the outcome of each, and how the curve ended."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.newton import Solution
-from tribodyn.hbm.outcome import BranchEnd
+from tribodyn.hbm.outcome import BranchEnd, Outcome
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Branch:
     energy : (n_point,) dissipated energy per cycle, all pairs [J]
     outcome : for each point "converged" or a sentence that says what went wrong
     newton_steps : (n_point,) Newton steps spent
-    end : sentence that says where and why the branch ends
+    end : why and where the branch ends; its text is a sentence
     folds : indices of the points that are folds, where the branch turns back
     parameter_name : what was stepped; parameter : (n_point,) its values, the same as omega where it is the frequency
     """
@@ -34,7 +34,7 @@ class Branch:
     energy: np.ndarray
     outcome: tuple[str, ...]
     newton_steps: np.ndarray
-    end: str
+    end: Outcome[BranchEnd]
     folds: tuple[int, ...] = ()
     parameter_name: str = "frequency"
     parameter: np.ndarray = field(default_factory=lambda: np.empty(0))
@@ -42,7 +42,7 @@ class Branch:
     @property
     def ended(self) -> BranchEnd:
         """Why the branch ends."""
-        return BranchEnd.of(self.end)
+        return self.end.kind
 
     @property
     def frequency(self) -> np.ndarray:
@@ -100,7 +100,7 @@ class BranchBuilder:
         del self.value[n_point:], self.x[n_point:], self._rows[n_point:]
         self.folds = [i for i in self.folds if i < n_point]
 
-    def finish(self, end: str) -> Branch:
+    def finish(self, end: Outcome[BranchEnd]) -> Branch:
         """The branch; `end` says why it ends where it ends."""
         omega, response, energy, outcome, steps = zip(*self._rows, strict=True)
         x = np.stack(self.x)

@@ -17,7 +17,7 @@ import numpy as np
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
-from tribodyn.hbm.outcome import WearEnd
+from tribodyn.hbm.outcome import Outcome, WearEnd
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.wear.evolution import (
     WearProblem,
@@ -122,7 +122,7 @@ class _Taken:
 
     row: WearRow
     after: WearState | None
-    failure: str = ""
+    failure: Outcome[WearEnd] | None = None
 
 
 def _step(problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow]) -> _Taken:
@@ -212,7 +212,9 @@ def _overtaken(problem: WearProblem, state: WearState) -> tuple[OperatingPoint, 
     return tuple(new or old for new, old in zip(moved, state.points, strict=True))
 
 
-def _leap(problem: WearProblem, state: WearState, stride: float, failure: str, rows: Sequence[WearRow]) -> _Taken:
+def _leap(
+    problem: WearProblem, state: WearState, stride: float, failure: Outcome[WearEnd] | None, rows: Sequence[WearRow]
+) -> _Taken:
     """An explicit step over the end of a branch, behind which the site is looked for as at the start.
 
     The response folds, or the tracked peak merges with a valley: no solution follows on the one here. A step that did

@@ -12,7 +12,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import SEPARATES
 from tribodyn.hbm.continuation.operating_point import OperatingPoint, Site
-from tribodyn.hbm.outcome import CONVERGED, WearEnd
+from tribodyn.hbm.outcome import CONVERGED, Outcome, WearEnd
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.hbm.wear.law import JointWear
@@ -109,11 +109,11 @@ class WearState:
     solves: int
     pairs: np.ndarray
     preload_at_rest: float = float("nan")
-    failure_at_rest: str = ""
+    failure_at_rest: Outcome[WearEnd] | None = None
 
     @property
-    def failure(self) -> str:
-        """Sentence on the first duty that did not converge, empty where all did."""
+    def failure(self) -> Outcome[WearEnd] | None:
+        """The end that the first duty which did not converge makes, None where all did."""
         for point in self.points:
             if not point.solution.converged:
                 hertz = point.state.omega / (2 * np.pi)
@@ -201,8 +201,8 @@ def reason_to_stop(
     first_at_rest: float = float("nan"),
     rows: Sequence[WearRow] = (),
     step_depth: float = 0.0,
-) -> str:
-    """Why a run ends at a state, as a sentence; empty where it continues.
+) -> Outcome[WearEnd] | None:
+    """Why a run ends at a state; None where it continues.
 
     first_preload, first_at_rest : of the unworn contact, vibrating and at rest [N]
     rows : taken before; step_depth : a depth that is worth wearing [m]: wear has faded out where the deepest pair needs
@@ -224,7 +224,7 @@ def reason_to_stop(
     fading = rows and state.work.sum() < FADED_SHARE * rows[0].energy.sum()
     if fading and state.rate.max() * ENDLESS < step_depth:
         return WearEnd.FADED.say(left)
-    return ""
+    return None
 
 
 def row_of(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tribodyn.hbm.outcome import WearEnd
+from tribodyn.hbm.outcome import Outcome, WearEnd
 
 if TYPE_CHECKING:
     from tribodyn.hbm.balance import HarmonicBalance
@@ -119,7 +119,7 @@ class WearHistory:
     work : (n_row, n_pair) friction work from this row to the next [J]
     duty_omega, duty_displacement : (n_row, n_duty) [rad/s], (n_row, n_duty, n_contact, n_coeff) [m]: every duty of a
         mission; the fields above show the first
-    end : sentence that says why the run ended
+    end : why the run ended; its text is a sentence
     preload_at_rest : (n_row,) static normal force of the whole contact without the harmonic loads [N]; nan where the
         end of the run does not depend on it
     """
@@ -142,7 +142,7 @@ class WearHistory:
     work: np.ndarray
     duty_omega: np.ndarray
     duty_displacement: np.ndarray
-    end: str
+    end: Outcome[WearEnd]
     preload_at_rest: np.ndarray | None = None
 
     @property
@@ -153,7 +153,7 @@ class WearHistory:
     @property
     def ended(self) -> WearEnd:
         """Why the run ended."""
-        return WearEnd.of(self.end)
+        return self.end.kind
 
     @property
     def displacement(self) -> np.ndarray:
@@ -187,7 +187,7 @@ def rows_to_resume(interrupted: WearHistory | None) -> list[WearRow]:
     return [row for row in rows if row.cycles_in_step > 0]
 
 
-def history(rows: list[WearRow], end: str) -> WearHistory:
+def history(rows: list[WearRow], end: Outcome[WearEnd]) -> WearHistory:
     """Rows put together."""
     columns = {f.name: np.array([getattr(r, f.name) for r in rows]) for f in fields(WearRow)}
     if np.isnan(columns["preload_at_rest"]).all():

@@ -39,7 +39,7 @@ class PreloadAtRest:
         self._before = assess(self._quiet, state.depth, 0.0, self._before)
         solves = state.solves + self._before.solves
         if self._before.failure:
-            failure = self._before.failure.replace("solve failed", "solve failed at rest", 1)
+            failure = self._before.failure.kind.say(f" at rest{self._before.failure.detail}")
             return replace(state, failure_at_rest=failure, preload_at_rest=float(np.nan), solves=solves)
         preload = problem.preload(self._before.points[0].state)
         return replace(state, preload_at_rest=preload, solves=solves)

@@ -41,7 +41,7 @@ def test_duffing_has_both_folds_where_its_discriminant_vanishes():
     down = arc_length.follow(duffing.balance(), 5.0, 0.5)
     for branch, far in ((up, 5.0), (down, 0.5)):
         assert branch.omega[-1] == far
-        assert branch.end.startswith("reached")
+        assert str(branch.end).startswith("reached")
         assert set(branch.outcome) == {"converged"}
         assert len(branch.omega) < 150
         np.testing.assert_allclose(np.sort(branch.omega[list(branch.folds)]), exact, rtol=1e-8)
@@ -101,7 +101,7 @@ def test_where_the_curve_is_single_valued_it_is_the_natural_one():
     for balance, low, high in ((friction, 0.3, 4.0), (pairs, 200.0, 900.0)):
         for way in ((low, high), (high, low)):
             arc = arc_length.follow(balance, *way)
-            assert arc.end.startswith("reached")
+            assert str(arc.end).startswith("reached")
             assert arc.folds == ()
             start = newton.solve_from_rest(balance, way[0]).state.x
             for omega, contact in zip(arc.omega, arc.contact, strict=True):  # stepped at the same frequencies
@@ -123,7 +123,7 @@ def test_sharp_resonances_and_infinite_ones():
     assert sharp.amplitude("mass").max() > 0.95 * 0.3 / 2e-5
     assert len(sharp.omega) < 250
     undamped = arc_length.follow(Duffing(zeta=0.0, cubic=0.0).balance(), 0.5, 2.0)
-    assert "grows without bound" in undamped.end
+    assert "grows without bound" in str(undamped.end)
     np.testing.assert_allclose(undamped.omega[-1], 1.0, atol=1e-6)
 
 
@@ -149,7 +149,7 @@ def test_folds_in_the_load_are_extremes_of_the_load_over_amplitude():
     for start, stop in ((0.0, 12.0), (12.0, 0.0)):
         branch = arc_length.follow(path, start, stop)
         assert branch.parameter_name == "load factor"
-        assert branch.end == f"reached load factor {stop:g}"
+        assert str(branch.end) == f"reached load factor {stop:g}"
         assert np.all(branch.omega == omega)
         np.testing.assert_allclose(np.sort(branch.parameter[list(branch.folds)]), [upper, lower], rtol=1e-8)
         np.testing.assert_allclose(load(branch.amplitude("mass")), branch.parameter, atol=1e-6)
@@ -163,7 +163,7 @@ def test_closed_curve_beside_the_main_one_is_recognised():
     island = Parameter("detuning", lambda v: balance.with_load(fold - 0.5 + v * v), omega)
     guess = newton.solve_from_rest(*island.place(0.0)).state.x
     ring = arc_length.follow(island, 0.0, 1.0, Options(bounds=(-2.0, 2.0), guess=guess))
-    assert ring.end.startswith("closed curve")
+    assert str(ring.end).startswith("closed curve")
     assert len(ring.folds) == 2
     np.testing.assert_allclose(np.abs(ring.parameter[list(ring.folds)]), np.sqrt(0.5), rtol=1e-7)
 
@@ -245,10 +245,10 @@ def test_a_guess_starts_on_another_branch():
 def test_it_says_where_it_ends():
     balance = Duffing().balance()
     few = arc_length.follow(balance, 0.5, 5.0, Options(max_points=10))
-    assert few.end == f"ended at {few.frequency[-1]:.6g} Hz: 10 points were allowed"
+    assert str(few.end) == f"ended at {few.frequency[-1]:.6g} Hz: 10 points were allowed"
     high = Duffing(zeta=0.005, force=0.6).balance()
     back = arc_length.follow(high, 4.0, 0.2)
-    assert back.end == f"turned back to {4.0 / (2 * np.pi):.6g} Hz"
+    assert str(back.end) == f"turned back to {4.0 / (2 * np.pi):.6g} Hz"
     assert back.omega[-1] == 4.0
     with pytest.raises(ValueError, match="start and stop are the same"):
         arc_length.follow(balance, 2.0, 2.0)
@@ -272,7 +272,7 @@ def test_an_unsolved_start_is_said(monkeypatch):
     balance = Duffing().balance()
     hopeless = replace(Options(), newton=newton.NewtonOptions(max_steps=0))
     branch = arc_length.follow(balance, 0.5, 5.0, hopeless)
-    assert branch.end.startswith(f"ended at {0.5 / (2 * np.pi):.6g} Hz: not converged")
+    assert str(branch.end).startswith(f"ended at {0.5 / (2 * np.pi):.6g} Hz: not converged")
     assert branch.outcome[0] != "converged"
 
 
@@ -287,8 +287,8 @@ def test_a_gap_in_the_curve_is_stepped_over_and_named(monkeypatch):
     monkeypatch.setattr(arc_length.Stepper, "advance", lose_it_once)
     duffing = Duffing()
     branch = arc_length.follow(duffing.balance(), 0.5, 5.0)
-    assert branch.end.startswith("reached")
-    assert "; stepped over gaps in the curve at " in branch.end
+    assert str(branch.end).startswith("reached")
+    assert "; stepped over gaps in the curve at " in str(branch.end)
     assert calls[5] is not calls[4]  # a new walk from behind the gap
     assert np.all(np.diff(branch.omega[:7]) > 0)
     np.testing.assert_allclose(np.sort(branch.omega[list(branch.folds)]), duffing.folds(), rtol=1e-8)

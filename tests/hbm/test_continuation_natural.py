@@ -21,7 +21,7 @@ def test_a_sweep_jumps_at_the_fold_and_says_so(n_points):
         assert set(branch.outcome) == {"converged"}
         assert np.all(np.diff(branch.omega) * (stop - start) > 0)
         np.testing.assert_allclose(branch.omega[list(branch.folds)], [fold], rtol=1e-8)
-        assert f"the response jumped at folds: {fold / (2 * np.pi):.6g} Hz" in branch.end
+        assert f"the response jumped at folds: {fold / (2 * np.pi):.6g} Hz" in str(branch.end)
         amplitude = branch.amplitude("mass")
         assert np.abs(duffing.defect(branch.omega, amplitude)).max() < 1e-5
         at = branch.folds[0]
@@ -34,7 +34,7 @@ def test_a_lifting_mass_jumps_both_ways_at_the_folds_of_the_arc_length():
     folds = np.sort(round_them.omega[list(round_them.folds)])
     for start, stop in ((0.9, 4.0), (4.0, 0.9)):
         branch = natural.follow(balance, start, stop, Options(n_points=60))
-        assert branch.end.startswith("reached")
+        assert str(branch.end).startswith("reached")
         assert branch.folds
         for fold in branch.omega[list(branch.folds)]:
             assert np.abs(folds / fold - 1).min() < 1e-8
@@ -45,5 +45,5 @@ def test_it_jumps_in_the_load_too():
     folds = arc_length.follow(path, 0.0, 12.0)
     for (start, stop), fold in zip(((0.0, 12.0), (12.0, 0.0)), folds.folds, strict=True):
         branch = natural.follow(path, start, stop, Options(n_points=25))
-        assert branch.end.startswith(f"reached load factor {stop:g}; the response jumped at folds: load factor ")
+        assert str(branch.end).startswith(f"reached load factor {stop:g}; the response jumped at folds: load factor ")
         np.testing.assert_allclose(branch.parameter[list(branch.folds)], folds.parameter[fold], rtol=1e-8)

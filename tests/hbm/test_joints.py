@@ -239,4 +239,4 @@ def test_only_the_preload_of_wearing_joints_counts() -> None:
     history = thesis_rule.evolve(problem, 2e-5, max_steps=40)
     state = newton.solve_from_rest(cut, OMEGA).state
     assert history.preload[0] == pytest.approx(cut.preload_by_joint(state)["part 1"], rel=1e-6)
-    assert history.end.startswith("preload fell below 0.5")
+    assert str(history.end).startswith("preload fell below 0.5")

@@ -50,7 +50,7 @@ def test_a_run_ends_where_the_preload_at_rest_is_lost(problem: WearProblem, rule
     found = worn(problem, rule)
     rest = found.preload_at_rest
     assert rest is not None
-    assert found.end == f"{WearEnd.LOST_AT_REST.say()} 0.4 of its first value"
+    assert str(found.end) == f"{WearEnd.LOST_AT_REST.say()} 0.4 of its first value"
     assert rest[-1] <= 0.4 * rest[0] < rest[-2]
     assert found.cycles_in_step[-1] == 0.0
     for row in (0, len(rest) // 3):

@@ -115,7 +115,7 @@ def lifting_mass() -> HarmonicBalance:
 def test_folds_of_a_lifting_mass_are_marked_where_the_branch_turns():
     balance = lifting_mass()
     branch = arc_length.follow(balance, 150.0, 260.0)
-    assert branch.end.startswith("reached")
+    assert str(branch.end).startswith("reached")
     assert len(branch.folds) == 2
     marks = mark(balance, branch)
     assert [m.kind for m in marks.bifurcations] == ["fold", "fold"]

@@ -86,7 +86,7 @@ def test_four_periodic_motions_at_one_frequency_and_time_integration_finds_each(
     for start, stop in ((700.0, 900.0), (900.0, 700.0)):
         balance = slab_balance((900.0, 60.0, 12.0), 7)
         branch = arc_length.follow(balance, 2 * np.pi * start, 2 * np.pi * stop)
-        assert branch.end == f"turned back to {start:g} Hz"
+        assert str(branch.end) == f"turned back to {start:g} Hz"
         assert len(branch.folds) == 1
         f = branch.frequency
         for i in np.flatnonzero((f[1:] - 800.0) * (f[:-1] - 800.0) < 0):

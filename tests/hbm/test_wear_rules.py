@@ -38,7 +38,7 @@ def fine(problem: WearProblem) -> WearHistory:
 def test_thesis_rule_wears_what_it_dissipates(problem: WearProblem) -> None:
     first = assess(problem, np.zeros(N_PAIR), 0.0, None)
     worn = thesis_rule.evolve(problem, 2e-6)
-    assert worn.end.startswith(("preload fell", "contact lost"))
+    assert str(worn.end).startswith(("preload fell", "contact lost"))
     assert worn.worn[0].max() <= 2e-6  # eq. 3.30: Z is rounded down
     assert worn.cycles_in_step[0] == np.floor(2e-6 / first.rate.max())
     volume = problem.area @ (worn.depth[-1] + worn.worn[-1])
@@ -102,7 +102,7 @@ def test_a_resumed_run_ends_in_the_same_bits(problem: WearProblem, kind: str) ->
     assert np.array_equal(whole.depth, parts.depth)
     assert np.array_equal(whole.cycles, parts.cycles)
     assert np.array_equal(whole.solves, parts.solves)
-    killed = run(replace(whole, end="unfinished"))  # after its last row, before its end was kept
+    killed = run(replace(whole, end=WearEnd.UNFINISHED.say()))  # after its last row, before its end was kept
     assert killed.end == whole.end
     assert np.array_equal(whole.depth, killed.depth)
 
@@ -141,7 +141,7 @@ def test_error_controlled_missions_equal_the_finest_thesis_run(problem: WearProb
     mixed = wear_problem(mission=mission, lost_below=0.02)
     fine = thesis_rule.evolve(mixed, 5e-7)
     worn = error_controlled_rule.evolve(mixed, error_controlled_rule.Tolerance(0.02, 2e-4))
-    assert worn.end.startswith("preload fell")
+    assert str(worn.end).startswith("preload fell")
     assert life(worn) == pytest.approx(life(fine), rel=0.01)
     assert worn.solves.sum() < fine.solves.sum() / 3
 
@@ -248,7 +248,7 @@ def test_error_controlled_steps_get_over_the_end_of_a_branch(problem: WearProble
     assert worn.worn[leaps[-1]].max() > 2 * worn.worn[leaps[-2]].max()  # a second one in a row is longer
     assert worn.worn[leaps].max() <= 1e-5  # never longer than the tolerance
     assert worn.depth[leaps[-1] + 1].max() > end + 2e-6
-    assert worn.end.startswith("preload fell")
+    assert str(worn.end).startswith("preload fell")
     assert problem.area @ worn.depth[-1] == pytest.approx(1e-9 * worn.work.sum(), rel=1e-12)
     plain = error_controlled_rule.evolve(problem, tolerance)
     assert life(worn) == pytest.approx(life(plain), rel=0.02)
@@ -275,7 +275,7 @@ def test_a_step_behind_which_no_solution_is_found_is_followed_by_a_longer_one(pr
 
     worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Blind("tip", 420.0)),)), tolerance)
     assert missed
-    assert worn.end.startswith("preload fell")
+    assert str(worn.end).startswith("preload fell")
     leap = int(np.flatnonzero(worn.depth.max(axis=1) == over[0])[0]) - 1
     assert worn.plan[leap, 0] == 0.0
     assert worn.solves[leap] > len(missed)  # what was looked for in vain is counted
@@ -323,7 +323,7 @@ def test_a_contact_that_outlives_its_wear_is_told_with_what_is_left() -> None:
         error_controlled_rule.evolve(problem, error_controlled_rule.Tolerance(0.05, 2e-4), max_steps=200),
     ):
         assert worn.ended.survived, worn.end
-        assert "N of preload left" in worn.end
+        assert "N of preload left" in str(worn.end)
         assert worn.preload[-1] > 0.4 * worn.preload[0]
 
 

@@ -15,6 +15,7 @@ import pytest
 
 from tests.helpers.command import leave
 from tests.helpers.synthetic_result import result
+from tribodyn.hbm.outcome import WearEnd
 from tribodyn.workflows.command import exits
 from tribodyn.workflows.result import store, summary
 from tribodyn.workflows.result.facts import Stage
@@ -215,7 +216,7 @@ def test_the_end_of_the_range_is_no_peak() -> None:
 def test_separation_is_told_only_where_contact_was_lost() -> None:
     made = result()
     assert made.wear is not None
-    unfinished = replace(made, wear=replace(made.wear, end="stopped after 8 wear steps"))
+    unfinished = replace(made, wear=replace(made.wear, end=WearEnd.STEPS_DONE.say(" 8 wear steps")))
     numbers = summary.summary(unfinished)
     assert numbers["separated_cycles"] is None
     assert numbers["cycles"] == made.wear.cycles[-1]

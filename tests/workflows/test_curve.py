@@ -11,6 +11,7 @@ import pytest
 from tests.helpers.command import leave
 from tests.helpers.matrix_scene import matrix_folder
 from tribodyn.hbm.continuation.harmonic_choice import estimate, widened
+from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.stability.exponents import mark
 from tribodyn.workflows.result import store
 from tribodyn.workflows.run import modelling, pipeline, settings
@@ -92,7 +93,7 @@ def test_every_continuation_gives_the_same_curve(folder: Path, method: str) -> N
     other = run(folder, f"response.method={method}").response
     assert natural is not None
     assert other is not None
-    assert other.end.startswith("the end of the") or "reached" in other.end
+    assert other.ended is BranchEnd.REACHED
     assert other.amplitude("response").max() == pytest.approx(natural.amplitude("response").max(), rel=2e-2)
 
 

@@ -117,7 +117,7 @@ def test_no_damping_at_all_is_a_structure_too(damping: np.ndarray | None) -> Non
 def test_a_curve_its_stability_a_mode_and_wear_are_told_in_hz() -> None:
     problem = balance(structure())
     curve = problem.response(40.0, 70.0, points=25)
-    assert curve.end.startswith("reached")
+    assert str(curve.end).startswith("reached")
     assert (curve.frequency[0], curve.frequency[-1]) == pytest.approx((40.0, 70.0))
     marks = problem.stability(curve)
     assert marks.stable[:3].all()

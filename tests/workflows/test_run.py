@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.killed_runs import go_on
+from tribodyn.hbm.outcome import WearEnd
 from tribodyn.workflows.pictures import plots
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.facts import Stage
@@ -139,7 +140,7 @@ def test_a_run_killed_again_and_again_at_its_last_row_keeps_one_of_it(
     assert finished.wear is not None
     kept: list[Result] = []
     monkeypatch.setattr(store, "save", lambda path, state: kept.append(state))
-    earlier = replace(finished, stage=Stage.WEARING, wear=replace(finished.wear, end="unfinished"))
+    earlier = replace(finished, stage=Stage.WEARING, wear=replace(finished.wear, end=WearEnd.UNFINISHED.say()))
     for _ in range(2):
         kept.clear()
         resumed = pipeline.run(read("beam", SMALL), tmp_path, Progress(), earlier)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.synthetic_result import result
-from tribodyn.hbm.outcome import WearEnd
+from tribodyn.hbm.outcome import Outcome, WearEnd
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.facts import Around, BudgetEntry, Stage
 
@@ -24,7 +24,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 from tests.helpers.synthetic_result import result
-from tribodyn.hbm.outcome import WearEnd
+from tribodyn.hbm.outcome import Outcome, WearEnd
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.facts import Around, BudgetEntry, Stage
 full = result(60)
@@ -101,7 +101,7 @@ def test_what_is_no_result_is_said_in_a_sentence(tmp_path: Path, content: object
 
 @pytest.mark.parametrize("stage", list(Stage))
 @pytest.mark.parametrize("end", [WearEnd.SOLVE_FAILED.say(": why"), WearEnd.NO_STEP.say()])
-def test_the_stage_of_a_run_is_read_back_from_its_sentence(tmp_path: Path, stage: Stage, end: str) -> None:
+def test_stage_and_ends_of_a_run_come_back(tmp_path: Path, stage: Stage, end: Outcome[WearEnd]) -> None:
     from dataclasses import replace
 
     made = result()
@@ -110,6 +110,8 @@ def test_the_stage_of_a_run_is_read_back_from_its_sentence(tmp_path: Path, stage
     store.save(tmp_path / "result.h5", written)
     read = store.load(tmp_path / "result.h5")
     assert (read.stage, read.state, read.finished) == (stage, written.state, stage is Stage.COMPLETE)
+    assert read.wear is not None
+    assert read.wear.end == end
 
 
 def test_facts_of_a_wheel_and_the_budget_come_back(tmp_path: Path) -> None:

@@ -64,7 +64,7 @@ def measure(file: SceneFile, wears: bool = True, refined: bool = True) -> Measur
                 worn = wear(file, model)
                 life = cycles_to_preload(worn)
                 if life is None:
-                    outcome = worn.end
+                    outcome = str(worn.end)
                 else:
                     depth = depth_at(worn, life)
                     values["depth_m"], values["life_cycles"] = float(depth.max()), life

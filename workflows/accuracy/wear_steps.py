@@ -126,7 +126,7 @@ def _measure(problem: WearProblem, delta: float, rule: str, step: float, say: Ca
         life_cycles=float("nan") if life is None else life,
         life_error=None,
         roughness=roughness(problem.balance.model.interface.points, worn.depth[-1]),
-        end=worn.end,
+        end=str(worn.end),
     )
 
 

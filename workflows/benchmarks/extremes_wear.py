@@ -71,7 +71,7 @@ def _judged(
 ) -> Verdict:
     """Conservation and monotony, then worn volume beside the reference, within what the run says of its own error."""
     if worn.ended is WearEnd.SOLVE_FAILED:
-        return Verdict(REFUSED, worn.end)
+        return Verdict(REFUSED, str(worn.end))
     if not all(np.all(np.isfinite(a)) for a in (worn.depth, worn.worn, worn.cycles, worn.work, worn.preload)):
         return Verdict(WRONG, "a number is not finite")
     if (worn.worn < 0).any() or (np.diff(worn.depth, axis=0) < 0).any():

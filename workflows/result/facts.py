@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm.outcome import End, WearEnd
+from tribodyn.hbm.outcome import End
 
 
 class Stage(End):
@@ -19,12 +19,6 @@ class Stage(End):
     WEARING = "unfinished"
     FAILED = "failed"
     COMPLETE = "complete"
-
-    @classmethod
-    def of(cls, sentence: str) -> Stage:
-        """The stage that a sentence tells; raises ValueError for one that tells none."""
-        failed = any(sentence.startswith(end.value) for end in WearEnd if end.failed)
-        return cls.FAILED if failed else super().of(sentence)
 
 
 @dataclass(frozen=True)

@@ -204,7 +204,7 @@ class Result:
         if self.stage is Stage.WEARING and self.wear is not None:
             return f"{self.stage.value}: {len(self.wear.cycles)} wear steps are done"
         if self.stage is Stage.FAILED and self.wear is not None:
-            return self.wear.end
+            return str(self.wear.end)
         if self.stage is Stage.COMPLETE and self.wear is not None:
             return f"{self.stage.value}: {self.wear.end}"
         return self.stage.value

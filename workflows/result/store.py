@@ -20,6 +20,7 @@ import h5py
 import numpy as np
 
 from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.outcome import BranchEnd, End, Outcome, WearEnd
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.result.facts import BudgetEntry, Facts, Stage
 from tribodyn.workflows.result.result import (
@@ -35,11 +36,13 @@ from tribodyn.workflows.result.result import (
 )
 from tribodyn.workflows.result.whole_file import replacing
 
-FORMAT = "tribodyn result 1"
+FORMAT = "tribodyn result 2"
 USER_BLOCK = 512  # bytes before the HDF5 content, the least that HDF5 allows
 MARK = b"tribodyn result, sha256 of what follows this block: "
 FIELD = {"frf": "response"}  # groups of the file that have another name than the field of a Result
 
+KIND = "end_kind"  # attribute with the name of the member whose sentence stands in "end"
+ENDS: dict[type, type[End]] = {Branch: BranchEnd, WearHistory: WearEnd}
 BUDGET = "error_budget"  # attribute of the group facts that holds the entries of the budget as JSON
 
 # group -> (type, {array: (dimensions, unit)}); what is not an array is an attribute of the group
@@ -170,6 +173,7 @@ def set_aside(path: Path) -> Path | None:
 def _write(file: h5py.File, result: Result) -> None:
     file.attrs["format"] = FORMAT
     file.attrs["state"] = result.state
+    file.attrs["stage"] = result.stage.name
     file.attrs["verdict"] = result.verdict
     facts = result.facts.table()
     if result.budget:
@@ -191,6 +195,8 @@ def _write(file: h5py.File, result: Result) -> None:
                 # numpy takes an empty tuple for one of floats
                 dtype = np.int64 if isinstance(value, tuple) and not value else None
                 _write_array(file, group, item.name, np.asarray(value, dtype), *arrays[item.name])
+            elif isinstance(value, Outcome):
+                group.attrs[item.name], group.attrs[KIND] = str(value), value.kind.name
             else:
                 group.attrs[item.name] = value if isinstance(value, str) else np.array(value, dtype=h5py.string_dtype())
 
@@ -241,7 +247,7 @@ def load(path: Path) -> Result:
                 for name, (kind, arrays) in SCHEMA.items()
                 if name in file
             }
-            facts, stage = _attributes(file["facts"].attrs), Stage.of(str(file.attrs["state"]))
+            facts, stage = _attributes(file["facts"].attrs), Stage[str(file.attrs["stage"])]
         except (KeyError, ValueError):
             raise ResultError(f'"{path}" was written by another version of tribodyn: run its scene again') from None
         return Result(
@@ -262,6 +268,9 @@ def _read(group: h5py.Group, kind: type, arrays: Mapping[str, Any]) -> Any:
                 continue
             value = group[item.name][()]
             values[item.name] = tuple(value.tolist()) if str(item.type).startswith("tuple") else value
+        elif item.name == "end":
+            end = ENDS[kind][group.attrs[KIND]]
+            values[item.name] = end.say(str(group.attrs[item.name]).removeprefix(end.value))
         else:
             value = group.attrs[item.name]
             values[item.name] = value if isinstance(value, str) else tuple(str(entry) for entry in value)

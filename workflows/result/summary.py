@@ -69,7 +69,7 @@ def _wear(result: Result) -> dict[str, Any]:
         "energy_J": float(wear.work.sum()),
         "volume_m3": volume,
         "hbm_solves": int(wear.solves.sum()),
-        "wear_end": wear.end,
+        "wear_end": str(wear.end),
     }
 
 
@@ -112,7 +112,7 @@ def _curve(result: Result) -> dict[str, Any]:
     numbers: dict[str, Any] = {
         "harmonics": list(result.harmonics),
         "harmonics_error": result.facts.harmonics_error,
-        "response_end": None if frf is None else frf.end,
+        "response_end": None if frf is None else str(frf.end),
         "folds_hz": [] if frf is None else [float(frf.frequency[i]) for i in frf.folds],
         "unstable_points": None,
         "bifurcations": None,

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import WearProblem
 from tribodyn.hbm.wear.history import WearHistory, WearRow, history, rows_to_resume
@@ -39,7 +40,7 @@ def wear_down(
 
     def on_row(row: WearRow) -> None:
         rows.append(row)
-        keep(replace(result, wear=history(rows, "unfinished"), stage=Stage.WEARING))
+        keep(replace(result, wear=history(rows, WearEnd.UNFINISHED.say()), stage=Stage.WEARING))
         done = float(patch.area @ (row.depth + row.worn)) / to_wear if to_wear > 0 else 0.0
         deepest, hertz = 1e3 * float((row.depth + row.worn).max()), row.omega / (2 * np.pi)
         told = f"{row.cycles + row.cycles_in_step:.3g} cycles, peak {hertz:.4g} Hz and {1e3 * row.amplitude:.3g} mm"

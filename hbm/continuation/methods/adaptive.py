@@ -22,6 +22,7 @@ from tribodyn.hbm.continuation.methods.arc_length import solve_along_load
 from tribodyn.hbm.continuation.methods.natural import EXTRAPOLATION_DEGREE, extrapolate
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.threads import single
 
 # Least share of the miss of extrapolation that counts as error of interpolation. On a smooth curve the share follows
@@ -78,20 +79,22 @@ def follow(
     first = solve_along_load(*path.place(start), options.newton)
     builder.add(start, first)
     if not first.converged:
-        return builder.finish(f"ended at {path.say(start)}: {first.outcome}")
+        return builder.finish(BranchEnd.ENDED.say(f" {path.say(start)}: {first.outcome}"))
     sweep = _Sweep(path, options, builder, first, start, stop)
     while builder.value[-1] != stop:
         if len(builder.value) >= options.max_points:
-            return builder.finish(f"ended at {path.say(builder.value[-1])}: {options.max_points} points were allowed")
+            here = path.say(builder.value[-1])
+            return builder.finish(BranchEnd.ENDED.say(f" {here}: {options.max_points} points were allowed"))
         trouble = sweep.advance()
         if trouble:
-            return builder.finish(f"ended at {path.say(builder.value[-1])}: {trouble}")
+            return builder.finish(BranchEnd.ENDED.say(f" {path.say(builder.value[-1])}: {trouble}"))
         if on_point is not None:
             done = len(builder.value)
             share = abs(builder.value[-1] - start) / abs(stop - start)
             on_point(done, max(done, min(options.max_points, round(done / max(share, 1e-3)))))
     jumps = ", ".join(path.say(value) for value in sweep.jumps)
-    return builder.finish(f"reached {path.say(stop)}" + (f"; the response jumped at {jumps}" if jumps else ""))
+    jumped = f"; the response jumped at {jumps}" if jumps else ""
+    return builder.finish(BranchEnd.REACHED.say(f" {path.say(stop)}{jumped}"))
 
 
 def interpolate(branch: Branch, values: np.ndarray) -> np.ndarray:

@@ -25,6 +25,7 @@ from tribodyn.hbm.continuation.curve import CurvePoint, Segment
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.continuation.stepper import Stepper
 from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.outcome import BranchEnd, Outcome
 from tribodyn.hbm.threads import single
 
 # Steps of the parameter over a gap in the curve, shares of its range, tried in turn; a longer one could miss a peak.
@@ -106,14 +107,14 @@ def follow(
     builder = BranchBuilder(path)
     builder.add(start, first)
     if not first.converged:
-        return builder.finish(f"ended at {path.say(start)}: {first.outcome}")
+        return builder.finish(BranchEnd.ENDED.say(f" {path.say(start)}: {first.outcome}"))
     walk = _Walk(path, options, builder, Stepper(path, options, first, start, stop), bounds, abs(stop - start))
     while (end := walk.advance()) is None:
         if on_point is not None:
             done = len(builder.value)
             share = abs(builder.value[-1] - start) / abs(stop - start)
             on_point(done, max(done, min(options.max_points, round(done / max(share, 1e-3)))))
-    return builder.finish(end + walk.gaps)
+    return builder.finish(end.kind.say(end.detail + walk.gaps))
 
 
 @single
@@ -161,14 +162,17 @@ class _Walk:
         places = ", ".join(self._path.say(value) for value in self._jumps)
         return f"; stepped over gaps in the curve at {places}" if places else ""
 
-    def advance(self) -> str | None:
-        """One step more; the sentence that ends the branch, or None."""
+    def advance(self) -> Outcome[BranchEnd] | None:
+        """One step more; why the branch ends, or None."""
         builder, path = self._builder, self._path
         if len(builder.value) >= self._options.max_points:
-            return f"ended at {path.say(builder.value[-1])}: {self._options.max_points} points were allowed"
+            here = path.say(builder.value[-1])
+            return BranchEnd.ENDED.say(f" {here}: {self._options.max_points} points were allowed")
         parts = self._stepper.advance()
         if not parts:
-            return None if self._jump() else f"ended at {path.say(builder.value[-1])}: {self._stepper.trouble}"
+            if self._jump():
+                return None
+            return BranchEnd.ENDED.say(f" {path.say(builder.value[-1])}: {self._stepper.trouble}")
         self._first = self._first or parts[0].start.bare()
         for part in parts:
             bound = next((b for b in self._bounds if part.crosses(b)), None)
@@ -197,7 +201,7 @@ class _Walk:
                 return True
         return False
 
-    def _land(self, part: Segment, bound: float) -> str:
+    def _land(self, part: Segment, bound: float) -> Outcome[BranchEnd]:
         """Solve at the bound that the curve crosses."""
         balance, omega = self._path.place(bound)
         flat = part.guess_at(bound)
@@ -205,22 +209,24 @@ class _Walk:
         last = newton.solve(balance, omega, guess, self._options.newton)
         self._builder.add(bound, last)
         if not last.converged:
-            return f"ended at {self._path.say(bound)}: {last.outcome}"
-        return f"{'turned back to' if bound == self._start else 'reached'} {self._path.say(bound)}"
+            return BranchEnd.ENDED.say(f" {self._path.say(bound)}: {last.outcome}")
+        end = BranchEnd.TURNED_BACK if bound == self._start else BranchEnd.REACHED
+        return end.say(f" {self._path.say(bound)}")
 
-    def _came_back(self, parts: list[Segment]) -> str | None:
+    def _came_back(self, parts: list[Segment]) -> Outcome[BranchEnd] | None:
         """Whether the curve is closed, or lost itself in infinity or in its own past."""
         builder, here, newton_options = self._builder, self._path.say(self._builder.value[-1]), self._options.newton
         growth = self._options.max_growth
         if np.linalg.norm(builder.x[-1]) > growth * self._size > 0:
-            return f"ended at {here}: the response grows without bound, {growth:.0e} times that of the first point"
+            told = f"the response grows without bound, {growth:.0e} times that of the first point"
+            return BranchEnd.ENDED.say(f" {here}: {told}")
         assert self._first is not None
         old = self._stepper.segments
         if len(old) > 3 and any(p.passes(self._path, self._first, 1.0, newton_options) for p in parts):
-            return f"closed curve: came back to its first point after {len(builder.value)} points"
+            return BranchEnd.CLOSED.say(f": came back to its first point after {len(builder.value)} points")
         return self._lost(parts, here)
 
-    def _lost(self, parts: list[Segment], here: str) -> str | None:
+    def _lost(self, parts: list[Segment], here: str) -> Outcome[BranchEnd] | None:
         """Whether the walk is back on its own way: then it went wrong there, is rewound and continues in shorter steps.
 
         Against its sense it turned where it should not; in its sense it left the curve for a closed one beside it.
@@ -232,7 +238,7 @@ class _Walk:
                 if not any(p.passes(self._path, old[index].start, sense, newton_options) for p in near):
                     continue
                 if self._rewinds == MAX_REWINDS:
-                    return f"ended at {here}: the curve came back onto itself"
+                    return BranchEnd.ENDED.say(f" {here}: the curve came back onto itself")
                 self._rewinds += 1
                 index = index if sense < 0 else max(index - 2, 0)
                 self._stepper.rewind(index)

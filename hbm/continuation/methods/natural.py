@@ -19,7 +19,7 @@ from tribodyn.hbm.continuation.branch import Branch, BranchBuilder
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.newton import NewtonOptions, Solution
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED, BranchEnd
 from tribodyn.hbm.threads import single
 
 EXTRAPOLATION_DEGREE = 2  # higher ones amplify the kinks of the contact
@@ -75,8 +75,8 @@ def follow(
     if solution.converged:
         folds = ", ".join(path.say(builder.value[i]) for i in builder.folds)
         jumped = f"; the response jumped at folds: {folds} (arc_length goes round them)" if folds else ""
-        return builder.finish(f"reached {path.say(stop)}{jumped}")
-    return builder.finish(f"ended at {path.say(builder.value[-1])}: {solution.outcome}")
+        return builder.finish(BranchEnd.REACHED.say(f" {path.say(stop)}{jumped}"))
+    return builder.finish(BranchEnd.ENDED.say(f" {path.say(builder.value[-1])}: {solution.outcome}"))
 
 
 def _step(path: Parameter, builder: BranchBuilder, value: float, options: Options, halvings: int) -> Solution:

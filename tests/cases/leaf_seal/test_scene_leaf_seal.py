@@ -168,7 +168,7 @@ def test_away_from_resonance_the_leaf_answers_as_if_stuck(leaf):
 
 def test_the_curve_softens_through_two_folds_where_stability_changes(leaf):
     branch, height = leaf.branch, leaf.branch.amplitude(LINER_NODE)
-    assert branch.end == "reached 450 Hz"
+    assert str(branch.end) == "reached 450 Hz"
     upper, lower = branch.folds
     assert branch.frequency[upper] == pytest.approx(174.74, abs=0.05)
     assert branch.frequency[lower] == pytest.approx(132.24, abs=0.1)

@@ -12,6 +12,7 @@ from scipy.linalg import eigh
 
 from tests.helpers.coarse_scenes import QUICK_RIG as QUICK
 from tests.helpers.coarse_scenes import RIG as COARSE
+from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.workflows.cases.rig import fit as rig_fit
@@ -144,8 +145,9 @@ def test_life_and_work_tell_the_coefficient(rig):
     ratios = [run.history.cycles[-1] / published.LIFE_MEASURED, run.spent[-1] / published.WORK]
     assert found.values[0] == pytest.approx(5.5e-15 * np.sqrt(np.prod(ratios)), rel=1e-6)
     np.testing.assert_allclose(found.sensitivity, [[-1.0], [-1.0]], rtol=1e-6)
+    stopped = replace(run.history, end=WearEnd.STEPS_DONE.say(" 3 wear steps"))
     with pytest.raises(ValueError, match="a run that loses its preload"):
-        rig_fit.fit_coefficient(replace(run, history=replace(run.history, end="stopped after 3 wear steps")), 5.5e-15)
+        rig_fit.fit_coefficient(replace(run, history=stopped), 5.5e-15)
 
 
 def test_both_wear_rules_use_up_the_preload_alike():

@@ -177,7 +177,7 @@ def trade(runs: Sequence[Worn]) -> list[TradeRow]:
             cycles=float(run.history.cycles[-1]),
             life_cycles=lives[run.step],
             life_error=lives[run.step] / lives[min(lives)] - 1,
-            end=run.history.end,
+            end=str(run.history.end),
         )
         for run in runs
     ]

@@ -18,7 +18,7 @@ from tribodyn.workflows.cases.leaf_seal.response import LINER_NODE, LeafResponse
 COLUMNS = (
     "group", "value", "points", "folds", "fold_hz", "unstable_points", "peak_hz", "peak_um",
     "stick", "stick_separation", "separation", "impact_velocity_mm_s", "least_touching",
-    "impact_work_mJ", "pin_work_mJ", "patch_wear_um", "pin_wear_um", "newton_steps", "seconds", "end",
+    "impact_work_mJ", "pin_work_mJ", "patch_wear_um", "pin_wear_um", "newton_steps", "seconds", "ended", "end",
 )  # fmt: skip
 WEAR_CYCLES = 1e9  # that the depths in the table stand for: some 2000 hours
 STRUCK_POINT = 2  # of the chosen five, where the leaf moves most
@@ -43,7 +43,7 @@ class Record:
     @property
     def complete(self) -> bool:
         """Whether the curve came to its end."""
-        return "points" in self.numbers and BranchEnd.of(self.numbers["end"]) is not BranchEnd.ENDED
+        return "points" in self.numbers and self.numbers.get("ended") != BranchEnd.ENDED.name
 
 
 def of_response(case: Case, response: LeafResponse) -> Record:
@@ -87,7 +87,8 @@ def row(case: Case, response: LeafResponse) -> dict[str, Any]:
                 round(float(pins), 3),
                 int(branch.newton_steps.sum()),
                 round(response.seconds, 2),
-                branch.end,
+                branch.ended.name,
+                str(branch.end),
             ),
             strict=True,
         )

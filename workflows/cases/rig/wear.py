@@ -92,7 +92,7 @@ def wear_down(rig: Rig, shift: float, tell: Callable[[str], None]) -> RigWear:
     tell(f"{name}: {len(rest)} steps, {history.cycles[-1]:.3g} cycles, preload {rest[-1]:.3g} N at rest; {history.end}")
     interface = balance.model.interface
     in_plane = (interface.points - interface.points.mean(axis=0))[:, :2]
-    return RigWear(shift, history, rest, interface.area, in_plane, history.end, time.process_time() - clock)
+    return RigWear(shift, history, rest, interface.area, in_plane, str(history.end), time.process_time() - clock)
 
 
 def loop(balance: HarmonicBalance, history: WearHistory, row: int) -> tuple[np.ndarray, np.ndarray]:
