@@ -49,7 +49,7 @@ EXPLICIT_STEPS = 0.01 * 3.0 ** np.arange(5)
 OVERTAKING_ACCURACY = 0.5  # share of the tolerance, of the cycles, within which a jump to another peak is located
 LOOKED_AT = 0.97  # ratio of preloads, counted from the first, at which higher peaks are looked for
 LARGEST_SHIFT = 0.1  # of a frequency in one step: a peak that moves further is another one
-SHIFTED = f"the tracked peak moves by more than {LARGEST_SHIFT:.0%} in the shortest step"
+SHIFTED = WearEnd.NO_STEP.say(f": the tracked peak moves by more than {LARGEST_SHIFT:.0%} in the shortest step")
 MAX_CORRECTIONS = 12  # solves of a stage
 GAIN_ACCURACY = 1e-9  # of the depth, for laws whose depth per work is not constant
 
@@ -103,7 +103,7 @@ def evolve(
             on_row(rows[-1])
         if reason:
             break
-    return history(rows, end + _jumps(rows))
+    return history(rows, end.kind.say(end.detail + _jumps(rows)))
 
 
 def _jumps(rows: Sequence[WearRow]) -> str:
@@ -172,7 +172,7 @@ def _step(problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Se
         else:
             stride = min(stride * _growth(error), 0.5 * longest if lost else np.inf)
         if stride < (leap if lost else smallest):
-            failure = second.failure or (SHIFTED if lost else "")
+            failure = second.failure or (SHIFTED if lost else None)
             return _leap(problem, replace(state, solves=solves), leap, failure, rows)
     if jumped is not None:
         stride, first, second, error, higher = jumped
