@@ -164,8 +164,10 @@ class AtPeak:
         return replace(found, solves=found.solves + scanned.solves) if self._is_higher(found, point) else None
 
     def _is_higher(self, found: OperatingPoint, point: OperatingPoint) -> bool:
-        apart = abs(found.state.omega - point.state.omega) > APART * point.state.omega
-        return apart and found.solution.converged and found.amplitude > OVERTAKES * point.amplitude
+        omega = found.state.omega
+        inside = min(self.start, self.stop) <= omega <= max(self.start, self.stop)
+        apart = abs(omega - point.state.omega) > APART * point.state.omega
+        return inside and apart and found.solution.converged and found.amplitude > OVERTAKES * point.amplitude
 
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
         """The distance of a state to the peak, by its slope and as though one mode responded."""

@@ -58,9 +58,9 @@ class PeriodSearch:
     def march(self, motion: Moving) -> Period:
         """Plain periods until one repeats itself, or the last one."""
         try:
-            found = self._period(motion)
+            found = self.step(motion)
             while found.drift > self.options.tolerance:
-                found = self._period(found.end, self.options.patience)
+                found = self.step(found.end, self.options.patience)
         except GivenUp:
             return self._last
         return found
@@ -69,19 +69,19 @@ class PeriodSearch:
         """Periods mixed from past ones, then Newton's method where they lead away; the best one where both fail."""
         mixing = Anderson(depth=40)
         try:
-            found = self._period(motion)
+            found = self.step(motion)
             while found.drift > self.options.tolerance:
                 if found.drift > THROWN_OFF * self.best.drift:
                     found = self._shoot(self.best)
                     mixing.forget()
                     continue
                 mixed = self.vector.unpack(mixing.propose(found.start, found.image), found.end)
-                found = self._period(mixed, self.options.patience)
+                found = self.step(mixed, self.options.patience)
         except GivenUp:
             return self.best
         return found
 
-    def _period(self, motion: Moving, patience: float = np.inf) -> Period:
+    def step(self, motion: Moving, patience: float = np.inf) -> Period:
         """March one period.
 
         Raises  GivenUp where no further period is allowed, or the best one was `patience` periods ago
@@ -107,14 +107,14 @@ class PeriodSearch:
 
             def product(v: np.ndarray, here: Period = here, size: float = size) -> np.ndarray:
                 length = float(np.linalg.norm(v)) / size
-                there = self._period(self.vector.unpack(here.start + v / length, here.end))
+                there = self.step(self.vector.unpack(here.start + v / length, here.end))
                 return (there.image - here.image) * length - v
 
             derivative = LinearOperator((len(miss), len(miss)), product, dtype=float)
             step = gmres(derivative, -miss, rtol=FORCING, restart=KRYLOV, maxiter=1)[0]
             share = 1.0
             while True:
-                there = self._period(self.vector.unpack(here.start + share * step, here.end))
+                there = self.step(self.vector.unpack(here.start + share * step, here.end))
                 if there.drift < (1 - 0.1 * share) * here.drift:
                     break
                 share *= 0.5

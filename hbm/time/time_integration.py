@@ -10,7 +10,7 @@ the march begins; what is returned is always one plainly integrated period toget
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as sla
@@ -91,6 +91,23 @@ class PeriodicMotion:
         """Fourier coefficients (..., n_coeff) of a series (..., n_step) of this motion, to stand beside the balance."""
         weight = np.where(basis.order == 0, 1.0, 2.0) / series.shape[-1]
         return series @ (basis.functions(self.omega * self.time) * weight)
+
+
+@dataclass(frozen=True)
+class LeftAlone:
+    """What a plain march does, without a search for what repeats itself, over its later half.
+
+    energy, energy_spread : friction work of the whole contact per period, mean and standard deviation [J]
+    amplitude, amplitude_spread : (n_output,) of each output in a period, likewise [m]
+    drift : change of the state over the last period, as of a `PeriodicMotion`; periods : marched in all
+    """
+
+    energy: float
+    energy_spread: float
+    amplitude: np.ndarray
+    amplitude_spread: np.ndarray
+    drift: float
+    periods: int
 
 
 class IntegrationFailed(RuntimeError):
@@ -297,6 +314,38 @@ def integrate(
     stepper = TimeStepper(balance, omega, options)
     motion = stepper.start_from(start) if start is not None else _rest(stepper)
     return _to_periodic(stepper, motion, options, with_slopes)
+
+
+@single
+def leave_alone(
+    balance: HarmonicBalance, omega: float, start: State, periods: int, options: Options | None = None
+) -> LeftAlone:
+    """March from a balance state and see where the motion goes, periodic or not.
+
+    An unstable periodic motion is left, for another one or for one that never repeats itself; means over many periods
+    then are what a machine shows
+    Raises  ValueError for models with no equation of motion in time; IntegrationFailed
+    """
+    options = replace(options or Options(), accelerate=False)
+    stepper = TimeStepper(balance, omega, options)
+    search = PeriodSearch(stepper, replace(options, max_periods=periods, patience=periods), False)
+    energy, amplitude = [], []
+    motion = stepper.start_from(start)
+    for _ in range(periods):
+        found = search.step(motion)
+        motion = found.end
+        whole = _result(stepper, found, search.periods, "")
+        energy.append(float(whole.energy.sum()))
+        amplitude.append(np.sqrt(2 * whole.outputs.var(axis=1)))
+    late, swing = np.array(energy[periods // 2 :]), np.array(amplitude[periods // 2 :])
+    return LeftAlone(
+        energy=float(late.mean()),
+        energy_spread=float(late.std()),
+        amplitude=swing.mean(axis=0),
+        amplitude_spread=swing.std(axis=0),
+        drift=found.drift,
+        periods=periods,
+    )
 
 
 def _rest(stepper: TimeStepper) -> Moving:

@@ -60,6 +60,8 @@ def test_a_motion_that_hill_finds_unstable_is_said_to_be_and_time_leaves_it(
         found[hertz] = json.loads(out)
     assert not found[500]["stable"]
     assert abs(found[500]["outputs"]["response"]["difference"]) > 0.1
+    assert found[500]["left_alone"]["periods"] == verification.LEFT_ALONE
+    assert found[640]["left_alone"] is None
     assert found[640]["stable"]
     assert abs(found[640]["outputs"]["response"]["difference"]) < 0.1
 
@@ -74,11 +76,21 @@ def test_more_harmonics_come_closer(folder: Path) -> None:
     found = []
     for highest in (3, 9, 15):
         override = [f"harmonics.kept={list(range(highest + 1))}"]
-        found.append(verification.compare(result, 2 * np.pi * 700, None, override, 512, Progress()).found)
+        comparison = verification.compare(result, 2 * np.pi * 700, None, override, 512, Progress())
+        found.append(comparison.found)
     assert all(one.outcome == "converged" for one in found)
     for values in zip(*((one.waveform["response"], abs(one.energy), one.largest) for one in found), strict=True):
         assert values[0] > 2 * values[1] > 4 * values[2]
     assert found[2].largest < 0.045
+    # left to itself the beam leaves that motion for one that never repeats itself, with eleven times the energy (600
+    # periods from this start and from rest, at 256 and 1024 steps: 5.09 and 5.19 J, spread 0.28 J)
+    alone = comparison.left_alone
+    assert alone is not None
+    assert not comparison.stable
+    assert alone.energy == pytest.approx(5.15, rel=0.05)
+    assert 0.1 < alone.energy_spread < 0.6
+    assert alone.drift > 0.1
+    assert any(name == "left alone" for name, _ in comparison.lines())
 
 
 def test_a_worn_row_is_compared_where_it_was_solved(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -19,7 +19,7 @@ from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.threads import limited
-from tribodyn.hbm.time.time_integration import Options
+from tribodyn.hbm.time.time_integration import LeftAlone, Options, leave_alone
 from tribodyn.hbm.time.verify import Verification, verify
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.workflows.pictures.plots import axes_of, force_unit, length_unit
@@ -34,6 +34,7 @@ from tribodyn.workflows.scene.schema import Scene
 STEPS, STEPS_PER_HARMONIC = 256, 32  # per period; per period of the highest harmonic kept
 TOLERANCE = 1e-6  # drift over a period, far below the differences that are looked for
 PERIODS = 150
+LEFT_ALONE = 120  # periods of a plain march where the balance solution is unstable or nothing periodic was found
 STRIDE = 5e-3  # of the frequency, from the nearest solution to the one asked for
 
 
@@ -43,6 +44,7 @@ class Comparison:
 
     balance, solution : the problem, with the wear of `row` (None: unworn), and its solution
     found : the comparison; stable : of the balance solution, by Hill's method; steps : per period; seconds : spent
+    left_alone : what a plain march does where that solution is unstable or nothing periodic was found, else None
     """
 
     balance: HarmonicBalance
@@ -52,6 +54,7 @@ class Comparison:
     row: int | None
     steps: int
     seconds: float
+    left_alone: LeftAlone | None
 
     @property
     def hertz(self) -> float:
@@ -96,6 +99,18 @@ class Comparison:
             "drift": found.drift,
             "outcome": found.outcome,
             "seconds": self.seconds,
+            "left_alone": None if self.left_alone is None else self._left_alone(self.left_alone),
+        }
+
+    def _left_alone(self, seen: LeftAlone) -> dict[str, Any]:
+        names = self.balance.compliance.output_names
+        return {
+            "energy_J": seen.energy,
+            "energy_spread_J": seen.energy_spread,
+            "amplitude_m": dict(zip(names, seen.amplitude.tolist(), strict=True)),
+            "amplitude_spread_m": dict(zip(names, seen.amplitude_spread.tolist(), strict=True)),
+            "drift": seen.drift,
+            "periods": seen.periods,
         }
 
     def lines(self) -> list[tuple[str, str]]:
@@ -121,6 +136,9 @@ class Comparison:
         shown.append(("time steps", f"{self.steps} per period, their own error {error}"))
         shown.append(("periodic", f"{self.found.outcome}, {self.found.periods} periods, drift {self.found.drift:.1e}"))
         shown.append(("stable", "yes" if self.stable else "no: the motion may leave the balance solution"))
+        if (seen := self.left_alone) is not None:
+            spread = f"{seen.energy:.6g} J per cycle on average, spread {seen.energy_spread:.2g} J"
+            shown.append(("left alone", f"{spread}, drift {seen.drift:.1e} after {seen.periods} periods"))
         return shown
 
 
@@ -156,9 +174,13 @@ def compare(
             raise SolveFailed(f"no balance at {target / (2 * np.pi):g} Hz: {solution.outcome}")
         steps = steps or max(STEPS, STEPS_PER_HARMONIC * balance.basis.harmonics[-1])
         with progress.stage("time integration"):
-            found = verify(balance, solution.state, Options(steps, tolerance=TOLERANCE, max_periods=PERIODS))
-        stable = exponents.stability(balance, solution.state).stable
-    return Comparison(balance, solution, found, stable, row, steps, time.perf_counter() - start)
+            options = Options(steps, tolerance=TOLERANCE, max_periods=PERIODS)
+            found = verify(balance, solution.state, options)
+            stable = exponents.stability(balance, solution.state).stable
+            left_alone = None
+            if not stable or found.outcome != CONVERGED:
+                left_alone = leave_alone(balance, target, solution.state, LEFT_ALONE, options)
+    return Comparison(balance, solution, found, stable, row, steps, time.perf_counter() - start, left_alone)
 
 
 def rebuilt(result: Result, overrides: Sequence[str] = ()) -> scene_file.SceneFile:

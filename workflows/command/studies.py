@@ -115,9 +115,7 @@ def trade(
     def keep(table: trade_table.Trade) -> None:
         trade_table.save(table, path)
 
-    found = whole_scenes.trade(
-        scene, knob, most=most, overrides=overrides, progress=aside, keep=keep, earlier=earlier
-    )
+    found = whole_scenes.trade(scene, knob, most=most, overrides=overrides, progress=aside, keep=keep, earlier=earlier)
     trade_picture.picture(found).savefig(path.with_suffix(".png"))
     if as_json:
         print(json.dumps(knob_trade.as_records(found), indent=2))
