@@ -12,7 +12,7 @@ import numpy as np
 from PIL import Image
 
 FORMATS = ("mp4", "gif")
-COLOURS = 128  # of a GIF, chosen from its first, middle and last image
+COLOURS = 256  # of an image of a GIF, the most that it can have: small patches of status keep their colours
 
 
 def write(images: Iterable[np.ndarray], stem: Path, formats: Sequence[str], rate: float) -> list[Path]:
@@ -36,9 +36,7 @@ def write(images: Iterable[np.ndarray], stem: Path, formats: Sequence[str], rate
             if "gif" in paths:
                 kept.append(Image.fromarray(image))
     if kept:
-        some = [np.asarray(kept[i]) for i in (0, len(kept) // 2, -1)]
-        palette = Image.fromarray(np.concatenate(some)).quantize(COLOURS)
-        pages = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in kept]
+        pages = [image.quantize(COLOURS, dither=Image.Dither.NONE) for image in kept]
         # hundredths of a second are the unit of the format
         pages[0].save(
             paths["gif"], save_all=True, append_images=pages[1:], duration=10 * max(round(100 / rate), 2), loop=0
