@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from tribodyn.fem.factor import Factor, factorise
 
 DENSE_BELOW = 400
-RESTARTS = 300  # of the Lanczos iteration; a sound mesh needs some ten
+RESTARTS = 100  # of the Lanczos iteration; a sound mesh needs some ten
 NEGATIVE = 1e-10  # squared frequency below zero over the largest of a single DOF that is no rounding any more
 UNSTABLE = "the structure is unstable at rest"
 CURE = "its speed or its static load is beyond divergence or buckling; lower it"

@@ -11,6 +11,7 @@ import pytest
 from tribodyn.geometry import blocks
 from tribodyn.hbm import newton
 from tribodyn.hbm.contact import law
+from tribodyn.workflows.result import summary
 from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
@@ -277,6 +278,31 @@ def test_a_free_structure_wears(tmp_path: Path) -> None:
     assert result.wear is not None
     assert result.wear.work.sum() > 0
     assert result.wear.preload == pytest.approx(400.0, rel=1e-6)
+    joint = summary.summary(result)["joints"]["lap"]
+    assert joint["preload_N"] == pytest.approx([400.0, 400.0], rel=1e-6)
+    assert joint["area_m2"] == pytest.approx(8e-4)
+    assert joint["volume_m3"] == pytest.approx(1e-12 * joint["energy_J"])  # coefficient times friction work
+
+
+def test_results_are_told_by_joint(tmp_path: Path) -> None:
+    """Two joints with coefficients of their own: each loses its coefficient times its own friction work."""
+    bar(tmp_path)
+    joints = "".join(
+        f'[contacts.{name}]\nfirst = "patch_{i}"\nsecond = "ground"\n{LAW}tangential_stiffness = 1e7\n'
+        f"normal_stiffness = 1e7\nwear = {{coefficient = {coefficient}}}\n"
+        for name, i, coefficient in (("near", 5, 1e-12), ("far", 7, 3e-12))
+    )
+    wear = '[wear]\ncoefficient = 1e-12\nrule = "thesis"\nstep = "0.5 um"\nmax_steps = 1\nat = "300 Hz"\n'
+    text = BAR.replace('["700 Hz", "900 Hz"]', '["290 Hz", "310 Hz"]\npoints = 3') + joints + wear
+    result = pipeline.run(scene_file.parse(text, "scene.toml", QUIET, tmp_path), None, Progress())
+    found = summary.summary(result)
+    for name, coefficient in (("near", 1e-12), ("far", 3e-12)):
+        joint = found["joints"][name]
+        assert joint["energy_J"] > 0
+        assert joint["volume_m3"] == pytest.approx(coefficient * joint["energy_J"], rel=1e-9)
+    for total, part in (("energy_J", "energy_J"), ("volume_m3", "volume_m3")):
+        assert found[total] == pytest.approx(sum(joint[part] for joint in found["joints"].values()), rel=1e-12)
+    assert "  near" in dict(summary.lines(result))
 
 
 STACK = """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -57,6 +58,7 @@ class Facts:
     interface_modes : characteristic constraint modes that stand for the masters
     delta_max_m : depth at which the static loads can close the contact no longer; wear_split : share of body 1
     around : the wheel of a part that is a sector
+    joints : of a scene with named contacts, JSON of name -> [first pair, one beyond its last]
     harmonics_error, harmonics_choice : estimated truncation error of chosen harmonics, and how they were chosen
     """
 
@@ -80,6 +82,12 @@ class Facts:
     around: Around | None = None
     harmonics_error: float | None = None
     harmonics_choice: str | None = None
+    joints: str | None = None
+
+    @property
+    def pairs_of_joints(self) -> dict[str, slice]:
+        """Named contact -> its pairs; empty where the scene names none."""
+        return {} if self.joints is None else {name: slice(*ends) for name, ends in json.loads(self.joints).items()}
 
     @property
     def share_of_body_1(self) -> float:

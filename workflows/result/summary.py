@@ -32,6 +32,8 @@ def summary(result: Result) -> dict[str, Any]:
     peak_is_stable : whether that peak of the curve is a motion that stays, None where this was not asked for
     stable_peak_hz, stable_peak_m : the highest point of the curve that is
     seconds : of computing, interrupted runs included
+    joints : named contact -> pairs, area_m2, and with wear preload_N [first, last], depth_max_m, depth_mean_m,
+        volume_m3, energy_J of that joint; empty where the scene names none
     verdict : quantity -> value, error, dominated_by, stated, reason, see workflows.accuracy.statement; None without
     error_budget : what each discretisation contributes, see result.facts.BudgetEntry
     """
@@ -41,10 +43,33 @@ def summary(result: Result) -> dict[str, Any]:
     for name in ("full_dofs", "model_dofs", "contact_pairs", "unknowns", "delta_max_m"):
         numbers[name] = getattr(result.facts, name)
     numbers |= _curve(result)
+    numbers["joints"] = by_joint(result)
     numbers["free_hz"] = result.facts.free_hz.tolist()
     numbers["error_budget"] = [vars(entry) for entry in result.budget]
     numbers["verdict"] = statement.record(result.verdict)
     return {name: plain(value) for name, value in numbers.items()}
+
+
+def by_joint(result: Result) -> dict[str, dict[str, Any]]:
+    """What each named contact carries and loses; see `summary`."""
+    patch, wear = result.patch, result.wear
+    if patch is None:
+        return {}
+    found: dict[str, dict[str, Any]] = {}
+    for name, pairs in result.facts.pairs_of_joints.items():
+        area = patch.area[pairs]
+        found[name] = {"pairs": len(area), "area_m2": float(area.sum())}
+        if wear is None or not len(wear.cycles) or not len(area):
+            continue
+        depth = result.depth_after(-1)[pairs]
+        found[name] |= {
+            "preload_N": [float(wear.normal_force[row, pairs].sum()) for row in (0, -1)],
+            "depth_max_m": float(depth.max()),
+            "depth_mean_m": float(depth @ area / area.sum()),
+            "volume_m3": float(depth @ area),
+            "energy_J": float(wear.work[:, pairs].sum()),
+        }
+    return found
 
 
 def _wear(result: Result) -> dict[str, Any]:
@@ -191,6 +216,13 @@ def lines(result: Result) -> list[tuple[str, str]]:
             ("friction work", f"{numbers['energy_J']:.5g} J"),
             ("wear steps", f"{numbers['wear_steps']} with {numbers['hbm_solves']} balance solves"),
         ]
+    for name, joint in numbers["joints"].items():
+        told = f"{joint['pairs']} pairs on {1e6 * joint['area_m2']:.5g} mm2"
+        if "preload_N" in joint:
+            first, last = joint["preload_N"]
+            told += f", preload {first:.5g} -> {last:.5g} N, {1e6 * joint['depth_max_m']:.4g} um deep at most, "
+            told += f"{1e9 * joint['volume_m3']:.4g} mm3, {joint['energy_J']:.4g} J"
+        shown.append((f"  {name}", told))
     shown += budget.lines(result)
     shown.append(("computing", f"{numbers['seconds']:.1f} s"))
     return shown

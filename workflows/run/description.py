@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import platform
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -21,6 +22,7 @@ from tribodyn.workflows.result.result import PartMesh, Patch, Result
 from tribodyn.workflows.run.references import delta_max, free_deflection
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene
+from tribodyn.workflows.scene.structure import StructureScene
 
 VTK_KIND = {27: ("hexahedron27", "triquadratic_hexahedron"), 10: ("tetra10", "quadratic_tetra")}
 PACKAGES = ("tribodyn", "numpy", "scipy", "numba", "scikit-fem", "gmsh", "meshio", "h5py", "pydantic")
@@ -56,6 +58,11 @@ def described(
             first_omitted_hz=reduced.info.first_omitted_frequency,
             factorisation=reduced.info.factorisation,
         )
+    if isinstance(file.scene, StructureScene) and file.scene.contacts:
+        pairs = {name: slice(0, i.n_pair) for name in file.scene.contacts}  # a single joint has them all
+        pairs |= {joint.name: joint.pairs for joint in balance.contact.joints if isinstance(joint.pairs, slice)}
+        pairs |= {name: own for name, own in reduced.info.joints.items() if name in pairs}
+        facts = replace(facts, joints=json.dumps({name: [own.start, own.stop] for name, own in pairs.items()}))
     if file.scene.wear is not None:
         facts = replace(facts, delta_max_m=delta_max(file.scene, free, i.area), wear_split=file.scene.wear.split)
     if isinstance(file.scene, MeshScene) and (wheel := file.scene.wheel) is not None:
