@@ -372,4 +372,4 @@ def test_the_jump_to_a_peak_that_overtakes_is_located_and_said(problem: WearProb
     assert worn.depth[after].max() >= LEAP_DEPTH
     assert worn.ended.lost
     jump = f"jumped from {420 / (2 * np.pi):.5g} to {SECOND / (2 * np.pi):.5g} Hz at {worn.cycles[after]:.3g} cycles"
-    assert jump in worn.end
+    assert jump in str(worn.end)
