@@ -95,7 +95,7 @@ class ContactCompliance:
         hardly couples the pairs.
         """
         n, root = self.n_contact, np.sqrt(self.k)
-        shapes = [root[:, None] * e.b[:n] * np.sqrt(e.still) for e, _ in self.groups]
+        shapes = [root[:, None] * e.b[:n] / np.sqrt(e.static_lam) for e, _ in self.groups]
         parts = [part for b in shapes for part in ((b.real, b.imag) if np.iscomplexobj(b) else (b,))]
         columns = np.concatenate(parts, axis=1)
         left, size, _ = np.linalg.svd(columns, full_matrices=False)

@@ -173,7 +173,7 @@ class Expansion:
         self.left = np.ascontiguousarray(self.columns[:, p:].T)
         r = self.rigid.shape[1]
         self.lam = np.concatenate([np.zeros(r), lam[r:]])
-        self.still = np.concatenate([np.zeros(r), 1 / lam[r:]])
+        self.static_lam = np.concatenate([np.full(r, np.inf), lam[r:]])  # rigid motions stand still
         self.c = phi.conj().T @ cphi
         n = self._n_contact
         self.w0_single, self.b_single = (a.astype(self.single.dtype) for a in (self.w0[:n, :n], self.b[:n]))
@@ -245,7 +245,7 @@ class PortCompliance:
     def through_core(self, z: np.ndarray) -> np.ndarray:
         """S(s)^-1 z for modal forces z (n_mode, ...)."""
         if self.s == 0:
-            return (z.T * self.expansion.still).T
+            return (z.T / self.expansion.static_lam).T
         solution: np.ndarray = sla.lapack.zgetrs(self.factor, self.pivots, z)[0]
         return solution.reshape(z.shape)
 

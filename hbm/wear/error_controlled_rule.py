@@ -48,7 +48,8 @@ LEAST_PRELOAD_SHARE = 1e-4
 EXPLICIT_STEPS = 0.01 * 3.0 ** np.arange(5)
 OVERTAKING_ACCURACY = 0.5  # share of the tolerance, of the cycles, within which a jump to another peak is located
 LOOKED_AT = 0.97  # ratio of preloads, counted from the first, at which higher peaks are looked for
-LARGEST_SHIFT = 0.1  # of a frequency in one step: a peak that moves further is another one
+LARGEST_SHIFT = 0.1  # of a frequency in one step: a peak that moves further is another one,
+UNEXPECTED = 4.0  # unless it moves less than so many times as far as the step before leads to expect
 SHIFTED = WearEnd.NO_STEP.say(f": the tracked peak moves by more than {LARGEST_SHIFT:.0%} in the shortest step")
 MAX_CORRECTIONS = 12  # solves of a stage
 GAIN_ACCURACY = 1e-9  # of the depth, for laws whose depth per work is not constant
@@ -111,7 +112,7 @@ def _jumps(rows: Sequence[WearRow]) -> str:
     said = [
         f"; the response jumped from {a.omega / TURN:.5g} to {b.omega / TURN:.5g} Hz at {b.cycles:.3g} cycles"
         for a, b in pairwise(rows)
-        if abs(b.omega / a.omega - 1) > LARGEST_SHIFT
+        if not a.plan.any() and abs(b.omega / a.omega - 1) > LARGEST_SHIFT  # what follows a jump or a leap has no plan
     ]
     return "".join(said)
 
@@ -145,7 +146,7 @@ def _step(problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Se
         first, second = _stages(problem, state, stride, drift, searches)
         slopes = np.array([search.slope for search in searches])
         solves += first.solves + second.solves
-        lost = bool(second.failure or first.failure) or _shift(state, second) > LARGEST_SHIFT
+        lost = bool(second.failure or first.failure) or _shifts(state, second, stride * drift)
         if lost:
             error, longest = np.inf, stride
         else:
@@ -197,9 +198,14 @@ def _is_due(problem: WearProblem, state: WearState, second: WearState, rows: Seq
     return bool(before != after)
 
 
-def _shift(state: WearState, second: WearState) -> float:
-    """Largest relative change of a duty's frequency in a step."""
-    return max(abs(b.state.omega / a.state.omega - 1) for a, b in zip(state.points, second.points, strict=True))
+def _shifts(state: WearState, second: WearState, expected: np.ndarray) -> bool:
+    """Whether a duty's frequency moves so far in a step that it is that of another peak.
+
+    expected : (n_duty,) change of the frequencies that the step before leads to expect [rad/s]
+    """
+    omega, after = (np.array([point.state.omega for point in s.points]) for s in (state, second))
+    limit = np.maximum(LARGEST_SHIFT * omega, UNEXPECTED * np.abs(expected))
+    return bool(np.any(np.abs(after - omega) > limit))
 
 
 def _overtaken(problem: WearProblem, state: WearState) -> tuple[OperatingPoint, ...] | None:

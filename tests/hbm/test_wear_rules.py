@@ -221,7 +221,7 @@ def test_a_branch_that_has_ended_is_looked_for_afresh(problem: WearProblem) -> N
     before = assess(lost, np.zeros(N_PAIR), 0.0, None)
     depth = np.full(N_PAIR, 1e-6)
     after, expected = assess(lost, depth, 1.0, before), assess(problem, depth, 1.0, None)
-    assert after.failure == ""
+    assert after.failure is None
     assert after.rate == pytest.approx(expected.rate, rel=1e-6)
     assert after.solves > 3
 

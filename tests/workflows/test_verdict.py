@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import signal
+from time import process_time
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ import tribodyn as td
 from tribodyn.hbm.continuation.operating_point import NoPeak
 from tribodyn.workflows.accuracy import statement, verdict
 from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution
+from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 
 SMALL = (
     "geometry.n_patch=5", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=4", "wear.tolerance=10 %",
@@ -81,3 +84,26 @@ def test_the_verdict_is_kept(small: td.Result, tmp_path) -> None:
     assert td.load(tmp_path).summary()["verdict"] == again.summary()["verdict"]
     assert again.summary()["verdict"]["life"]["stated"] is False
     assert np.isfinite(again.summary()["verdict"]["amplitude"]["error"])
+
+
+def _spin() -> None:
+    while True:
+        sum(range(1000))
+
+
+def test_work_beyond_its_seconds_is_stopped() -> None:
+    start = process_time()
+    with pytest.raises(TimeUp), processor_seconds(0.2):
+        _spin()
+    assert 0.15 < process_time() - start < 2.0
+    with pytest.raises(TimeUp), processor_seconds(0.0):
+        raise AssertionError("no second is left")
+    with processor_seconds(5.0):
+        pass
+    assert signal.getitimer(signal.ITIMER_PROF) == (0.0, 0.0)
+
+
+def test_a_verdict_without_seconds_says_what_is_not_known() -> None:
+    said = td.run("beam", overrides=(*SMALL, "wear=", "verdict.seconds=1e-3")).summary()["verdict"]
+    assert "verdict.seconds are used up" in said["energy"]["reason"]
+    assert said["energy"]["error"] is None

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from time import process_time
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.time.time_integration import IntegrationFailed, Options
 from tribodyn.hbm.time.verify import verify
 from tribodyn.hbm.wear.history import LIFE_SHARE
+from tribodyn.workflows.accuracy.time_limit import processor_seconds
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.progress import Progress
@@ -217,10 +219,13 @@ def relative(ours: float, theirs: float) -> float:
     return abs(ours - theirs) / abs(theirs)
 
 
-def each(seen: list[State], look: Callable[[State], Answers | None]) -> Iterator[Answers | None]:
-    """What a look says of every state; None where it fails."""
+def each(seen: list[State], look: Callable[[State], Answers | None], seconds: float) -> Iterator[Answers | None]:
+    """What a look says of every state; None where it fails, or the processor seconds for all of them are spent."""
+    end = process_time() + seconds
     for state in seen:
         try:
-            yield look(state)
+            with processor_seconds(end - process_time()):
+                answers = look(state)
+            yield answers
         except (ValueError, RuntimeError):
             yield None

@@ -18,11 +18,13 @@ from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload
 from tribodyn.workflows.accuracy import probes
 from tribodyn.workflows.accuracy.probes import Answers, InTime, State, relative
 from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution, Statement, Verdict
+from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 
+HALF = 0.5  # of the seconds that are left, for one measurement of several
 CONTRADICTION = 3.0  # times the estimated error, from which on time integration contradicts the balance
 RESPONSE = ("amplitude", "energy", "preload")
 
@@ -33,23 +35,27 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress) -> 
     The scene's [verdict] says which measurements are made and limits their processor seconds
     """
     wanted, clock = file.scene.verdict, process_time()
+    skipped = f"the {wanted.seconds:g} s of verdict.seconds are used up"
 
-    def left() -> bool:
-        return process_time() - clock < wanted.seconds
+    def left() -> float:
+        return wanted.seconds - (process_time() - clock)
 
     try:
-        seen = probes.states(file, model.balance, result)
-    except NoPeak as missing:
-        return Verdict(_nothing(str(missing)), (), process_time() - clock)
+        with processor_seconds(HALF * left()):
+            seen = probes.states(file, model.balance, result)
+    except (NoPeak, TimeUp) as missing:
+        why = skipped if isinstance(missing, TimeUp) else str(missing)
+        return Verdict(_nothing(why), (), process_time() - clock)
     values = _values(result, seen)
     parts: list[Contribution] = list(_of_budget(result))
-    skipped = f"the {wanted.seconds:g} s of verdict.seconds are used up"
     with progress.stage("verdict: harmonics"):
-        finer = list(probes.each(seen, probes.with_more_harmonics)) if left() else [None] * len(seen)
-        parts += _of_harmonics(result, seen, finer, values["life"], "lost with more harmonics" if left() else skipped)
+        share, start = HALF * left(), process_time()
+        finer = list(probes.each(seen, probes.with_more_harmonics, share))
+        lost = "lost with more harmonics" if process_time() - start < share else skipped
+        parts += _of_harmonics(result, seen, finer, values["life"], lost)
     with progress.stage("verdict: mesh"):
         parts += (
-            list(_of_mesh(file, result, seen, skipped if not left() else ""))
+            list(_of_mesh(file, result, seen, HALF * left() if wanted.in_time else left(), skipped))
             if wanted.mesh
             else _unknown("mesh and contact grid", "verdict.mesh is false")
         )
@@ -58,13 +64,11 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress) -> 
     if wanted.in_time:
         with progress.stage("verdict: time integration"):
             for state in [seen[i] for i in sorted({0, len(seen) // 2, len(seen) - 1})] if seen else []:
-                if not left():
-                    refusal = skipped
-                    break
                 try:
-                    checks.append((state, probes.in_time(state)))
-                except ValueError as reason:
-                    refusal = str(reason)
+                    with processor_seconds(left()):
+                        checks.append((state, probes.in_time(state)))
+                except (ValueError, TimeUp) as reason:
+                    refusal = skipped if isinstance(reason, TimeUp) else str(reason)
                     break
     statements = {name: _statement(name, values[name], parts, checks, refusal, result) for name in QUANTITIES}
     return Verdict(statements, tuple(parts), process_time() - clock)
@@ -136,14 +140,20 @@ def _depth_error(result: Result, seen: Sequence[State], finer: Sequence[Answers 
     return change / fall * deepened / float(result.depth_after(-1).max())
 
 
-def _of_mesh(file: SceneFile, result: Result, seen: Sequence[State], skipped: str) -> Iterator[Contribution]:
+def _of_mesh(
+    file: SceneFile, result: Result, seen: Sequence[State], seconds: float, skipped: str
+) -> Iterator[Contribution]:
     """The first state on a coarser mesh: the difference bounds the error of the finer one from second order on."""
     source = "mesh and contact grid"
-    if skipped or not seen:
-        yield from _unknown(source, skipped or "no state was solved")
+    if not seen:
+        yield from _unknown(source, "no state was solved")
         return
     try:
-        found = probes.on_coarser_mesh(file, result.harmonics)
+        with processor_seconds(seconds):
+            found = probes.on_coarser_mesh(file, result.harmonics)
+    except TimeUp:
+        yield from _unknown(source, skipped)
+        return
     except (ValueError, RuntimeError) as refusal:
         yield from _unknown(source, f"on a coarser mesh: {refusal}")
         return

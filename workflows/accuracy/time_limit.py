@@ -1,0 +1,38 @@
+"""A limit of processor seconds on work that nobody needs at any price."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+
+class TimeUp(RuntimeError):
+    """The processor seconds are used up."""
+
+
+@contextmanager
+def processor_seconds(limit: float) -> Iterator[None]:
+    """Raise TimeUp in the body once this process has spent `limit` seconds of the processor in it.
+
+    The timer of a process belongs to its main thread: in another one, and on systems without it, nothing is limited.
+    Raises  TimeUp, also at once where `limit` is not above 0
+    """
+    if limit <= 0:
+        raise TimeUp(f"{limit:g} s are left")
+    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
+        yield
+        return
+
+    def up(number: int, frame: FrameType | None) -> None:
+        raise TimeUp(f"{limit:g} s are used up")
+
+    before = signal.signal(signal.SIGPROF, up)
+    signal.setitimer(signal.ITIMER_PROF, limit)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
