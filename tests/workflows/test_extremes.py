@@ -21,7 +21,7 @@ def test_no_cell_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     cli.app(["extremes", "--quick", "--json", "--out", str(tmp_path / "table.png")], result_action="return_value")
     rows = json.loads(capsys.readouterr().out)
     assert (tmp_path / "table.png").stat().st_size > 10_000
-    assert len(rows) > 140
+    assert len(rows) > 50
     assert {row["outcome"] for row in rows} == {"converged", "refused"}
     assert sum(row["outcome"] == "converged" for row in rows) > 0.8 * len(rows)
     assert all(len(row["reason"]) > 10 for row in rows)

@@ -213,7 +213,7 @@ def test_a_scene_that_is_not_this_rig_is_one_sentence(override, words):
 
 def test_a_wear_law_beside_the_scene_is_found(tmp_path):
     """The law of a file, the energy's own written once more, gives the same wear."""
-    law = (Path(wear_law.__file__).parent / "wear" / "energy.py").read_text(encoding="utf-8")
+    law = (Path(wear_law.__file__).parent / "laws" / "energy.py").read_text(encoding="utf-8")
     text = scene_file.find("rig").read_text(encoding="utf-8")
     (tmp_path / "own.py").write_text(law, encoding="utf-8")
     (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
