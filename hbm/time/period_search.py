@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tribodyn.hbm.time.time_integration import Options, TimeStepper
 
 THROWN_OFF = 4.0  # drift, over the smallest one, from which on past periods no longer tell where to go
+LOST = 100.0  # ... from which on mixing does not come back by itself: the motion leaves the periodic one
 PROGRESS = 0.9  # drift, over the smallest one, that counts as a better period
 DIFFERENCE = 1e-6  # step of the derivative of a period, relative to the state
 KRYLOV, FORCING = 60, 0.05  # products at most and relative residual of a linear solve
@@ -67,14 +68,16 @@ class PeriodSearch:
 
     def mix(self, motion: Moving) -> Period:
         """Periods mixed from past ones, then Newton's method where they lead away; the best one where both fail."""
-        mixing = Anderson(depth=40)
+        mixing, tried = Anderson(depth=40), None
         try:
             found = self.step(motion)
             while found.drift > self.options.tolerance:
                 if found.drift > THROWN_OFF * self.best.drift:
-                    found = self._shoot(self.best)
                     mixing.forget()
-                    continue
+                    if found.drift > LOST * self.best.drift and self.best is not tried:
+                        found = self._shoot(self.best)
+                        tried = self.best
+                        continue
                 mixed = self.vector.unpack(mixing.propose(found.start, found.image), found.end)
                 found = self.step(mixed, self.options.patience)
         except GivenUp:
