@@ -22,7 +22,7 @@ from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.time.time_integration import IntegrationFailed, Options
 from tribodyn.hbm.time.verify import verify
 from tribodyn.hbm.wear.history import LIFE_SHARE
-from tribodyn.workflows.accuracy.time_limit import processor_seconds
+from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.progress import Progress
@@ -133,16 +133,22 @@ def _at_response_peak(site: Site, balance: HarmonicBalance, result: Result) -> S
 
 
 def with_more_harmonics(state: State) -> Answers | None:
-    """The same state with more harmonics, its place followed; None where it is lost on the way."""
+    """The same state with more and more harmonics, its place followed, as far as it is found within the seconds.
+
+    None where it is lost at once
+    """
     top = state.balance.basis.harmonics[-1]
     basis, x, omega = state.balance.basis, state.here.state.x, state.here.state.omega
     wide = harmonic_choice.widened(state.balance, max(CLIMB[-1], top + FURTHER))
     answers = None
     for highest in [h for h in CLIMB if h > top + 1] or [top + FURTHER // 2, top + FURTHER]:
         finer = wide.with_harmonics(tuple(h for h in wide.basis.harmonics if h <= highest))
-        point = state.site.next(finer, omega, basis.transfer(x, finer.basis))
+        try:
+            point = state.site.next(finer, omega, basis.transfer(x, finer.basis))
+        except TimeUp:
+            return answers
         if not point.solution.converged:
-            return None
+            return answers
         basis, x, omega = finer.basis, point.state.x, point.state.omega
         answers = Answers.of(finer, point)
     return answers
@@ -222,9 +228,10 @@ def relative(ours: float, theirs: float) -> float:
 def each(seen: list[State], look: Callable[[State], Answers | None], seconds: float) -> Iterator[Answers | None]:
     """What a look says of every state; None where it fails, or the processor seconds for all of them are spent."""
     end = process_time() + seconds
-    for state in seen:
+    for done, state in enumerate(seen):
         try:
-            with processor_seconds(end - process_time()):
+            left = end - process_time()  # half of it for the first state: all quantities but depth and life are its own
+            with processor_seconds(left / (len(seen) - done) if done else 0.5 * left):
                 answers = look(state)
             yield answers
         except (ValueError, RuntimeError):

@@ -24,6 +24,7 @@ from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 
+MOST = 0.8  # of the seconds, for more harmonics, which matter most
 HALF = 0.5  # of the seconds that are left, for one measurement of several
 CONTRADICTION = 3.0  # times the estimated error, from which on time integration contradicts the balance
 RESPONSE = ("amplitude", "energy", "preload")
@@ -49,9 +50,8 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress) -> 
     values = _values(result, seen)
     parts: list[Contribution] = list(_of_budget(result))
     with progress.stage("verdict: harmonics"):
-        share, start = HALF * left(), process_time()
-        finer = list(probes.each(seen, probes.with_more_harmonics, share))
-        lost = "lost with more harmonics" if process_time() - start < share else skipped
+        finer = list(probes.each(seen, probes.with_more_harmonics, MOST * left()))
+        lost = f"lost with more harmonics, or beyond the {wanted.seconds:g} s of verdict.seconds"
         parts += _of_harmonics(result, seen, finer, values["life"], lost)
     with progress.stage("verdict: mesh"):
         parts += (

@@ -33,8 +33,8 @@ class VerdictOptions(Table):
 
     enabled: StrictBool = True
     """Judge the result when the run is done."""
-    seconds: Annotated[Number, Field(gt=0)] = 120.0
-    """Processor seconds after which no further measurement is begun."""
+    seconds: Annotated[Number, Field(gt=0)] = 60.0
+    """Processor seconds that the measurements may take together; what they do not reach is not known."""
     mesh: StrictBool = True
     """Solve the unworn contact on a coarser mesh."""
     in_time: StrictBool = False
