@@ -47,7 +47,7 @@ LEAST_PRELOAD_SHARE = 1e-4
 # within the tolerance
 EXPLICIT_STEPS = 0.01 * 3.0 ** np.arange(5)
 OVERTAKING_ACCURACY = 0.5  # share of the tolerance, of the cycles, within which a jump to another peak is located
-LOOKED_AT = 0.75  # ratio of preloads, counted from the first, at which higher peaks are looked for
+LOOKED_AT = 0.97  # ratio of preloads, counted from the first, at which higher peaks are looked for
 LARGEST_SHIFT = 0.1  # of a frequency in one step: a peak that moves further is another one,
 UNEXPECTED = 4.0  # unless it moves less than so many times as far as the step before leads to expect
 SHIFTED = WearEnd.NO_STEP.say(f": the tracked peak moves by more than {LARGEST_SHIFT:.0%} in the shortest step")
