@@ -145,7 +145,9 @@ def with_more_harmonics(state: State) -> Answers | None:
         finer = wide.with_harmonics(tuple(h for h in wide.basis.harmonics if h <= highest))
         try:
             point = state.site.next(finer, omega, basis.transfer(x, finer.basis))
-        except TimeUp:
+            if not point.solution.converged:  # no solution is near: the place is looked for as at the start
+                point = state.site.first(finer)
+        except (TimeUp, NoPeak):
             return answers
         if not point.solution.converged:
             return answers
