@@ -91,9 +91,9 @@ class AtFrequency:
             solution, solves = arc_length.solve_along_load(balance, self.omega, self.newton), 2
         return OperatingPoint.of(balance, solution, self.output, solves)
 
-    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> OperatingPoint | None:
-        """None: the frequency is given."""
-        return None
+    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> tuple[OperatingPoint | None, int]:
+        """None, without a solve: the frequency is given."""
+        return None, 0
 
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
         """The distance of a state to the fixed frequency."""
@@ -146,22 +146,23 @@ class AtPeak:
         """Refine from a neighbouring peak."""
         return self._refine(balance, omega, x, 2e-4 * omega)
 
-    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> OperatingPoint | None:
+    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> tuple[OperatingPoint | None, int]:
         """The higher peak that a sweep with rising frequency meets, None where the tracked one is the highest.
 
         point : the tracked peak
+        Returns the peak and the balance solves spent, those of a sweep without any peak apart
         """
         needed = max((h for h, _ in balance.excitation.loads), default=0)
         few = balance.with_harmonics(tuple(h for h in balance.basis.harmonics if h <= max(SCANNED, needed)))
         try:
             scanned = self.first(few)
         except NoPeak:
-            return None
+            return None, 0
         if not self._is_higher(scanned, point):
-            return None
+            return None, scanned.solves
         x = few.basis.transfer(scanned.state.flat, balance.basis).reshape(point.state.x.shape)
         found = self.next(balance, scanned.state.omega, x)
-        return replace(found, solves=found.solves + scanned.solves) if self._is_higher(found, point) else None
+        return found if self._is_higher(found, point) else None, found.solves + scanned.solves
 
     def _is_higher(self, found: OperatingPoint, point: OperatingPoint) -> bool:
         omega = found.state.omega
@@ -294,12 +295,17 @@ class BesidePeak:
         found = self._beside(balance, at_peak)
         return replace(found, solves=found.solves + solves)
 
-    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> OperatingPoint | None:
-        """The cycle at the ratio to a peak that has overtaken the tracked one, None where none has."""
+    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> tuple[OperatingPoint | None, int]:
+        """The cycle at the ratio to a peak that has overtaken the tracked one, None where none has; solves spent."""
         omega = point.state.omega
-        back, _ = self._walk(balance, omega, omega / self.ratio, point.state.x)
-        peak = self.peak.overtaken(balance, self.peak.next(balance, omega / self.ratio, back.state.x))
-        return self._beside(balance, peak) if peak is not None else None
+        back, solves = self._walk(balance, omega, omega / self.ratio, point.state.x)
+        tracked = self.peak.next(balance, omega / self.ratio, back.state.x)
+        peak, searched = self.peak.overtaken(balance, tracked)
+        spent = solves + tracked.solves + searched
+        if peak is None:
+            return None, spent
+        found = self._beside(balance, peak)
+        return found, spent - peak.solves + found.solves
 
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
         """The distance of a state to the ratio times the frequency of the peak, which is found from it."""

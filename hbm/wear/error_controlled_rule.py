@@ -154,8 +154,10 @@ def _step(problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Se
         if error <= 1.0:
             preload = problem.preload(second.points[0].state)
             if preload >= EVENT_WINDOW[0] * target:
-                found = _overtaken(problem, second) if jumped or _is_due(problem, state, second, rows) else None
-                solves += sum(point.solves for point in found or ())
+                found = None
+                if jumped or _is_due(problem, state, second, rows):
+                    found, searched = _overtaken(problem, second)
+                    solves += searched
                 if found is not None:
                     jumped = (stride, first, second, error, found)
                 elif jumped is None:
@@ -208,14 +210,19 @@ def _shifts(state: WearState, second: WearState, expected: np.ndarray) -> bool:
     return bool(np.any(np.abs(after - omega) > limit))
 
 
-def _overtaken(problem: WearProblem, state: WearState) -> tuple[OperatingPoint, ...] | None:
-    """The duties of a state, those at a peak that another one has overtaken at that one; None where none has."""
-    moved = []
-    for duty, point in zip(problem.mission, state.points, strict=True):
-        moved.append(duty.site.overtaken(problem.at_depth(state.depth).with_load(duty.load), point))
-    if not any(moved):
-        return None
-    return tuple(new or old for new, old in zip(moved, state.points, strict=True))
+def _overtaken(problem: WearProblem, state: WearState) -> tuple[tuple[OperatingPoint, ...] | None, int]:
+    """The duties of a state, those at a peak that another one has overtaken at that one; None where none has.
+
+    Returns them and the balance solves spent
+    """
+    searched = [
+        duty.site.overtaken(problem.at_depth(state.depth).with_load(duty.load), point)
+        for duty, point in zip(problem.mission, state.points, strict=True)
+    ]
+    solves = sum(spent for _, spent in searched)
+    if not any(new for new, _ in searched):
+        return None, solves
+    return tuple(new or old for (new, _), old in zip(searched, state.points, strict=True)), solves
 
 
 def _leap(

@@ -337,12 +337,13 @@ def test_a_peak_is_overtaken_by_a_higher_one_that_a_sweep_meets(problem: WearPro
     highest = site.first(problem.balance)
     lower = AtPeak("tip", 500.0, 545.0).first(problem.balance)
     assert lower.amplitude < highest.amplitude / 2
-    found = site.overtaken(problem.balance, lower)
+    found, solves = site.overtaken(problem.balance, lower)
     assert found is not None
+    assert solves > found.solves > 0  # the sweep's, too
     assert found.state.omega == pytest.approx(highest.state.omega, rel=1e-4)
-    assert site.overtaken(problem.balance, highest) is None
+    assert site.overtaken(problem.balance, highest)[0] is None
     beside = BesidePeak(site, 1.01)
-    moved = beside.overtaken(problem.balance, beside.next(problem.balance, 1.01 * lower.state.omega, lower.state.x))
+    moved, _ = beside.overtaken(problem.balance, beside.next(problem.balance, 1.01 * lower.state.omega, lower.state.x))
     assert moved is not None
     assert moved.state.omega == pytest.approx(1.01 * highest.state.omega, rel=1e-4)
 
@@ -353,9 +354,11 @@ LEAP_DEPTH, SECOND = 2e-5, 520.0  # depth [m] from which on a second place is th
 class TwoPlaces(AtFrequency):
     """A fixed frequency that another one overtakes at a given depth."""
 
-    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> OperatingPoint | None:
-        deep = balance.contact.gap.max() >= LEAP_DEPTH
-        return AtFrequency("tip", SECOND).first(balance) if deep and point.state.omega == self.omega else None
+    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> tuple[OperatingPoint | None, int]:
+        if balance.contact.gap.max() < LEAP_DEPTH or point.state.omega != self.omega:
+            return None, 0
+        found = AtFrequency("tip", SECOND).first(balance)
+        return found, found.solves
 
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
         return Correction(0.0, np.zeros_like(state.x), 0)

@@ -16,7 +16,7 @@ TINY = (
 
 
 def test_every_run_ends_as_a_run_may() -> None:
-    tried = fuzz.fuzz("beam", TINY, runs=12, seed=1)
+    tried = fuzz.fuzz("beam", TINY, runs=12, seed=1, command=cli.main)
     assert len(tried) == 12
     assert [one for one in tried if not one.good] == []
     again = fuzz.cases("beam", TINY, runs=12, seed=1)
@@ -43,12 +43,11 @@ def test_every_key_is_tried() -> None:
         ("import sys; print('tribodyn: no.', file=sys.stderr); raise SystemExit(2)", "refused"),
     ],
 )
-def test_a_wrong_end_is_seen(does: str, end: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wrong_end_is_seen(does: str, end: str) -> None:
     def instead(arguments: object) -> None:
         exec(does, {})
 
-    monkeypatch.setattr(cli, "main", instead)
-    (tried,) = fuzz.fuzz("beam", TINY, runs=1, seconds=1.0)
+    (tried,) = fuzz.fuzz("beam", TINY, runs=1, seconds=1.0, command=instead)
     assert tried.end == end
 
 

@@ -113,3 +113,11 @@ def test_what_is_given_is_left_alone_and_named() -> None:
     assert len(rounds) == 1
     assert promise.errors == {"energy": 0.003}
     assert "not counted: harmonics" in promise.sentence
+
+
+def test_the_settings_that_are_told_are_those_that_were_run() -> None:
+    verdict = _told({"wear steps": {"life": 0.5}})
+    promise, rounds = _search("1 % of life", [verdict])
+    assert not promise.kept
+    assert len(rounds) == promise.rounds == refinement.ROUNDS
+    assert set(promise.overrides) <= set(rounds[-1])

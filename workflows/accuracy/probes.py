@@ -236,5 +236,5 @@ def each(seen: list[State], look: Callable[[State], Answers | None], seconds: fl
             with processor_seconds(left / (len(seen) - done) if done else 0.5 * left):
                 answers = look(state)
             yield answers
-        except (ValueError, RuntimeError):
+        except (ValueError, RuntimeError, TimeUp):
             yield None

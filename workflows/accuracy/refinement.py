@@ -8,7 +8,7 @@ promised that the last round has not measured.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 
 from tribodyn.geometry import parts
@@ -78,33 +78,28 @@ def to_accuracy(file: SceneFile, accuracy: str, run: Runner, say: Callable[[str]
     wanted, named, knobs = parsed(accuracy)
     given = tuple(GIVEN.get(knob, knob.replace("_", " ")) for knob in knobs)
     asked = tuple(QUANTITIES[TRADED.index(name)] for name in named)
-    texts: dict[str, str] = {"verdict.enabled": "true"}
+    always = {"verdict.enabled": "true"}
     if named and not any(name in OF_WEAR for name in named):
-        texts["wear"] = ""
+        always["wear"] = ""
     added: dict[str, str] = {}
     for number in range(1, ROUNDS + 1):
-        more = (f"{key}={value}" for key, value in (texts | added).items())
+        more = (f"{key}={value}" for key, value in (always | added).items())
         current = parse(file.text, f"{file.name}.toml", (*file.overrides, *more), file.folder)
         result = run(current, number)
         found = loaded(result.verdict)
         of = asked or tuple(name for name, said in found.statements.items() if said.value is not None)
         promise = _promise(found, wanted, of, given, added, number)
+        if not of:
+            raise RuntimeError(f"nothing of {file.name} can be promised: {found.statements['peak_frequency'].reason}")
         say(f"round {number}: {promise.sentence}")
-        if promise.kept or not of:
+        if promise.kept:
             break
-        large = _large(found, wanted, of, given)
-        finer = [text for source in large if source in SETTINGS for text in SETTINGS[source](current, result)]
-        if not finer:
+        finer = {s: SETTINGS[s](current, result) if s in SETTINGS else () for s in _large(found, wanted, of, given)}
+        promise = replace(promise, left=tuple(source for source, texts in finer.items() if not texts))
+        if number == ROUNDS or not any(finer.values()):
             break
-        added |= dict(text.split("=", 1) for text in finer)
-    if not of:
-        raise RuntimeError(f"nothing of {file.name} can be promised: {found.statements['peak_frequency'].reason}")
-    stuck = (
-        tuple(source for source in large if not SETTINGS.get(source, _fixed)(current, result))
-        if not promise.kept
-        else ()
-    )
-    return result, _promise(found, wanted, of, given, added, number, stuck)
+        added |= dict(text.split("=", 1) for texts in finer.values() for text in texts)
+    return result, promise
 
 
 def _promise(
@@ -114,7 +109,6 @@ def _promise(
     given: tuple[str, ...],
     added: dict[str, str],
     rounds: int,
-    left: tuple[str, ...] = (),
 ) -> Promise:
     errors, reasons = {}, {}
     for name in of:
@@ -124,7 +118,7 @@ def _promise(
             assert error is not None
             reasons[name] = "" if error <= wanted else f"its error is {error:.2g}"
     overrides = tuple(f"{key}={value}" for key, value in added.items())
-    return Promise(wanted, errors, reasons, overrides, given, left, rounds)
+    return Promise(wanted, errors, reasons, overrides, given, (), rounds)
 
 
 def _error(found: Verdict, name: str, given: Sequence[str]) -> tuple[float | None, str]:
@@ -195,10 +189,6 @@ def _wear(file: SceneFile, result: Result) -> Iterator[str]:
 def _points(file: SceneFile, result: Result) -> Iterator[str]:
     if file.scene.response.points:
         yield f"response.points={2 * file.scene.response.points}"
-
-
-def _fixed(file: SceneFile, result: Result) -> tuple[str, ...]:
-    return ()
 
 
 def _setting(texts: Callable[[SceneFile, Result], Iterator[str]]) -> Setting:

@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from types import FrameType
 
 
-class TimeUp(RuntimeError):
-    """The processor seconds are used up."""
+class TimeUp(Exception):
+    """The processor seconds are used up; no RuntimeError, which a solver may answer by trying another way."""
 
 
 @contextmanager

@@ -22,7 +22,6 @@ from typing import Any
 import numpy as np
 
 from tribodyn.fem import factor
-from tribodyn.workflows.command import main
 from tribodyn.workflows.command.exits import BAD_INPUT, FAILED_SOLVE
 from tribodyn.workflows.result import store
 from tribodyn.workflows.run import pipeline  # noqa: F401  # loaded once, before the processes are forked
@@ -98,11 +97,14 @@ def fuzz(
     seconds: float = 10.0,
     workers: int = 1,
     say: Callable[[str], None] = lambda sentence: None,
+    *,
+    command: Callable[[list[str]], None],
 ) -> list[Tried]:
     """Try nasty values of the keys of a scene, one at a time.
 
     overrides : that make the scene small, so that a run takes a second; runs : how many pairs of key and value, drawn
     with `seed`, all by default; seconds : of the processor that a run may take
+    command : what `tribodyn` does with the words of a command line; it leaves by SystemExit
     Raises  SceneError for a scene that cannot be read, ValueError where processes cannot be forked
     """
     if not hasattr(os, "fork"):
@@ -118,7 +120,7 @@ def fuzz(
             place = Path(folder) / str(number)
             place.mkdir()
             changed = (*overrides, f"{key}={value}")
-            process: BaseProcess = fork.Process(target=_run, args=(scene, changed, place, seconds))
+            process: BaseProcess = fork.Process(target=_run, args=(command, scene, changed, place, seconds))
             process.start()
             active[process] = (scene, key, value, place, time.monotonic())
             if number % 100 == 99:
@@ -175,7 +177,9 @@ def _not_finite(file: Path) -> str:
     return ""
 
 
-def _run(scene: str, overrides: tuple[str, ...], place: Path, seconds: float) -> None:
+def _run(
+    command: Callable[[list[str]], None], scene: str, overrides: tuple[str, ...], place: Path, seconds: float
+) -> None:
     """The command in this process, which ends with its exit code."""
     _, hard = resource.getrlimit(resource.RLIMIT_CPU)
     resource.setrlimit(resource.RLIMIT_CPU, (int(np.ceil(seconds)), hard))
@@ -186,7 +190,7 @@ def _run(scene: str, overrides: tuple[str, ...], place: Path, seconds: float) ->
         sys.stdout = sys.stderr = printed
         words = ["run", scene, "--no-pictures", "--out", str(place / "out")]
         try:
-            main.main([*words, *(word for text in overrides for word in ("--set", text))])
+            command([*words, *(word for text in overrides for word in ("--set", text))])
         finally:
             printed.flush()
             (place / "spent").write_text(str(time.process_time()))

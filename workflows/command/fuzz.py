@@ -37,8 +37,9 @@ def fuzz(
         Print JSON for machines.
     """
     from tribodyn.workflows.benchmarks import fuzz as measured
+    from tribodyn.workflows.command import main
 
-    tried = measured.fuzz(scene, overrides, runs, seed, seconds, workers, aside)
+    tried = measured.fuzz(scene, overrides, runs, seed, seconds, workers, aside, command=main.main)
     wrong = [one for one in tried if not one.good]
     if as_json:
         print(json.dumps({"ends": measured.counts(tried), "wrong": [one.record() for one in wrong]}, indent=2))

@@ -46,15 +46,7 @@ class Geometry(Table):
     @model_validator(mode="before")
     @classmethod
     def _gather_parameters(cls, table: Any, info: ValidationInfo) -> Any:
-        if not isinstance(table, dict) or "parameters" in table:
-            return table
-        own = {key: value for key, value in table.items() if key in cls.model_fields}
-        other = {key: value for key, value in table.items() if key not in cls.model_fields}
-        if ("part" in own) == ("mesh" in own):
-            raise ValueError('expected either part = "name" or mesh = "file.msh", and not both')
-        if not isinstance(own.get("part"), str):
-            return own | other  # a mesh file has no parameters: the other keys are unknown ones
-        return own | {"parameters": part_parameters(own["part"], other, folder_of(info))}
+        return gathered(cls, table, folder_of(info))
 
     _own: Path | None = PrivateAttr(None)
 
@@ -67,6 +59,19 @@ class Geometry(Table):
     def part_name(self) -> str | None:
         """The part for geometry.parts: its name, or the path of the file beside the scene."""
         return self.part if self._own is None else str(self._own)
+
+
+def gathered(kind: type[Table], table: Any, folder: Path | None) -> Any:
+    """A table with a part or a mesh whose keys that its kind does not have are gathered as parameters of the part."""
+    if not isinstance(table, dict) or "parameters" in table:
+        return table
+    own = {key: value for key, value in table.items() if key in kind.model_fields}
+    other = {key: value for key, value in table.items() if key not in kind.model_fields}
+    if ("part" in own) == ("mesh" in own):
+        raise ValueError('expected either part = "name" or mesh = "file.msh", and not both')
+    if not isinstance(own.get("part"), str):
+        return own | other  # a mesh file has no parameters: the other keys are unknown ones
+    return own | {"parameters": part_parameters(own["part"], other, folder)}
 
 
 def part_parameters(part: str, given: dict[str, Any], folder: Path | None = None) -> dict[str, int | float]:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, ValidationInfo, model_validator
 
-from tribodyn.workflows.scene.body import Geometry, Material, part_parameters
+from tribodyn.workflows.scene.body import Geometry, Material, gathered
 from tribodyn.workflows.scene.contact import FaceContact
 from tribodyn.workflows.scene.decks import Deck, in_metres
 from tribodyn.workflows.scene.faces import FaceRule, Point
@@ -70,19 +70,11 @@ class Body(Table):
     @model_validator(mode="before")
     @classmethod
     def _gather_parameters(cls, table: Any, info: ValidationInfo) -> Any:
-        if not isinstance(table, dict) or "parameters" in table:
-            return table
-        own = {key: value for key, value in table.items() if key in cls.model_fields}
-        other = {key: value for key, value in table.items() if key not in cls.model_fields}
-        if ("part" in own) == ("mesh" in own):
-            raise ValueError('expected either part = "name" or mesh = "file.msh", and not both')
         for key in ("size", "face_sizes", "volume", "unit"):
-            if "part" in own and key in own:
+            if isinstance(table, dict) and "part" in table and "mesh" not in table and key in table:
                 raise ValueError(f"{key} is for a mesh or a CAD file: a part has parameters of its own")
-        if not isinstance(own.get("part"), str):
-            return own | other
         try:
-            return own | {"parameters": part_parameters(own["part"], other, folder_of(info))}
+            return gathered(cls, table, folder_of(info))
         except ValueError as trouble:
             raise ValueError(str(trouble).replace("geometry.", "")) from None
 
