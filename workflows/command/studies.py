@@ -162,7 +162,7 @@ def extremes(*, quick: Flag = False, out: Path = Path("extremes.png"), as_json: 
     Parameters
     ----------
     quick
-        Every third cell, on smaller models.
+        Every eighth cell, on smaller models and up to 1e9 N/m.
     out
         File of the picture.
     as_json
