@@ -1,4 +1,4 @@
-"""Constraints: faces glued together though their meshes differ, and points that carry faces.
+"""Constraints: faces glued together though their meshes differ, points that carry faces, and points linked together.
 
 Source  ties: Bernardi, Maday and Patera, A new nonconforming approach to domain decomposition: the mortar element
     method, 1994; distributed coupling: the mean motion of a face in the sense of least squares, weighted by area
@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix, kron
+from scipy.linalg import qr
+from scipy.sparse import coo_matrix, csr_matrix, eye_array, kron
 from scipy.sparse.linalg import splu
 
 from tribodyn.fem.constraints import Following, named
@@ -157,6 +158,43 @@ class DistributedCoupling:
                             shape=(6, 3 * len(points)))  # fmt: skip
         dofs = np.concatenate([3 * place + np.arange(3), 3 * turn + np.arange(3)])
         return Following(dofs, matrix, f"couplings.{self.point}")
+
+
+@dataclass(frozen=True)
+class Link:
+    """Two points of couplings that move alike but for some of their motions.
+
+    what : name for errors; first, second : the couplings; free : motions out of 0..2 along and 3..5 about x, y, z in
+        which they stay free of each other
+    """
+
+    what: str
+    first: RigidCoupling | DistributedCoupling
+    second: RigidCoupling | DistributedCoupling
+    free: Sequence[int] = ()
+
+    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following:
+        """As many displacements of the first point, or of the face that it follows, in terms of the others."""
+        alike = np.setdiff1d(np.arange(6), np.asarray(self.free, int))
+        one, two = (self._motion(c, mesh, node_sets)[alike] for c in (self.first, self.second))
+        rows = csr_matrix(one - two)
+        own = np.unique(one.nonzero()[1])
+        pivots = own[np.sort(qr(one[:, own].toarray(), mode="r", pivoting=True)[1][: len(alike)])]
+        moved = np.linalg.solve(rows[:, pivots].toarray(), -rows.toarray())
+        moved[:, pivots] = 0.0
+        moved[np.abs(moved) < SMALL] = 0.0
+        return Following(pivots, csr_matrix(moved), self.what)
+
+    @staticmethod
+    def _motion(
+        coupling: RigidCoupling | DistributedCoupling, mesh: Any, node_sets: Mapping[str, np.ndarray]
+    ) -> csr_matrix:
+        """(6, n_dof) the motion of a point: its own DOFs, or those of the face that it follows."""
+        place, turn = mesh.points[coupling.point]
+        dofs = np.concatenate([3 * place + np.arange(3), 3 * turn + np.arange(3)])
+        if isinstance(coupling, DistributedCoupling):
+            return csr_matrix(coupling.build(mesh, node_sets).map)
+        return csr_matrix(eye_array(3 * mesh.doflocs.shape[1], format="csr")[dofs])
 
 
 def _turning(arm: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import ast
 import importlib
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -20,6 +21,7 @@ from tribodyn import declare
 _FOLDER = Path(__file__).parent
 
 
+@cache
 def names() -> tuple[str, ...]:
     """Return the names of all parts, sorted; no part is imported for it."""
     return tuple(sorted(file.stem for file in _FOLDER.glob("*.py") if _is_part(file)))

@@ -12,6 +12,7 @@ Source  extended periodic motion concept: Krack 2015, Computers & Structures 154
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import scipy.linalg as sla
@@ -20,6 +21,9 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.law import SEPARATES, ContactCycle
 from tribodyn.hbm.krylov import gmres
+from tribodyn.hbm.linear.expansion import stuck_modes
+
+PROPORTIONAL = 1e-6  # of the damping of two modes: less between them is rounding
 
 
 @dataclass(frozen=True)
@@ -28,7 +32,7 @@ class Point:
 
     coordinates : (n_contact * n_coeff + 3,) the same, scaled
     residual : (n_contact * n_coeff + 2,), scaled; eta : complex modal amplitudes (n, n_harmonic)
-    factors : of the bordered dynamic stiffness of each harmonic
+    factors : the bordered dynamic stiffness of each harmonic, ready to be solved
     """
 
     coordinates: np.ndarray
@@ -39,7 +43,54 @@ class Point:
     cycle: ContactCycle
     eta: np.ndarray
     residual: np.ndarray
-    factors: list[tuple[np.ndarray, np.ndarray]]
+    factors: list[Bordered]
+
+
+class Bordered(Protocol):
+    """[D, r; r^T, 0] of one harmonic, or [D, 0; 0, 1] where nothing borders it; solves for rhs (n + 1,)."""
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray: ...
+
+
+class DenseBordered:
+    """With a full D (n, n); border : (n,)."""
+
+    def __init__(self, d: np.ndarray, border: np.ndarray, corner: float):
+        self._factor = sla.lu_factor(np.block([[d, border[:, None]], [border[None], np.array([[corner]])]]))
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray:
+        """Solution (n + 1,)."""
+        return sla.lu_solve(self._factor, rhs)
+
+
+class DiagonalBordered:
+    """With a diagonal D (n,), as proportional damping has it; one of its entries may vanish where r is largest."""
+
+    def __init__(self, d: np.ndarray, border: np.ndarray, corner: float):
+        self._d, self._r, self._corner = d, border, corner
+        self._pivot = int(np.abs(border).argmax())
+        with np.errstate(divide="ignore"):
+            self._inverse = 1.0 / d
+        if not corner:
+            self._inverse[self._pivot] = 0.0
+            ratio = d[self._pivot] / border[self._pivot]
+            self._scale = border[self._pivot] + ratio * (border**2 * self._inverse).sum()
+            self._ratio = ratio
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray:
+        """Solution (n + 1,)."""
+        out = np.empty(len(rhs), complex)
+        force, wanted = rhs[:-1], rhs[-1]
+        if self._corner:
+            out[:-1], out[-1] = force * self._inverse, wanted / self._corner
+            return out
+        k, r = self._pivot, self._r
+        others = force * self._inverse
+        missing = (force[k] - self._ratio * (wanted - r @ others)) / self._scale
+        out[:-1] = others - r * self._inverse * missing
+        out[k] = (wanted - r @ out[:-1] + r[k] * out[k]) / r[k]
+        out[-1] = missing
+        return out
 
 
 class FreeVibration:
@@ -67,11 +118,20 @@ class FreeVibration:
             )
         self.k = balance.compliance.k
         mass = np.asarray(system.mass)
-        self.lam, phi = sla.eigh(np.asarray(system.stiffness) + b.T @ (self.k[:, None] * b), mass)
+        self.lam, phi, free = stuck_modes(np.asarray(system.stiffness) + b.T @ (self.k[:, None] * b), mass)
         self.n = len(self.lam)
+        self.held = np.where(free, np.inf, self.lam)  # static loads in equilibrium do not move what nothing holds
         self.U = b @ phi
         self.O = np.array([system.outputs[name] @ phi for name in names])
         self.damping = np.zeros_like(mass) if system.damping is None else phi.T @ np.asarray(system.damping) @ phi
+        size = np.abs(np.diag(self.damping))
+        apart_from_it = np.abs(self.damping - np.diag(np.diag(self.damping)))
+        self.proportional = bool(
+            (
+                apart_from_it
+                <= PROPORTIONAL * np.sqrt(np.outer(size, size)) + PROPORTIONAL * 1e-6 * size.max(initial=0.0)
+            ).all()
+        )
         static = sum(
             (v * system.loads[name] for (h, name), v in balance.excitation.loads.items() if h == 0), np.zeros(self.n)
         )
@@ -85,10 +145,10 @@ class FreeVibration:
         if squares[mode] <= 1e-13 * squares[-1]:
             raise ValueError(f"mode {mode} is a rigid-body motion at rest: choose one that vibrates")
         self.reference, self.reference_omega = shapes[:, mode], float(np.sqrt(squares[mode]))
-        moved = self.O @ self.reference
-        self.per_amplitude = float(abs(moved[0 if output is None else names.index(output)]))
+        self.output = output or names[0]
+        self.per_amplitude = float(abs((self.O @ self.reference)[names.index(self.output)]))
         if self.per_amplitude <= 1e-9 * np.abs(self.O).max():
-            raise ValueError(f"output '{output or names[0]}' does not move in mode {mode}: choose another output")
+            raise ValueError(f"output '{self.output}' does not move in mode {mode}: choose another output")
 
     def _static_state(self) -> tuple[np.ndarray, np.ndarray]:
         """x at rest, and which contacts are open there."""
@@ -125,12 +185,17 @@ class FreeVibration:
         x = flat.reshape(self.rest.shape)
         cycle = self.balance.contact.cycle(x, self.basis, self.balance.memory)
         g = self.k[:, None] * flat - cycle.force.reshape(flat.shape)
-        factors = []
+        factors: list[Bordered] = []
         for h in self.basis.harmonics:
             s = 1j * h * omega
-            d = s * self.damping + np.diag(self.lam + s * s - 2 * zeta * omega * s)
+            undamped = (self.lam if h else self.held) + s * s - 2 * zeta * omega * s
             border, corner = (self.reference, 0.0) if h == 1 else (np.zeros(self.n), 1.0)
-            factors.append(sla.lu_factor(np.block([[d, border[:, None]], [border[None], np.array([[corner]])]])))
+            if self.proportional:
+                factors.append(DiagonalBordered(undamped + s * np.diag(self.damping), border, corner))
+            elif h:
+                factors.append(DenseBordered(s * self.damping + np.diag(undamped), border, corner))
+            else:
+                factors.append(DiagonalBordered(undamped, border, corner))
         rhs = self._rhs(self.U.T @ self.basis.to_complex(g), a)
         if self.basis.has_static:
             rhs[:-1, 0] += self.static_load
@@ -148,9 +213,9 @@ class FreeVibration:
         rhs[-1, self.basis.harmonics.index(1)] = a
         return rhs
 
-    def _solve(self, factors: list[tuple[np.ndarray, np.ndarray]], rhs: np.ndarray) -> tuple[np.ndarray, complex]:
+    def _solve(self, factors: list[Bordered], rhs: np.ndarray) -> tuple[np.ndarray, complex]:
         """Modal amplitudes, and what is missing along the reference mode in harmonic 1."""
-        out = np.stack([sla.lu_solve(f, rhs[:, i]) for i, f in enumerate(factors)], axis=1)
+        out = np.stack([f.solve(rhs[:, i]) for i, f in enumerate(factors)], axis=1)
         return out[:-1], out[-1, self.basis.harmonics.index(1)]
 
     def _residual(self, a: float, x: np.ndarray, mismatch: complex) -> np.ndarray:

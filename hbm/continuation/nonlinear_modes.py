@@ -45,8 +45,11 @@ class BackboneOptions:
 class Backbone:
     """One nonlinear mode.
 
+    modal_amplitude : (n_point,) a of the mass-normalised reference mode [m kg^0.5]
     amplitude : (n_point,) of the chosen output as the reference mode alone would move it [m]
+    output : the chosen one
     omega : (n_point,) natural frequency [rad/s]; damping : (n_point,) modal damping ratio, structure and contact
+    order : (n_coeff,) harmonic of each coefficient
     output_names, response : (n_point, n_output, n_coeff) Fourier coefficients of the outputs [m]
     contact : (n_point, n_pair * n_component, n_coeff) relative displacement [m]
     energy : (n_point,) dissipated energy per cycle, all pairs [J]
@@ -55,9 +58,12 @@ class Backbone:
     end : sentence that says where and why the backbone ends
     """
 
+    modal_amplitude: np.ndarray
     amplitude: np.ndarray
+    output: str
     omega: np.ndarray
     damping: np.ndarray
+    order: np.ndarray
     output_names: tuple[str, ...]
     response: np.ndarray
     contact: np.ndarray
@@ -71,6 +77,13 @@ class Backbone:
     def frequency(self) -> np.ndarray:
         """(n_point,) natural frequency [Hz]."""
         return self.omega / (2 * np.pi)
+
+    @property
+    def acceleration(self) -> np.ndarray:
+        """(n_point,) largest acceleration of the chosen output in the first harmonic [m/s2]."""
+        row = self.response[:, self.output_names.index(self.output)]
+        first = self.order == 1
+        return self.omega**2 * np.linalg.norm(row[:, first], axis=1)
 
     @property
     def reference_frequency(self) -> float:
@@ -89,11 +102,13 @@ def backbone(
     mode: int = 0,
     output: str | None = None,
     options: BackboneOptions | None = None,
+    modal: bool = False,
 ) -> Backbone:
     """Follow one nonlinear mode from a small to a large amplitude (or back).
 
     balance : its vibration load plays no part, its static load does
-    start, stop : amplitudes [m] of `output` (the first by default) in the reference mode
+    start, stop : amplitudes [m] of `output` (the first by default) in the reference mode; where `modal`, those of the
+        mass-normalised mode itself [m kg^0.5]
     mode : number of the reference mode, from 0, among the modes about the static equilibrium
     Raises  ValueError for models whose harmonics see different systems, unknown outputs, no static equilibrium
     """
@@ -101,7 +116,7 @@ def backbone(
     if not (start > 0 and stop > 0 and start != stop):
         raise ValueError(f"the amplitudes of a backbone must be > 0 and differ, not {start} and {stop}")
     problem = FreeVibration(balance, mode, output)
-    a, goal = np.log(np.array([start, stop]) / problem.per_amplitude)
+    a, goal = np.log(np.array([start, stop]) / (1.0 if modal else problem.per_amplitude))
     solved, end = _walk(problem, float(a), float(goal), options)
     return _result(problem, solved, end)
 
@@ -175,9 +190,12 @@ def _result(problem: FreeVibration, solved: list[_Solved], end: str) -> Backbone
     t = problem.balance.contact.tangential
     work = [float(basis.work_per_cycle(p.cycle.force[:, t], p.x[:, t]).sum()) for p in points]
     return Backbone(
+        modal_amplitude=np.array([p.a for p in points]),
         amplitude=np.array([p.a for p in points]) * problem.per_amplitude,
+        output=problem.output,
         omega=np.array([p.omega for p in points]),
         damping=np.array([p.zeta for p in points]),
+        order=basis.order,
         output_names=problem.balance.compliance.output_names,
         response=np.stack([problem.outputs(p) for p in points]),
         contact=np.stack([p.x.reshape(-1, basis.n_coeff) for p in points]),

@@ -35,6 +35,7 @@ SPARSE_SHARE = 0.05  # of entries of the port rows, up to which zeros are left o
 RESONANCE_DISTANCE = 1e-13  # of a frequency from an undamped resonance, relative: the response is rounding alone
 RIGID = 1e3  # squared frequency of a mode over rounding from which on it is looked whether it is rigid
 GAP = 1e-10  # squared frequency of a rigid mode over that of the first elastic one, at the most
+ROUNDED = 1e-6  # the same where it is the rounding of far stiffer modes
 MOST_RIGID = 24  # those of four bodies that nothing joins
 RESISTED = 1e-6  # displacement at the contacts beside that elsewhere from which on a motion is not free of them
 
@@ -201,18 +202,43 @@ def _rigid(stiffness: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, float]:
     squares, shapes = sla.eigh(stiffness, mass, subset_by_index=(0, min(len(mass), MOST_RIGID + 1) - 1))
     largest = float(np.max(np.diag(stiffness).real / np.diag(mass).real)) or 1.0
     size = np.maximum.accumulate(np.abs(squares))
-    gaps = [r for r in range(1, len(squares) + 1) if size[r - 1] <= GAP * (squares[r] if r < len(squares) else largest)]
+    rounding = len(mass) * float(np.finfo(float).eps) * largest
+    above = [float(squares[r]) if r < len(squares) else largest for r in range(1, len(squares) + 1)]
+    gaps = [
+        r
+        for r, next_one in enumerate(above, start=1)
+        if size[r - 1] <= max(GAP * next_one, min(rounding, ROUNDED * next_one))
+    ]
     if not gaps or gaps[-1] > MOST_RIGID:
         raise np.linalg.LinAlgError
     r = gaps[-1]
-    above = float(squares[r]) if r < len(squares) else largest
     # two steps of inverse iteration take the rounding of the stiff modes out of the shapes
-    factor = sla.cho_factor(stiffness + 0.3 * above * mass)
+    factor = sla.cho_factor(stiffness + 0.3 * above[r - 1] * mass)
     R = shapes[:, :r]
     for _ in range(2):
         R = sla.cho_solve(factor, mass @ R)
         R = R @ np.linalg.inv(np.linalg.cholesky(R.conj().T @ mass @ R)).conj().T
-    return R, 0.3 * above
+    return R, 0.3 * above[r - 1]
+
+
+def stuck_modes(stiffness: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """All modes of a stuck structure: squared frequencies (n,), shapes (n, n) of unit modal mass, which are rigid (n,).
+
+    Those that nothing resists come first, with zero for their squared frequency.
+    """
+    largest = float(np.max(np.diag(stiffness).real / np.diag(mass).real))
+    squares, shapes = sla.eigh(stiffness, mass)
+    free = np.zeros(len(mass), bool)
+    if squares[0] <= RIGID * len(mass) * np.finfo(float).eps * largest:
+        try:
+            rigid, shift = _rigid(stiffness, mass)
+        except np.linalg.LinAlgError:
+            return squares, shapes, free
+        held = mass @ rigid
+        squares, shapes = sla.eigh(stiffness + shift * held @ held.T, mass)
+        free[: rigid.shape[1]] = True
+        squares[free], shapes[:, free] = 0.0, rigid
+    return squares, shapes, free
 
 
 def _modes(stiffness: np.ndarray, mass: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -10,7 +10,7 @@ import skfem
 
 from tribodyn.fem.assembly import Assembly, Body
 from tribodyn.fem.constraints import Clamp
-from tribodyn.fem.couplings import DistributedCoupling, RigidCoupling, Tie
+from tribodyn.fem.couplings import DistributedCoupling, Link, RigidCoupling, Tie
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.factor import factorise
 from tribodyn.fem.loads import Moment, NodalForce
@@ -173,3 +173,29 @@ def test_an_isotropic_material_is_the_special_case():
     same = Orthotropic((STEEL.E,) * 3, (STEEL.nu,) * 3, (G,) * 3, STEEL.rho, ((1, 2, 3), (0, 1, 1)))
     for one, other in zip(assemble(mesh, STEEL), assemble(mesh, same), strict=True):
         assert abs(one - other).max() < 1e-11 * abs(one).max()
+
+
+def test_a_link_joins_the_points_of_two_bodies_in_all_motions_or_leaves_one_free():
+    """A bar cut in two: linked in all motions it is the bar tied by rigid ends; free along, it slides there alone."""
+    points = {"one": (2.0, 0.5, 0.5), "two": (2.0, 0.5, 0.5)}
+    loads = {"pull": NodalForce("b.x_max", (1, 0, 0), "area"), "bend": NodalForce("b.x_max", (0, 0, 1), "area")}
+    mesh, sets = block(L(0, 2, 3), L(0, 1, 3), L(0, 1, 3)), block(L(2, 5, 4), L(0, 1, 3), L(0, 1, 3))
+    bar = Assembly([Body("a", *mesh, STEEL), Body("b", *sets, STEEL)], points)
+    rigid = [RigidCoupling("one", "a.x_max"), RigidCoupling("two", "b.x_min")]
+    joined = part(bar, [Clamp("a.x_min")], loads, constraints=[*rigid, Link("links.l", *rigid)])
+    same = Assembly([Body("a", *mesh, STEEL), Body("b", *sets, STEEL)], {"one": points["one"]})
+    whole = [RigidCoupling("one", "a.x_max"), RigidCoupling("one", "b.x_min")]
+    one_point = part(same, [Clamp("a.x_min")], loads, constraints=whole)
+    for load in loads:
+        expected = static(one_point, load)[: bar.doflocs.shape[1] - 4]
+        assert np.abs(static(joined, load)[: len(expected)] - expected).max() < 1e-9 * np.abs(expected).max()
+    soft = [DistributedCoupling("one", "a.x_max"), DistributedCoupling("two", "b.x_min")]
+    sliding = part(bar, [Clamp("a.x_min")], loads, constraints=[*soft, Link("links.l", *soft, free=[0])])
+    lam, shapes = modes(sliding.system.stiffness + 1e-3 * sliding.system.mass, sliding.system.mass, 2)
+    assert lam[0] ** 2 < 1e-6 * lam[1] ** 2
+    u = sliding.field(shapes[:, 0])
+    other = np.unique(u[sliding.node_sets["b.x_max"], 0].round(9))
+    assert len(other) == 1
+    assert np.abs(u[sliding.node_sets["a.x_max"]]).max() < 1e-6 * abs(other[0])
+    with pytest.raises(ValueError, match=r"links\.m and links\.l both move the same nodes"):
+        part(bar, [Clamp("a.x_min")], constraints=[*soft, Link("links.l", *soft), Link("links.m", *soft)])

@@ -243,10 +243,10 @@ def track(
 def backbone(
     scene: str,
     *,
-    start: Annotated[str, Parameter(name="--from")],
-    stop: Annotated[str, Parameter(name="--to")],
-    mode: int = 0,
-    points: int = 40,
+    start: Annotated[str | None, Parameter(name="--from")] = None,
+    stop: Annotated[str | None, Parameter(name="--to")] = None,
+    mode: int | None = None,
+    points: int | None = None,
     overrides: Overrides = (),
     out: Path | None = None,
     as_json: Json = False,
@@ -258,13 +258,13 @@ def backbone(
     scene
         Name of a scene (see `tribodyn list`) or a .toml file; its harmonic loads play no part.
     start
-        Amplitude of the response to begin at, such as 1um.
+        Amplitude of the response to begin at, such as 1um; [backbone] of the scene by default.
     stop
         Amplitude to end at, such as 1mm.
     mode
-        Number of the mode about the static equilibrium, from 0.
+        Number of the mode about the static equilibrium, from 0; 0 or that of [backbone] by default.
     points
-        Points on an easy way; there are more where the backbone bends.
+        Points on an easy way; there are more where the backbone bends. 40 or those of [backbone] by default.
     out
         Folder of backbone.csv and backbone.png; results/NAME by default.
     as_json
@@ -276,8 +276,9 @@ def backbone(
 
     make_room(out)
     file = scene_file.read(scene, overrides)
-    ends = quantity("--from", start, "m"), quantity("--to", stop, "m")
-    found = modes.follow(file, *ends, mode, points, Progress() if as_json else console_progress())
+    ends = [None if end is None else quantity(name, end, "m") for name, end in (("--from", start), ("--to", stop))]
+    asked = modes.way(file, ends[0], ends[1], mode, points)
+    found = modes.follow(file, asked, Progress() if as_json else console_progress())
     folder = out or Path("results") / file.name
     folder.mkdir(parents=True, exist_ok=True)
     modes.write(found, folder / "backbone.csv")

@@ -10,7 +10,7 @@ import numpy as np
 
 from tribodyn.fem.assembly import Assembly, Body, Materials
 from tribodyn.fem.constraints import Clamp, Constraint, named
-from tribodyn.fem.couplings import DistributedCoupling, RigidCoupling, Tie
+from tribodyn.fem.couplings import DistributedCoupling, Link, RigidCoupling, Tie
 from tribodyn.fem.cyclic import rotation
 from tribodyn.fem.loads import Load
 from tribodyn.fem.material import AnyMaterial, Material, Orthotropic
@@ -159,11 +159,16 @@ def clamps(scene: StructureScene, folder: Path) -> list[Clamp]:
 
 
 def constraints(scene: StructureScene, folder: Path) -> list[Constraint]:
-    """Ties, couplings and equations."""
+    """Ties, couplings, links and equations."""
     found: list[Constraint] = [Tie(f"ties.{name}", t.first, t.second, t.reach) for name, t in scene.ties.items()]
+    coupled: dict[str, RigidCoupling | DistributedCoupling] = {}
     for name, table in scene.couplings.items():
         kind = RigidCoupling if table.kind == "rigid" else DistributedCoupling
-        found.append(kind(name, table.face))
+        coupled[name] = kind(name, table.face)
+    found += coupled.values()
+    for name, link in scene.links.items():
+        free = [AXES.index(axis) for axis in link.free]
+        found.append(Link(f"links.{name}", coupled[link.first], coupled[link.second], free))
     return found + [one for deck in of_decks(scene, folder).values() for one in deck.constraints]
 
 

@@ -23,7 +23,7 @@ from tribodyn.reduction.cyclic import ReducedSector, reduce_sector, travelling_w
 from tribodyn.reduction.interface_modes import interface_modes
 from tribodyn.reduction.model import ReducedModel, StaticReaction
 from tribodyn.reduction.prescribed import prescribe
-from tribodyn.reduction.relative import relative
+from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
 
 SEAM = ("cyclic_right", "cyclic_left")  # what a part calls the faces where its wheel is one piece
@@ -65,7 +65,9 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
     held = [part.dofs(given.group, given.axis) for given in scene.prescribed.values()]
     if held and len(part.held):
         raise ValueError("prescribed: a part whose turning is held cannot have prescribed nodes; hold it by springs")
+    relative_dofs = np.zeros(0, int)
     if wanted.relative:
+        relative_dofs = body_1_dofs(interface).ravel()
         system, interface, back = relative(system, interface)
     # a shank sees the whole static shape of the faces that it pulls at, which no few modes have
     shanks = [np.flatnonzero(row) for name, row in part.system.outputs.items() if name.startswith(BOLTS)]
@@ -73,9 +75,7 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
     try:
         reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, extra)
     except SingularStiffness:  # a body that no support, joint or load has a master on
-        if wanted.relative:
-            raise
-        extra = np.union1d(extra, anchors(part))
+        extra = np.union1d(extra, anchors(part, relative_dofs))
         reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, extra)
     if wanted.interface_modes is not None:
         masters = reduced.info.master_dofs
@@ -88,11 +88,15 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
     return reduced if back is None else replace(reduced, basis=back @ reduced.basis)
 
 
-def anchors(part: Part) -> np.ndarray:
-    """Free DOFs of three nodes far apart on every body, without which it cannot move rigidly."""
+def anchors(part: Part, relative_dofs: np.ndarray) -> np.ndarray:
+    """Free DOFs of three nodes far apart on every body, without which it cannot move rigidly.
+
+    relative_dofs : free DOFs that have become relative displacements, which hold nothing
+    """
     found = []
     moves = np.full(3 * len(part.points), -1)
     moves[part.free] = np.arange(len(part.free))
+    moves[part.free[relative_dofs]] = -1
     for piece in pieces(part.mesh):
         nodes = piece.node + np.arange(piece.mesh.doflocs.shape[1])
         nodes = nodes[(moves.reshape(-1, 3)[nodes] >= 0).all(axis=1)]

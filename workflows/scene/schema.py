@@ -22,7 +22,15 @@ from tribodyn.workflows.scene.fields import (
     Table,
 )
 from tribodyn.workflows.scene.loads import HarmonicLoad, Loads, Motion, Prescribed, Spring, StaticLoad
-from tribodyn.workflows.scene.solution import Damping, Harmonics, PartResponse, Reduction, Response, Solver
+from tribodyn.workflows.scene.solution import (
+    Damping,
+    Harmonics,
+    NonlinearMode,
+    PartResponse,
+    Reduction,
+    Response,
+    Solver,
+)
 from tribodyn.workflows.scene.wear import Wear
 from tribodyn.workflows.scene.wheel import Wheel
 from tribodyn.workflows.scene.words import unknown_key
@@ -54,6 +62,8 @@ class Scene(Table, ABC):
     """Harmonics and time samples."""
     damping: Damping = Damping()
     """Structural damping."""
+    backbone: NonlinearMode | None = None
+    """The nonlinear mode that `tribodyn backbone` follows by itself."""
     wear: Wear | None = None
     """Wear; left out, nothing wears."""
     pictures: Pictures = Pictures()

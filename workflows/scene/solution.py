@@ -199,6 +199,23 @@ class Damping(Table):
         return not (self.modal is None and self.mass is None and self.stiffness is None)
 
 
+class NonlinearMode(Table):
+    """The nonlinear mode that `tribodyn backbone` follows where its options do not say otherwise."""
+
+    modal_amplitude: tuple[Annotated[Number, Field(gt=0)], Annotated[Number, Field(gt=0)]]
+    """First and last amplitude of the mass-normalised mode, in m kg^0.5."""
+    mode: Annotated[StrictInt, Field(ge=0)] = 0
+    """Number of the mode about the static equilibrium, from 0; motions of a free structure as a rigid body count."""
+    points: Annotated[StrictInt, Field(ge=2)] = 40
+    """Points on an easy way; there are more where the backbone bends."""
+
+    @model_validator(mode="after")
+    def _goes_somewhere(self) -> NonlinearMode:
+        if self.modal_amplitude[0] == self.modal_amplitude[1]:
+            raise ValueError("modal_amplitude: expected two amplitudes that differ")
+        return self
+
+
 class Solver(Table):
     """Tolerances of the solver, and threads of the linear algebra."""
 

@@ -196,6 +196,25 @@ class Coupling(Table):
         return self
 
 
+class Link(Table):
+    """The points of two couplings move alike."""
+
+    first: str
+    """Name of a coupling."""
+    second: str
+    """Name of the other one."""
+    free: tuple[str, ...] = ()
+    """Motions in which they stay free of each other: out of "x", "y", "z" and the turns "rx", "ry", "rz"."""
+
+    @model_validator(mode="after")
+    def _known(self) -> Link:
+        if set(self.free) - set(AXES) or len(set(self.free)) == len(AXES):
+            raise ValueError(f"free: expected some of {', '.join(AXES)}, but not all, got {list(self.free)}")
+        if self.first == self.second:
+            raise ValueError(f"second: expected another coupling than {self.first!r}")
+        return self
+
+
 Inertia = Annotated[float, quantity("kg m2"), Field(ge=0)]
 
 
@@ -260,6 +279,8 @@ class StructureScene(MeshScene):
     """Faces glued together, by name."""
     couplings: dict[str, Coupling] = Field(default_factory=dict)
     """Points that carry faces, by name."""
+    links: dict[str, Link] = Field(default_factory=dict)
+    """Points of couplings that move alike, by name."""
     masses: dict[str, PointMass] = Field(default_factory=dict)
     """Lumped masses by name."""
     bolts: dict[str, Bolt] = Field(default_factory=dict)
@@ -300,6 +321,10 @@ class StructureScene(MeshScene):
         for name in self.couplings:
             if name in self.bodies:
                 raise ValueError(f"couplings.{name} has the name of a body: give it another")
+        for name, link in self.links.items():
+            for coupling in (link.first, link.second):
+                if coupling not in self.couplings:
+                    raise ValueError(f"links.{name}: {unknown_key(f'couplings.{coupling}', [*self.couplings])}")
         for name, contact in self.contacts.items():
             if contact.wear is not None and self.wear is None:
                 raise ValueError(f"contacts.{name}.wear needs [wear], which says how far the wear goes")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,17 +21,46 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 
 
-def follow(file: SceneFile, start: float, stop: float, mode: int, points: int, progress: Progress) -> Backbone:
-    """The backbone of a scene's observed displacement from one amplitude to another [m].
+@dataclass(frozen=True)
+class Way:
+    """From which amplitude to which, of which mode.
 
-    mode : number of the mode about the static equilibrium, from 0; points : on an easy way
+    start, stop : of the observed displacement [m], or where `modal` of the mass-normalised mode [m kg^0.5]
+    mode : its number about the static equilibrium, from 0; points : on an easy way
+    """
+
+    start: float
+    stop: float
+    mode: int = 0
+    points: int = 40
+    modal: bool = False
+
+
+def way(file: SceneFile, start: float | None, stop: float | None, mode: int | None, points: int | None) -> Way:
+    """What is asked for, else what the scene says in [backbone]; raises ValueError where neither says it."""
+    said = file.scene.backbone
+    mode = mode if mode is not None else said.mode if said else 0
+    points = points if points is not None else said.points if said else 40
+    if start is not None and stop is not None:
+        return Way(start, stop, mode, points)
+    if start is not None or stop is not None or said is None:
+        raise ValueError(
+            f"--{'to' if start is not None else 'from'} is missing: give both ends of the backbone, "
+            "or backbone.modal_amplitude in the scene"
+        )
+    return Way(*said.modal_amplitude, mode, points, modal=True)
+
+
+def follow(file: SceneFile, asked: Way, progress: Progress) -> Backbone:
+    """The backbone of a scene.
+
     Raises  ValueError for what cannot be; SolveFailed where not even the first point is found
     """
     with limited(file.scene.solver.threads):
         balance = modelling.build(file, None, progress).balance
         with progress.stage("backbone"):
-            options = BackboneOptions(points, newton=settings.newton_options(file.scene))
-            found = backbone(balance, start, stop, mode, settings.OUTPUT, options)
+            options = BackboneOptions(asked.points, newton=settings.newton_options(file.scene))
+            found = backbone(balance, asked.start, asked.stop, asked.mode, settings.OUTPUT, options, asked.modal)
     if CONVERGED not in found.outcome:
         raise SolveFailed(f"the backbone {found.end}")
     return found
@@ -38,25 +68,31 @@ def follow(file: SceneFile, start: float, stop: float, mode: int, points: int, p
 
 def follow_backbone(file: SceneFile, start: float, stop: float, *, mode: int = 0, points: int = 40) -> Backbone:
     """The backbone of a scene between two amplitudes [m], without telling what goes on, see `follow`."""
-    return follow(file, start, stop, mode, points, Progress())
+    return follow(file, Way(start, stop, mode, points), Progress())
 
 
 def record(found: Backbone) -> dict[str, Any]:
     """The converged points for machines."""
     good = _good(found)
+    columns = {
+        "modal_amplitude": found.modal_amplitude,
+        "frequency_hz": found.frequency,
+        "damping": found.damping,
+        "amplitude_m": found.amplitude,
+        "acceleration_m_s2": found.acceleration,
+        "energy_J": found.energy,
+    }
     return {
         "reference_hz": found.reference_omega / (2 * np.pi),
-        "amplitude_m": found.amplitude[good].tolist(),
-        "frequency_hz": (found.omega[good] / (2 * np.pi)).tolist(),
-        "damping": found.damping[good].tolist(),
-        "energy_J": found.energy[good].tolist(),
+        **{name: values[good].tolist() for name, values in columns.items()},
+        "rows": [dict(zip(columns, map(float, row), strict=True)) for row in np.array([*columns.values()]).T[good]],
         "end": found.end,
     }
 
 
 def write(found: Backbone, path: Path) -> None:
     """The converged points as comma-separated values."""
-    columns = {name: value for name, value in record(found).items() if isinstance(value, list)}
+    columns = {name: value for name, value in record(found).items() if isinstance(value, list) and name != "rows"}
     write_columns(columns, path)
 
 

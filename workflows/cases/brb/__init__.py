@@ -1,0 +1,1 @@
+"""Brake-Reuss beam: the measured benchmark of the joints community."""
