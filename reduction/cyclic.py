@@ -82,20 +82,12 @@ def travelling_wave(reduced: ReducedSector, engine_order: int, cutoff: float | N
     Returns the model whose system and interface are those of harmonic 1; coordinates are the relative displacements,
         then accessories, then the rest; `reconstruct` takes the harmonic. One object serves all harmonics of one index
     """
-    index_of = _Indices(reduced, cutoff)
-    n_sectors = reduced.sector.n_sectors
-
-    def per_harmonic(h: int) -> tuple[SecondOrderSystem, np.ndarray]:
-        return index_of(h * engine_order % n_sectors)[:2]
-
-    def harmonic_basis(h: int) -> np.ndarray:
-        return reduced.basis @ index_of(h * engine_order % n_sectors)[2]
-
-    system, B = per_harmonic(1)
+    wave = _Wave(reduced, engine_order, _Indices(reduced, cutoff))
+    system, B = wave.model(1)
     omega, _ = hermitian_modes(system.stiffness, system.mass, min(REPORTED_MODES, system.n_dof))
     info = replace(_shared_info(reduced), engine_order=engine_order, free_frequency=omega / (2 * np.pi))
     interface = replace(reduced.sector.interface, B=B)
-    return ReducedModel(system, interface, None, info, per_harmonic, harmonic_basis)
+    return ReducedModel(system, interface, None, info, wave.model, wave.basis)
 
 
 def wheel_model(reduced: ReducedSector, stiffness: Sequence[float] | None = None) -> ReducedModel:
@@ -136,6 +128,26 @@ class _Indices:
             system = projected(self._sector.system, T)
             self._made[index] = system, np.eye(len(self._sector.left), system.n_dof), T
         return self._made[index]
+
+
+@dataclass(frozen=True)
+class _Wave:
+    """What a harmonic of a wave of an engine order sees of a sector; a class, so that the model can be stored."""
+
+    reduced: ReducedSector
+    engine_order: int
+    index_of: _Indices
+
+    def model(self, h: int) -> tuple[SecondOrderSystem, np.ndarray]:
+        """Small system and contact map of harmonic h."""
+        return self._index(h)[:2]
+
+    def basis(self, h: int) -> np.ndarray:
+        """From the small coordinates of harmonic h to the full ones."""
+        return self.reduced.basis @ self._index(h)[2]
+
+    def _index(self, h: int) -> tuple[SecondOrderSystem, np.ndarray, np.ndarray]:
+        return self.index_of(h * self.engine_order % self.reduced.sector.n_sectors)
 
 
 def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -21,9 +22,11 @@ from scipy import stats
 
 import tribodyn as td
 from tests.helpers.command import leave
-from tribodyn.workflows.designs import design, pool, study_file
+from tribodyn.workflows.designs import design, parallel_picture, pool, study_file, task
 from tribodyn.workflows.designs.journal import Journal
 from tribodyn.workflows.designs.task import Row, Task
+from tribodyn.workflows.run import reuse
+from tribodyn.workflows.scene import scene_file
 
 TINY = ["geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "response.points=6", "wear="]
 PRESS, FRICTION = "loads.static.press.value", "contact.friction"
@@ -139,6 +142,9 @@ def test_a_row_is_what_the_run_itself_gives(done: Path) -> None:
         np.testing.assert_allclose(data["peak_m_first"], frame["peak_m_first"], rtol=1e-14)
         assert list(data["status"].values) == list(frame["status"])
     assert (done / "study.png").stat().st_size > 5000
+    parquet = pandas.read_parquet(done / "study.parquet")
+    np.testing.assert_array_equal(parquet["peak_m_first"], frame["peak_m_first"])
+    assert list(parquet["sentence"]) == list(frame["sentence"])
 
 
 def test_the_table_does_not_depend_on_the_workers(done: Path, tmp_path: Path) -> None:
@@ -170,6 +176,8 @@ def test_resuming_repeats_nothing_and_takes_what_a_larger_study_shares(
     assert list(found.columns["status"]) == ["failed", "failed", "complete", "complete"]
     td.study(larger, tmp_path, resume=True)
     assert asked == [1, 2]  # what failed fails again
+    td.study(larger, tmp_path, retry=True)
+    assert asked == [1, 2, 1, 2]
 
 
 def test_the_key_of_a_run_follows_its_files(tmp_path: Path) -> None:
@@ -221,7 +229,35 @@ def test_the_command_resumes_a_study_that_was_killed(
     assert (tmp_path / "out" / "study.csv").read_bytes() == (done / "study.csv").read_bytes()
 
 
-def test_dask_gives_the_same_table(done: Path, tmp_path: Path) -> None:
-    pytest.importorskip("distributed")
-    td.study(TABLES, tmp_path, workers=1, scheduler="local")
-    assert (tmp_path / "study.h5").read_bytes() == (done / "study.h5").read_bytes()
+def test_processes_share_what_is_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Path] = []
+    both = {FRICTION: [0.3, 0.4], "geometry.n_length": [3, 4]}
+    own = reuse._made
+    monkeypatch.setattr(reuse, "_made", lambda file: made.append(file.folder) or own(file))
+
+    def every_process_new(tasks: list[Task], workers: int) -> Any:
+        for one in tasks:
+            assert one.store is not None
+            assert one.store.parent.is_dir()
+            task._bench.early = ""  # as in a process that has done nothing yet
+            yield task.solve(one)
+
+    monkeypatch.setattr(pool, "finished", every_process_new)
+    found = td.study(TABLES | {"vary": both}, tmp_path, workers=2)
+    assert found.count("complete") == 4
+    assert len(made) == 2
+    assert not (tmp_path / "models").exists()
+    assert parallel_picture.picture(found).axes
+
+
+def test_the_parts_of_all_scenes_can_be_stored() -> None:
+    for name in ("beam", "blade", "leaf_seal"):
+        small = (*TINY, "reduction.modes=4") if name == "beam" else ()
+        bench = reuse.Bench()
+        bench.plain(scene_file.read(name, small))
+        kept = pickle.loads(pickle.dumps((bench.part, bench.reduced)))[1]
+        assert bench.reduced is not None
+        for h in (0, 1):
+            here, there = bench.reduced.at_harmonic(h), kept.at_harmonic(h)
+            np.testing.assert_array_equal(here[0].stiffness, there[0].stiffness)
+            np.testing.assert_array_equal(here[1], there[1])

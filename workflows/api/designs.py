@@ -20,15 +20,16 @@ def study(
     workers: int | None = None,
     scheduler: str = "",
     resume: bool = False,
+    retry: bool = False,
     progress: Report = None,
 ) -> StudyTable:
     """Run a scene many times, over lists of values or drawn from distributions.
 
     source : path of the .toml file of a study, or its tables as a dict
-    folder : of study.csv, study.h5 and study.png; results/NAME by default, NAME that of the file, or "study"
+    folder : of tables and pictures; results/NAME by default, NAME that of the file, or "study"
     workers : processes, as many as there are cores by default; a script needs `if __name__ == "__main__":` around this
     scheduler : address of a scheduler of dask.distributed, or "local" for one of its own
-    resume : take the runs that the folder holds already, and do the others
+    resume : take the runs that the folder holds already, and do the others; retry : and those that failed
     Raises  SceneError, ValueError: the study asks for what cannot be; SolveFailed: the scheduler was lost
     """
     if isinstance(source, Mapping):
@@ -36,4 +37,4 @@ def study(
     else:
         read = study_file.read(Path(source))
     place = Path("results") / read.name if folder is None else Path(folder)
-    return studies.run(read, place, reporter(progress), workers, scheduler, resume)
+    return studies.run(read, place, reporter(progress), workers, scheduler, resume, retry)

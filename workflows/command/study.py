@@ -5,8 +5,14 @@ from __future__ import annotations
 import json
 import shlex
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tribodyn.workflows.command.words import Flag, Json, make_room
+
+if TYPE_CHECKING:
+    from tribodyn.workflows.designs.table import StudyTable
+
+TOLD = 5  # runs that are not complete, before the rest is only counted
 
 
 def study(
@@ -16,6 +22,7 @@ def study(
     scheduler: str = "",
     out: Path | None = None,
     resume: Flag = False,
+    retry: Flag = False,
     as_json: Json = False,
 ) -> None:
     """Run a scene many times, over lists of values or drawn from distributions, and leave one table.
@@ -31,9 +38,11 @@ def study(
     scheduler
         Address of a scheduler of dask.distributed, such as tcp://host:8786, or "local" for one of its own.
     out
-        Folder of study.csv, study.h5 and study.png; results/NAME by default.
+        Folder of tables and pictures; results/NAME by default.
     resume
         Take the runs that the folder holds already, and do the others.
+    retry
+        Resume, and do failed runs again.
     as_json
         Print JSON for machines.
     """
@@ -46,7 +55,7 @@ def study(
     folder = out or Path("results") / read.name
     progress = Progress() if as_json else console_progress()
     try:
-        found = studies.run(read, folder, progress, workers, scheduler, resume)
+        found = studies.run(read, folder, progress, workers, scheduler, resume, retry)
     except KeyboardInterrupt:
         again = shlex.join(["tribodyn", "study", str(file), "--out", str(folder), "--resume"])
         raise KeyboardInterrupt(f"stopped; what was finished is kept in {folder}: resume with {again}") from None
@@ -56,11 +65,21 @@ def study(
         print(json.dumps({"study": found.name, "runs": counts, "influence": found.influence(), **files}, indent=2))
         return
     print("runs: " + ", ".join(f"{count} {status}" for status, count in counts.items() if count))
+    for line in troubles(found):
+        print(line)
     for number, by_key in found.influence().items():
         if number.endswith("_first") or number in ("life_cycles", "depth_max_m"):
             told = ", ".join(f"{key} {rank:+.2f}" for key, rank in sorted(by_key.items(), key=lambda i: -abs(i[1])))
             print(f"{number:14} rank correlation with {told}")
     print(folder / "study.csv", folder / "study.h5", sep="\n")
+
+
+def troubles(found: StudyTable) -> list[str]:
+    """The first runs that are not complete, with their sentences."""
+    columns = found.columns
+    bad = [i for i, status in enumerate(columns["status"]) if status != "complete"]
+    told = [f"run {columns['run'][i]} {columns['status'][i]}: {columns['sentence'][i]}" for i in bad[:TOLD]]
+    return told + ([f"... and {len(bad) - TOLD} more, in the table"] if len(bad) > TOLD else [])
 
 
 COMMANDS = (study,)

@@ -9,8 +9,9 @@ from typing import Any
 
 import tomli_w
 
-from tribodyn.workflows.designs import cluster, design, life_picture, pool
+from tribodyn.workflows.designs import cluster, design, life_picture, parallel_picture, pool
 from tribodyn.workflows.designs.journal import Journal
+from tribodyn.workflows.designs.shared_models import shared
 from tribodyn.workflows.designs.study_file import Study
 from tribodyn.workflows.designs.table import StudyTable, table, write
 from tribodyn.workflows.designs.task import Row, Task
@@ -29,11 +30,12 @@ def run(
     workers: int | None = None,
     scheduler: str = "",
     resume: bool = False,
+    retry: bool = False,
 ) -> StudyTable:
-    """Do the runs of a study, and leave study.csv, study.h5, study.png, and life.png of five lives or more.
+    """Do the runs of a study, and leave its tables and pictures in a folder.
 
     workers : processes, as many as there are cores by default; scheduler : see cluster.finished, none by default
-    resume : take the rows that `folder` holds of the same runs
+    resume : take the rows that `folder` holds of the same runs; retry : but those of failed runs
     Raises  SceneError, ValueError: the study asks for what cannot be; SolveFailed: the scheduler was lost
     """
     if workers is not None and workers < 1:
@@ -43,24 +45,26 @@ def run(
     folder.mkdir(parents=True, exist_ok=True)
     with alone_in(folder):
         journal, rows = Journal(folder), dict(refused)
-        earlier = journal.rows() if resume else {}
+        earlier, again = journal.rows() if resume or retry else {}, ("lost", "failed") if retry else ("lost",)
         for task in tasks:
             row = earlier.get(task.key)
-            if row is not None and row.status != "lost":
+            if row is not None and row.status not in again:
                 rows[task.number] = replace(row, run=task.number)
         known = [row for number, row in sorted(rows.items()) if number not in refused]
-        previous = journal.begin(known, resume)
+        previous = journal.begin(known, resume or retry)
         if previous:
             progress.say(f"the rows that were here are now {previous}")
-        if resume:
+        if resume or retry:
             progress.say(f"{len(known)} of {len(varied)} runs are done already")
         # runs that share mesh and reduction come one after the other
         left = sorted((task for task in tasks if task.number not in rows), key=lambda task: task.early)
+        count = workers or pool.cores()
         try:
-            with progress.track(f"{len(left)} runs") as advance:
-                for done, row in enumerate(_finished(left, workers or pool.cores(), scheduler), 1):
+            with progress.track(f"{len(left)} runs") as advance, shared(left, folder, count, scheduler) as (ready, end):
+                for done, row in enumerate(_finished(ready, count, scheduler), 1):
                     journal.add(row)
                     rows[row.run] = row
+                    end(row.run)
                     bad = sum(one.status != "complete" for one in rows.values())
                     advance(done / len(left), f"{done} of {len(left)}{f', {bad} not complete' if bad else ''}")
         finally:
@@ -70,6 +74,8 @@ def run(
         assert found is not None
         if found.count("complete"):
             found.plot().savefig(folder / "study.png")
+            if parallel_picture.possible(found):
+                found.plot_parallel().savefig(folder / "parallel.png")
             if life_picture.possible(found):
                 found.plot_distribution().savefig(folder / "life.png")
     return found

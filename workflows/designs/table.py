@@ -1,8 +1,9 @@
-"""The table of a study: a row a run, in the order of the design, as CSV and HDF5."""
+"""The table of a study: a row a run, in the order of the design, as CSV, HDF5 and Parquet."""
 
 from __future__ import annotations
 
 import csv
+import importlib.util
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -74,6 +75,12 @@ class StudyTable:
 
         return life_picture.picture(self, number)
 
+    def plot_parallel(self, number: str | None = None) -> Figure:
+        """The runs as parallel coordinates, coloured by a number; raises ValueError where they are few."""
+        from tribodyn.workflows.designs import parallel_picture
+
+        return parallel_picture.picture(self, number)
+
     def plot(self) -> Figure:
         """Response against each of the keys that vary, see designs.picture."""
         from tribodyn.workflows.designs import picture
@@ -116,7 +123,10 @@ def _values(values: Sequence[Any], chosen: Sequence[int]) -> np.ndarray:
 
 
 def write(found: StudyTable, folder: Path) -> tuple[Path, Path]:
-    """Write study.csv and study.h5; the same table gives the same bytes. Returns both files."""
+    """Write study.csv and study.h5, and study.parquet where pyarrow is installed; the same table gives the same bytes.
+
+    Returns the first two
+    """
     paths = folder / "study.csv", folder / "study.h5"
     fresh = [path.with_suffix(f"{path.suffix}.new") for path in paths]
     with fresh[0].open("w", encoding="utf-8", newline="") as file:
@@ -137,7 +147,19 @@ def write(found: StudyTable, folder: Path) -> tuple[Path, Path]:
                 data.attrs["varied"] = 1
     for new, path in zip(fresh, paths, strict=True):
         os.replace(new, path)
+    if importlib.util.find_spec("pyarrow") is not None:
+        _write_parquet(found, folder / "study.parquet")
     return paths
+
+
+def _write_parquet(found: StudyTable, path: Path) -> None:
+    import pyarrow
+    from pyarrow import parquet
+
+    columns = {name: pyarrow.array(column.tolist(), from_pandas=True) for name, column in found.columns.items()}
+    fresh = path.with_suffix(".parquet.new")
+    parquet.write_table(pyarrow.table(columns), fresh)
+    os.replace(fresh, path)
 
 
 def _cell(value: Any) -> str:

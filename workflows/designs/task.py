@@ -36,6 +36,7 @@ class Task:
 
     number : of the run, from 1; overrides : of the scene, those of the run last; folder : of the files it names
     early : what its mesh and reduction are made of, empty where they are not shared
+    store : file that these are shared through by the processes of a study
     """
 
     number: int
@@ -44,11 +45,20 @@ class Task:
     overrides: tuple[str, ...]
     folder: Path
     early: str = field(default="", repr=False, compare=False)
+    store: Path | None = field(default=None, repr=False, compare=False)
 
     @property
     def key(self) -> str:
         """Hash of all that the row depends on: scene, overrides, contents of the files that they name, version."""
-        content = hashlib.sha256(repr((__version__, self.text, self.overrides)).encode())
+        return self._content(self.text, self.overrides)
+
+    @property
+    def early_key(self) -> str:
+        """Hash of all that its mesh and reduction depend on."""
+        return self._content(self.early)
+
+    def _content(self, *told: object) -> str:
+        content = hashlib.sha256(repr((__version__, *told)).encode())
         for path in sorted(set(_files(self.text, self.overrides, self.folder))):
             content.update(_digest(path, path.stat().st_mtime_ns))
         return content.hexdigest()
@@ -79,7 +89,7 @@ class Row:
 
 
 _one_at_a_time = threading.Lock()  # workers may have several threads, Gmsh and the threads of BLAS are of a process
-_bench = Bench()
+_bench, _made_of = Bench(), ""  # a process outlives a study on a cluster, where files may change between two
 
 
 def solve(task: Task) -> Row:
@@ -91,6 +101,7 @@ def solve(task: Task) -> Row:
         return Row(task.number, task.key, status, told, numbers or {}, time.perf_counter() - start)
 
     with _one_at_a_time:
+        _set_up(task)
         try:
             result = pipeline.run(task.scene(), None, Progress(), build=_model)
         except np.linalg.LinAlgError as error:
@@ -104,6 +115,14 @@ def solve(task: Task) -> Row:
         except Exception as error:  # one run that nobody foresaw does not stop the others
             return ended("failed", f"{type(error).__name__}: {error}")
         return ended("complete", result.state, numbers_of(result))
+
+
+def _set_up(task: Task) -> None:
+    """Keep mesh and reduction of the run before where this one has the same."""
+    global _bench, _made_of
+    if task.early_key != _made_of:
+        _bench, _made_of = Bench(), task.early_key
+    _bench.store = task.store
 
 
 def _model(file: SceneFile) -> modelling.Model:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
+import pickle
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from filelock import FileLock
 
 from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance, State
@@ -38,22 +41,24 @@ def early_of(scene: PartScene) -> str:
 
 @dataclass
 class Bench:
-    """Builds the problems of scenes, one after the other; what the next one shares with the last is not made again."""
+    """Builds the problems of scenes, one after the other; what the next one shares with the last is not made again.
+
+    store : file that processes share what is made through: the first one makes it while the others wait
+    """
 
     early: str = ""
     part: Part | None = None
     reduced: ReducedModel | None = None
     measured: tuple[object, np.ndarray] = field(default_factory=lambda: (None, np.empty(0)))
+    store: Path | None = None
 
     def plain(self, file: SceneFile, opening: np.ndarray | None = None) -> ReducedModel:
         """The reduced model, not damped, with nothing prescribed; opening : (n_pair,) added to its gaps [m]."""
         scene = file.part_scene
         early = early_of(scene)
         if self.part is None or self.reduced is None or early != self.early:
-            with TemporaryDirectory() as folder:
-                mesh, node_sets = modelling.make_mesh(file, Path(folder))
-            self.part = modelling.make_part(scene, mesh, node_sets, file.folder)
-            self.reduced, self.early = hold(part_reduction.reduce(scene, self.part), self.part.held), early
+            self.part, self.reduced = self._shared(file)
+            self.early = early
         interface = self.reduced.interface
         gap = interface.gap
         if scene.surfaces is not None:
@@ -61,6 +66,18 @@ class Bench:
         if opening is not None:
             gap = gap + opening
         return replace(self.reduced, interface=replace(interface, gap=gap))
+
+    def _shared(self, file: SceneFile) -> tuple[Part, ReducedModel]:
+        """Part and reduction from the store, or made and left there."""
+        if self.store is None or not self.store.parent.is_dir():
+            return _made(file)
+        with FileLock(self.store.with_suffix(".lock")):  # released by the system where its holder is killed
+            if not self.store.exists():
+                fresh = self.store.with_suffix(".new")
+                fresh.write_bytes(pickle.dumps(_made(file), pickle.HIGHEST_PROTOCOL))
+                os.replace(fresh, self.store)
+        part, reduced = pickle.loads(self.store.read_bytes())
+        return part, reduced
 
     def _waviness(self, file: SceneFile) -> np.ndarray:
         surfaces = file.part_scene.surfaces
@@ -103,6 +120,15 @@ class Bench:
             Excitation({**loads, (0, HOLD): 1.0}),
             settings.response_range(scene)[1],
         )
+
+
+def _made(file: SceneFile) -> tuple[Part, ReducedModel]:
+    """A part and its reduction, not damped, with nothing prescribed."""
+    scene = file.part_scene
+    with TemporaryDirectory() as folder:
+        mesh, node_sets = modelling.make_mesh(file, Path(folder))
+    part = modelling.make_part(scene, mesh, node_sets, file.folder)
+    return part, hold(part_reduction.reduce(scene, part), part.held)
 
 
 def reaction(file: SceneFile, model: modelling.Model, state: State) -> float:

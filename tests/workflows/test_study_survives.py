@@ -1,0 +1,126 @@
+"""A study on an engine of another process: workers and the scheduler are killed in the middle, and nothing is lost."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pytest
+
+import tribodyn as td
+from tribodyn.workflows.designs import pool
+from tribodyn.workflows.designs.journal import Journal
+from tribodyn.workflows.designs.task import solve
+
+pytest.importorskip("distributed")
+
+KEYS = {
+    "loads.static.press.value": ["15 kN", "18 kN", "20 kN"],
+    "contact.friction": [0.3, 0.5],
+}
+SET = ["geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "response.points=8", "wear="]
+TABLES: dict[str, Any] = {"study": {"scene": "beam", "design": "grid", "set": SET}, "vary": KEYS}
+RUNS = 6
+PATIENCE = 60.0
+
+
+def until(true: Callable[[], Any]) -> None:
+    """Wait for something to come true."""
+    end = time.monotonic() + PATIENCE
+    while not true():
+        assert time.monotonic() < end, "nothing happened"
+        time.sleep(0.02)
+
+
+class Loopback:
+    """A scheduler and two workers of dask, each a process of its own, with only the engine between them and a study."""
+
+    def __init__(self) -> None:
+        with TemporaryDirectory() as folder:
+            file = Path(folder) / "scheduler.json"
+            words = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file))
+            self.scheduler = self._start("scheduler", *words)
+            until(lambda: file.exists() and file.stat().st_size > 0)
+            self.address = str(json.loads(file.read_text())["address"])
+        plain = ("--nthreads", "1", "--no-nanny", "--no-dashboard")
+        self.workers = [self._start("worker", self.address, *plain) for _ in range(2)]
+
+    @staticmethod
+    def _start(kind: str, *words: str) -> subprocess.Popen[bytes]:
+        words = (sys.executable, "-m", f"distributed.cli.dask_{kind}", *words)
+        return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    def kill_worker(self) -> None:
+        self.workers[0].kill()
+
+    def kill_scheduler(self) -> None:
+        self.scheduler.kill()
+        for process in (self.scheduler, *self.workers):
+            process.kill()
+            process.wait()
+
+
+class InProcess:
+    """The same by closing what lives in this process, which takes less time."""
+
+    def __init__(self) -> None:
+        distributed = pytest.importorskip("distributed")
+        self.cluster = distributed.LocalCluster(2, threads_per_worker=1, processes=False, dashboard_address=None)
+        self.address = str(self.cluster.scheduler_address)
+
+    def kill_worker(self) -> None:
+        self.cluster.scale(1)
+
+    def kill_scheduler(self) -> None:
+        self.cluster.close()
+
+
+@pytest.fixture
+def reference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The study done without any engine."""
+    with monkeypatch.context() as patch:
+        patch.setattr(pool, "finished", lambda tasks, workers: map(solve, tasks))
+        td.study(TABLES, tmp_path / "here", workers=1)
+    return tmp_path / "here"
+
+
+@pytest.mark.parametrize("kind", [InProcess, pytest.param(Loopback, marks=pytest.mark.slow)])
+def test_a_killed_worker_and_a_killed_scheduler_lose_nothing(kind: Any, tmp_path: Path, reference: Path) -> None:
+    folder, failures = tmp_path / "there", []
+    journal = Journal(folder)
+    engine = kind()
+
+    def study() -> None:
+        try:
+            td.study(TABLES, folder, scheduler=engine.address)
+        except td.SolveFailed as failure:
+            failures.append(str(failure))
+
+    thread = threading.Thread(target=study)
+    thread.start()
+    until(lambda: len(journal.rows()) >= 1)
+    engine.kill_worker()  # dask gives its run to the other one
+    until(lambda: len(journal.rows()) >= 2)
+    engine.kill_scheduler()
+    thread.join(PATIENCE)
+    assert failures == [f"the scheduler at {engine.address} was lost"]
+    before = journal.rows()
+    assert 2 <= len(before) < RUNS
+
+    again = kind() if kind is InProcess else None
+    found = td.study(TABLES, folder, workers=1, scheduler=again.address if again else "local", resume=True)
+    if again:
+        again.kill_scheduler()
+    assert found.count("complete") == RUNS
+    after = journal.rows()
+    assert all(after[key].seconds == row.seconds for key, row in before.items())  # none was done again
+    for name in ("study.csv", "study.h5", "study.parquet"):
+        assert (folder / name).read_bytes() == (reference / name).read_bytes()
+    assert not (folder / "models").exists()
