@@ -9,7 +9,7 @@ Source  Tamatam 2021, section 3.2.3, whose equation numbers stand as comments; P
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -32,11 +32,12 @@ class Sector:
     """A sector cut out of its wheel, full or reduced: nothing is joined yet.
 
     system : n coordinates, real
-    interface : contacts between neighbours; B (n_c, n) is the half of the right face of this sector
-    left : (n_c, n) the half of the left face: relative displacement = B q_n - left q_(n-1)
+    interface : its contacts; B (n_c, n) is what this sector moves, of a contact with the neighbour the right face
+    left : (n_c, n) the half of the left face: relative displacement = B q_n - left q_(n-1); rows of zero for a contact
+        inside the sector or with the ground
     seam_right, seam_left : (k, 3) coordinates of matched nodes where sectors are joined, x, y, z; k = 0 for none
     turn : (3, 3) rotation by one pitch, from a sector to the one on its left
-    n_sectors : sectors of the wheel
+    n_sectors : sectors of the wheel; joints : joint -> its pairs
     """
 
     system: SecondOrderSystem
@@ -46,6 +47,7 @@ class Sector:
     seam_left: np.ndarray
     turn: np.ndarray
     n_sectors: int
+    joints: Mapping[str, slice] = field(default_factory=dict)
 
     def phase(self, index: int) -> complex:
         """exp(-i 2 pi j / N), real to the last bit where it is."""
@@ -82,7 +84,8 @@ def build(
 ) -> tuple[Part, Sector]:
     """Assemble one sector and find what its faces meet in the neighbours.
 
-    contacts : face is on the right, opposite on the left; each meets after a turn by one pitch about the axis
+    contacts : between neighbours: face is on the right, opposite on the left; each meets after a turn by one pitch
+        about the axis
     seam : names of the right and the left face where sectors are one piece, None where only contacts couple them
     axis : of the wheel, through the origin. Other arguments as fem.part.build
     Returns the part of one sector, its interface the half of the right face; and the sector over the same DOFs
@@ -94,7 +97,7 @@ def build(
 
 
 def turned(contacts: Sequence[Contact], n_sectors: int, axis: Sequence[float] = AXIS) -> list[Contact]:
-    """The contacts of a sector with the faces of its neighbours; raises ValueError as `cut_from` does."""
+    """Contacts of a sector with the faces of its neighbours; raises ValueError as `cut_from` does."""
     if n_sectors < 2:
         raise ValueError(f"a wheel of {n_sectors} sectors has no neighbours; give at least 2")
     missing = [contact.face for contact in contacts if contact.opposite is None]
@@ -111,18 +114,29 @@ def cut_from(
     seam: tuple[str, str] | None = None,
     axis: Sequence[float] = AXIS,
 ) -> Sector:
-    """The sector that a part is; arguments as `build`, the contacts are those of `turned` that the part was built with.
+    """The sector that a part is; arguments as `build`.
 
+    contacts : those that the part was built with; the ones of `turned` meet the neighbour, the others stay inside
     Raises  ValueError where faces do not match after the turn, a seam is held on one side only, or a contact has no
         opposite face
     """
     if n_sectors < 2:
         raise ValueError(f"a wheel of {n_sectors} sectors has no neighbours; give at least 2")
     turn = rotation(axis, 2 * np.pi / n_sectors)
-    left = part.rows(vstack([contact.halves(part.mesh)[1] for contact in contacts], format="csr"))
+    left = part.rows(_left_halves(part, contacts))
     none = np.empty((0, 3), dtype=int)
     seams = (none, none) if seam is None else _seams(part, seam, turn)
-    return Sector(part.system, part.interface, left, *seams, turn, n_sectors)
+    return Sector(part.system, part.interface, left, *seams, turn, n_sectors, part.joints)
+
+
+def _left_halves(part: Part, contacts: Sequence[Contact]) -> csr_matrix:
+    """The halves of the left faces (n_c, n_dof) over all DOFs of the mesh; zero for contacts inside the sector."""
+    n_component, n_dof = len(part.interface.components), 3 * len(part.points)
+    halves = [csr_matrix((0, n_dof))]
+    for contact, pairs in zip(contacts, part.pairs.values(), strict=True):
+        inside = csr_matrix(((pairs.stop - pairs.start) * n_component, n_dof))
+        halves.append(inside if contact.turn is None else contact.halves(part.mesh)[1])
+    return csr_matrix(vstack(halves))
 
 
 def _seams(part: Part, seam: tuple[str, str], turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -178,10 +192,12 @@ def projected(system: SecondOrderSystem, T: Any) -> SecondOrderSystem:
         small = T.conj().T @ (matrix @ T)
         return (small + small.conj().T) / 2
 
+    turning = None if system.gyroscopic is None else T.conj().T @ (system.gyroscopic @ T)
     return SecondOrderSystem(
         congruent(system.mass),
         congruent(system.stiffness),
         None if system.damping is None else congruent(system.damping),
         {name: T.conj().T @ load for name, load in system.loads.items()},
         {name: T.T @ row for name, row in system.outputs.items()},
+        None if turning is None else (turning - turning.conj().T) / 2,
     )

@@ -11,11 +11,12 @@ import numpy as np
 
 @dataclass(frozen=True)
 class SecondOrderSystem:
-    """A linear structure in n coordinates, with the vectors that load and observe it.
+    """A linear structure M q'' + (C + G) q' + K q = f in n coordinates, with the vectors that load and observe it.
 
     mass, stiffness : (n, n) symmetric (Hermitian for one harmonic index of a cyclic part), sparse or dense [kg], [N/m]
     damping : (n, n) like stiffness, or None for none [N s/m]
     loads : name -> (n,) force per unit of the named load [N/N]
+    gyroscopic : (n, n) antisymmetric (anti-Hermitian), the Coriolis matrix G of a turning frame, or None [N s/m]
     outputs : name -> (n,) row that observes a displacement, output = row . q [m/m]
     """
 
@@ -24,8 +25,16 @@ class SecondOrderSystem:
     damping: Any = None
     loads: Mapping[str, np.ndarray] = field(default_factory=dict)
     outputs: Mapping[str, np.ndarray] = field(default_factory=dict)
+    gyroscopic: Any = None
 
     @property
     def n_dof(self) -> int:
         """Number of coordinates n."""
         return int(self.stiffness.shape[0])
+
+    @property
+    def velocity_matrix(self) -> Any:
+        """C + G (n, n), what multiplies the velocity [N s/m]; None for neither."""
+        if self.gyroscopic is None or self.damping is None:
+            return self.damping if self.gyroscopic is None else self.gyroscopic
+        return self.damping + self.gyroscopic

@@ -126,38 +126,38 @@ def build(parameters: Parameters, path: str | Path) -> None:
     p = parameters
     rows = (p.n_end, p.n_along - 1, p.n_end)
     columns = (p.n_side, p.n_through, p.n_side)
-    root, shroud = _root(p), _shroud(p)
+    root, shroud = _root(p), shroud_of(p)
     every = [(i, j) for i in range(3) for j in range(3)]
     under = {} if p.disk_radius else {at: {"w-": "clamp"} for at in every}
     faces = {(1, 2): {"v+": "shroud_right"}, (1, 0): {"v-": "shroud_left"}}
     sector = [
         *root.blocks(rows, columns, p.n_root, "root", under),
-        blocks.Block(unit(rows[1]), unit(columns[1]), unit(p.n_span), "airfoil", {}, lambda q: _airfoil(p, q)),
+        blocks.Block(unit(rows[1]), unit(columns[1]), unit(p.n_span), "airfoil", {}, lambda q: airfoil_at(p, q)),
         *shroud.blocks(rows, columns, p.n_up - 1, "shroud", faces),
     ]
     if p.disk_radius:
         sector += _disk(p, root, rows, columns)
     couple = round(p.couple_height * 2 * p.n_span) / (2 * p.n_span)  # nearest node along the span
-    points = _airfoil(p, np.array([[0.0, 0.5, couple], [1.0, 0.5, couple], [0.5, 1.0, 0.5]]))
+    points = airfoil_at(p, np.array([[0.0, 0.5, couple], [1.0, 0.5, couple], [0.5, 1.0, 0.5]]))
     named = dict(zip(("couple_leading", "couple_trailing", "excitation"), points, strict=True))
     named["tip"] = shroud.position(1, 1, np.array([[0.5, 0.5, 1.0]]))[0]
     blocks.write(path, blocks.body(sector, points=named))
 
 
-def _turned(points: np.ndarray, angle: float) -> np.ndarray:
-    """Points (..., 3) turned about x."""
+def turned(points: np.ndarray, angle: float) -> np.ndarray:
+    """Points (..., 3) turned about x by an angle [rad]."""
     c, s = np.cos(angle), np.sin(angle)
     x, y, z = np.moveaxis(points, -1, 0)
     return np.stack([x, c * y - s * z, s * y + c * z], axis=-1)
 
 
-def _airfoil(p: Parameters, q: np.ndarray) -> np.ndarray:
+def airfoil_at(p: Parameters, q: np.ndarray) -> np.ndarray:
     """Map (n, 3) fractions of chord, thickness, span into space."""
     x, y = airfoil.between(p.root, p.tip, q[:, 2]).at(q[:, 0], q[:, 1])
     return np.column_stack([x, y, p.hub_radius + q[:, 2] * p.span])
 
 
-def _shroud(p: Parameters) -> Platform:
+def shroud_of(p: Parameters) -> Platform:
     """The Z-shaped shroud: a contact face between two edges that leave a clearance."""
     radii = (p.hub_radius + p.span, p.hub_radius + p.span + p.contact_height)
     x = 0.5 * p.contact_length * np.cos(p.shroud_angle)
@@ -168,7 +168,7 @@ def _shroud(p: Parameters) -> Platform:
     left, right = line.copy(), line.copy()
     left[..., 1] += relief
     right[..., 1] -= relief
-    return platform(p.tip, radii, _turned(left, p.pitch / 2), _turned(right, -p.pitch / 2))
+    return platform(p.tip, radii, turned(left, p.pitch / 2), turned(right, -p.pitch / 2))
 
 
 def _root(p: Parameters) -> Platform:
@@ -180,7 +180,7 @@ def _root(p: Parameters) -> Platform:
         raise ValueError(f"geometry.root_length is {p.root_length}: it must be longer than the airfoil at the hub")
     line = np.stack([np.column_stack([x, np.zeros(4), np.full(4, r)]) for r in radii])
     half = p.root_fill * p.pitch / 2
-    return platform(p.root, radii, _turned(line, half), _turned(line, -half))
+    return platform(p.root, radii, turned(line, half), turned(line, -half))
 
 
 def _disk(p: Parameters, root: Platform, rows: tuple[int, ...], columns: tuple[int, ...]) -> list[blocks.Block]:
@@ -191,7 +191,7 @@ def _disk(p: Parameters, root: Platform, rows: tuple[int, ...], columns: tuple[i
     for j, of_root, angle in ((0, 0, p.pitch / 2), (4, 3, -p.pitch / 2)):
         axial = rim[:, of_root, 0]
         face = np.column_stack([axial, np.zeros(4), np.full(4, p.hub_radius - p.root_height)])
-        edges[j] = [_turned(face, angle), rim[:, of_root]][:: 1 if j == 0 else -1]
+        edges[j] = [turned(face, angle), rim[:, of_root]][:: 1 if j == 0 else -1]
 
     def rim_at(i: int, j: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         if j not in edges:

@@ -63,7 +63,7 @@ class DenseBalance:
         """(n n_coeff, n n_coeff) linear part, coefficients innermost."""
         system, basis = self.problem.model.system, self.problem.basis
         n, m = system.n_dof, basis.n_coeff
-        damping = np.zeros_like(system.mass) if system.damping is None else system.damping
+        damping = np.zeros_like(system.mass) if system.velocity_matrix is None else system.velocity_matrix
         z = np.zeros((n, m, n, m))
         for a in range(m):
             h = basis.order[a]

@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 from tribodyn.fem.constraints import partition
 from tribodyn.fem.factor import Factor, factorise
 from tribodyn.fem.interface import ContactInterface
-from tribodyn.fem.modes import modes
+from tribodyn.fem.modes import StaticDivergence, modes
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.model import ModelInfo, ReducedModel
@@ -35,6 +35,7 @@ def craig_bampton(
     extra_masters: Sequence[int] | np.ndarray = (),
     contact_stiffness: np.ndarray | None = None,
     solver: str | None = None,
+    attached: Sequence[str] = (),
 ) -> ReducedModel:
     """Reduce a full system to its contact DOFs, accessory DOFs and fixed-interface modes.
 
@@ -42,6 +43,7 @@ def craig_bampton(
     n_modes : fixed-interface modes kept, or cutoff : all of them up to this frequency [Hz]; give one of the two
     extra_masters : DOFs of the system to keep besides those of the contact and of point loads and outputs
     contact_stiffness : (n_pair, n_component) [N/m], for an estimate of the stuck state too; solver : see fem.factor
+    attached : loads whose static response with the masters held joins the modes, so that statics under them are exact
     Returns the model; coordinates are the masters in ascending order, then the modes; loads and outputs are projected.
         info: masters (DOFs of the system), n_full, n_masters, n_modes, factorisation, first_omitted_frequency [Hz],
         free_frequency [Hz] of the first ten modes and free_frequency_error, their estimated relative error by
@@ -56,6 +58,7 @@ def craig_bampton(
     K_ss, M_ss = K[s][:, s], M[s][:, s]
     factor = factorise(K_ss, solver=solver)
     omega, phi, omitted = fixed_interface_modes(K_ss, M_ss, factor, n_modes, cutoff)
+    omega, phi = with_static_shapes([system.loads[name][s] for name in attached], K_ss, M_ss, factor, omega, phi)
 
     n_m = len(m)
     basis = np.zeros((system.n_dof, n_m + len(omega)))
@@ -70,6 +73,10 @@ def craig_bampton(
     stiffness = _symmetric(stiffness)
     mass = _congruent(basis, M)  # A.6
     mass[n_m:, n_m:] = np.eye(len(omega))
+    turning = None
+    if system.gyroscopic is not None:
+        turning = basis.T @ (system.gyroscopic @ basis)
+        turning = (turning - turning.T) / 2
 
     reduced = SecondOrderSystem(
         mass,
@@ -77,6 +84,7 @@ def craig_bampton(
         None if system.damping is None else _congruent(basis, system.damping),
         {name: basis.T @ load for name, load in system.loads.items()},  # A.8
         {name: basis.T @ row for name, row in system.outputs.items()},
+        turning,
     )
     model = ReducedModel(reduced, replace(interface, B=np.asarray(interface.B @ basis)), basis)
     info = ModelInfo(
@@ -88,7 +96,12 @@ def craig_bampton(
         first_omitted_frequency=omitted / (2 * np.pi),
     )
     for springs in (None,) if contact_stiffness is None else (None, contact_stiffness):
-        frequency, q = linear_modes(model, springs, min(REPORTED_MODES, reduced.n_dof))
+        try:
+            frequency, q = linear_modes(model, springs, min(REPORTED_MODES, reduced.n_dof))
+        except StaticDivergence:
+            if not interface.n_pair:
+                raise
+            continue  # rotation carries away what only the contact holds
         w = 2 * np.pi * frequency
         # K R q vanishes at the slaves but for the modal part, as K_ss psi + K_sm = 0; springs act on masters only
         residual = K_ss @ (phi @ q[n_m:]) - (M @ (basis @ q))[s] * w**2
@@ -135,6 +148,30 @@ def fixed_interface_modes(
         wanted *= 2
     kept = wanted if cutoff is None else int(np.sum(omega <= 2 * np.pi * cutoff))
     return omega[:kept], phi[:, :kept], float(omega[kept]) if kept < len(omega) else np.inf
+
+
+def with_static_shapes(
+    forces: Sequence[np.ndarray], K_ss: Any, M_ss: Any, factor: Factor, omega: np.ndarray, phi: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Modes and, behind them, the static shapes of forces (n_slave,) on the slaves, orthogonal to all before them.
+
+    Returns omega (k + j,), those of the shapes by Rayleigh's quotient, and phi (n_slave, k + j), of unit modal mass
+    """
+    for force in forces:
+        if not force.any():
+            continue
+        shape = factor.solve(force)
+        size = np.sqrt(shape @ (M_ss @ shape))
+        for _ in range(2):
+            shape = shape - phi @ (phi.T @ (M_ss @ shape))
+        left = np.sqrt(shape @ (M_ss @ shape))
+        if left <= 1e-9 * size:  # the modes hold it already
+            continue
+        phi = np.column_stack([phi, shape / left])
+        coupling = phi.T @ (K_ss @ phi)
+        squares, turn = np.linalg.eigh((coupling + coupling.T) / 2)
+        omega, phi = np.sqrt(squares), phi @ turn
+    return omega, phi
 
 
 def _congruent(basis: np.ndarray, matrix: Any) -> np.ndarray:

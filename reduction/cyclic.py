@@ -1,8 +1,10 @@
 """Craig-Bampton of a sector, and the models of its wheel: travelling waves by harmonic index, or all sectors at once.
 
 One real reduction of the sector, with both shroud faces, both seams and the accessories as masters, serves all harmonic
-indices: the phase constraints act on the small system. The contact then becomes a coordinate of its own, the relative
-displacement of neighbours (3.18), so that its map is [I 0] for every index.
+indices: the phase constraints act on the small system. Where neighbours touch node to node and nothing touches inside
+the sector, the contact then becomes a coordinate of its own, the relative displacement of neighbours (3.18), so that
+its map is [I 0] for every index. With contacts inside the sector or of meshes that do not match, the masters stay the
+coordinates, and the contact has a map of its own for every index (3.17).
 Source  Tamatam 2021, eq. 3.12 to 3.22
 """
 
@@ -18,10 +20,13 @@ from scipy.sparse import vstack
 from tribodyn.fem import wheel
 from tribodyn.fem.cyclic import Sector, at_index, projected, seam_map
 from tribodyn.fem.hermitian import hermitian_modes
+from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.craig_bampton import POINT_LOAD, REPORTED_MODES, craig_bampton
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ModelInfo, ReducedModel
+
+ROUNDING = 1e-9  # of the rows of a contact map
 
 
 @dataclass(frozen=True)
@@ -35,14 +40,16 @@ class ReducedSector:
     info: ModelInfo = field(default_factory=ModelInfo)
 
 
-def reduce_sector(sector: Sector, n_modes: int | None = None, cutoff: float | None = None) -> ReducedSector:
-    """Reduce a full sector; n_modes or cutoff [Hz] as in `craig_bampton`.
+def reduce_sector(
+    sector: Sector, n_modes: int | None = None, cutoff: float | None = None, attached: Sequence[str] = ()
+) -> ReducedSector:
+    """Reduce a full sector; n_modes or cutoff [Hz], and attached loads, as in `craig_bampton`.
 
     Raises  ValueError as `craig_bampton` does
     """
     both = replace(sector.interface, B=vstack([sector.interface.B, sector.left], format="csr"))
     seams = np.concatenate([sector.seam_right.ravel(), sector.seam_left.ravel()])
-    model = craig_bampton(sector.system, both, n_modes, cutoff, extra_masters=seams.tolist())
+    model = craig_bampton(sector.system, both, n_modes, cutoff, extra_masters=seams.tolist(), attached=attached)
     masters = model.info.master_dofs
     right, left = np.split(np.asarray(model.interface.B), 2)
     small = replace(
@@ -54,7 +61,7 @@ def reduce_sector(sector: Sector, n_modes: int | None = None, cutoff: float | No
         seam_left=np.searchsorted(masters, sector.seam_left),
     )
     assert model.basis is not None
-    return ReducedSector(small, model.basis, model.info)
+    return ReducedSector(small, model.basis, replace(model.info, joints=dict(sector.joints)))
 
 
 def nodal_diameters(
@@ -84,8 +91,12 @@ def travelling_wave(reduced: ReducedSector, engine_order: int, cutoff: float | N
     """
     wave = _Wave(reduced, engine_order, _Indices(reduced, cutoff))
     system, B = wave.model(1)
-    omega, _ = hermitian_modes(system.stiffness, system.mass, min(REPORTED_MODES, system.n_dof))
-    info = replace(_shared_info(reduced), engine_order=engine_order, free_frequency=omega / (2 * np.pi))
+    info = replace(_shared_info(reduced), engine_order=engine_order)
+    try:
+        omega, _ = hermitian_modes(system.stiffness, system.mass, min(REPORTED_MODES, system.n_dof))
+        info = replace(info, free_frequency=omega / (2 * np.pi))
+    except StaticDivergence:  # rotation carries away what only the contact holds
+        pass
     interface = replace(reduced.sector.interface, B=B)
     return ReducedModel(system, interface, None, info, wave.model, wave.basis)
 
@@ -122,11 +133,15 @@ class _Indices:
 
     def __call__(self, index: int) -> tuple[SecondOrderSystem, np.ndarray, np.ndarray]:
         if index not in self._made:
-            T, n_masters = relative_map(self._sector, index)
+            once, of_row = distinct(self._sector)
+            if self._cutoff is None and not node_to_node(once):
+                self._made[index] = *at_index(self._sector, index), seam_map(self._sector, index).toarray()
+                return self._made[index]
+            T, n_masters = relative_map(once, index)
             if self._cutoff is not None:
                 T = T @ condensation(projected(self._sector.system, T), n_masters, self._cutoff)
             system = projected(self._sector.system, T)
-            self._made[index] = system, np.eye(len(self._sector.left), system.n_dof), T
+            self._made[index] = system, np.eye(len(once.left), system.n_dof)[of_row], T
         return self._made[index]
 
 
@@ -150,6 +165,23 @@ class _Wave:
         return self.index_of(h * self.engine_order % self.reduced.sector.n_sectors)
 
 
+def distinct(sector: Sector) -> tuple[Sector, np.ndarray]:
+    """The sector with each row of its contact once, where joints share nodes, and which of them each row was (n_c,)."""
+    right, left = np.asarray(sector.interface.B), np.asarray(sector.left)
+    same = (right @ right.T >= 1 - ROUNDING) & (left @ left.T >= 1 - ROUNDING)
+    same[np.arange(len(right)), np.arange(len(right))] = True
+    first, of_row = np.unique(same.argmax(axis=1), return_inverse=True)
+    once = replace(sector, interface=replace(sector.interface, B=right[first]), left=left[first])
+    return once, of_row
+
+
+def node_to_node(sector: Sector) -> bool:
+    """Whether every contact is one of the neighbours' nodes, each in one pair, as `relative_map` needs it."""
+    right, left = np.asarray(sector.interface.B), np.asarray(sector.left)
+    between = np.abs(left).max(axis=1, initial=0.0) > 0
+    return bool(between.all()) and np.abs(right @ right.T - np.eye(len(right))).max(initial=0.0) <= ROUNDING
+
+
 def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:
     """T (n, m) of a wave, q = T [x, y], and how many of these coordinates are contacts and accessories.
 
@@ -161,7 +193,7 @@ def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:
     S = seam_map(sector, index)
     right, left = sector.interface.B @ S, sector.left @ S
     faces = np.flatnonzero(np.abs(right).max(axis=0))
-    if np.abs(right @ right.conj().T - np.eye(len(right))).max() > 1e-9 or left[:, faces].any():
+    if np.abs(right @ right.conj().T - np.eye(len(right))).max() > ROUNDING or left[:, faces].any():
         raise ValueError(
             "the right contact face of a cyclic part must be of master nodes that lie neither on its left contact face "
             "nor on a cyclic face"

@@ -134,6 +134,7 @@ def _with_harmonics(file: h5py.File, model: ReducedModel) -> ReducedModel:
 
 def _write_system(group: h5py.Group, system: SecondOrderSystem) -> None:
     _write(group, {"mass": system.mass, "stiffness": system.stiffness, "damping": system.damping})
+    _write(group, {"gyroscopic": system.gyroscopic})
     _write(group.create_group("loads"), system.loads)
     _write(group.create_group("outputs"), system.outputs)
 
@@ -141,7 +142,8 @@ def _write_system(group: h5py.Group, system: SecondOrderSystem) -> None:
 def _read_system(group: h5py.Group) -> SecondOrderSystem:
     matrices = _read(group)
     loads, outputs = _read(group["loads"]), _read(group["outputs"])
-    return SecondOrderSystem(matrices["mass"], matrices["stiffness"], matrices.get("damping"), loads, outputs)
+    damping, gyroscopic = matrices.get("damping"), matrices.get("gyroscopic")
+    return SecondOrderSystem(matrices["mass"], matrices["stiffness"], damping, loads, outputs, gyroscopic)
 
 
 def _write(group: h5py.Group, values: Mapping[str, object]) -> None:

@@ -11,8 +11,9 @@ A structure that nothing holds has rigid modes R, K_s R = 0 and B R = 0. With K_
 matrix above exists and R are modes like the others; their true Lambda, zero, stands in S. At s = 0 they cannot move:
 the static loads must be in equilibrium.
 
-which holds for any Hermitian damping matrix; the error falls like (|s| / omega_next)^order and is measured against a
-direct solve. What s multiplies is small beside W_0 and Phi: single precision keeps it exact enough.
+which holds for any Hermitian damping matrix; with Coriolis forces C is not Hermitian and all modes are kept. The error
+falls like (|s| / omega_next)^order and is measured against a direct solve. What s multiplies is small beside W_0 and
+Phi: single precision keeps it exact enough.
 Source  block elimination of modal coordinates (ours); static correction of truncated modes as in MacNeal 1971.
 """
 
@@ -80,7 +81,7 @@ class Expansion:
         self.n_port, self._n_contact = len(ports), len(b)
         self.s_unit = s_max or 1.0
         mass = np.asarray(system.mass)
-        damping = np.zeros_like(mass) if system.damping is None else np.asarray(system.damping)
+        damping = np.zeros_like(mass) if system.velocity_matrix is None else np.asarray(system.velocity_matrix)
         stuck = np.asarray(system.stiffness) + b.conj().T @ (stiffness[:, None] * b)
         stuck = 0.5 * (stuck + stuck.conj().T)
         self._system = (mass, damping)
@@ -89,7 +90,7 @@ class Expansion:
             "the part can move as a rigid body even with all contacts stuck: clamp it, add a spring, "
             "or raise the contact stiffness"
         )
-        count = n if n < ALL_MODES_BELOW else TRUNCATIONS[-1][0]
+        count = n if n < ALL_MODES_BELOW or system.gyroscopic is not None else TRUNCATIONS[-1][0]
         self.rigid = np.zeros((n, 0))
         # a rigid mode comes out of the eigenvalue problem as rounding of the stiffest ones, of either sign
         rounding = n * np.finfo(float).eps * np.max(np.diag(stuck).real / np.diag(mass).real)
@@ -125,7 +126,8 @@ class Expansion:
         del stuck, free
         few = np.linspace(0, len(ports) - 1, min(len(ports), COMPARED_PORTS)).astype(int)
         before = np.inf
-        for m, order in (c for c in TRUNCATIONS if c[0] < len(lam)):  # tried between the probe and a few ports
+        truncations = TRUNCATIONS if system.gyroscopic is None else ()
+        for m, order in (c for c in truncations if c[0] < len(lam)):  # tried between the probe and a few ports
             self._build(lam[:m], phi[:, :m], factor, order, np.concatenate([force.conj().T, ports[few]]))
             moved = self.at(s).apply(np.eye(N_PROBE), slice(0, N_PROBE))[N_PROBE:]
             error = float(np.abs(moved - exact[few]).max() / np.abs(exact).max())

@@ -25,8 +25,8 @@ def coordinates(
         system, B = balance.model.at_harmonic(h)
         s = 1j * h * omega
         dynamic = system.stiffness + B.conj().T @ (k[:, None] * B) + s**2 * system.mass
-        if system.damping is not None:
-            dynamic = dynamic + s * system.damping
+        if system.velocity_matrix is not None:
+            dynamic = dynamic + s * system.velocity_matrix
         total = B.conj().T @ g[:, position]
         for (order, name), value in excitation.loads.items():
             if order == h:

@@ -61,7 +61,7 @@ def test_disk_sector_has_matching_cyclic_faces_and_touches_no_neighbour(tmp_path
 def test_shroud_opens_beside_the_contact_face(sector):
     """Neighbouring shrouds meet at the contact face alone: elsewhere the edges part."""
     p = blade.Parameters()
-    shroud = blade._shroud(p).corners
+    shroud = blade.shroud_of(p).corners
     gap = turned(shroud[:, :, 3], p.pitch) - shroud[:, :, 0]
     apart = np.linalg.norm(gap, axis=-1)
     assert np.abs(apart[:, 1:3]).max() < 1e-12

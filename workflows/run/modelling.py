@@ -18,27 +18,33 @@ from tribodyn.fem.constraints import Clamp, NoMeanRotation
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.interface import COMPONENTS
 from tribodyn.fem.loads import BodyForce, Centrifugal, Couple, Load, Moment, NodalForce, Pressure
-from tribodyn.fem.material import Material
 from tribodyn.fem.part import Part
 from tribodyn.fem.springs import Spring
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.fem.thermal import Heating, temperature_at
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact import law
-from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.contact.stiffness import rectangular_punch
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.expansion import UnbalancedLoad
+from tribodyn.reduction.cyclic import travelling_wave
 from tribodyn.reduction.damping import modal_damping, rayleigh
 from tribodyn.reduction.held import hold
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ReducedModel
-from tribodyn.workflows.run import bodies, curve, decks, matrix_model, memory, part_reduction, settings, tightening
+from tribodyn.workflows.run import (
+    bodies,
+    curve,
+    joints,
+    matrix_model,
+    memory,
+    part_reduction,
+    sector,
+    settings,
+    tightening,
+)
 from tribodyn.workflows.run.contact_surfaces import surface_gap
 from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.scene.contact import Contact, FaceContact
 from tribodyn.workflows.scene.loads import StaticLoad
 from tribodyn.workflows.scene.matrices import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -94,7 +100,8 @@ def build(file: SceneFile, folder: Path | None, progress: Progress, chosen: tupl
         except UnbalancedLoad as unbalanced:
             if part is None or reduced.basis is None:
                 raise
-            raise ValueError(unbalanced_load(excite(scene, None), part, reduced.basis @ unbalanced.shapes)) from None
+            shapes = reduced.basis @ unbalanced.shapes
+            raise ValueError(unbalanced_load(joints.excite(scene, None), part, shapes)) from None
     if model.choice is not None:
         progress.say(model.choice.outcome)
     return model
@@ -187,6 +194,9 @@ def make_load(load: StaticLoad, mesh: Any, material: Any, folder: Path) -> Load:
 
 def reduce_part(scene: MeshScene, part: Part) -> ReducedModel:
     """The part on its contact and load nodes and a few modes, damped and held as the scene says."""
+    if scene.wheel is not None:
+        small = sector.reduced(scene, sector.sector(scene, part))
+        return damped(scene, travelling_wave(small, scene.wheel.engine_order))
     reduced = hold(part_reduction.reduce(scene, part), part.held)
     reduced = damped(scene, replace(reduced, info=replace(reduced.info, joints=dict(part.joints))))
     return part_reduction.with_prescribed(scene, part, reduced)
@@ -195,7 +205,7 @@ def reduce_part(scene: MeshScene, part: Part) -> ReducedModel:
 def damped(scene: Scene, reduced: ReducedModel) -> ReducedModel:
     """The model with the scene's damping; raises ValueError where its files hold another one."""
     if reduced.system.damping is None:
-        return reduced.with_damping(partial(damping_matrix, scene, contact_stiffness(scene, reduced)))
+        return reduced.with_damping(partial(damping_matrix, scene, joints.contact_stiffness(scene, reduced)))
     if scene.damping.given:
         raise ValueError("the files of the model hold a damping matrix: leave [damping] out, or the matrix")
     return reduced
@@ -213,57 +223,10 @@ def damping_matrix(scene: Scene, springs: np.ndarray, system: SecondOrderSystem,
     return None
 
 
-def contact_stiffness(scene: Scene, reduced: ReducedModel) -> np.ndarray:
-    """Contact springs (n_pair, n_component) [N/m], each joint's shared by its areas; zero where it models nothing."""
-    interface = reduced.interface
-    k = np.zeros((interface.n_pair, len(interface.components)))
-    for name, pairs in joint_pairs(scene, reduced).items():
-        contact = scene.joints[name]
-        tangential, normal = joint_stiffness(scene, contact)
-        total = {"t1": tangential, "t2": tangential, "n": normal}
-        along = [total[c] if c in contact.components else 0.0 for c in interface.components]
-        k[pairs] = np.outer(interface.area[pairs] / interface.area[pairs].sum(), along)
-    return k
-
-
-def joint_pairs(scene: Scene, reduced: ReducedModel) -> dict[str, slice]:
-    """Pairs of every joint; all of them where there is one."""
-    if len(scene.joints) == 1:
-        return {name: slice(0, reduced.interface.n_pair) for name in scene.joints}
-    return dict(reduced.info.joints)
-
-
-def joint_stiffness(scene: Scene, contact: Contact) -> tuple[float, float]:
-    """Tangential and normal stiffness of a joint [N/m]; those of a punch in shear along t1 serve both tangents."""
-    if isinstance(contact, FaceContact) and contact.punch is not None:
-        first = elastic(scene, contact.groups[0])
-        second = first if contact.opposite is None else elastic(scene, contact.opposite)
-        normal, tangential = rectangular_punch(*contact.punch, *first, *second)
-        return tangential, normal
-    return contact.tangential_stiffness or 0.0, contact.normal_stiffness or 0.0
-
-
-def elastic(scene: Scene, face: str) -> tuple[float, float]:
-    """Young's modulus [Pa] and Poisson's ratio of the body that a face belongs to.
-
-    Raises  ValueError where it is orthotropic or of several materials
-    """
-    if isinstance(scene, PartScene | StructureScene) and scene.material is not None:
-        return scene.material.young, scene.material.poisson
-    assert isinstance(scene, StructureScene)
-    body = scene.bodies.get(face.partition(".")[0])
-    if body is None:
-        raise ValueError(f"the punch on '{face}' needs a body of [bodies.NAME]: give its stiffness")
-    solid = None if not isinstance(body.material, str) else bodies.solid(scene.materials[body.material])
-    if not isinstance(solid, Material):
-        raise ValueError(f"the punch on '{face}' needs a body of one isotropic material: give its stiffness")
-    return solid.E, solid.nu
-
-
 def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: tuple[int, ...] = ()) -> Model:
     """The harmonic balance of the scene; harmonics are those it names, else `chosen`, else chosen here."""
     harmonics, gap = scene.harmonics, reduced.interface.gap
-    joints = make_joints(scene, reduced)
+    all_joints = joints.make_joints(scene, reduced)
 
     turned: dict[str, float] = {}
     top = settings.response_range(scene)[1]
@@ -272,7 +235,7 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
 
         def alone(loads: Mapping[str, float]) -> HarmonicBalance:
             bolts = Excitation({(0, name): complex(force) for name, force in loads.items()}, None)
-            return HarmonicBalance.of(reduced, joints, HarmonicBasis((0, 1), harmonics.samples), bolts, top)
+            return HarmonicBalance.of(reduced, all_joints, HarmonicBasis((0, 1), harmonics.samples), bolts, top)
 
         stiffness = {name: rod.stiffness for name, rod in shanks.items()}
         turned = tightening.tightened(scene, stiffness, alone, top)
@@ -282,10 +245,10 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
         if not basis.has_static and np.any(np.abs(gap) > NO_GAP):
             raise ValueError("the contact has gaps, which act in harmonic 0: keep it in harmonics.kept")
         base = ground_motion(scene, part, basis) if isinstance(scene, MeshScene) and part is not None else None
-        excitation = excite(scene, base)
+        excitation = joints.excite(scene, base)
         if turned:
             excitation = replace(excitation, loads={**excitation.loads, **{(0, n): P for n, P in turned.items()}})
-        return HarmonicBalance.of(reduced, joints, basis, excitation, top)
+        return HarmonicBalance.of(reduced, all_joints, basis, excitation, top)
 
     choice = None
     if harmonics.automatic and not chosen:
@@ -299,37 +262,6 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
         )
         chosen = choice.harmonics
     return Model(part, reduced, balance(harmonics.kept or chosen), choice)
-
-
-def make_joints(scene: Scene, reduced: ReducedModel) -> list[Joint]:
-    """Every joint with its law and that law's parameters."""
-    springs, interface = contact_stiffness(scene, reduced), reduced.interface
-    found = []
-    for name, pairs in joint_pairs(scene, reduced).items():
-        contact = scene.joints[name]
-        seen = [interface.components.index(c) for c in contact.components]
-        parameters = law.ContactParameters.of(
-            contact.components, springs[pairs][:, seen], gap=interface.gap[pairs], **contact.numbers
-        )
-        found.append(Joint(name, contact.law_name, parameters, pairs))
-    if not found:  # a structure that touches nothing: a joint of no pairs
-        nothing = law.ContactParameters.of(interface.components, springs, gap=interface.gap, friction=0.0)
-        found.append(Joint("none", "jenkins", nothing))
-    return found
-
-
-def excite(scene: Scene, base: np.ndarray | None) -> Excitation:
-    """The loads of the scene, F cos(h w t + phase) as amplitude F exp(i phase), and the motion of the ground."""
-    loads: dict[tuple[int, str], complex] = {(0, name): load.amplitude for name, load in scene.loads.static.items()}
-    if isinstance(scene, MeshScene):
-        loads |= {(0, name): given.displacement for name, given in scene.prescribed.items()}
-        if isinstance(scene, StructureScene):
-            loads |= {(0, decks.load_name(name)): 1.0 for name in scene.decks}
-        if scene.wheel is not None and scene.wheel.speed:
-            loads[0, CENTRIFUGAL] = (2 * np.pi * scene.wheel.speed) ** 2
-    for name, load in scene.loads.harmonic.items():
-        loads[load.harmonic, name] = load.amplitude * np.exp(1j * load.phase)
-    return Excitation(loads, base)
 
 
 def unbalanced_load(excitation: Excitation, part: Part, motions: np.ndarray) -> str:

@@ -1,4 +1,4 @@
-"""From a part to its reduced model: masters, relative coordinates, prescribed displacement, a sector of a wheel."""
+"""From a part to its reduced model: masters, relative coordinates, prescribed displacement."""
 
 from __future__ import annotations
 
@@ -10,23 +10,18 @@ import numpy as np
 from tribodyn.fem import cyclic
 from tribodyn.fem import part as fem_part
 from tribodyn.fem.assembly import pieces
-from tribodyn.fem.cyclic import Sector
 from tribodyn.fem.factor import SingularStiffness
 from tribodyn.fem.interface import COMPONENTS
-from tribodyn.fem.matching import Mismatch
 from tribodyn.fem.material import Material
 from tribodyn.fem.part import Part
-from tribodyn.fem.prestress import spinning
 from tribodyn.fem.springs import Spring
 from tribodyn.reduction.craig_bampton import craig_bampton
-from tribodyn.reduction.cyclic import ReducedSector, reduce_sector, travelling_wave
 from tribodyn.reduction.interface_modes import interface_modes
 from tribodyn.reduction.model import ReducedModel, StaticReaction
 from tribodyn.reduction.prescribed import prescribe
 from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
 
-SEAM = ("cyclic_right", "cyclic_left")  # what a part calls the faces where its wheel is one piece
 BOLTS = "bolts."  # begins the names of outputs that are elongations of bolts
 
 
@@ -45,22 +40,23 @@ def components(scene: Scene) -> tuple[str, ...]:
 
 
 def contacts(scene: MeshScene) -> list[fem_part.Contact]:
-    """The contact of every face; in a wheel the second face is that of the next sector."""
-    found = [
-        fem_part.Contact(
-            face, c.t1, c.opposite, components(scene), c.gap, c.vertices_only, c.plane, c.inclination,
-            c.pairing, c.reach, name,
-        )
-        for name, c in scene.joints.items()
-        for face in c.groups
-    ]  # fmt: skip
-    return found if scene.wheel is None else cyclic.turned(found, scene.wheel.sectors, scene.wheel.axis)
+    """The contact of every face; in a wheel some second faces are those of the next sector."""
+    found = []
+    for name, c in scene.joints.items():
+        own = [
+            fem_part.Contact(
+                face, c.t1, c.opposite, components(scene), c.gap, c.vertices_only, c.plane, c.inclination,
+                c.pairing, c.reach, name,
+            )
+            for face in c.groups
+        ]  # fmt: skip
+        outward = scene.wheel if c.meets_next else None
+        found += own if outward is None else cyclic.turned(own, outward.sectors, outward.axis)
+    return found
 
 
 def reduce(scene: MeshScene, part: Part) -> ReducedModel:
     """The part on its contact, load and prescribed nodes and a few modes; not damped yet, nothing prescribed yet."""
-    if scene.wheel is not None:
-        return travelling_wave(reduced_sector(scene, part), scene.wheel.engine_order)
     wanted, system, interface, back = scene.reduction, part.system, part.interface, None
     held = [part.dofs(given.group, given.axis) for given in scene.prescribed.values()]
     if held and len(part.held):
@@ -108,47 +104,6 @@ def anchors(part: Part, relative_dofs: np.ndarray) -> np.ndarray:
         third = int(np.linalg.norm(np.cross(x - x[first], x[second] - x[first]), axis=1).argmax())
         found.append(moves.reshape(-1, 3)[nodes[[first, second, third]]].ravel())
     return np.concatenate([[], *found]).astype(int)
-
-
-def sector(scene: MeshScene, part: Part) -> Sector:
-    """The full sector of the scene's wheel, stiffened by its stress where the wheel spins.
-
-    Raises  ValueError where its faces do not match those of its neighbours, or where the disk is left cut open
-    """
-    wheel = scene.wheel
-    assert wheel is not None
-    if wheel.seam is None and all(name in part.node_sets for name in SEAM):
-        raise ValueError(
-            f"wheel.seam is missing, but the part has {' and '.join(SEAM)}, where its disk would be cut open: "
-            f'give wheel.seam = ["{SEAM[0]}", "{SEAM[1]}"]'
-        )
-    try:
-        cut = cyclic.cut_from(part, contacts(scene), wheel.sectors, wheel.seam, wheel.axis)
-    except Mismatch as miss:
-        raise ValueError(
-            f"{miss}, and let wheel.sectors = {wheel.sectors} and wheel.axis be those that the part was made for"
-        ) from None
-    if not wheel.speed:
-        return cut
-    tie = cyclic.seam_map(cut, 0)
-    spun = spinning(part, material(scene, part.mesh), wheel.axis, 2 * np.pi * wheel.speed, tie)
-    return replace(cut, system=spun.system)
-
-
-def reduced_sector(scene: MeshScene, part: Part) -> ReducedSector:
-    """The sector on its shroud, seam and load nodes and a few modes: what serves every engine order."""
-    return reduced_from(scene, sector(scene, part))
-
-
-def reduced_from(scene: MeshScene, full: Sector) -> ReducedSector:
-    """The full sector reduced as the scene says; raises ValueError where it cannot stand, by itself or at its speed."""
-    try:
-        return reduce_sector(full, scene.reduction.modes, scene.reduction.cutoff)
-    except ValueError as trouble:
-        if scene.wheel is None or not scene.wheel.speed:
-            raise
-        rpm = 60 * scene.wheel.speed
-        raise ValueError(f"at wheel.speed = {rpm:.6g} rpm {trouble}, or let it turn slower") from None
 
 
 def with_prescribed(scene: MeshScene, part: Part, reduced: ReducedModel) -> ReducedModel:

@@ -61,7 +61,8 @@ def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: st
         except np.linalg.LinAlgError:
             return np.full(len(omega), np.nan)
         lam, phi = sla.eigh(stiffness, system.mass, subset_by_index=(0, min(MODES, system.n_dof) - 1))
-        damping = np.zeros((len(lam),) * 2) if system.damping is None else phi.conj().T @ system.damping @ phi
+        rate = system.velocity_matrix
+        damping = np.zeros((len(lam),) * 2) if rate is None else phi.conj().T @ rate @ phi
         row = system.outputs[output]
         modal = phi.conj().T @ force
         remainder = row @ sla.cho_solve(factor, force) - (row @ phi) @ (modal / lam)

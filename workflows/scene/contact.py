@@ -66,6 +66,9 @@ class FaceContact(Contact):
     every facet of the first face has its like on the second."""
     reach: Annotated[Length, Field(ge=0)] | None = None
     """Farthest opening at which two faces still meet; a tenth of the length of the first face by default."""
+    sector: Literal["same", "next"] | None = None
+    """In a wheel, where the second face is: in the same sector, or in the next one, which the first face meets on its
+    right side; by default in the next one for two faces of one body, in the same one otherwise."""
     plane: Direction | None = None
     """Direction towards a ground that is a plane, which each face touches with its nearest node."""
     inclination: Angle = 0.0
@@ -83,6 +86,14 @@ class FaceContact(Contact):
     def groups(self) -> tuple[str, ...]:
         """The faces."""
         return (self.group,) if isinstance(self.group, str) else self.group
+
+    @property
+    def meets_next(self) -> bool:
+        """Whether it is, in a wheel, a contact of neighbouring sectors."""
+        if self.sector is not None or self.opposite is None:
+            return self.sector == "next"
+        first, second = (name.rpartition(".")[0].split(".")[0] for name in (self.groups[0], self.opposite))
+        return first == second
 
 
 class SyntheticPair(Table):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from pydantic import (
     Field,
@@ -104,6 +104,9 @@ class MeshScene(Scene):
     wheel: Wheel | None = None
     """The wheel of which the part is one sector."""
 
+    one_body: ClassVar[bool] = False
+    """Whether it can have a single body only."""
+
     @property
     @abstractmethod
     def joints(self) -> Mapping[str, FaceContact]:
@@ -111,10 +114,14 @@ class MeshScene(Scene):
 
     @model_validator(mode="after")
     def _what_a_sector_is(self) -> MeshScene:
+        for name, contact in self.joints.items():
+            if self.wheel is None and contact.sector is not None:
+                raise ValueError(f"{name}: sector is for a [wheel], and the scene has none: leave it out")
         if self.wheel is None:
             return self
         for contact in self.joints.values():
-            if contact.opposite is None or not isinstance(contact.group, str):
+            outward = contact.meets_next or self.one_body
+            if outward and (contact.opposite is None or not isinstance(contact.group, str)):
                 raise ValueError("wheel: the contact needs one group, the right face, and its opposite, the left one")
         for key, has in (
             ("contact.plane", any(contact.plane is not None for contact in self.joints.values())),
@@ -154,6 +161,7 @@ class PartScene(MeshScene):
     """Material."""
     contact: FaceContact
     """The contact faces and their law."""
+    one_body: ClassVar[bool] = True
 
     @property
     def joints(self) -> dict[str, FaceContact]:

@@ -45,7 +45,7 @@ class Body(Table):
     mesh: str | None = None
     """Mesh file, relative to the scene file, instead of a part."""
     volume: str | None = None
-    """Volume group of the mesh that is this body; the whole mesh by default."""
+    """Volume group of the part or mesh that is this body; the whole mesh by default."""
     unit: Annotated[float, BeforeValidator(in_metres), Field(gt=0)] = 1.0
     """Length unit of the mesh file, such as "mm"."""
     size: Annotated[Length, Field(gt=0)] | None = None
@@ -70,7 +70,7 @@ class Body(Table):
     @model_validator(mode="before")
     @classmethod
     def _gather_parameters(cls, table: Any, info: ValidationInfo) -> Any:
-        for key in ("size", "face_sizes", "volume", "unit"):
+        for key in ("size", "face_sizes", "unit"):
             if isinstance(table, dict) and "part" in table and "mesh" not in table and key in table:
                 raise ValueError(f"{key} is for a mesh or a CAD file: a part has parameters of its own")
         try:

@@ -20,7 +20,7 @@ from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.workflows.accuracy import measure
-from tribodyn.workflows.run import modelling, settings
+from tribodyn.workflows.run import joints, modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
@@ -228,7 +228,7 @@ class Answers:
         reduced = self.model.reduced
         if mode > reduced.system.n_dof:
             raise ValueError(f"there is no mode {mode}: the model has {reduced.system.n_dof}")
-        springs = modelling.contact_stiffness(self.file.scene, reduced) if stuck else None
+        springs = joints.contact_stiffness(self.file.scene, reduced) if stuck else None
         return float(linear_modes(reduced, springs, mode)[0][mode - 1])
 
     def _at_rest(self) -> float:

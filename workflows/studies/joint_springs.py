@@ -21,7 +21,7 @@ from tribodyn.reduction.held import hold
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.relative import relative
-from tribodyn.workflows.run import modelling
+from tribodyn.workflows.run import joints, modelling
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.solution import Output
 
@@ -92,4 +92,4 @@ def joint_springs(file: SceneFile, probes: Mapping[str, tuple[str, str]] | None 
         e = np.asarray(rows @ basis)
         units[name] = e.T @ (share[:, None] * e)
     given = {name: spring.stiffness for name, spring in scene.springs.items()}
-    return JointSprings(model, units, modelling.contact_stiffness(scene, model), given)
+    return JointSprings(model, units, joints.contact_stiffness(scene, model), given)

@@ -19,10 +19,11 @@ from tribodyn.hbm.continuation.methods import adaptive
 from tribodyn.hbm.linear.travelling_wave import on_wheel
 from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.reduction.cyclic import ReducedSector, nodal_diameters, travelling_wave, wheel_model
-from tribodyn.workflows.run import modelling, part_reduction
+from tribodyn.workflows.run import joints, modelling
+from tribodyn.workflows.run import sector as sectors
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
-from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.scene.schema import MeshScene
 
 MAX_POINTS = 1000  # of a response
 
@@ -37,9 +38,9 @@ class Wheel:
     reduced: ReducedSector
 
     @property
-    def scene(self) -> PartScene:
+    def scene(self) -> MeshScene:
         """The scene."""
-        return self.file.part_scene
+        return self.file.mesh_scene
 
     @property
     def n_sectors(self) -> int:
@@ -49,7 +50,7 @@ class Wheel:
     @property
     def springs(self) -> np.ndarray:
         """(n_pair, n_component) stuck, closed contact [N/m]."""
-        return modelling.contact_stiffness(self.scene, travelling_wave(self.reduced, 0))
+        return joints.contact_stiffness(self.scene, travelling_wave(self.reduced, 0))
 
     def diagram(self, diameters: Sequence[int], families: int, stuck: bool, full: bool = False) -> np.ndarray:
         """Frequencies (n_diameter, families) [Hz] of nodal diameters, of the reduced or of the full sector."""
@@ -63,7 +64,7 @@ class Wheel:
         reduced = modelling.damped(scene, travelling_wave(self.reduced, scene.wheel.engine_order))
         return modelling.make_model(scene, self.part, reduced).balance
 
-    def _asked(self, engine_order: int | None, frequency: tuple[float, float] | None) -> PartScene:
+    def _asked(self, engine_order: int | None, frequency: tuple[float, float] | None) -> MeshScene:
         wheel, response = self.scene.wheel, self.scene.response
         assert wheel is not None
         if engine_order is not None:
@@ -108,7 +109,7 @@ def follow(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: 
 
 def build(file: SceneFile) -> Wheel:
     """Mesh, assemble and reduce the sector of a scene; raises SceneError for a scene without a wheel."""
-    if file.part_scene.wheel is None:
+    if file.mesh_scene.wheel is None:
         raise SceneError(f"{file.name} has no [wheel]: this study is for a sector of one")
     with TemporaryDirectory() as folder:
         mesh, node_sets = modelling.make_mesh(file, Path(folder))
@@ -117,10 +118,10 @@ def build(file: SceneFile) -> Wheel:
 
 def assembled(file: SceneFile, mesh: Any, node_sets: dict[str, np.ndarray]) -> Wheel:
     """Assemble and reduce the sector of a scene with a wheel from its mesh."""
-    scene = file.part_scene
+    scene = file.mesh_scene
     part = modelling.make_part(scene, mesh, node_sets)
-    full = part_reduction.sector(scene, part)
-    return Wheel(file, part, full, part_reduction.reduced_from(scene, full))
+    full = sectors.sector(scene, part)
+    return Wheel(file, part, full, sectors.reduced(scene, full))
 
 
 def campbell(

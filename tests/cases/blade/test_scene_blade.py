@@ -20,7 +20,7 @@ from tribodyn.workflows.pictures import render, render_wheel
 from tribodyn.workflows.result import store, summary
 from tribodyn.workflows.result.faces import faces_of
 from tribodyn.workflows.result.facts import Facts
-from tribodyn.workflows.run import modelling, part_reduction, pipeline, planning
+from tribodyn.workflows.run import modelling, part_reduction, pipeline, planning, sector
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 
@@ -195,11 +195,11 @@ def test_flexible_disk_couples_through_its_seam(folder):
     mesh, nodes = modelling.make_mesh(scene, folder)
     assert len(named(nodes, "cyclic_left")) > 0
     part = modelling.make_part(scene.part_scene, mesh, nodes)
-    reduced = part_reduction.reduced_sector(scene.part_scene, part)
+    reduced = sector.reduced(scene.part_scene, sector.sector(scene.part_scene, part))
     free = nodal_diameters(reduced.sector, (0, 5, 10), 1)[:, 0]
     assert np.ptp(free) > 0.1
     spinning = scene_file.read("blade", (*COARSE, *disk, "wheel.speed=6000 rpm")).part_scene
-    spun = part_reduction.reduced_sector(spinning, modelling.make_part(spinning, mesh, nodes))
+    spun = sector.reduced(spinning, sector.sector(spinning, modelling.make_part(spinning, mesh, nodes)))
     assert (nodal_diameters(spun.sector, (0, 5, 10), 1)[:, 0] > free).all()
 
 
@@ -221,7 +221,7 @@ def test_rotation_leads_to_the_left(finished):
         ("reduction.relative=true", "reduction.relative has no meaning for a sector of a wheel"),
         ("motion.shroud_right.direction=z", "motion has no meaning for a sector of a wheel"),
         ("wheel.sectors=1", "wheel.sectors: expected a value at least 2"),
-        ("wheel.sectors=39", "must be of master nodes that lie neither on its left contact face"),
+        ("wheel.sectors=39", "wheel.sectors = 39, but the part is made for n_blades = 40"),
         ("wheel.axis=-x", "the two contact faces do not meet"),
         ('loads.static={p = {group = "tip", opposite = "clamp", pressure = 1}}', "opposite only with value and direc"),
         ('loads.static={p = {group = "tip", opposite = "no", direction = "y", value = 1}}', "has no node set 'no'"),

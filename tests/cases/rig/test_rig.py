@@ -24,7 +24,8 @@ from tribodyn.workflows.cases.rig.model import Rig
 from tribodyn.workflows.cases.rig.time import in_time
 from tribodyn.workflows.cases.rig.wear import RigWear, wear_down
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.run import modelling, settings
+from tribodyn.workflows.run import settings
+from tribodyn.workflows.run.joints import contact_stiffness
 from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.identification import Measured, Parameter, fit
@@ -92,7 +93,7 @@ def test_the_force_found_instead_of_the_height_makes_the_same_motion(rig):
 
 def test_frequencies_of_the_joint_model_are_those_of_the_rig(rig, joints):
     """Other masters, the same rig: springs put in after the reduction or before it."""
-    system, stuck = rig.plain().system, modelling.contact_stiffness(rig.scene, rig.plain())
+    system, stuck = rig.plain().system, contact_stiffness(rig.scene, rig.plain())
     for K, state in (
         (system.stiffness, False),
         (stuck_stiffness(system.stiffness, rig.plain().interface.B, stuck), True),

@@ -1,0 +1,94 @@
+"""From the tables of a scene to its joints with their laws and springs, and to what excites the model."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tribodyn.fem.material import Material
+from tribodyn.hbm.contact import law
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.stiffness import rectangular_punch
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.reduction.model import ReducedModel
+from tribodyn.workflows.run import bodies, decks
+from tribodyn.workflows.scene.contact import Contact, FaceContact
+from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, PartScene, Scene
+from tribodyn.workflows.scene.structure import StructureScene
+
+
+def contact_stiffness(scene: Scene, reduced: ReducedModel) -> np.ndarray:
+    """Contact springs (n_pair, n_component) [N/m], each joint's shared by its areas; zero where it models nothing."""
+    interface = reduced.interface
+    k = np.zeros((interface.n_pair, len(interface.components)))
+    for name, pairs in joint_pairs(scene, reduced).items():
+        contact = scene.joints[name]
+        tangential, normal = joint_stiffness(scene, contact)
+        total = {"t1": tangential, "t2": tangential, "n": normal}
+        along = [total[c] if c in contact.components else 0.0 for c in interface.components]
+        k[pairs] = np.outer(interface.area[pairs] / interface.area[pairs].sum(), along)
+    return k
+
+
+def joint_pairs(scene: Scene, reduced: ReducedModel) -> dict[str, slice]:
+    """Pairs of every joint; all of them where there is one."""
+    if len(scene.joints) == 1:
+        return {name: slice(0, reduced.interface.n_pair) for name in scene.joints}
+    return dict(reduced.info.joints)
+
+
+def joint_stiffness(scene: Scene, contact: Contact) -> tuple[float, float]:
+    """Tangential and normal stiffness of a joint [N/m]; those of a punch in shear along t1 serve both tangents."""
+    if isinstance(contact, FaceContact) and contact.punch is not None:
+        first = elastic(scene, contact.groups[0])
+        second = first if contact.opposite is None else elastic(scene, contact.opposite)
+        normal, tangential = rectangular_punch(*contact.punch, *first, *second)
+        return tangential, normal
+    return contact.tangential_stiffness or 0.0, contact.normal_stiffness or 0.0
+
+
+def elastic(scene: Scene, face: str) -> tuple[float, float]:
+    """Young's modulus [Pa] and Poisson's ratio of the body that a face belongs to.
+
+    Raises  ValueError where it is orthotropic or of several materials
+    """
+    if isinstance(scene, PartScene | StructureScene) and scene.material is not None:
+        return scene.material.young, scene.material.poisson
+    assert isinstance(scene, StructureScene)
+    body = scene.bodies.get(face.partition(".")[0])
+    if body is None:
+        raise ValueError(f"the punch on '{face}' needs a body of [bodies.NAME]: give its stiffness")
+    solid = None if not isinstance(body.material, str) else bodies.solid(scene.materials[body.material])
+    if not isinstance(solid, Material):
+        raise ValueError(f"the punch on '{face}' needs a body of one isotropic material: give its stiffness")
+    return solid.E, solid.nu
+
+
+def make_joints(scene: Scene, reduced: ReducedModel) -> list[Joint]:
+    """Every joint with its law and that law's parameters."""
+    springs, interface = contact_stiffness(scene, reduced), reduced.interface
+    found = []
+    for name, pairs in joint_pairs(scene, reduced).items():
+        contact = scene.joints[name]
+        seen = [interface.components.index(c) for c in contact.components]
+        parameters = law.ContactParameters.of(
+            contact.components, springs[pairs][:, seen], gap=interface.gap[pairs], **contact.numbers
+        )
+        found.append(Joint(name, contact.law_name, parameters, pairs))
+    if not found:  # a structure that touches nothing: a joint of no pairs
+        nothing = law.ContactParameters.of(interface.components, springs, gap=interface.gap, friction=0.0)
+        found.append(Joint("none", "jenkins", nothing))
+    return found
+
+
+def excite(scene: Scene, base: np.ndarray | None) -> Excitation:
+    """The loads of the scene, F cos(h w t + phase) as amplitude F exp(i phase), and the motion of the ground."""
+    loads: dict[tuple[int, str], complex] = {(0, name): load.amplitude for name, load in scene.loads.static.items()}
+    if isinstance(scene, MeshScene):
+        loads |= {(0, name): given.displacement for name, given in scene.prescribed.items()}
+        if isinstance(scene, StructureScene):
+            loads |= {(0, decks.load_name(name)): 1.0 for name in scene.decks}
+        if scene.wheel is not None and scene.wheel.speed:
+            loads[0, CENTRIFUGAL] = (2 * np.pi * scene.wheel.speed) ** 2
+    for name, load in scene.loads.harmonic.items():
+        loads[load.harmonic, name] = load.amplitude * np.exp(1j * load.phase)
+    return Excitation(loads, base)

@@ -1,0 +1,96 @@
+"""A sector that turns: its stress in the deformed state of contact, spin softening and Coriolis forces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from tribodyn.fem.constraints import named
+from tribodyn.fem.cyclic import Sector, at_index
+from tribodyn.fem.elasticity import assemble
+from tribodyn.fem.factor import SingularStiffness
+from tribodyn.fem.modes import StaticDivergence
+from tribodyn.fem.part import Part
+from tribodyn.fem.prestress import UNSTABLE, check_stability, coriolis, geometric_stiffness, spin_softening
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.linear.recovery import full_displacement
+from tribodyn.reduction.craig_bampton import POINT_LOAD
+from tribodyn.reduction.cyclic import reduce_sector, travelling_wave
+from tribodyn.reduction.linear import stuck_stiffness
+from tribodyn.reduction.model import ModelInfo, ReducedModel
+from tribodyn.workflows.run import joints, part_reduction
+from tribodyn.workflows.scene.schema import MeshScene
+
+SETTLED = 1e-10  # tolerance of the contact at rest
+AT_REST = 2 * np.pi  # any frequency: nothing vibrates [rad/s]
+FEW_SAMPLES = 16  # of a cycle in which nothing moves
+
+
+def spun(scene: MeshScene, part: Part, cut: Sector) -> Sector:
+    """The sector `cut` from a part, vibrating about its equilibrium at the scene's speed.
+
+    The stress is that of the static loads with the contact as it settles: closed, slipped or open, pair by pair
+    Raises  ValueError where the contact does not settle or a body can move rigidly, StaticDivergence where the sector
+        is unstable at rest with its contacts stuck
+    """
+    wheel = scene.wheel
+    assert wheel is not None
+    speed = 2 * np.pi * wheel.speed
+    material = part_reduction.material(scene, part.mesh)
+    mass, _ = assemble(part.mesh, material)
+    soft = csr_matrix(cut.system.stiffness + part.restricted(spin_softening(mass, wheel.axis, speed)))
+    turning = csr_matrix(part.restricted(coriolis(mass, wheel.axis, speed))) if wheel.coriolis else None
+    softened = replace(cut, system=replace(cut.system, stiffness=soft, gyroscopic=turning))
+    still = part.field(at_rest(scene, softened))
+    stress = part.restricted(geometric_stiffness(part.mesh, material, still, temperature(scene, part)))
+    stiffened = replace(cut, system=replace(softened.system, stiffness=csr_matrix(soft + stress)))
+    system, B = at_index(stiffened, 0)
+    stuck = ReducedModel(cut.system, cut.interface, info=ModelInfo(joints=cut.joints))
+    check_stability(stuck_stiffness(system.stiffness, B, joints.contact_stiffness(scene, stuck)))
+    return stiffened
+
+
+def at_rest(scene: MeshScene, sector: Sector) -> np.ndarray:
+    """Displacement (n_free,) [m] under the static loads of the scene, the contact settled; the same in every sector."""
+    try:
+        reduced = reduce_sector(sector, n_modes=0, attached=distributed(scene, sector))
+    except SingularStiffness:
+        raise StaticDivergence(UNSTABLE) from None
+    model = travelling_wave(reduced, 0)
+    excitation = joints.excite(scene, None)
+    static = replace(excitation, loads={key: value for key, value in excitation.loads.items() if key[0] == 0})
+    basis = HarmonicBasis((0, 1), FEW_SAMPLES)
+    made = joints.make_joints(scene, model)
+    balance = HarmonicBalance.of(model, made, basis, static, AT_REST)
+    solved = newton.solve_from_rest(balance, AT_REST, newton.NewtonOptions(tolerance=SETTLED))
+    if not solved.converged:
+        raise ValueError(f"the contacts do not settle under the static loads: {solved.outcome}")
+    state = solved.state
+    return full_displacement(balance, state.flat, state.cycle.force.reshape(state.flat.shape), AT_REST)[:, 0]
+
+
+def distributed(scene: MeshScene, sector: Sector) -> list[str]:
+    """Static loads that act on many nodes, whose statics the reduction is to keep exact."""
+    static = {name for h, name in joints.excite(scene, None).loads if h == 0}
+    loads = sector.system.loads
+    return [name for name in loads if name in static and np.count_nonzero(loads[name]) > POINT_LOAD]
+
+
+def temperature(scene: MeshScene, part: Part) -> np.ndarray | None:
+    """Change of temperature (n_node,) [K] by the static loads of the scene; None where none heats.
+
+    Raises  ValueError for a field from a file
+    """
+    found = None
+    for name, load in scene.loads.static.items():
+        if load.field is not None:
+            raise ValueError(f"loads.static.{name}: in a wheel that turns, heat whole bodies instead of a field")
+        if load.temperature is not None:
+            found = np.zeros(len(part.points)) if found is None else found
+            heated = [named(part.node_sets, body) for body in load.bodies] or [np.arange(len(found))]
+            found[np.concatenate(heated)] += load.temperature
+    return found

@@ -1,0 +1,64 @@
+"""From a part to the sector of a wheel that it is, full and reduced."""
+
+from __future__ import annotations
+
+from tribodyn.fem import cyclic
+from tribodyn.fem.cyclic import Sector
+from tribodyn.fem.matching import Mismatch
+from tribodyn.fem.part import Part
+from tribodyn.reduction.cyclic import ReducedSector, reduce_sector
+from tribodyn.workflows.run import part_reduction, rotation
+from tribodyn.workflows.scene.schema import MeshScene, PartScene
+from tribodyn.workflows.scene.structure import StructureScene
+
+SEAM = ("cyclic_right", "cyclic_left")  # what a part calls the faces where its wheel is one piece
+
+
+def sector(scene: MeshScene, part: Part) -> Sector:
+    """The full sector of the scene's wheel, vibrating about its equilibrium where it spins.
+
+    Raises  ValueError where its faces do not match those of its neighbours, or where the disk is left cut open
+    """
+    wheel = scene.wheel
+    assert wheel is not None
+    for made_for in blades_of_parts(scene):
+        if made_for != wheel.sectors:
+            raise ValueError(f"wheel.sectors = {wheel.sectors}, but the part is made for n_blades = {made_for}")
+    cuts = [tuple(name for name in part.node_sets if name.rpartition(".")[2] == side) for side in SEAM]
+    if wheel.seam is None and all(cuts):
+        (right, *_), (left, *_) = cuts
+        raise ValueError(
+            f"wheel.seam is missing, but the part has {right} and {left}, where its disk would be cut open: "
+            f'give wheel.seam = ["{right}", "{left}"]'
+        )
+    try:
+        found = cyclic.cut_from(part, part_reduction.contacts(scene), wheel.sectors, wheel.seam, wheel.axis)
+    except Mismatch as miss:
+        raise ValueError(
+            f"{miss}, and let wheel.sectors = {wheel.sectors} and wheel.axis be those that the part was made for"
+        ) from None
+    return rotation.spun(scene, part, found) if wheel.speed else found
+
+
+def blades_of_parts(scene: MeshScene) -> set[int]:
+    """The number of blades that parts of a scene are made for, where they say one."""
+    tables = list(scene.bodies.values()) if isinstance(scene, StructureScene) else []
+    own = scene.geometry if isinstance(scene, PartScene | StructureScene) else None
+    given = [table.parameters for table in (*tables, own) if table is not None]
+    return {int(of["n_blades"]) for of in given if "n_blades" in of}
+
+
+def reduced(scene: MeshScene, full: Sector) -> ReducedSector:
+    """A full sector on its contact, seam and load nodes and a few modes: what serves every engine order.
+
+    Raises  ValueError where it cannot stand, by itself or at its speed
+    """
+    turning = scene.wheel is not None and scene.wheel.speed > 0
+    try:
+        kept = rotation.distributed(scene, full) if turning else ()
+        return reduce_sector(full, scene.reduction.modes, scene.reduction.cutoff, kept)
+    except ValueError as trouble:
+        if scene.wheel is None or not turning:
+            raise
+        rpm = 60 * scene.wheel.speed
+        raise ValueError(f"at wheel.speed = {rpm:.6g} rpm {trouble}, or let it turn slower") from None
