@@ -39,7 +39,7 @@ def outputs(mesh, node_sets, faces, order):
 
 @pytest.mark.parametrize("order", [3, 4])
 def test_a_face_of_a_wheel_split_into_named_contacts_equals_the_one_contact(tmp_path, order):
-    """Acceptance 13.1: nodes on the cuts belong to two joints, each with its share of the area; a complex and a real wave."""
+    """Acceptance 13.1: nodes on the cuts belong to two joints, each with its share of the area."""
     mesh, node_sets = small.read(tmp_path / "s.msh")
     groups = dict(mesh.boundaries)
     for side in ("right", "left"):
