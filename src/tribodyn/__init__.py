@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from tribodyn.hbm.wear.law import names as wear_laws
     from tribodyn.reduction.foreign import ForeignMatrices as Matrices
     from tribodyn.reduction.foreign import from_arrays, read_matrices
-    from tribodyn.workflows.api.designs import study
+    from tribodyn.workflows.api.designs import lives, study
     from tribodyn.workflows.api.own_matrices import Balance, Contact, Cycle, Structure, reduce, wear_law
     from tribodyn.workflows.api.scenes import build, load, plan, read_scene, run, run_to_accuracy, scene_names
     from tribodyn.workflows.api.studies import (
@@ -128,6 +128,7 @@ if TYPE_CHECKING:
         verify,
     )
     from tribodyn.workflows.designs.table import StudyTable
+    from tribodyn.workflows.lives.lives import Lives
     from tribodyn.workflows.result.result import Result
     from tribodyn.workflows.result.store import ResultError
     from tribodyn.workflows.run.failure import SolveFailed
@@ -139,6 +140,7 @@ _HOME: dict[str, tuple[str, ...]] = {
     "Balance": ("tribodyn.workflows.api.own_matrices",),
     "Contact": ("tribodyn.workflows.api.own_matrices",),
     "Cycle": ("tribodyn.workflows.api.own_matrices",),
+    "Lives": ("tribodyn.workflows.lives.lives",),
     "Matrices": ("tribodyn.reduction.foreign", "ForeignMatrices"),
     "Model": ("tribodyn.workflows.run.modelling",),
     "Result": ("tribodyn.workflows.result.result",),
@@ -153,6 +155,7 @@ _HOME: dict[str, tuple[str, ...]] = {
     "contact_laws": ("tribodyn.hbm.contact.law", "names"),
     "continuations": ("tribodyn.hbm.continuation", "names"),
     "from_arrays": ("tribodyn.reduction.foreign",),
+    "lives": ("tribodyn.workflows.api.designs",),
     "load": ("tribodyn.workflows.api.scenes",),
     "plan": ("tribodyn.workflows.api.scenes",),
     "read_matrices": ("tribodyn.reduction.foreign",),
@@ -292,6 +295,7 @@ __all__ = [
     "Identification",
     "IntegrationFailed",
     "JointSprings",
+    "Lives",
     "Matrices",
     "Measured",
     "Mistuned",
@@ -350,6 +354,7 @@ __all__ = [
     "joint_springs",
     "length_unit",
     "linear_references",
+    "lives",
     "load",
     "mac",
     "mark_stability",

@@ -1,4 +1,4 @@
-"""Studies of many runs from Python, as for the command `tribodyn study`."""
+"""Studies of many runs from Python, as for the commands `tribodyn study` and `tribodyn lives`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from typing import Any
 from tribodyn.workflows.api.scenes import Report, reporter
 from tribodyn.workflows.designs import study as studies
 from tribodyn.workflows.designs import study_file
+from tribodyn.workflows.designs.study_file import Study
 from tribodyn.workflows.designs.table import StudyTable
+from tribodyn.workflows.lives import lives as distributions
+from tribodyn.workflows.lives.lives import Lives
 
 
 def study(
@@ -32,9 +35,33 @@ def study(
     resume : take the runs that the folder holds already, and do the others; retry : and those that failed
     Raises  SceneError, ValueError: the study asks for what cannot be; SolveFailed: the scheduler was lost
     """
-    if isinstance(source, Mapping):
-        read = study_file.parse(source, "study", Path().resolve())
-    else:
-        read = study_file.read(Path(source))
+    read = _read(source)
     place = Path("results") / read.name if folder is None else Path(folder)
     return studies.run(read, place, reporter(progress), workers, scheduler, resume, retry)
+
+
+def lives(
+    source: str | PathLike[str] | Mapping[str, Any],
+    folder: str | PathLike[str] | None = None,
+    *,
+    rare: float | None = None,
+    workers: int | None = None,
+    scheduler: str = "",
+    resume: bool = False,
+    progress: Report = None,
+) -> Lives:
+    """The distribution of a life, or of another number, over what a study draws; its table [lives] says which.
+
+    source, folder, workers, scheduler, resume : as of `study`
+    rare : a share whose value is wanted too, such as 1e-4
+    Raises  SceneError, ValueError: what is asked for cannot be; SolveFailed: no run has the number, a lost scheduler
+    """
+    read = _read(source)
+    place = Path("results") / read.name if folder is None else Path(folder)
+    return distributions.run(read, place, reporter(progress), workers, scheduler, resume, rare)
+
+
+def _read(source: str | PathLike[str] | Mapping[str, Any]) -> Study:
+    if isinstance(source, Mapping):
+        return study_file.parse(source, "study", Path().resolve())
+    return study_file.read(Path(source))

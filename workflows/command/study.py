@@ -1,4 +1,4 @@
-"""The word of the command `tribodyn` that does the many runs of a study."""
+"""The words of the command `tribodyn` that do the many runs of a study, and ask what lives they give."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tribodyn.workflows.command.words import Flag, Json, make_room
+from tribodyn.workflows.command.words import Flag, Json, make_room, quantity
 
 if TYPE_CHECKING:
     from tribodyn.workflows.designs.table import StudyTable
@@ -57,8 +57,7 @@ def study(
     try:
         found = studies.run(read, folder, progress, workers, scheduler, resume, retry)
     except KeyboardInterrupt:
-        again = shlex.join(["tribodyn", "study", str(file), "--out", str(folder), "--resume"])
-        raise KeyboardInterrupt(f"stopped; what was finished is kept in {folder}: resume with {again}") from None
+        raise KeyboardInterrupt(_stopped("study", file, folder)) from None
     counts = {status: found.count(status) for status in ("complete", "failed", "refused", "lost")}
     if as_json:
         files = {kind: str(folder / f"study.{kind}") for kind in ("csv", "h5")}
@@ -82,4 +81,57 @@ def troubles(found: StudyTable) -> list[str]:
     return told + ([f"... and {len(bad) - TOLD} more, in the table"] if len(bad) > TOLD else [])
 
 
-COMMANDS = (study,)
+def lives(
+    file: Path,
+    *,
+    rare: str | None = None,
+    workers: int | None = None,
+    scheduler: str = "",
+    out: Path | None = None,
+    resume: Flag = False,
+    as_json: Json = False,
+) -> None:
+    """Say what life a share of the parts outlives, how sure that is, and what to measure next.
+
+    Parameters
+    ----------
+    file
+        The .toml file of a study that draws from distributions; its table [lives] says what is wanted.
+    rare
+        Share of the parts whose value is wanted as well, such as 1e-4.
+    workers
+        Processes; as many as there are cores by default.
+    scheduler
+        Address of a scheduler of dask.distributed, or "local" for one of its own.
+    out
+        Folder of lives.json, lives.png and the study's tables; results/NAME by default.
+    resume
+        Take the runs that the folder holds already, and do the others.
+    as_json
+        Print JSON for machines.
+    """
+    from tribodyn.workflows.designs import study_file
+    from tribodyn.workflows.lives import lives as distributions
+    from tribodyn.workflows.run.progress import Progress, console_progress
+
+    make_room(out)
+    share = None if rare is None else quantity("--rare", rare, "")
+    read = study_file.read(file)
+    folder = out or Path("results") / read.name
+    progress = Progress() if as_json else console_progress()
+    try:
+        found = distributions.run(read, folder, progress, workers, scheduler, resume, share)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(_stopped("lives", file, folder)) from None
+    if as_json:
+        print(json.dumps(found.record(), indent=2))
+        return
+    print(*troubles(found.table), *found.lines(), folder / "lives.json", folder / "lives.png", sep="\n")
+
+
+def _stopped(word: str, file: Path, folder: Path) -> str:
+    again = shlex.join(["tribodyn", word, str(file), "--out", str(folder), "--resume"])
+    return f"stopped; what was finished is kept in {folder}: resume with {again}"
+
+
+COMMANDS = (study, lives)

@@ -45,11 +45,12 @@ class Distribution(Table):
 
 @dataclass(frozen=True)
 class Marginal:
-    """A distribution of a number in SI units, truncated to [low, high]."""
+    """A distribution of a number in SI units, truncated to [low, high]; logarithmic : one of its logarithm."""
 
     law: Any
     low: float = -math.inf
     high: float = math.inf
+    logarithmic: bool = False
 
     @classmethod
     def of(cls, table: Distribution) -> Marginal:
@@ -83,7 +84,7 @@ class Marginal:
             if not n["median"] > 0:
                 raise ValueError(f"median {table.median} is not above 0")
             # coefficient of variation v of a lognormal variable: v^2 = exp(s^2) - 1
-            found = cls(stats.lognorm(math.sqrt(math.log1p(n["cov"] ** 2)), scale=n["median"]), *ends)
+            found = cls(stats.lognorm(math.sqrt(math.log1p(n["cov"] ** 2)), scale=n["median"]), *ends, logarithmic=True)
         if not found.law.cdf(found.high) - found.law.cdf(found.low) > 0:
             raise ValueError("nothing is left of the distribution between low and high")
         return found

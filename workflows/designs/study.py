@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -31,16 +31,19 @@ def run(
     scheduler: str = "",
     resume: bool = False,
     retry: bool = False,
+    more: Sequence[dict[str, Any]] = (),
+    drawn: bool = True,
 ) -> StudyTable:
     """Do the runs of a study, and leave its tables and pictures in a folder.
 
     workers : processes, as many as there are cores by default; scheduler : see cluster.finished, none by default
     resume : take the rows that `folder` holds of the same runs; retry : but those of failed runs
+    more : values of runs beyond those of the design; drawn : whether pictures are wanted
     Raises  SceneError, ValueError: the study asks for what cannot be; SolveFailed: the scheduler was lost
     """
     if workers is not None and workers < 1:
         raise ValueError(f"workers {workers}: give at least 1")
-    varied = design.runs(study)
+    varied = [*design.runs(study), *more]
     tasks, refused = _tasks(study, varied)
     folder.mkdir(parents=True, exist_ok=True)
     with alone_in(folder):
@@ -51,7 +54,8 @@ def run(
             if row is not None and row.status not in again:
                 rows[task.number] = replace(row, run=task.number)
         known = [row for number, row in sorted(rows.items()) if number not in refused]
-        previous = journal.begin(known, resume or retry)
+        # rows that this study does not ask for stay too: one that is larger may
+        previous = journal.begin((earlier | {row.key: row for row in known}).values(), resume or retry)
         if previous:
             progress.say(f"the rows that were here are now {previous}")
         if resume or retry:
@@ -72,13 +76,19 @@ def run(
             if found is not None:
                 write(found, folder)
         assert found is not None
-        if found.count("complete"):
-            found.plot().savefig(folder / "study.png")
-            if parallel_picture.possible(found):
-                found.plot_parallel().savefig(folder / "parallel.png")
-            if life_picture.possible(found):
-                found.plot_distribution().savefig(folder / "life.png")
+        if drawn:
+            draw(found, folder)
     return found
+
+
+def draw(found: StudyTable, folder: Path) -> None:
+    """Pictures of a study, as far as its runs make any."""
+    if found.count("complete"):
+        found.plot().savefig(folder / "study.png")
+        if parallel_picture.possible(found):
+            found.plot_parallel().savefig(folder / "parallel.png")
+        if life_picture.possible(found):
+            found.plot_distribution().savefig(folder / "life.png")
 
 
 def _finished(tasks: Sequence[Task], workers: int, scheduler: str) -> Iterator[Row]:
@@ -87,14 +97,23 @@ def _finished(tasks: Sequence[Task], workers: int, scheduler: str) -> Iterator[R
     return cluster.finished(tasks, scheduler, workers) if scheduler else pool.finished(tasks, workers)
 
 
+def task_at(study: Study, values: Mapping[str, Any]) -> Task:
+    """One run of a study by itself, with a verdict on what it finds."""
+    base = scene_file.read(study.scene, always := ("solver.threads=1", *study.settings.set))
+    return Task(1, base.name, base.text, (*always, *_overrides(values)), base.folder)
+
+
+def _overrides(values: Mapping[str, Any]) -> list[str]:
+    return [f"{key}={tomli_w.dumps({'v': value}).partition('=')[2].strip()}" for key, value in values.items()]
+
+
 def _tasks(study: Study, varied: Sequence[dict[str, Any]]) -> tuple[list[Task], dict[int, Row]]:
     """The runs, and rows for those whose scene is refused; raises SceneError where every one is."""
     always = ["solver.threads=1", *([] if study.settings.verdict else ["verdict.enabled=false"]), *study.settings.set]
     base = scene_file.read(study.scene, always)
     tasks, refused = [], {}
     for number, values in enumerate(varied, 1):
-        own = [f"{key}={tomli_w.dumps({'v': value}).partition('=')[2].strip()}" for key, value in values.items()]
-        task = Task(number, base.name, base.text, (*always, *own), base.folder)
+        task = Task(number, base.name, base.text, (*always, *_overrides(values)), base.folder)
         try:
             scene = task.scene().scene
         except SceneError as error:

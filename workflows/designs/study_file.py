@@ -12,7 +12,7 @@ from pydantic import Field, StrictBool, StrictInt, model_validator
 
 from tribodyn.workflows.designs.distributions import Distribution, Marginal
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.scene.fields import Table
+from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.scene_file import SceneError
 
 LISTED = ("grid", "list")
@@ -53,12 +53,43 @@ class Correlation(Table):
     """Correlation of the normal variables behind both, Gaussian copula; Spearman's is 6/pi asin(value/2)."""
 
 
+Share = Annotated[Number, Field(gt=0, lt=1)]
+
+
+class Lives(Table):
+    """The table [lives]: what `tribodyn lives` asks of the runs."""
+
+    number: str = "life_cycles"
+    """Column of the study's table whose distribution is wanted."""
+    shares: Annotated[tuple[Share, ...], Field(min_length=1)] = (0.1, 0.5, 0.9)
+    """Shares of the parts that fall below the wanted values: 0.1 gives P10, which 90 % of the parts outlive."""
+    confidence: Share = 0.9
+    """Chance that a true quantile lies between the ends that are told."""
+    within: Annotated[Number, Field(gt=0)] | None = None
+    """Runs are added near the first share until its ends are within this of it, such as "5 %"; none are by default."""
+    most: Annotated[StrictInt, Field(ge=1)] = 200
+    """Largest number of full runs, those of the design and those that are added."""
+    cheap: tuple[str, ...] = ()
+    """Keys that make a run cheap, as "section.key=value"; the full runs then correct what the cheap ones say."""
+    cheap_runs: Annotated[StrictInt, Field(ge=1)] | None = None
+    """Number of cheap runs; four times as many as full ones by default."""
+    model_error: Annotated[Number, Field(ge=0)] | None = None
+    """Relative error of the model itself; by default that of the verdict on a run at the medians."""
+
+    @model_validator(mode="after")
+    def _cheap_has_runs(self) -> Lives:
+        if self.cheap_runs is not None and not self.cheap:
+            raise ValueError("lives.cheap_runs: say in lives.cheap what makes a run cheap")
+        return self
+
+
 class StudyFile(Table):
     """A study as its file has it."""
 
     study: Settings
     vary: dict[str, Any]
     correlations: tuple[Correlation, ...] = ()
+    lives: Lives = Lives()
 
 
 @dataclass(frozen=True)
@@ -74,6 +105,7 @@ class Study:
     varied: Mapping[str, tuple[Any, ...] | Marginal]
     correlations: tuple[Correlation, ...]
     folder: Path
+    lives: Lives
 
     @property
     def scene(self) -> str:
@@ -110,7 +142,7 @@ def parse(data: Mapping[str, Any], label: str, folder: Path) -> Study:
                 raise SceneError(f'{label}: correlations[{at}]: "{key}" does not vary by a distribution')
         if correlation.keys[0] == correlation.keys[1]:
             raise SceneError(f'{label}: correlations[{at}]: give two keys, not "{correlation.keys[0]}" twice')
-    return Study(Path(label).name.removesuffix(".toml"), file.study, varied, file.correlations, folder)
+    return Study(Path(label).name.removesuffix(".toml"), file.study, varied, file.correlations, folder, file.lives)
 
 
 def _leaves(table: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:

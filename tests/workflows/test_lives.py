@@ -1,0 +1,287 @@
+"""Lives as distributions: against closed forms, in their confidence, and by the command on a scene."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from scipy import stats
+
+import tribodyn as td
+from tests.helpers.command import leave
+from tribodyn.workflows.designs import design, pool, study_file
+from tribodyn.workflows.designs import study as studies
+from tribodyn.workflows.designs.sensitivity import influences
+from tribodyn.workflows.designs.space import Space
+from tribodyn.workflows.designs.surrogate import Level, Surrogate
+from tribodyn.workflows.designs.task import Row, Task, solve
+from tribodyn.workflows.lives import quantiles
+from tribodyn.workflows.lives.quantiles import Sample
+
+pytest.importorskip("sklearn")
+
+PRESS, FRICTION, DAMPING = "loads.static.press.value", "contact.friction", "damping.modal"
+VARY = {
+    FRICTION: {"distribution": "lognormal", "median": 0.5, "cov": "10 %"},
+    PRESS: {"distribution": "lognormal", "median": "20 kN", "cov": "5 %"},
+    DAMPING: {"distribution": "lognormal", "median": 0.01, "cov": "20 %"},
+}
+POWERS = {FRICTION: -2.0, PRESS: -3.0, DAMPING: 0.5}
+MEDIAN = 1e8
+
+
+@pytest.fixture(autouse=True)
+def _no_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They take longer than all the rest."""
+    if "command" not in request.node.name:
+        monkeypatch.setattr(studies, "draw", lambda found, folder: None)
+        monkeypatch.setattr(td.Lives, "plot", lambda self: Figure())
+
+
+def study(vary: dict[str, Any] = VARY, runs: int = 32, seed: int = 3, **more: Any) -> dict[str, Any]:
+    return {"study": {"scene": "beam", "design": "sobol", "runs": runs, "seed": seed}, "vary": vary, **more}
+
+
+def space(tables: dict[str, Any]) -> Space:
+    return Space.of(study_file.parse(tables, "mine.toml", Path()))
+
+
+def width(key: str) -> float:
+    """Standard deviation of the logarithm of a key, times its power."""
+    cov = float(str(VARY[key]["cov"]).removesuffix(" %")) / 100
+    return abs(POWERS[key]) * math.sqrt(math.log1p(cov**2))
+
+
+SCATTER = math.sqrt(sum(width(key) ** 2 for key in VARY))
+
+
+def exact(share: float) -> float:
+    return MEDIAN * math.exp(SCATTER * stats.norm.ppf(share))
+
+
+def lasts(values: dict[str, float]) -> float:
+    medians = {FRICTION: 0.5, PRESS: 20e3, DAMPING: 0.01}
+    return MEDIAN * math.prod((values[key] / medians[key]) ** power for key, power in POWERS.items())
+
+
+def engine(life: Callable[[dict[str, float], Task], dict[str, float] | None]) -> Any:
+    """In place of the processes: rows with a closed-form life."""
+
+    def finished(tasks: Sequence[Task], workers: int) -> Iterator[Row]:
+        for task in tasks:
+            said = dict(text.split("=", 1) for text in task.overrides)
+            numbers = life({key: float(said[key]) for key in VARY}, task)
+            done = numbers is not None
+            yield Row(task.number, task.key, "complete" if done else "failed", "told", numbers or {})
+
+    return finished
+
+
+def planted(seed: int) -> tuple[Space, Callable[[np.ndarray], np.ndarray]]:
+    """A problem of four lognormal variables with powers, curvature and a wave."""
+    draw = np.random.default_rng(seed)
+    vary = {
+        f"k.{i}": {"distribution": "lognormal", "median": 1.0, "cov": float(draw.uniform(0.05, 0.3))} for i in range(4)
+    }
+    power, curve = draw.uniform(-3, 3, 4), draw.uniform(-5, 5, 4)
+
+    def log_life(x: np.ndarray) -> np.ndarray:
+        z = np.log(x)
+        return np.asarray(17 + z @ power + z**2 @ curve + 0.5 * np.sin(6 * z[:, 0] + 2 * z[:, 1]))
+
+    return space(study(vary, seed=seed)), log_life
+
+
+def covered(seeds: range, runs: int) -> tuple[float, float]:
+    """Share of problems whose P10 lies in its 90 % interval, and the largest error of its logarithm."""
+    inside, errors = [], []
+    for seed in seeds:
+        of, log_life = planted(seed)
+        points = of.values(design.qmc.Sobol(4, seed=np.random.default_rng(seed)).random(runs))
+        surrogate = Surrogate.fitted(of.coordinates(points), log_life(points))
+        sample = Sample.of(of, surrogate)
+        many, _ = of.draw(17, seed=99)
+        truth = float(np.quantile(log_life(many), 0.1))
+        low, high = np.quantile(quantiles.drawn(sample, surrogate, 0.1), [0.05, 0.95])
+        inside.append(low <= truth <= high)
+        errors.append(abs(sample.quantile(0.1) - truth))
+    return float(np.mean(inside)), float(np.max(errors))
+
+
+def test_the_claimed_confidence_is_kept_on_planted_problems() -> None:
+    share, error = covered(range(4), 48)
+    assert share >= 0.5
+    assert error < 0.05
+
+
+@pytest.mark.slow
+def test_the_claimed_confidence_is_kept_on_fifty_planted_problems() -> None:
+    share, error = covered(range(50), 48)
+    assert share >= 0.8
+    assert error < 0.05
+
+
+def test_quantiles_and_indices_are_those_of_the_closed_form(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pool, "finished", engine(lambda values, task: {"life_cycles": lasts(values)}))
+    found = td.lives(study(lives={"model_error": 0.1}), tmp_path)
+    for q, name in zip(found.quantiles, ("P10", "P50", "P90"), strict=True):
+        assert q.name == name
+        assert q.value == pytest.approx(exact(q.share), rel=2e-3)
+        assert q.low <= q.value <= q.high
+        assert q.low_in_all == pytest.approx(0.91 * q.value, rel=0.01)  # the 5 % quantile of a factor in 0.9 .. 1.1
+        assert q.high_in_all == pytest.approx(1.09 * q.value, rel=0.01)
+        assert not q.at_least
+    assert found.scatter == pytest.approx(SCATTER, rel=2e-3)
+    assert [one.key for one in found.influences] == sorted(VARY, key=width, reverse=True)
+    for one in found.influences:
+        assert one.first == pytest.approx((width(one.key) / SCATTER) ** 2, abs=0.01)
+        assert one.total == pytest.approx(one.first, abs=0.01)
+    record = json.loads((tmp_path / "lives.json").read_text())
+    assert record["quantiles"][0]["value"] == found.quantiles[0].value
+
+
+def test_runs_are_added_for_a_rare_life_and_taken_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+
+    def life(values: dict[str, float], task: Task) -> dict[str, float]:
+        asked.append(task.number)
+        whole = lasts(values)
+        return {"life_cycles": whole * math.exp(0.2 * math.sin(6 * math.log(whole / MEDIAN)))}
+
+    monkeypatch.setattr(pool, "finished", engine(life))
+    tables = study(runs=16, lives={"model_error": 0, "within": "4 %", "most": 48})
+    found = td.lives(tables, tmp_path, rare=1e-4)
+    rare = exact(1e-4)
+    truth = rare * math.exp(0.2 * math.sin(6 * math.log(rare / MEDIAN)))
+    assert found.quantiles[0].share == 1e-4
+    assert found.quantiles[0].value == pytest.approx(truth, rel=0.05)
+    assert found.quantiles[0].low <= truth * 1.02
+    assert found.quantiles[0].high >= truth * 0.98
+    assert 16 < found.runs <= 48
+    count = len(asked)
+    assert count == found.runs
+    again = td.lives(tables, tmp_path, rare=1e-4, resume=True)
+    assert len(asked) == count
+    assert again.quantiles[0] == found.quantiles[0]
+
+
+def test_few_full_runs_correct_many_cheap_ones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def life(values: dict[str, float], task: Task) -> dict[str, float]:
+        friction = math.log(values[FRICTION] / 0.5)
+        bend = math.exp(math.sin(25 * friction))  # what only many runs see
+        cheap = "harmonics.samples=32" in task.overrides
+        return {"life_cycles": lasts(values) * bend * (0.7 * math.exp(friction) if cheap else 1.0)}
+
+    monkeypatch.setattr(pool, "finished", engine(life))
+    both = {"model_error": 0, "cheap": ["harmonics.samples=32"], "cheap_runs": 96}
+    one = td.lives(study(runs=16, lives={"model_error": 0}), tmp_path / "one")
+    two = td.lives(study(runs=16, lives=both), tmp_path / "two")
+    assert (two.runs, two.cheap_runs) == (16, 96)
+    of = space(study())
+    many = of.draw(17, seed=99)[0]
+    lives = [lasts(of.run_of(x)) * math.exp(math.sin(25 * math.log(x[0] / 0.5))) for x in many[:20000]]
+    truth = float(np.quantile(lives, 0.1))
+    errors = [abs(math.log(each.quantiles[0].value / truth)) for each in (one, two)]
+    assert errors[1] < 0.03
+    assert errors[1] < 0.5 * errors[0]
+
+
+def test_missing_runs_widen_what_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def life(values: dict[str, float], task: Task) -> dict[str, float] | None:
+        return None if task.number % 16 == 0 else {"life_cycles": lasts(values)}
+
+    monkeypatch.setattr(pool, "finished", engine(life))
+    found = td.lives(study(lives={"model_error": 0}), tmp_path)
+    assert found.missing == 2
+    ten = found.quantiles[0]
+    lost = 2 / 32
+    assert ten.low == pytest.approx(exact((0.1 - lost) / (1 - lost)), rel=0.02)
+    assert ten.high == pytest.approx(exact(0.1 / (1 - lost)), rel=0.02)
+    assert "2 more have none" in found.lines()[0]
+
+
+def test_lives_that_did_not_end_are_lower_bounds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    limit = 1.2 * MEDIAN
+
+    def life(values: dict[str, float], task: Task) -> dict[str, float]:
+        own = lasts(values)
+        return {"cycles": limit} if own > limit else {"cycles": own, "life_cycles": own}
+
+    monkeypatch.setattr(pool, "finished", engine(life))
+    found = td.lives(study(runs=64, lives={"model_error": 0}), tmp_path)
+    assert [q.at_least for q in found.quantiles] == [False, False, True]
+    assert found.quantiles[0].value == pytest.approx(exact(0.1), rel=0.05)
+    assert "at least" in found.lines()[-len(VARY) - 2]
+
+
+def test_indices_of_correlated_variables_are_those_of_a_linear_function() -> None:
+    vary = {key: {"distribution": "normal", "mean": 0, "std": 1} for key in ("a", "b")}
+    of = space(study(vary, correlations=[{"keys": ["a", "b"], "value": 0.6}]))
+    found = {one.key: one for one in influences(of, lambda z: 2 * z[:, 0] + z[:, 1])}
+    variance = 4 + 1 + 2 * 2 * 0.6
+    assert found["a"].first == pytest.approx((2 + 0.6) ** 2 / variance, abs=0.01)  # E[y | a] = (2 + 0.6) a
+    assert found["b"].first == pytest.approx((1 + 2 * 0.6) ** 2 / variance, abs=0.01)
+    assert found["a"].total == pytest.approx(4 * (1 - 0.36) / variance, abs=0.01)
+    assert found["b"].total == pytest.approx((1 - 0.36) / variance, abs=0.01)
+
+
+def test_a_surrogate_says_how_far_it_is_off_where_runs_are_left_out() -> None:
+    of, log_life = planted(1)
+    points = of.draw(5)[0]
+    coordinates, values = of.coordinates(points), log_life(points)
+    level = Level.fitted(coordinates, values)
+    kernel = level.regression.kernel_
+    missed = []
+    for i in range(len(values)):
+        rest = np.arange(len(values)) != i
+        own = kernel(coordinates[rest])
+        across = kernel(coordinates[[i]], coordinates[rest])
+        scaled = (values - level.middle) / level.width
+        missed.append(scaled[i] - (across @ np.linalg.solve(own, scaled[rest]))[0])
+    assert level.explained == pytest.approx(1 - np.mean(np.square(missed)), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"lives": {"number": "lifes"}}, 'has no number "lifes": there are life_cycles'),
+        ({"lives": {"shares": [1.5]}}, "lives.shares"),
+        ({"lives": {"cheap_runs": 3}}, "say in lives.cheap what makes a run cheap"),
+        ({"vary": VARY | {"damping.modal": [0.01, 0.02]}}, "vary.damping.modal: expected a distribution"),
+        ({"study": {"scene": "beam", "design": "list"}, "vary": {FRICTION: [0.5]}}, "lives are drawn"),
+    ],
+)
+def test_what_cannot_be_is_refused(
+    change: dict[str, Any], sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pool, "finished", engine(lambda values, task: {"life_cycles": 1e6}))
+    with pytest.raises(ValueError, match=sentence):
+        td.lives(study() | change, tmp_path)
+
+
+def test_the_command_tells_the_verdict_with_the_distribution(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(pool, "finished", lambda tasks, workers: map(solve, tasks))
+    file = tmp_path / "mine.toml"
+    file.write_text(
+        '[study]\nscene = "beam"\ndesign = "sobol"\nruns = 8\nset = ["geometry.n_patch=3", "geometry.n_length=3", '
+        '"geometry.n_height=1", "reduction.modes=4", "response.points=10", "wear="]\n'
+        f'[vary]\n{FRICTION} = {{ distribution = "uniform", low = 0.4, high = 0.6 }}\n'
+        '[lives]\nnumber = "peak_m_first"\n'
+    )
+    code, out, _ = leave(["lives", str(file), "--out", str(tmp_path / "out")], capsys)
+    assert code == 0
+    assert "verdict on the run at the medians" in out
+    assert (tmp_path / "out" / "lives.png").stat().st_size > 5000
+    record = json.loads((tmp_path / "out" / "lives.json").read_text())
+    assert record["model_error"] > 0
+    first = record["quantiles"][0]
+    assert first["low_in_all"] < first["low"] <= first["value"] <= first["high"] < first["high_in_all"]
+    assert record["influences"][0]["first"] == pytest.approx(1, abs=0.01)
