@@ -55,6 +55,7 @@ class HarmonicBalance:
     memory : (n_pair, n_state) slider positions at the start of the load path [m]
     compliance : the linear side, which problems that differ in contact or load share
     load_factor : on the harmonics >= 1 of the excitation
+    at_rest : (n_pair, n_component) displacement under the static loads, where it is known [m]
     """
 
     model: ReducedModel
@@ -65,6 +66,7 @@ class HarmonicBalance:
     memory: np.ndarray
     compliance: ContactCompliance
     load_factor: float = 1.0
+    at_rest: np.ndarray | None = None
 
     @classmethod
     def of(
@@ -145,9 +147,12 @@ class HarmonicBalance:
         return self.loaded(self.at(omega).x_lin)
 
     def stuck(self, omega: float) -> np.ndarray:
-        """The same as a first guess x (n_pair, n_component, n_coeff) [m]."""
+        """The same as a first guess x (n_pair, n_component, n_coeff) [m], about the state at rest where it is known."""
         x = self.x_lin(omega)
-        return x.reshape(self.contact.n_pair, len(self.contact.components), x.shape[-1])
+        guess = x.reshape(self.contact.n_pair, len(self.contact.components), x.shape[-1])
+        if self.at_rest is not None and self.basis.has_static:
+            guess = np.concatenate([self.at_rest[..., None], guess[..., 1:]], axis=-1)
+        return guess
 
     def evaluate(self, omega: float, x: np.ndarray, jacobian: bool = True) -> State:
         """The balance at x (n_pair, n_component, n_coeff)."""

@@ -32,3 +32,22 @@ def rayleigh(system: SecondOrderSystem, alpha: float, beta: float) -> np.ndarray
     if not (alpha >= 0 and beta >= 0):
         raise ValueError(f"damping: alpha = {alpha} and beta = {beta} must not be negative")
     return alpha * system.mass + beta * system.stiffness
+
+
+def rayleigh_of_ratios(
+    system: SecondOrderSystem, modes: tuple[int, int], ratios: tuple[float, float]
+) -> tuple[float, float]:
+    """alpha [1/s] and beta [s] that give two modes of a system their damping ratios, zeta = alpha / 2 w + beta w / 2.
+
+    Raises  ValueError where there are no such modes, one does not vibrate, or a coefficient would be negative
+    """
+    if max(modes) >= len(system.mass):
+        raise ValueError(f"damping.modes: there is no mode {max(modes)}, the system has {len(system.mass)}")
+    squares = eigh(system.stiffness, system.mass, eigvals_only=True, subset_by_index=(0, max(modes)))[list(modes)]
+    if not (squares > 0).all():
+        raise ValueError(f"damping.modes: mode {min(modes)} is a motion as a rigid body: choose modes that vibrate")
+    omega = np.sqrt(squares)
+    alpha, beta = np.linalg.solve(np.column_stack([0.5 / omega, 0.5 * omega]), ratios)
+    if min(alpha, beta) < 0:
+        raise ValueError("damping.ratios: no damping of Rayleigh gives these two modes these ratios: change modes")
+    return float(alpha), float(beta)

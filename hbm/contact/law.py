@@ -5,6 +5,10 @@ A law is a module `hbm/contact/<name>.py`, or a file of one's own, with
 - `COMPONENTS` : the component tuples it accepts, such as (("t1", "t2", "n"),)
 - `Parameters` : its own numbers with their units, see `tribodyn.declare`; none where the class is missing
 - `n_state(components)` : number of memory variables of one pair
+- optionally `TABLE` : meaning of the columns of a table that it needs, and `tabulated(parameters)` : (n_pair, m) what
+  it makes of it, with which every packed row ends
+- optionally `OWN_STIFFNESS` and `springs(parameters)` : its springs follow from its own numbers
+- optionally `rested(x, parameters)` : memory of a contact without shear at x; positions of sliders without it
 - `step` : numba function that advances one pair by one time sample (see `hbm.contact.aft.march`); its p is a packed row
 - optionally `cycle(x, parameters, memory, basis, jacobian)` : the same periodic cycle at the samples, faster
 - optionally `located(x, parameters, memory, basis, jacobian)` : the cycle with its transitions located between samples
@@ -14,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from types import ModuleType
 
@@ -34,12 +38,15 @@ class ContactParameters:
     stiffness : (n_pair, n_component) contact springs [N/m], >= 0 and finite
     gap : (n_pair,) opening of the unloaded pair [m], wear adds to it, interference is negative
     numbers : the law's own by name, each (n_pair,), in the units that the law declares
+    table : (k, m) the law's own table, None for none; tail : (n_pair, ...) what the law has made of it
     """
 
     components: tuple[str, ...]
     stiffness: np.ndarray
     gap: np.ndarray
     numbers: Mapping[str, np.ndarray]
+    table: np.ndarray | None = None
+    tail: np.ndarray | None = None
 
     @classmethod
     def of(
@@ -48,6 +55,7 @@ class ContactParameters:
         stiffness: np.ndarray,
         *,
         gap: np.ndarray | float = 0.0,
+        table: np.ndarray | None = None,
         **numbers: np.ndarray | float,
     ) -> ContactParameters:
         """Parameters with scalars spread over all pairs; numbers : the law's own, such as friction=0.4.
@@ -61,7 +69,7 @@ class ContactParameters:
         def spread(value: np.ndarray | float) -> np.ndarray:
             return np.array(np.broadcast_to(np.asarray(value, float), (len(k),)))
 
-        made = cls(tuple(components), k, spread(gap), {name: spread(value) for name, value in numbers.items()})
+        made = cls(tuple(components), k, spread(gap), {name: spread(value) for name, value in numbers.items()}, table)
         for name, value, low in (("stiffness", made.stiffness, 0.0), ("gap", made.gap, -np.inf)):
             if not np.all(np.isfinite(value)) or np.any(value < low):
                 raise ValueError(f"contact {name} must be finite{' and >= 0' if low == 0 else ''} at every pair")
@@ -75,10 +83,16 @@ class ContactParameters:
     def taken(self, pairs: np.ndarray) -> ContactParameters:
         """The parameters of some pairs, by their indices."""
         numbers = {name: value[pairs] for name, value in self.numbers.items()}
-        return replace(self, stiffness=self.stiffness[pairs], gap=self.gap[pairs], numbers=numbers)
+        tail = None if self.tail is None else self.tail[pairs]
+        return replace(self, stiffness=self.stiffness[pairs], gap=self.gap[pairs], numbers=numbers, tail=tail)
 
     def scaled(self, name: str, factor: float) -> ContactParameters:
-        """The same with one of the law's own numbers times a factor."""
+        """The same with one of the law's own numbers times a factor.
+
+        Raises  ValueError for a number from which the law has tabulated something
+        """
+        if self.tail is not None and name != "friction":
+            raise ValueError(f"{name} cannot be scaled in a contact law with a table: give it in the scene")
         return replace(self, numbers={**self.numbers, name: factor * self.numbers[name]})
 
     @property
@@ -87,16 +101,20 @@ class ContactParameters:
         return [i for i, c in enumerate(self.components) if c != "n"]
 
     def packed(self) -> np.ndarray:
-        """(n_pair, 4 + n_number) rows [k of the up to three components, gap, the law's own numbers] for kernels.
+        """(n_pair, ...) rows [k of the up to three components, gap, the law's own numbers, tail] for kernels.
 
-        The numbers stand in the order in which the law declares them, as a `Joint` has put them.
+        The numbers stand in the order in which the law declares them, as a `Joint` has put them. Not to be written to.
         """
+        return self._packed
+
+    @cached_property
+    def _packed(self) -> np.ndarray:
         rows = np.zeros((self.n_pair, 4 + len(self.numbers)))
         rows[:, : len(self.components)] = self.stiffness
         rows[:, 3] = self.gap
         for column, value in enumerate(self.numbers.values(), start=4):
             rows[:, column] = value
-        return rows
+        return rows if self.tail is None else np.concatenate([rows, self.tail], axis=1)
 
 
 @dataclass(frozen=True)
@@ -159,4 +177,9 @@ def checked(name: str, parameters: ContactParameters) -> ContactParameters:
     values = declare.checked(declared(name), parameters.numbers, f"contact law '{Path(name).stem}'")
     n = parameters.n_pair
     numbers = {key: np.array(np.broadcast_to(np.asarray(v, float), (n,))) for key, v in values.items()}
-    return replace(parameters, numbers=numbers)
+    complete, law = replace(parameters, numbers=numbers), load(name)
+    if hasattr(law, "tabulated"):
+        return replace(complete, tail=law.tabulated(complete))
+    if parameters.table is not None:
+        raise ValueError(f"contact law '{Path(name).stem}' takes no table: leave it out")
+    return complete

@@ -101,6 +101,15 @@ def read(path: Path, kind: str = "Parameters") -> tuple[Number, ...]:
     return tuple(numbers)
 
 
+@cache
+def constant(path: Path, name: str) -> Any:
+    """The literal that a Python file assigns to a name, None where it does not; the file is not run."""
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.Assign) and any(ast.unparse(target) == name for target in node.targets):
+            return _literal(node.value)
+    return None
+
+
 def _number(name: str, node: ast.AnnAssign, meaning: str) -> Number:
     whole = ast.unparse(node.annotation) == "int"
     call = node.value

@@ -25,7 +25,7 @@ from tests.helpers.verification_models import random_structure
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene import scene_file
 
-TEXTS = {name: (scene_file.CASES / name / f"{name}.toml").read_text(encoding="utf-8") for name in scene_file.names()}
+TEXTS = {name: scene_file.find(name).read_text(encoding="utf-8") for name in scene_file.names()}
 GARBAGE = (
     "0", "-1", "1", "2", "3", "7", "0.5", "-0.0", "1e-300", "1e300", "inf", "nan", "1e999", "true", "false", "[]", "{}",
     "[0, 1]", "[1, 0]", "[-1]", "[[0]]", '["n"]', '["t1", "n"]', '["a", "b"]', "{a = 1}", '""', '"x"', '"auto"',

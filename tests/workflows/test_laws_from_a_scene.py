@@ -24,6 +24,8 @@ SMALL: dict[str, Any] = {
     "verdict.enabled": False,
 }
 # a value in SI units at which a number matters in the beam; a law with a new number needs a line here
+# laws without a table of their own; one with a table is in test_rough_scene
+PLAIN = [law for law in contact_law.names() if not hasattr(contact_law.load(law), "TABLE")]
 VALUES = {"friction": 0.5, "normal_load": 2e3, "cubic": 1e15, "coefficient": 2e-15}
 
 
@@ -54,7 +56,7 @@ def response(law: str, changed: str = "") -> np.ndarray:
     return np.asarray(curve.response[:, 0])
 
 
-@pytest.mark.parametrize("law", contact_law.names())
+@pytest.mark.parametrize("law", PLAIN)
 def test_every_number_of_a_contact_law_changes_the_response(law: str) -> None:
     first = response(law)
     for number in declare.read(contact_law.file_of(law)):
@@ -63,7 +65,7 @@ def test_every_number_of_a_contact_law_changes_the_response(law: str) -> None:
 
 
 def test_the_contact_laws_with_friction_give_different_responses() -> None:
-    found = [response(law)[:, -2:] for law in contact_law.names() if "t1" in contact_law.load(law).COMPONENTS[0]]
+    found = [response(law)[:, -2:] for law in PLAIN if "t1" in contact_law.load(law).COMPONENTS[0]]
     for i, one in enumerate(found):
         for other in found[i + 1 :]:
             assert np.abs(one - other).max() > 1e-3 * np.abs(one).max()

@@ -214,7 +214,7 @@ def test_a_law_of_ones_own_does_not_locate_its_transitions(scene: Path) -> None:
         td.run(scene, overrides={"harmonics.transitions": "located"})
 
 
-@pytest.mark.parametrize("name", contact_law.names())
+@pytest.mark.parametrize("name", [n for n in contact_law.names() if not hasattr(contact_law.load(n), "TABLE")])
 def test_every_number_of_a_contact_law_changes_its_force(name: str) -> None:
     law, basis = contact_law.load(name), HarmonicBasis((0, 1), 64)
     components = law.COMPONENTS[0]

@@ -66,10 +66,9 @@ class Contact:
 
     def joint(self, pairs: np.ndarray) -> Joint:
         """The joint of a balance whose interface has its pairs at these places."""
-        i = self.interface
-        return Joint(
-            self.name, self.law, ContactParameters.of(i.components, self.stiffness, gap=i.gap, **self.numbers), pairs
-        )
+        i, numbers = self.interface, dict[str, Any](self.numbers)
+        parameters = ContactParameters.of(i.components, self.stiffness, gap=i.gap, **numbers)
+        return Joint(self.name, self.law, parameters, pairs)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.geometry import surface_io
@@ -50,6 +51,20 @@ def surface_gap(surfaces: Surfaces, interface: ContactInterface, folder: Path) -
     for i, wave in enumerate(waves):
         heights[i] = onto_nodes(wave, nodes)
     return SurfaceGap(facing_gap(heights[0], heights[1], surfaces.mating_height), tuple(repairs), heights, tuple(waves))
+
+
+def mapped_gap(rows: np.ndarray, interface: ContactInterface, pairs: slice) -> np.ndarray:
+    """Opening (k,) of some pairs of an interface from points in space, their least one taken off [m].
+
+    rows : (n, 4) x, y, z, opening [m], seen along the mean normal of the pairs: linear between the points, that of the
+        nearest one outside
+    """
+    tangents = interface.frames[pairs].mean(axis=0)[:2]
+    at, wanted = rows[:, :3] @ tangents.T, interface.points[pairs] @ tangents.T
+    found = LinearNDInterpolator(at, rows[:, 3])(wanted)
+    outside = ~np.isfinite(found)
+    found[outside] = NearestNDInterpolator(at, rows[:, 3])(wanted[outside])
+    return np.asarray(found - found.min())
 
 
 def faces(surfaces: Surfaces, folder: Path) -> list[HeightMap]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.material import Material
 from tribodyn.hbm.contact import law
 from tribodyn.hbm.contact.joint import Joint
@@ -22,6 +25,12 @@ def contact_stiffness(scene: Scene, reduced: ReducedModel) -> np.ndarray:
     k = np.zeros((interface.n_pair, len(interface.components)))
     for name, pairs in joint_pairs(scene, reduced).items():
         contact = scene.joints[name]
+        module = law.load(contact.law_name)
+        if getattr(module, "OWN_STIFFNESS", False):
+            seen = [interface.components.index(c) for c in contact.components]
+            own = parameters_of(contact, interface, pairs, np.ones((len(interface.area[pairs]), len(seen))))
+            k[pairs, seen] = module.springs(law.checked(contact.law_name, own))
+            continue
         tangential, normal = joint_stiffness(scene, contact)
         total = {"t1": tangential, "t2": tangential, "n": normal}
         along = [total[c] if c in contact.components else 0.0 for c in interface.components]
@@ -70,14 +79,24 @@ def make_joints(scene: Scene, reduced: ReducedModel) -> list[Joint]:
     for name, pairs in joint_pairs(scene, reduced).items():
         contact = scene.joints[name]
         seen = [interface.components.index(c) for c in contact.components]
-        parameters = law.ContactParameters.of(
-            contact.components, springs[pairs][:, seen], gap=interface.gap[pairs], **contact.numbers
-        )
+        parameters = parameters_of(contact, interface, pairs, springs[pairs][:, seen])
         found.append(Joint(name, contact.law_name, parameters, pairs))
     if not found:  # a structure that touches nothing: a joint of no pairs
         nothing = law.ContactParameters.of(interface.components, springs, gap=interface.gap, friction=0.0)
         found.append(Joint("none", "jenkins", nothing))
     return found
+
+
+def parameters_of(
+    contact: Contact, interface: ContactInterface, pairs: slice, springs: np.ndarray
+) -> law.ContactParameters:
+    """The parameters of a joint with springs (n_pair, n_component); a law that counts by area has that of each pair."""
+    numbers: dict[str, Any] = dict(contact.numbers)
+    if any(n.name == "area" for n in law.declared(contact.law_name)):
+        numbers.setdefault("area", interface.area[pairs])
+    return law.ContactParameters.of(
+        contact.components, springs, gap=interface.gap[pairs], table=contact.law_table(), **numbers
+    )
 
 
 def excite(scene: Scene, base: np.ndarray | None) -> Excitation:

@@ -22,13 +22,14 @@ from tribodyn.fem.part import Part
 from tribodyn.fem.springs import Spring
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.fem.thermal import Heating, temperature_at
+from tribodyn.hbm import rest
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.expansion import UnbalancedLoad
 from tribodyn.reduction.cyclic import travelling_wave
-from tribodyn.reduction.damping import modal_damping, rayleigh
+from tribodyn.reduction.damping import modal_damping, rayleigh, rayleigh_of_ratios
 from tribodyn.reduction.held import hold
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ReducedModel
@@ -43,7 +44,7 @@ from tribodyn.workflows.run import (
     settings,
     tightening,
 )
-from tribodyn.workflows.run.contact_surfaces import surface_gap
+from tribodyn.workflows.run.contact_surfaces import mapped_gap, surface_gap
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.loads import StaticLoad
 from tribodyn.workflows.scene.matrices import MatrixScene
@@ -153,6 +154,13 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
 
 def with_surfaces(scene: MeshScene, part: Part, folder: Path) -> tuple[Part, tuple[str, ...]]:
     """The part with the waviness of measured faces in its gap, and a sentence for each repair of a height map."""
+    for name, contact in scene.joints.items():
+        rows = contact.opening()
+        if rows is not None:
+            pairs = part.joints[name]
+            gap = np.array(part.interface.gap, float)
+            gap[pairs] += mapped_gap(rows, part.interface, pairs)
+            part = replace(part, interface=replace(part.interface, gap=gap))
     if scene.surfaces is None:
         return part, ()
     measured = surface_gap(scene.surfaces, part.interface, folder)
@@ -214,10 +222,12 @@ def damped(scene: Scene, reduced: ReducedModel) -> ReducedModel:
 def damping_matrix(scene: Scene, springs: np.ndarray, system: SecondOrderSystem, B: np.ndarray) -> np.ndarray | None:
     """Damping matrix (n, n) [N s/m] of a system with its contact map and springs, None where the scene has none."""
     damping = scene.damping
+    if damping.state == "stuck":
+        system = replace(system, stiffness=stuck_stiffness(system.stiffness, B, springs))
     if damping.modal is not None:
-        if damping.state == "stuck":
-            system = replace(system, stiffness=stuck_stiffness(system.stiffness, B, springs))
         return modal_damping(system, damping.modal)
+    if damping.ratios is not None and damping.modes is not None:
+        return rayleigh(system, *rayleigh_of_ratios(system, damping.modes, damping.ratios))
     if damping.mass is not None or damping.stiffness is not None:
         return rayleigh(system, damping.mass or 0.0, damping.stiffness or 0.0)
     return None
@@ -248,7 +258,8 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
         excitation = joints.excite(scene, base)
         if turned:
             excitation = replace(excitation, loads={**excitation.loads, **{(0, n): P for n, P in turned.items()}})
-        return HarmonicBalance.of(reduced, all_joints, basis, excitation, top)
+        made = HarmonicBalance.of(reduced, all_joints, basis, excitation, top)
+        return preloaded(scene, reduced, made) if scene.preload.frictionless else made
 
     choice = None
     if harmonics.automatic and not chosen:
@@ -261,7 +272,32 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
             settings.newton_options(scene),
         )
         chosen = choice.harmonics
-    return Model(part, reduced, balance(harmonics.kept or chosen), choice)
+    final = balance(harmonics.kept or chosen)
+    return Model(part, final.model, final, choice)
+
+
+def preloaded(scene: Scene, reduced: ReducedModel, balance: HarmonicBalance) -> HarmonicBalance:
+    """The balance resting in its preload, to which it has come without friction.
+
+    Joints whose springs follow from their own numbers have those of this state, and so has the damping of its modes.
+    """
+    x = rest.displacement(balance, settings.newton_options(scene))
+    resting = replace(balance, memory=rest.memory(balance, x), at_rest=x)
+    own = rest.tangents(resting, x)
+    if not own:
+        return resting
+    tangent = [
+        replace(j, parameters=replace(j.parameters, stiffness=own.get(j.name, j.parameters.stiffness)))
+        for j in resting.contact.joints
+    ]
+    b, springs = balance, np.array(balance.contact.stiffness)
+    for joint in tangent:
+        springs[np.ix_(joint.rows, b.contact.columns(joint))] = joint.parameters.stiffness
+    if scene.damping.given and scene.damping.state == "stuck":
+        undamped = replace(reduced, system=replace(reduced.system, damping=None))
+        reduced = undamped.with_damping(partial(damping_matrix, scene, springs))
+    again = HarmonicBalance.of(reduced, tangent, b.basis, b.excitation, b.omega_max, resting.memory)
+    return replace(again, at_rest=x)
 
 
 def unbalanced_load(excitation: Excitation, part: Part, motions: np.ndarray) -> str:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import ModuleType
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field, StrictBool, StrictInt, model_validator
+import numpy as np
+from pydantic import Field, PrivateAttr, StrictBool, StrictInt, ValidationInfo, model_validator
 
+from tribodyn import declare
 from tribodyn.hbm.contact import law as contact_law
 from tribodyn.workflows.scene.fields import Angle, Direction, Length, Stiffness, Table
-from tribodyn.workflows.scene.own import LawTable
+from tribodyn.workflows.scene.own import LawTable, beside, folder_of, is_file
 
 
 class Contact(LawTable):
@@ -27,6 +30,36 @@ class Contact(LawTable):
     """Tangential stiffness of all pairs together."""
     normal_stiffness: Annotated[Stiffness, Field(gt=0, le=1e16)] | None = None
     """Normal stiffness of all pairs together."""
+    table: str | None = None
+    """File of the law's own table beside the scene, comma-separated numbers, where the law takes one."""
+
+    _table: Path | None = PrivateAttr(None)
+
+    @model_validator(mode="after")
+    def _remember_the_table(self, info: ValidationInfo) -> Self:
+        folder = folder_of(info)
+        if folder is None:
+            return self
+        columns = declare.constant(self.law_file, "TABLE")
+        if (columns is None) != (self.table is None):
+            verb = "has no meaning" if columns is None else f"is missing ({' and '.join(columns)})"
+            raise ValueError(f"{self.TABLE}.table {verb} for the law '{self.law}'")
+        self._table = None if self.table is None else beside(folder, self.table, f"{self.TABLE}.table")
+        return self
+
+    @property
+    def law_file(self) -> Path:
+        """File of the law."""
+        return Path(self.law_name) if self._own is not None else contact_law.file_of(self.law)
+
+    def law_table(self) -> np.ndarray | None:
+        """The law's own table (k, m), None where it has none; raises ValueError where the file holds none."""
+        if self._table is None:
+            return None
+        try:
+            return np.atleast_2d(np.loadtxt(self._table, delimiter=","))
+        except ValueError as error:
+            raise ValueError(f"{self.TABLE}.table '{self._table.name}' is no table of numbers ({error})") from None
 
     @model_validator(mode="after")
     def _only_what_the_components_need(self) -> Contact:
@@ -38,14 +71,17 @@ class Contact(LawTable):
         ):
             if need != (getattr(self, name) is not None):
                 verb = "is missing" if need else "has no meaning"
-                what = "with a punch" if given and not need else f"for the components {', '.join(self.components)}"
+                what = f"for the components {', '.join(self.components)}"
+                what = "where it follows from a punch or the law" if given and not need else what
                 raise ValueError(f"contact.{name} {verb} {what}")
         return self
 
     @property
     def stiffness_is_given(self) -> bool:
         """Whether the stiffness follows from something else than its two numbers."""
-        return False
+        if is_file(self.law) and self._own is None:  # of a result: it was checked when the scene was read
+            return self.tangential_stiffness is None and self.normal_stiffness is None
+        return bool(declare.constant(self.law_file, "OWN_STIFFNESS"))
 
 
 class FaceContact(Contact):
@@ -61,6 +97,9 @@ class FaceContact(Contact):
     """Leave the mid-side nodes of the mesh out."""
     gap: Length | None = None
     """Initial gap of all pairs; by default that of the geometry, interference negative, and 0 against the ground."""
+    gap_map: str | None = None
+    """File beside the scene with rows x, y, z, opening in metres, which adds to the gap; its least at a pair is taken
+    off."""
     pairing: Literal["auto", "nodes", "mortar"] = "auto"
     """"nodes" pairs matching nodes, "mortar" weighs both faces over the surface they share, "auto" pairs nodes where
     every facet of the first face has its like on the second."""
@@ -77,10 +116,34 @@ class FaceContact(Contact):
     """Sides of a rectangular punch along t1 and t2, from which the contact stiffness is calculated instead of given
     numbers."""
 
+    _gap_map: Path | None = PrivateAttr(None)
+
+    @model_validator(mode="after")
+    def _remember_the_map(self, info: ValidationInfo) -> Self:
+        folder = folder_of(info)
+        if folder is not None and self.gap_map is not None:
+            self._gap_map = beside(folder, self.gap_map, f"{self.TABLE}.gap_map")
+        return self
+
+    def opening(self) -> np.ndarray | None:
+        """Rows x, y, z, opening (k, 4) [m] of its map, None without one; raises ValueError where there are none."""
+        if self._gap_map is None:
+            return None
+        try:
+            rows = np.loadtxt(self._gap_map, delimiter=",", ndmin=2)
+        except ValueError as error:
+            raise ValueError(f"{self.TABLE}.gap_map '{self._gap_map.name}' is no table of numbers ({error})") from None
+        rows = rows[np.isfinite(rows).all(axis=1)]
+        if rows.shape[1:] != (4,) or len(rows) < 4:
+            raise ValueError(
+                f"{self.TABLE}.gap_map '{self._gap_map.name}': expected four rows or more of x, y, z, opening"
+            )
+        return rows
+
     @property
     def stiffness_is_given(self) -> bool:
-        """Whether it follows from a punch."""
-        return self.punch is not None
+        """Whether it follows from a punch, or from the numbers of the law."""
+        return self.punch is not None or super().stiffness_is_given
 
     @property
     def groups(self) -> tuple[str, ...]:

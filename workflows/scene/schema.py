@@ -27,6 +27,7 @@ from tribodyn.workflows.scene.solution import (
     Harmonics,
     NonlinearMode,
     PartResponse,
+    Preload,
     Reduction,
     Response,
     Solver,
@@ -62,6 +63,8 @@ class Scene(Table, ABC):
     """Harmonics and time samples."""
     damping: Damping = Damping()
     """Structural damping."""
+    preload: Preload = Preload()
+    """How the contact comes to its preload."""
     backbone: NonlinearMode | None = None
     """The nonlinear mode that `tribodyn backbone` follows by itself."""
     wear: Wear | None = None

@@ -182,6 +182,10 @@ class Damping(Table):
     """Damping ratio of every mode."""
     state: Literal["free", "stuck"] = "free"
     """Whose modes these are: "free" without the contact, or "stuck" with every pair closed."""
+    ratios: tuple[Annotated[Number, Field(ge=0, lt=1)], Annotated[Number, Field(ge=0, lt=1)]] | None = None
+    """Damping ratios of two modes, from which Rayleigh's two coefficients follow."""
+    modes: tuple[Annotated[StrictInt, Field(ge=0)], Annotated[StrictInt, Field(ge=0)]] | None = None
+    """Numbers of these two modes, from 0; motions of a free structure as a rigid body count."""
     mass: Annotated[float, quantity("1/s"), Field(ge=0)] | None = None
     """Rayleigh's coefficient of the mass matrix."""
     stiffness: Annotated[float, quantity("s"), Field(ge=0)] | None = None
@@ -189,14 +193,24 @@ class Damping(Table):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Damping:
-        if self.modal is not None and (self.mass is not None or self.stiffness is not None):
-            raise ValueError("expected either modal, or mass and stiffness, and not both")
+        rayleigh = self.mass is not None or self.stiffness is not None
+        if sum((self.modal is not None, rayleigh, self.ratios is not None)) > 1:
+            raise ValueError("expected either modal, or mass and stiffness, or ratios, and only one of them")
+        if (self.ratios is None) != (self.modes is None) or (self.modes and self.modes[0] == self.modes[1]):
+            raise ValueError("expected ratios together with the numbers of two different modes")
         return self
 
     @property
     def given(self) -> bool:
         """Whether there is any."""
-        return not (self.modal is None and self.mass is None and self.stiffness is None)
+        return any(v is not None for v in (self.modal, self.mass, self.stiffness, self.ratios))
+
+
+class Preload(Table):
+    """How the contact comes to its preload."""
+
+    frictionless: StrictBool = False
+    """Let the static loads act without friction; then friction is on, and all sliders rest where the contact stands."""
 
 
 class NonlinearMode(Table):

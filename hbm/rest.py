@@ -1,0 +1,84 @@
+"""A contact that has come to its preload without friction, and rests there with friction on.
+
+The static loads act on a contact whose friction is off; then friction is on and every slider stands where the contact
+stands, so that the preloaded state carries no shear. A law whose springs follow from its own numbers then has the
+tangent of this state for its stuck springs.
+Source  the order of loading of Porter and Brake, MSSP 192 (2023) 110210
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
+
+EXACT = 1e-11  # relative residual of the state at rest
+OPENINGS = 4  # steps in which faces are opened that do not fit
+
+
+def displacement(balance: HarmonicBalance, options: newton.NewtonOptions | None = None) -> np.ndarray:
+    """Static displacement x (n_pair, n_component) [m] under the static loads alone, friction off.
+
+    Raises  ValueError where the contact does not settle
+    """
+    if not balance.basis.has_static:
+        raise ValueError("a preload without friction needs harmonic 0: keep it in harmonics.kept")
+    few = balance if 1 not in balance.basis.harmonics else balance.with_harmonics((0, 1))
+    still = few.with_contact(few.contact.with_parameters(_smooth)).with_load(0.0)
+    exact = replace(options or newton.NewtonOptions(), tolerance=EXACT)
+
+    def solve(at: HarmonicBalance, start: np.ndarray) -> newton.Solution:
+        return newton.solve(at, at.omega_max, start, exact)
+
+    solved = solve(still, still.stuck(still.omega_max))
+    gap = balance.contact.gap
+    if not solved.converged and np.ptp(gap) > 0:  # far openings: from faces that fit, opened step by step
+        normal = balance.contact.components.index("n")
+        solved = solve(still.with_gap(np.zeros_like(gap)), still.stuck(still.omega_max))
+        for share in np.linspace(0, 1, OPENINGS + 1)[1:]:
+            start = solved.state.x.copy()
+            start[:, normal, 0] += gap / OPENINGS
+            solved = solve(still.with_gap(share * gap), start)
+    if not solved.converged:
+        raise ValueError(f"preload: the contact does not settle without friction ({solved.outcome})")
+    return solved.state.x[:, :, 0]
+
+
+def memory(balance: HarmonicBalance, x: np.ndarray) -> np.ndarray:
+    """Memory (n_pair, n_state) of every joint without shear at the displacement x (n_pair, n_component)."""
+    found = np.zeros((balance.contact.n_pair, balance.contact.n_state))
+    for joint in balance.contact.joints:
+        own = x[np.ix_(joint.rows, balance.contact.columns(joint))]
+        if hasattr(joint.module, "rested"):
+            found[joint.rows, : joint.n_state] = joint.module.rested(own, joint.parameters)
+        elif joint.n_state == len(joint.parameters.tangential):  # the positions of its sliders
+            found[joint.rows, : joint.n_state] = own[:, joint.parameters.tangential]
+    return found
+
+
+def tangents(balance: HarmonicBalance, x: np.ndarray) -> dict[str, np.ndarray]:
+    """Springs (n_pair, n_component) [N/m] at rest in x, of the joints whose springs follow from their own numbers."""
+    still = np.zeros((*x.shape, balance.basis.n_coeff))
+    still[:, :, 0] = x
+    found = {}
+    for joint in balance.contact.joints:
+        if getattr(joint.module, "OWN_STIFFNESS", False):
+            found[joint.name] = _tangent(balance, joint, still)
+    return found
+
+
+def _tangent(balance: HarmonicBalance, joint: Joint, still: np.ndarray) -> np.ndarray:
+    jac = balance.contact.cycle(still, balance.basis, balance.memory).jacobian
+    assert jac is not None
+    n, m = balance.basis.n_coeff, len(balance.contact.components)
+    each = np.diagonal(jac, axis1=1, axis2=2).reshape(-1, m, n)[:, :, balance.basis.harmonics.index(1)]
+    return np.maximum(each[np.ix_(joint.rows, balance.contact.columns(joint))], 0.0)
+
+
+def _smooth(parameters: ContactParameters) -> ContactParameters:
+    return parameters.scaled("friction", 0.0) if "friction" in parameters.numbers else parameters
