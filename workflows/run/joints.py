@@ -95,7 +95,11 @@ def parameters_of(
     if any(n.name == "area" for n in law.declared(contact.law_name)):
         numbers.setdefault("area", interface.area[pairs])
     return law.ContactParameters.of(
-        contact.components, springs, gap=interface.gap[pairs], table=contact.law_table(), **numbers
+        contact.components,
+        springs,
+        gap=interface.gap[pairs],
+        table=None if contact.table is None else np.array(contact.table),
+        **numbers,
     )
 
 

@@ -155,7 +155,7 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
 def with_surfaces(scene: MeshScene, part: Part, folder: Path) -> tuple[Part, tuple[str, ...]]:
     """The part with the waviness of measured faces in its gap, and a sentence for each repair of a height map."""
     for name, contact in scene.joints.items():
-        rows = contact.opening()
+        rows = contact.opening(folder)
         if rows is not None:
             pairs = part.joints[name]
             gap = np.array(part.interface.gap, float)

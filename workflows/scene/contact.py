@@ -4,15 +4,24 @@ from __future__ import annotations
 
 from pathlib import Path
 from types import ModuleType
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field, PrivateAttr, StrictBool, StrictInt, ValidationInfo, model_validator
+from pydantic import Field, StrictBool, StrictInt, ValidationInfo, field_validator, model_validator
 
 from tribodyn import declare
 from tribodyn.hbm.contact import law as contact_law
 from tribodyn.workflows.scene.fields import Angle, Direction, Length, Stiffness, Table
 from tribodyn.workflows.scene.own import LawTable, beside, folder_of, is_file
+
+
+def rows_of(path: Path) -> list[list[float]]:
+    """The rows of a file of comma-separated numbers; raises ValueError where it is none."""
+    try:
+        rows: list[list[float]] = np.loadtxt(path, delimiter=",", ndmin=2).tolist()
+    except ValueError as error:
+        raise ValueError(f"'{path.name}' is no table of comma-separated numbers ({error})") from None
+    return rows
 
 
 class Contact(LawTable):
@@ -30,36 +39,28 @@ class Contact(LawTable):
     """Tangential stiffness of all pairs together."""
     normal_stiffness: Annotated[Stiffness, Field(gt=0, le=1e16)] | None = None
     """Normal stiffness of all pairs together."""
-    table: str | None = None
-    """File of the law's own table beside the scene, comma-separated numbers, where the law takes one."""
+    table: tuple[tuple[float, ...], ...] | None = None
+    """File of the law's own table beside the scene, comma-separated numbers, or its rows; where the law takes one."""
 
-    _table: Path | None = PrivateAttr(None)
+    @field_validator("table", mode="before")
+    @classmethod
+    def _read_the_table(cls, table: Any, info: ValidationInfo) -> Any:
+        folder = folder_of(info)
+        return rows_of(beside(folder, table, f"{cls.TABLE}.table")) if isinstance(table, str) and folder else table
 
     @model_validator(mode="after")
-    def _remember_the_table(self, info: ValidationInfo) -> Self:
-        folder = folder_of(info)
-        if folder is None:
-            return self
-        columns = declare.constant(self.law_file, "TABLE")
-        if (columns is None) != (self.table is None):
-            verb = "has no meaning" if columns is None else f"is missing ({' and '.join(columns)})"
-            raise ValueError(f"{self.TABLE}.table {verb} for the law '{self.law}'")
-        self._table = None if self.table is None else beside(folder, self.table, f"{self.TABLE}.table")
+    def _table_that_the_law_takes(self, info: ValidationInfo) -> Self:
+        if folder_of(info) is not None:
+            columns = declare.constant(self.law_file, "TABLE")
+            if (columns is None) != (self.table is None):
+                verb = "has no meaning" if columns is None else f"is missing ({' and '.join(columns)})"
+                raise ValueError(f"{self.TABLE}.table {verb} for the law '{self.law}'")
         return self
 
     @property
     def law_file(self) -> Path:
         """File of the law."""
         return Path(self.law_name) if self._own is not None else contact_law.file_of(self.law)
-
-    def law_table(self) -> np.ndarray | None:
-        """The law's own table (k, m), None where it has none; raises ValueError where the file holds none."""
-        if self._table is None:
-            return None
-        try:
-            return np.atleast_2d(np.loadtxt(self._table, delimiter=","))
-        except ValueError as error:
-            raise ValueError(f"{self.TABLE}.table '{self._table.name}' is no table of numbers ({error})") from None
 
     @model_validator(mode="after")
     def _only_what_the_components_need(self) -> Contact:
@@ -116,27 +117,22 @@ class FaceContact(Contact):
     """Sides of a rectangular punch along t1 and t2, from which the contact stiffness is calculated instead of given
     numbers."""
 
-    _gap_map: Path | None = PrivateAttr(None)
-
     @model_validator(mode="after")
-    def _remember_the_map(self, info: ValidationInfo) -> Self:
+    def _map_is_there(self, info: ValidationInfo) -> Self:
         folder = folder_of(info)
         if folder is not None and self.gap_map is not None:
-            self._gap_map = beside(folder, self.gap_map, f"{self.TABLE}.gap_map")
+            beside(folder, self.gap_map, f"{self.TABLE}.gap_map")
         return self
 
-    def opening(self) -> np.ndarray | None:
-        """Rows x, y, z, opening (k, 4) [m] of its map, None without one; raises ValueError where there are none."""
-        if self._gap_map is None:
+    def opening(self, folder: Path) -> np.ndarray | None:
+        """Rows x, y, z, opening (k, 4) [m] of its map in `folder`, None without one; raises ValueError without rows."""
+        if self.gap_map is None:
             return None
-        try:
-            rows = np.loadtxt(self._gap_map, delimiter=",", ndmin=2)
-        except ValueError as error:
-            raise ValueError(f"{self.TABLE}.gap_map '{self._gap_map.name}' is no table of numbers ({error})") from None
+        rows = np.array(rows_of(beside(folder, self.gap_map, f"{self.TABLE}.gap_map")))
         rows = rows[np.isfinite(rows).all(axis=1)]
         if rows.shape[1:] != (4,) or len(rows) < 4:
             raise ValueError(
-                f"{self.TABLE}.gap_map '{self._gap_map.name}': expected four rows or more of x, y, z, opening"
+                f"{self.TABLE}.gap_map: expected four rows or more of x, y, z, opening in '{self.gap_map}'"
             )
         return rows
 
