@@ -123,6 +123,7 @@ if TYPE_CHECKING:
         converge,
         fit,
         folds,
+        posterior,
         track,
         trade,
         verify,
@@ -134,6 +135,7 @@ if TYPE_CHECKING:
     from tribodyn.workflows.run.failure import SolveFailed
     from tribodyn.workflows.run.modelling import Model
     from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
+    from tribodyn.workflows.studies.posterior import Posterior
 
 # name here -> module, and name there where it is another one
 _HOME: dict[str, tuple[str, ...]] = {
@@ -143,6 +145,7 @@ _HOME: dict[str, tuple[str, ...]] = {
     "Lives": ("tribodyn.workflows.lives.lives",),
     "Matrices": ("tribodyn.reduction.foreign", "ForeignMatrices"),
     "Model": ("tribodyn.workflows.run.modelling",),
+    "Posterior": ("tribodyn.workflows.studies.posterior",),
     "Result": ("tribodyn.workflows.result.result",),
     "ResultError": ("tribodyn.workflows.result.store",),
     "SceneError": ("tribodyn.workflows.scene.scene_file",),
@@ -267,6 +270,7 @@ _HOME |= dict.fromkeys(
         "converge",
         "fit",
         "folds",
+        "posterior",
         "track",
         "trade",
         "verify",
@@ -304,6 +308,7 @@ __all__ = [
     "Part",
     "PartScene",
     "Patch",
+    "Posterior",
     "ReducedModel",
     "References",
     "Result",
@@ -370,6 +375,7 @@ __all__ = [
     "plot_mistuned",
     "plot_nodal_diameters",
     "plot_safe",
+    "posterior",
     "published_wear_steps",
     "reaction",
     "read_matrices",

@@ -26,6 +26,7 @@ from tribodyn.workflows.studies import fit_file, tracking
 from tribodyn.workflows.studies import folds as fold_study
 from tribodyn.workflows.studies.folds import FoldsFound
 from tribodyn.workflows.studies.identification import Identification
+from tribodyn.workflows.studies.posterior import Posterior
 from tribodyn.workflows.studies.tracking import Track
 
 Place = str | PathLike[str]
@@ -133,6 +134,24 @@ def fit(
     """
     asked = fit_file.parse(task) if isinstance(task, Mapping) else fit_file.read(Path(task))
     return fit_file.run(fspath(scene), override_texts(overrides), asked, reporter(progress).say)
+
+
+def posterior(
+    scene: Place,
+    task: Place | Mapping[str, Any],
+    *,
+    trials: int = 100,
+    seed: int = 0,
+    overrides: Overrides = (),
+    progress: Report = None,
+) -> Posterior:
+    """What measured numbers with their errors leave of numbers of a scene, as `tribodyn identify --posterior`.
+
+    task : file of the fit, or its tables as a dict; trials : of the scene, at most
+    Raises  SceneError, ValueError: what is asked for cannot be; SolveFailed: most trials fail
+    """
+    asked = fit_file.parse(task) if isinstance(task, Mapping) else fit_file.read(Path(task))
+    return fit_file.sample(fspath(scene), override_texts(overrides), asked, reporter(progress).say, trials, seed)
 
 
 def benchmark(quick: bool = True, *, progress: Report = None) -> list[Timing]:

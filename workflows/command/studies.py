@@ -298,7 +298,17 @@ def backbone(
         print(folder / "backbone.csv", folder / "backbone.png", sep="\n")
 
 
-def identify(scene: str, task: Path, *, overrides: Overrides = (), as_json: Json = False) -> None:
+def identify(
+    scene: str,
+    task: Path,
+    *,
+    posterior: Flag = False,
+    trials: int = 100,
+    seed: int = 0,
+    out: Path | None = None,
+    overrides: Overrides = (),
+    as_json: Json = False,
+) -> None:
     """Fit named numbers of a scene to measured ones, within bounds, and say how well these determine them.
 
     Parameters
@@ -307,11 +317,26 @@ def identify(scene: str, task: Path, *, overrides: Overrides = (), as_json: Json
         Name of a scene or a .toml file; nothing is written into it.
     task
         File with the numbers that are looked for and those that were measured, as cases/rig/rig.fit.toml.
+    posterior
+        Sample what the measured numbers, each with its error, leave of the others, instead of the best fit.
+    trials
+        Runs of the scene that the posterior may take.
+    seed
+        Of the posterior's samples.
+    out
+        Picture of the posterior.
     as_json
         Print JSON for machines.
     """
     from tribodyn.workflows.api import whole_scenes
 
+    if posterior:
+        make_room(out, PICTURE)
+        known = whole_scenes.posterior(scene, task, trials=trials, seed=seed, overrides=overrides, progress=aside)
+        if out is not None:
+            known.plot().savefig(out)
+        print(json.dumps(known.record(), indent=2) if as_json else "\n".join(known.lines()))
+        return
     found, changes = whole_scenes.fit(scene, task, overrides=overrides, progress=aside)
     if as_json:
         print(json.dumps({**found.record(), "set": changes}, indent=2))

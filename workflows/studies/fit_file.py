@@ -9,7 +9,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, StrictBool, StrictInt, model_validator
@@ -20,6 +20,7 @@ from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.workflows.accuracy import measure
+from tribodyn.workflows.designs.distributions import Distribution, Marginal
 from tribodyn.workflows.run import joints, modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.reuse import Bench
@@ -29,7 +30,9 @@ from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import PartScene
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.wear import At, Place
+from tribodyn.workflows.studies import posterior
 from tribodyn.workflows.studies.identification import Identification, Measured, Parameter, fit
+from tribodyn.workflows.studies.posterior import Posterior
 
 UNITS = ("m", "N", "N/m", "Pa", "kg/m3", "m3/J", "Hz", "rad", "s", "1/s", "")  # of keys of a scene
 MEASURED_IN = {
@@ -45,6 +48,8 @@ class Looked(Table):
     keys : of the scene, section.key; several get the same value
     low, high : bounds, with a unit or in SI; start : one or more to begin from, the scene's own value by default
     ratio : count in ratios, for a positive number known to its order only; by default where both bounds are above 0
+    prior : distribution that was known before, for a posterior; evenly between the bounds by default, of its logarithm
+        where it counts in ratios
     """
 
     keys: Annotated[tuple[str, ...], Field(min_length=1)]
@@ -52,12 +57,13 @@ class Looked(Table):
     high: Quantity
     start: tuple[Quantity, ...] = ()
     ratio: StrictBool | None = None
+    prior: Distribution | None = None
 
 
-class Known(Table):
-    """A measured number.
+class Asked(Table):
+    """A number that a scene answers.
 
-    of : what it is; value : with a unit or in SI; weight : of its relative error
+    of : what it is
     mode : number of a frequency, from 1
     at : of energy, amplitude and preload: a frequency, "peak" or a share of it; a preload without it is that at rest
     load : factor on the harmonic loads of the scene
@@ -65,15 +71,13 @@ class Known(Table):
     """
 
     of: Literal["open frequency", "stuck frequency", "preload", "energy", "amplitude", "peak frequency", "life", "work"]
-    value: Quantity
-    weight: Annotated[Number, Field(gt=0)] = 1.0
     mode: Annotated[StrictInt, Field(ge=1)] | None = None
     at: At | None = None
     load: Annotated[Number, Field(gt=0)] = 1.0
     left: Annotated[Number, Field(gt=0, lt=1)] = LIFE_SHARE
 
     @model_validator(mode="after")
-    def _only_what_it_needs(self) -> Known:
+    def _only_what_it_needs(self) -> Self:
         cycle = self.of in ("energy", "amplitude") or (self.of == "preload" and self.at is not None)
         mode = self.of in ("open frequency", "stuck frequency")
         for name, may, must in (
@@ -88,11 +92,24 @@ class Known(Table):
         return self
 
 
+class Known(Asked):
+    """A measured number.
+
+    value : with a unit or in SI; weight : of its relative error in a fit
+    error : its standard deviation, relative, for a posterior
+    """
+
+    value: Quantity
+    weight: Annotated[Number, Field(gt=0)] = 1.0
+    error: Annotated[Number, Field(gt=0)] | None = None
+
+
 class Task(Table):
-    """What is looked for, and what is known, both by names of one's own."""
+    """What is looked for, what is known, and what is to follow from it, by names of one's own."""
 
     parameters: Annotated[dict[str, Looked], Field(min_length=1)]
     measured: Annotated[dict[str, Known], Field(min_length=1)]
+    predict: dict[str, Asked] = Field(default_factory=dict)
 
 
 def read(path: Path) -> Task:
@@ -119,32 +136,70 @@ def run(
     tell : called with a sentence at every trial
     Raises  SceneError for a key that is no number of the scene, ValueError for bounds that cannot be, SolveFailed
     """
-    file = scene_file.read(scene, overrides)
-    parameters = [parameter(name, looked, file.part_scene) for name, looked in task.parameters.items()]
-    measured = [
-        Measured(name, _si(f"measured.{name}.value", known.value, (MEASURED_IN[known.of],))[0], MEASURED_IN[known.of],
-                 known.weight)
-        for name, known in task.measured.items()
-    ]  # fmt: skip
-    own = {name: value_of(file.part_scene, looked.keys[0]) for name, looked in task.parameters.items()}
+    looked = _Looking(scene, overrides, task, tell)
+    own = {name: value_of(looked.file.part_scene, one.keys[0]) for name, one in task.parameters.items()}
     before = {name: value for name, value in own.items() if value is not None}
-    bench, count = Bench(), 0
+    with threadpool_limits(1):
+        known = before if len(before) == len(looked.parameters) else None
+        found = fit(looked.parameters, looked.measured, lambda values: looked.trial(values, task.measured), known)
+    return found, looked.changes(found.named(), digits=6)
 
-    def changes(values: Mapping[str, float], digits: int = 17) -> list[str]:
-        said = {p.name: f"{values[p.name]:.{digits}g} {p.unit}".rstrip() for p in parameters}
-        return [f"{key}={text}" for name, text in said.items() for key in task.parameters[name].keys]
 
-    def tried(values: Mapping[str, float]) -> np.ndarray:
-        nonlocal count
-        count += 1
-        trial = scene_file.read(scene, (*overrides, *changes(values)))
-        found = predict(bench, trial, task.measured)
-        tell(f"trial {count}: " + ", ".join(f"{name} {value:.6g}" for name, value in values.items()))
+def sample(
+    scene: str, overrides: tuple[str, ...], task: Task, tell: Callable[[str], None], most: int = 100, seed: int = 0
+) -> Posterior:
+    """What the measured numbers leave of the parameters, and what follows from them for the numbers in `predict`.
+
+    tell : called with a sentence at every trial; most : trials
+    Raises  as `run`
+    """
+    looked = _Looking(scene, overrides, task, tell)
+    asked = {**task.measured, **task.predict}
+    units = {name: MEASURED_IN[one.of] for name, one in task.predict.items()}
+    priors = {name: looked.prior(name, one.prior) for name, one in task.parameters.items() if one.prior is not None}
+    with threadpool_limits(1):
+        return posterior.sample(
+            looked.parameters, looked.measured, lambda values: looked.trial(values, asked), units, priors, most, seed
+        )
+
+
+class _Looking:
+    """A scene whose numbers are looked for."""
+
+    def __init__(self, scene: str, overrides: tuple[str, ...], task: Task, tell: Callable[[str], None]):
+        both = set(task.measured) & set(task.predict)
+        if both:
+            raise SceneError(f"predict.{min(both)}: a measured number has this name, give another one")
+        self._scene, self._overrides, self._task, self._tell = scene, overrides, task, tell
+        self.file = scene_file.read(scene, overrides)
+        self.parameters = [parameter(name, one, self.file.part_scene) for name, one in task.parameters.items()]
+        self.measured = [
+            Measured(name, _si(f"measured.{name}.value", known.value, (MEASURED_IN[known.of],))[0],
+                     MEASURED_IN[known.of], known.weight, known.error)
+            for name, known in task.measured.items()
+        ]  # fmt: skip
+        self._bench, self._count = Bench(), 0
+
+    def changes(self, values: Mapping[str, float], digits: int = 17) -> list[str]:
+        """Overrides that put values into the scene."""
+        said = {p.name: f"{values[p.name]:.{digits}g} {p.unit}".rstrip() for p in self.parameters}
+        return [f"{key}={text}" for name, text in said.items() for key in self._task.parameters[name].keys]
+
+    def trial(self, values: Mapping[str, float], asked: Mapping[str, Asked]) -> np.ndarray:
+        """What the scene says with values."""
+        self._count += 1
+        trial = scene_file.read(self._scene, (*self._overrides, *self.changes(values)))
+        found = predict(self._bench, trial, asked)
+        self._tell(f"trial {self._count}: " + ", ".join(f"{name} {value:.6g}" for name, value in values.items()))
         return found
 
-    with threadpool_limits(1):
-        found = fit(parameters, measured, tried, before if len(before) == len(parameters) else None)
-    return found, changes(found.named(), digits=6)
+    @staticmethod
+    def prior(name: str, table: Distribution) -> Marginal:
+        """A distribution that was known before."""
+        try:
+            return Marginal.of(table)
+        except ValueError as error:
+            raise SceneError(f"parameters.{name}.prior: {error}") from None
 
 
 def parameter(name: str, looked: Looked, scene: PartScene) -> Parameter:
@@ -190,7 +245,7 @@ def _si(key: str, value: Quantity, units: tuple[str, ...]) -> tuple[float, str]:
     raise SceneError(f"{key}: {problem}")
 
 
-def predict(bench: Bench, file: SceneFile, measured: Mapping[str, Known]) -> np.ndarray:
+def predict(bench: Bench, file: SceneFile, measured: Mapping[str, Asked]) -> np.ndarray:
     """(n_measured,) what a scene says to each measured number."""
     answers = Answers(file, bench.model(file))
     return np.array([answers.to(name, known) for name, known in measured.items()])
@@ -204,7 +259,7 @@ class Answers:
         self._points: dict[tuple[Place, float], OperatingPoint] = {}
         self._runs: dict[float, WearHistory] = {}
 
-    def to(self, name: str, known: Known) -> float:
+    def to(self, name: str, known: Asked) -> float:
         """The scene's number beside a measured one; raises SolveFailed, naming it, where there is none."""
         try:
             if known.mode is not None:
@@ -247,7 +302,7 @@ class Answers:
             self._points[where, load] = point
         return self._points[where, load]
 
-    def _wear(self, known: Known) -> float:
+    def _wear(self, known: Asked) -> float:
         if self.file.scene.wear is None:
             raise SceneError("a life or its work is measured, but the scene has no [wear]")
         if known.left not in self._runs:

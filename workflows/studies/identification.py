@@ -51,12 +51,16 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Measured:
-    """A measured number, above 0. weight : of its logarithmic residual ln(predicted / measured)."""
+    """A measured number, above 0.
+
+    weight : of its logarithmic residual ln(predicted / measured); error : its relative standard deviation, where known
+    """
 
     name: str
     value: float
     unit: str = ""
     weight: float = 1.0
+    error: float | None = None
 
 
 @dataclass(frozen=True)
