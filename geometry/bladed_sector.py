@@ -71,17 +71,17 @@ class Parameters:
     tip_stagger: float = 0.6
     contact_length: float = 0.018
     contact_height: float = 0.008
-    shroud_angle: float = 0.61
+    shroud_angle: float = -0.61
     shroud_length: float = 0.036
     clearance: float = 0.002
     platform_height: float = 0.01
     platform_length: float = 0.056
-    gap_bottom: float = 0.016
+    gap_bottom: float = 0.02
     gap_top: float = 0.004
     neck_width: float = 0.012
     bulb_width: float = 0.022
     neck_height: float = 0.008
-    flank_height: float = 0.005
+    flank_height: float = 0.002
     bulb_height: float = 0.006
     disk_radius: float = 0.11
     disk_taper: float = 0.6
@@ -97,10 +97,10 @@ class Parameters:
     n_platform: int = 1
     n_neck: int = 1
     n_flank: int = 1
-    n_axial: int = 5
+    n_axial: int = 3
     n_slot: int = 1
     n_post: int = 1
-    n_disk: int = 2
+    n_disk: int = 1
     n_damper: int = 3
 
     def __post_init__(self) -> None:

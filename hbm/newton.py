@@ -13,6 +13,8 @@ from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
 
 ZERO_SIZE = 1e-6  # size of x, relative to the start, below which a solution counts as zero
+UNRESISTED = 1e-9  # singular value over the largest of a Jacobian whose motion counts as not resisted
+MOST_DENSE = 3000  # unknowns up to which the dense Jacobian serves where Krylov steps fail at rest
 RAMP_STEPS = 12  # Newton steps in one step of the load ramp; beyond it a shorter step costs less
 FORCE_ACCURACY = 1e-4  # of the contact forces, wanted where these stretch their springs far less than x is large
 CURES = "more damping, a softer contact, fewer harmonics or a larger static load make it easier"
@@ -66,6 +68,8 @@ class NewtonOptions:
     krylov : largest relative residual of a direction; the forcing term asks for less where Newton is fast
     shortest : share of a Newton step that is tried
     slowest : residual over that of two steps before from which on the solve is given up; 1 continues while it falls
+    least_motion : take the shortest of all directions that solve the linear problem, by its dense matrix: a body that
+        slips on all its faces can be at rest in many places
     """
 
     tolerance: float = 1e-8
@@ -74,6 +78,7 @@ class NewtonOptions:
     krylov: float = 0.1
     shortest: float = 4e-4
     slowest: float = 1.0
+    least_motion: bool = False
 
 
 @dataclass(frozen=True)
@@ -137,7 +142,10 @@ def solve(
         target = max(min(forcing, options.krylov), 0.3 * wanted / error, 1e-12)
         try:
             with np.errstate(over="raise"):
-                direction, spent, reached = linear.solve(-state.residual, target, options.max_products)
+                if options.least_motion:
+                    direction, spent, reached = _shortest_direction(linear.dense(), state.residual), 0, 0.0
+                else:
+                    direction, spent, reached = linear.solve(-state.residual, target, options.max_products)
         except FloatingPointError:  # a slope too steep for the single precision of the products
             spent, reached = 0, np.inf
         products += spent
@@ -166,6 +174,12 @@ def solve(
         far = float(np.abs(state.x).max())
         outcome = f"the contact slides away, {far:.1e} m, and its forces are known to {off:.0%} only: nothing holds it"
     return Solved(state, outcome, len(history) - 1, products, tuple(history))
+
+
+def _shortest_direction(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    """The shortest solution of jacobian . d = -residual (n_contact, n_coeff), motions that nothing resists left out."""
+    found: np.ndarray = np.linalg.lstsq(jacobian, -residual.ravel(), rcond=UNRESISTED)[0]
+    return found.reshape(residual.shape)
 
 
 def _leans(balance: Balance[Frequency, Evaluated], state: Evaluated, x_lin: np.ndarray) -> bool:
@@ -230,8 +244,11 @@ def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptio
     steps, products = first.steps, first.products
     factor = 0.0
     start = balance.with_load(0.0).stuck(omega)
-    last = solve(balance.with_load(0.0), omega, start, options)
     options = options or NewtonOptions()
+    last = solve(balance.with_load(0.0), omega, start, options)
+    if not last.converged and balance.n_unknown <= MOST_DENSE:
+        thorough = replace(options, least_motion=True, max_steps=2 * options.max_steps)
+        last = solve(balance.with_load(0.0), omega, start, thorough)
     for patience in (min(options.max_steps, RAMP_STEPS), options.max_steps):
         stride = 0.25
         while last.converged and stride > 1e-3:

@@ -8,14 +8,15 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from tribodyn.fem.constraints import named
-from tribodyn.fem.cyclic import Sector, at_index
+from tribodyn.fem.cyclic import Sector, at_index, seam_map
 from tribodyn.fem.elasticity import assemble
-from tribodyn.fem.factor import SingularStiffness
+from tribodyn.fem.factor import SingularStiffness, factorise
 from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.part import Part
 from tribodyn.fem.prestress import UNSTABLE, check_stability, coriolis, geometric_stiffness, spin_softening
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.recovery import full_displacement
 from tribodyn.reduction.craig_bampton import POINT_LOAD
@@ -44,14 +45,40 @@ def spun(scene: MeshScene, part: Part, cut: Sector) -> Sector:
     mass, _ = assemble(part.mesh, material)
     soft = csr_matrix(cut.system.stiffness + part.restricted(spin_softening(mass, wheel.axis, speed)))
     turning = csr_matrix(part.restricted(coriolis(mass, wheel.axis, speed))) if wheel.coriolis else None
-    softened = replace(cut, system=replace(cut.system, stiffness=soft, gyroscopic=turning))
-    still = part.field(at_rest(scene, softened))
-    stress = part.restricted(geometric_stiffness(part.mesh, material, still, temperature(scene, part)))
-    stiffened = replace(cut, system=replace(softened.system, stiffness=csr_matrix(soft + stress)))
-    system, B = at_index(stiffened, 0)
-    stuck = ReducedModel(cut.system, cut.interface, info=ModelInfo(joints=cut.joints))
-    check_stability(stuck_stiffness(system.stiffness, B, joints.contact_stiffness(scene, stuck)))
-    return stiffened
+    heat = temperature(scene, part)
+
+    def stiffened(q: np.ndarray) -> Sector:
+        stress = part.restricted(geometric_stiffness(part.mesh, material, part.field(q), heat))
+        return replace(cut, system=replace(cut.system, stiffness=csr_matrix(soft + stress), gyroscopic=turning))
+
+    softened = replace(cut, system=replace(cut.system, stiffness=soft))
+    first = stiffened(stuck_at_rest(scene, softened))
+    found = stiffened(at_rest(scene, first))
+    check_stability(stuck_index_0(scene, found)[0])
+    return found
+
+
+def stuck_index_0(scene: MeshScene, sector: Sector) -> tuple[csr_matrix, csr_matrix, np.ndarray]:
+    """Stiffness (m, m) [N/m] of sectors that move alike with their contacts stuck, contact map (n_c, m), springs."""
+    system, B = at_index(sector, 0)
+    model = ReducedModel(sector.system, sector.interface, info=ModelInfo(joints=sector.joints))
+    springs = joints.contact_stiffness(scene, model)
+    return stuck_stiffness(system.stiffness, B, springs), csr_matrix(B), springs
+
+
+def stuck_at_rest(scene: MeshScene, sector: Sector) -> np.ndarray:
+    """Displacement (n_free,) [m] under the static loads with all contacts stuck: where a body would slide away that
+    only its stress holds upright, this is where the stress is first taken from.
+    """
+    stiffness, B, springs = stuck_index_0(scene, sector)
+    T = seam_map(sector, 0)
+    gap = np.zeros(springs.shape)
+    if "n" in sector.interface.components:
+        gap[:, sector.interface.components.index("n")] = sector.interface.gap
+    force = B.T @ (springs * gap).ravel()
+    for name, value in static_loads(scene).items():
+        force = force + value * (T.T @ sector.system.loads[name])
+    return np.asarray(T @ factorise(stiffness, definite=False).solve(force))
 
 
 def at_rest(scene: MeshScene, sector: Sector) -> np.ndarray:
@@ -61,8 +88,7 @@ def at_rest(scene: MeshScene, sector: Sector) -> np.ndarray:
     except SingularStiffness:
         raise StaticDivergence(UNSTABLE) from None
     model = travelling_wave(reduced, 0)
-    excitation = joints.excite(scene, None)
-    static = replace(excitation, loads={key: value for key, value in excitation.loads.items() if key[0] == 0})
+    static = Excitation.of(static_loads(scene))
     basis = HarmonicBasis((0, 1), FEW_SAMPLES)
     made = joints.make_joints(scene, model)
     balance = HarmonicBalance.of(model, made, basis, static, AT_REST)
@@ -75,9 +101,14 @@ def at_rest(scene: MeshScene, sector: Sector) -> np.ndarray:
 
 def distributed(scene: MeshScene, sector: Sector) -> list[str]:
     """Static loads that act on many nodes, whose statics the reduction is to keep exact."""
-    static = {name for h, name in joints.excite(scene, None).loads if h == 0}
-    loads = sector.system.loads
+    static, loads = static_loads(scene), sector.system.loads
     return [name for name in loads if name in static and np.count_nonzero(loads[name]) > POINT_LOAD]
+
+
+def static_loads(scene: MeshScene) -> dict[str, float]:
+    """Static loads by name."""
+    loads = joints.excite(scene, None).loads
+    return {name: float(value.real) for (harmonic, name), value in loads.items() if harmonic == 0}
 
 
 def temperature(scene: MeshScene, part: Part) -> np.ndarray | None:

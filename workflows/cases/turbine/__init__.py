@@ -1,0 +1,1 @@
+"""Turbine wheel as it is built: dovetail roots, underplatform dampers and tip shrouds at once."""
