@@ -19,6 +19,7 @@ from scipy.sparse import vstack
 
 from tribodyn.fem import wheel
 from tribodyn.fem.cyclic import Sector, at_index, projected, seam_map
+from tribodyn.fem.gyroscopic import turning_frequencies
 from tribodyn.fem.hermitian import hermitian_modes
 from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.system import SecondOrderSystem
@@ -69,7 +70,8 @@ def nodal_diameters(
 ) -> np.ndarray:
     """Frequencies [Hz] of the wheel for each nodal diameter: the diagram of a bladed disk, full or reduced.
 
-    diameters : harmonic indices; 0 to N/2 differ; stiffness : (n_pair, n_component) of closed, stuck contacts [N/m],
+    diameters : harmonic indices; 0 to N/2 differ, and where Coriolis forces act those of waves that run against the
+        rotation too, -1 to -N/2; stiffness : (n_pair, n_component) of closed, stuck contacts [N/m],
         None for open ones
     Returns (n_diameter, n_modes)
     """
@@ -77,7 +79,11 @@ def nodal_diameters(
     for index in diameters:
         system, B = at_index(sector, index)
         K = system.stiffness if stiffness is None else stuck_stiffness(system.stiffness, B, stiffness)
-        found.append(hermitian_modes(K, system.mass, n_modes)[0] / (2 * np.pi))
+        if system.gyroscopic is None:
+            omega = hermitian_modes(K, system.mass, n_modes)[0]
+        else:
+            omega = turning_frequencies(K, system.mass, system.gyroscopic, n_modes)
+        found.append(omega / (2 * np.pi))
     return np.array(found)
 
 

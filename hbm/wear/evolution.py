@@ -39,6 +39,7 @@ class WearProblem:
     area : (n_pair,) [m2], of all joints
     lost_below : contact counts as lost when the preload falls below this share of its first value; the last touch
         of a vibrating contact wears ever more slowly, so that the time until it ends has no limit (see README)
+    any_joint : whether a single joint whose preload has fallen below that share ends the run
     lost_below_at_rest : the run ends when the preload without the harmonic loads falls to this share of its first
         value, see hbm.wear.preload_at_rest; None: it is not looked at
     """
@@ -49,6 +50,7 @@ class WearProblem:
     area: np.ndarray
     lost_below: float = 0.0
     lost_below_at_rest: float | None = None
+    any_joint: bool = False
 
     def __post_init__(self) -> None:
         shares = [duty.share for duty in self.mission]
@@ -218,12 +220,27 @@ def reason_to_stop(
     preload = problem.preload(state.points[0].state)
     if preload < problem.lost_below * first_preload:
         return WearEnd.PRELOAD_LOST.say(f" {problem.lost_below:.3g} of its first value")
+    lost = lost_joint(problem, state, rows) if problem.any_joint else None
+    if lost is not None:
+        return WearEnd.PRELOAD_LOST.say(f" {problem.lost_below:.3g} of its first value in joint {lost}")
     left = f", the contact survives with {state.depth.max():.4g} m worn at most and {preload:.4g} N of preload left"
     if state.rate.max() <= 0.0:
         return WearEnd.NO_LOSS.say() if state.work.max() > 0.0 else WearEnd.NO_SLIP.say(left)
     fading = rows and state.work.sum() < FADED_SHARE * rows[0].energy.sum()
     if fading and state.rate.max() * ENDLESS < step_depth:
         return WearEnd.FADED.say(left)
+    return None
+
+
+def lost_joint(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) -> str | None:
+    """The first joint whose preload has fallen below the share that the problem asks for; None for none."""
+    if not rows:
+        return None
+    now = problem.balance.preload_by_joint(state.points[0].state)
+    for name in problem.wearing:
+        first = float(rows[0].normal_force[problem.balance.contact.joint(name).rows].sum())
+        if now[name] < problem.lost_below * first:
+            return name
     return None
 
 

@@ -172,13 +172,18 @@ def cycles_to_preload(history: WearHistory, share: float = LIFE_SHARE) -> float 
     This is the life that converges with the wear step. The last touch of a vibrating contact does not end in finite
     time: near it the work falls with the power 3/2 of what is left to wear.
     """
-    below = np.flatnonzero(history.preload < share * history.preload[0])
+    return cycles_to_share(history.cycles, history.preload, share)
+
+
+def cycles_to_share(cycles: np.ndarray, preload: np.ndarray, share: float) -> float | None:
+    """The same of any preload (n_row,) [N], such as that of one joint; cycles (n_row,) at which it is known."""
+    below = np.flatnonzero(preload < share * preload[0])
     if len(below) == 0 or below[0] == 0:
         return None
     i = int(below[0])
-    high, low = history.preload[i - 1], max(float(history.preload[i]), 1e-3 * share * float(history.preload[0]))
-    part = np.log(high / (share * history.preload[0])) / np.log(high / low)
-    return float(history.cycles[i - 1] + part * (history.cycles[i] - history.cycles[i - 1]))
+    high, low = preload[i - 1], max(float(preload[i]), 1e-3 * share * float(preload[0]))
+    part = np.log(high / (share * preload[0])) / np.log(high / low)
+    return float(cycles[i - 1] + part * (cycles[i] - cycles[i - 1]))
 
 
 def rows_to_resume(interrupted: WearHistory | None) -> list[WearRow]:

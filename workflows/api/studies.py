@@ -46,7 +46,7 @@ from tribodyn.workflows.run.reuse import Bench, reaction
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import PartScene, Scene
-from tribodyn.workflows.studies import mistuning
+from tribodyn.workflows.studies import forces, mistuning
 from tribodyn.workflows.studies import wheel as wheels
 from tribodyn.workflows.studies.identification import Identification, Measured, Parameter
 from tribodyn.workflows.studies.identification import fit as identify
@@ -94,6 +94,7 @@ __all__ = [
     "WearEnd",
     "WearHistory",
     "Wheel",
+    "body_forces",
     "build_wheel",
     "campbell",
     "changed",
@@ -145,6 +146,7 @@ __all__ = [
     "write_whole",
 ]
 
+body_forces = forces.study
 build_wheel = wheels.build
 mistuned = mistuning.respond
 mark_stability = exponents.mark

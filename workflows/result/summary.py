@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.wear.events import events
-from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload
+from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload, cycles_to_share
 from tribodyn.workflows.accuracy import budget, statement
 from tribodyn.workflows.accuracy.trade_table import plain
 from tribodyn.workflows.result.result import Result
@@ -32,7 +33,8 @@ def summary(result: Result) -> dict[str, Any]:
     peak_is_stable : whether that peak of the curve is a motion that stays, None where this was not asked for
     stable_peak_hz, stable_peak_m : the highest point of the curve that is
     seconds : of computing, interrupted runs included
-    joints : named contact -> pairs, area_m2, and with wear preload_N [first, last], depth_max_m, depth_mean_m,
+    joints : named contact -> pairs, area_m2, and with wear preload_N [first, last], life_cycles until its preload has
+        fallen to `wear.lost_below` (LIFE_SHARE where that is 0), None if it has not, depth_max_m, depth_mean_m,
         volume_m3, energy_J of that joint; empty where the scene names none
     verdict : quantity -> value, error, dominated_by, stated, reason, see workflows.accuracy.statement; None without
     error_budget : what each discretisation contributes, see result.facts.BudgetEntry
@@ -64,12 +66,19 @@ def by_joint(result: Result) -> dict[str, dict[str, Any]]:
         depth = result.depth_after(-1)[pairs]
         found[name] |= {
             "preload_N": [float(wear.normal_force[row, pairs].sum()) for row in (0, -1)],
+            "life_cycles": cycles_to_share(wear.cycles, wear.normal_force[:, pairs].sum(axis=1), _life_share(result)),
             "depth_max_m": float(depth.max()),
             "depth_mean_m": float(depth @ area / area.sum()),
             "volume_m3": float(depth @ area),
             "energy_J": float(wear.work[:, pairs].sum()),
         }
     return found
+
+
+def _life_share(result: Result) -> float:
+    """Share of the first preload where the life of a joint ends: the scene's `wear.lost_below`, else LIFE_SHARE."""
+    told = json.loads(result.provenance.get("scene", "{}")).get("wear") or {}
+    return float(told.get("lost_below") or LIFE_SHARE)
 
 
 def _wear(result: Result) -> dict[str, Any]:
@@ -222,6 +231,8 @@ def lines(result: Result) -> list[tuple[str, str]]:
             first, last = joint["preload_N"]
             told += f", preload {first:.5g} -> {last:.5g} N, {1e6 * joint['depth_max_m']:.4g} um deep at most, "
             told += f"{1e9 * joint['volume_m3']:.4g} mm3, {joint['energy_J']:.4g} J"
+            if joint["life_cycles"] is not None:
+                told += f", life {joint['life_cycles']:.4g} cycles"
         shown.append((f"  {name}", told))
     shown += budget.lines(result)
     shown.append(("computing", f"{numbers['seconds']:.1f} s"))

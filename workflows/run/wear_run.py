@@ -70,7 +70,8 @@ def wear_problem(
     wear = dict.fromkeys(scene.joints, of_all) | by_name if own else of_all
     area = balance.model.interface.area
     vibrating, resting = (0.0, lost_below) if at_rest else (lost_below, None)
-    return WearProblem(balance, settings.mission(scene), wear, area, vibrating, resting)
+    any_joint = scene.wear.lost_of == "any"
+    return WearProblem(balance, settings.mission(scene), wear, area, vibrating, resting, any_joint)
 
 
 def evolve(

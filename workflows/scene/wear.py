@@ -101,6 +101,8 @@ class Wear(LawTable):
     """Error that one wear step of the error-controlled rule may make, relative."""
     lost_below: Annotated[Number, Field(ge=0, lt=1)] = 0.0
     """Share of the first preload at which the run ends; 0 waits until the last touch ends."""
+    lost_of: Literal["all", "any"] = "all"
+    """Whose preload `lost_below` counts: of all joints that wear together, or of whichever joint falls first."""
     end_at: Literal["vibrating", "at_rest"] = "vibrating"
     """Whose preload that is: of the vibrating contact, its mean force, or of the contact without harmonic loads."""
     step: Annotated[WearStep, BeforeValidator(_step)] | None = None
@@ -119,6 +121,8 @@ class Wear(LawTable):
         total = sum(duty.share for duty in self.mission)
         if self.mission and abs(total - 1) > 1e-9:
             raise ValueError(f"expected shares of the mission that sum to 1, got {total:g}")
+        if self.lost_of == "any" and self.end_at == "at_rest":
+            raise ValueError('expected lost_of = "any" only with end_at = "vibrating"')
         if self.mission and "at" in self.model_fields_set:
             raise ValueError("expected either at or mission, and not both")
         return self

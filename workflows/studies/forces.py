@@ -1,0 +1,136 @@
+"""Static forces on every body of a scene, joint by joint, and whether they balance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tribodyn.fem.assembly import Assembly
+from tribodyn.fem.constraints import named
+from tribodyn.fem.elasticity import assemble
+from tribodyn.fem.part import Part
+from tribodyn.fem.prestress import spin_softening
+from tribodyn.hbm import newton
+from tribodyn.hbm.linear.recovery import full_displacement
+from tribodyn.hbm.threads import limited
+from tribodyn.workflows.run import modelling, part_reduction, settings
+from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.schema import MeshScene
+
+TOLERANCE = 1e-12  # of the contact at rest: the balance of forces is to be seen to 1e-8
+
+
+@dataclass(frozen=True)
+class BodyForces:
+    """Static forces on a body, their sums (3,) along x, y, z [N].
+
+    load : of the static loads, of centrifugal force where it has moved to; joints : joint -> force of that contact
+    held : whether a support or a spring carries some of it too
+    """
+
+    body: str
+    load: np.ndarray
+    joints: dict[str, np.ndarray]
+    held: bool
+
+    @property
+    def imbalance(self) -> float:
+        """|load + contact forces| over the largest of them."""
+        forces = np.array([self.load, *self.joints.values()])
+        scale = float(np.linalg.norm(forces, axis=1).max())
+        return float(np.linalg.norm(forces.sum(axis=0))) / scale if scale > 0 else 0.0
+
+
+def study(file: SceneFile) -> list[BodyForces]:
+    """Forces on every body at rest under the static loads of the scene, harmonic loads away.
+
+    Raises  SceneError for a scene of matrices; SolveFailed where the contact does not settle
+    """
+    scene = file.mesh_scene
+    with limited(scene.solver.threads):
+        model = modelling.build(file, None, Progress())
+        part, balance = model.part, model.balance.with_load(0.0)
+        assert part is not None
+        omega = 2 * np.pi * settings.response_range(scene)[0]
+        solved = newton.solve_from_rest(balance, omega, newton.NewtonOptions(tolerance=TOLERANCE))
+        if not solved.converged:
+            raise SolveFailed(f"the contact does not settle under the static loads: {solved.outcome}")
+        force = solved.state.cycle.force
+        q = full_displacement(balance, solved.state.flat, force.reshape(solved.state.flat.shape), omega)[:, 0]
+    load = _loads(scene, part, balance.excitation.loads, q)
+    contact = _contact_forces(scene, part, force[:, :, 0])
+    bodies = [b.name for b in part.mesh.bodies if b.name] if isinstance(part.mesh, Assembly) else []
+    sets = {name: named(part.node_sets, name) for name in bodies} or {"part": np.arange(len(part.points))}
+    free = np.zeros(3 * len(part.points), bool)
+    free[part.free] = True
+    found = []
+    for name, nodes in sets.items():
+        joints = {joint: on[nodes].sum(axis=0) for joint, on in contact.items() if on[nodes].any()}
+        held = not free.reshape(-1, 3)[nodes].all() or part.follow is not None or bool(scene.springs)
+        found.append(BodyForces(name, load[nodes].sum(axis=0), joints, held))
+    return found
+
+
+def _loads(scene: MeshScene, part: Part, loads: Any, q: np.ndarray) -> np.ndarray:
+    """Static loads at the nodes (n_node, 3) [N]; those of a turning frame grow with the static displacement q."""
+    total = np.zeros(len(part.free))
+    for (harmonic, name), value in loads.items():
+        if harmonic == 0:
+            total += np.real(value) * part.system.loads[name]
+    full = np.zeros(3 * len(part.points))
+    full[part.free] = total
+    if scene.wheel is not None and scene.wheel.speed:
+        mass, _ = assemble(part.mesh, part_reduction.material(scene, part.mesh))
+        moved = part.field(q).ravel()
+        full -= spin_softening(mass, scene.wheel.axis, 2 * np.pi * scene.wheel.speed) @ moved
+    return full.reshape(-1, 3)
+
+
+def _contact_forces(scene: MeshScene, part: Part, force: np.ndarray) -> dict[str, np.ndarray]:
+    """Nodal forces (n_node, 3) [N] of every joint, in a wheel those that the sector gets on both sides.
+
+    force : (n_pair, n_component) static part of the contact forces [N]
+    """
+    found: dict[str, np.ndarray] = {}
+    for contact, pairs in zip(part_reduction.contacts(scene), part.pairs.values(), strict=True):
+        own = force[pairs].ravel()
+        if contact.opposite is None:
+            on = -contact.build(part.mesh).B.T @ own
+        else:
+            interface, second = contact.halves(part.mesh)
+            on = second.T @ own - interface.B.T @ own
+        found[contact.joint] = found.get(contact.joint, 0.0) + on.reshape(-1, 3)
+    return found
+
+
+def lines(found: Sequence[BodyForces]) -> list[str]:
+    """What was found, for people."""
+    said = []
+    for one in found:
+        said.append(f"{one.body}: static load {_vector(one.load)} N")
+        said += [f"  {name}: {_vector(force)} N" for name, force in one.joints.items()]
+        held = ", the rest is carried by supports" if one.held else ""
+        said.append(f"  out of balance by {one.imbalance:.1e} of it{held}")
+    return said
+
+
+def record(found: Sequence[BodyForces]) -> dict[str, Any]:
+    """What was found, for machines."""
+    return {
+        one.body: {
+            "load_N": one.load.tolist(),
+            "joints_N": {name: force.tolist() for name, force in one.joints.items()},
+            "imbalance": one.imbalance,
+            "held": one.held,
+        }
+        for one in found
+    }
+
+
+def _vector(force: np.ndarray) -> str:
+    return f"({', '.join(f'{value:.6g}' for value in force)})"
