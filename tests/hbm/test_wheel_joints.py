@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.helpers import small_wheel as small
 from tribodyn.fem import cyclic
+from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.part import Contact
+from tribodyn.fem.prestress import coriolis
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import SLIPS, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.linear import travelling_wave as waves
+from tribodyn.hbm.reference import DenseBalance
 from tribodyn.reduction.cyclic import reduce_sector, travelling_wave
 from tribodyn.reduction.damping import modal_damping
 
@@ -53,3 +59,64 @@ def test_a_face_of_a_wheel_split_into_named_contacts_equals_the_one_contact(tmp_
     split, _ = outputs(cut, node_sets, range(len(facets)), order)
     assert len(facets) > 1
     assert np.abs(split - one).max() < 1e-12 * np.abs(one).max()
+
+
+SPEED = 900.0  # rad/s: enough to move a response by per cents
+
+
+@pytest.fixture(scope="module")
+def turning(tmp_path_factory):
+    """The small sector on a flexible disk in a turning frame, its stress left out."""
+    part, sector = small.full_sector(tmp_path_factory.mktemp("turning") / "s.msh", 0.02)
+    mass, _ = assemble(part.mesh, small.STEEL)
+    gyroscopic = coriolis(mass, (1, 0, 0), SPEED)[part.free][:, part.free]
+    return reduce_sector(replace(sector, system=replace(sector.system, gyroscopic=gyroscopic)), n_modes=10)
+
+
+def tips(one, wheel, outputs, everywhere, order):
+    """What the wave says of the tip of every sector, and what the whole wheel does."""
+    names = list(wheel.compliance.output_names)
+    tip = outputs[list(one.compliance.output_names).index("tip")]
+    expected = np.array([waves.at_sector(one.basis, tip, order, small.N, n) for n in range(small.N)])
+    return expected, everywhere[[names.index(f"tip@{n}") for n in range(small.N)]]
+
+
+def test_linear_waves_with_coriolis_forces_are_the_whole_wheel(turning):
+    """Acceptance 18.2: contacts stuck, to 1e-8; waves along and against the rotation differ."""
+    heights = []
+    for order in (2, -2):
+        one, wheel = small.wave_and_wheel(turning, order)
+        found = [balance.at(2 * np.pi * 310).outputs_lin for balance in (one, wheel)]
+        expected, there = tips(one, wheel, *found, order)
+        assert np.abs(there - expected).max() < 1e-8 * np.abs(expected[:, 1:3]).max()
+        heights.append(np.hypot(*expected[0, 1:3]))
+    assert abs(heights[1] / heights[0] - 1) > 1e-2
+
+
+def slipping(balance):
+    """The state at 250 Hz, where some pairs slip."""
+    solution = newton.solve_from_rest(balance, 2 * np.pi * 250, newton.NewtonOptions(tolerance=1e-11))
+    assert solution.converged
+    assert (solution.state.cycle.status & SLIPS).any()
+    return solution.state
+
+
+def test_friction_with_coriolis_forces_is_the_whole_wheel(turning):
+    """Acceptance 18.2: slipping and separating, to 1e-6, in every sector."""
+    one, wheel = small.wave_and_wheel(turning, 1)
+    here, everywhere = slipping(one), slipping(wheel)
+    expected, there = tips(one, wheel, one.outputs(here), wheel.outputs(everywhere), 1)
+    assert np.abs(there - expected).max() < 1e-6 * np.abs(expected).max()
+
+
+def test_unequal_blades_with_coriolis_forces_solve_the_equations_of_the_whole_wheel(turning):
+    """Acceptance 18.2: the balance of blades that differ against the dense equations of motion, to 1e-6."""
+    factors = 1 + np.array([0.03, -0.02, 0.01, -0.04, 0.02, 0.0, -0.01, 0.04])
+    _, wheel = small.wave_and_wheel(turning, 1, harmonics=(0, 1), stiffness=factors)
+    state = slipping(wheel)
+    dense = DenseBalance(wheel)
+    q = dense.coordinates_of(state.omega, state.x)
+    back = dense.onto_contact(q.ravel()).reshape(state.x.shape)
+    assert np.abs(back - state.x).max() < 1e-6 * np.abs(state.x).max()
+    heights = np.hypot(*wheel.outputs(state)[:, 1:3].T)
+    assert np.ptp(heights[[name.startswith("tip") for name in wheel.compliance.output_names]]) > 0.01 * heights.max()
