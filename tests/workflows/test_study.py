@@ -95,6 +95,7 @@ def test_correlations_are_those_of_a_gaussian_copula() -> None:
         ({"study": {"scene": "beam", "design": "grid", "runs": 3}}, "leave it out"),
         ({"study": {"scene": "beam", "design": "list"}, "vary": {"a": [1], "b": [1, 2]}}, "need one length"),
         ({"study": {"scene": "beam", "design": "grid", "worker": 2}}, "unknown key study.worker"),
+        ({"study": {"scene": "beam", "design": "grid", "set": ["solver.threads=2"]}}, "every run has one thread"),
         ({"study": {"scene": "no", "design": "grid"}}, 'there is no scene "no"'),
         ({"correlations": [{"keys": [FRICTION, "b"], "value": 0.1}]}, "does not vary by a distribution"),
     ],

@@ -63,6 +63,9 @@ def run(
         # runs that share mesh and reduction come one after the other
         left = sorted((task for task in tasks if task.number not in rows), key=lambda task: task.early)
         count = workers or pool.cores()
+        if left:
+            where = f"the workers of {scheduler}" if scheduler else f"{min(count, len(left))} processes"
+            progress.say(f"{len(left)} runs on {where}, one thread for each run")
         try:
             with progress.track(f"{len(left)} runs") as advance, shared(left, folder, count, scheduler) as (ready, end):
                 for done, row in enumerate(_finished(ready, count, scheduler), 1):

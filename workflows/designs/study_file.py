@@ -131,6 +131,8 @@ def parse(data: Mapping[str, Any], label: str, folder: Path) -> Study:
     leaves = dict(_leaves(file.vary))
     if not leaves:
         raise SceneError(f'{label}: vary is empty, give keys of the scene such as "contact.friction" = [0.3, 0.5]')
+    if any(key.replace(" ", "").startswith("solver.threads") for key in (*leaves, *file.study.set, *file.lives.cheap)):
+        raise SceneError(f"{label}: solver.threads: every run has one thread, say by --workers how many run at a time")
     varied = {key: _read(key, value, file.study.design, label) for key, value in leaves.items()}
     design, lengths = file.study.design, {key: len(v) for key, v in varied.items() if isinstance(v, tuple)}
     if design == "list" and len(set(lengths.values())) > 1:

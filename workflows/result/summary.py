@@ -235,7 +235,8 @@ def lines(result: Result) -> list[tuple[str, str]]:
                 told += f", life {joint['life_cycles']:.4g} cycles"
         shown.append((f"  {name}", told))
     shown += budget.lines(result)
-    shown.append(("computing", f"{numbers['seconds']:.1f} s"))
+    threads = result.provenance.get("threads", "1")
+    shown.append(("computing", f"{numbers['seconds']:.1f} s on {threads} thread{'s' if threads != '1' else ''}"))
     return shown
 
 
