@@ -69,7 +69,7 @@ class DiagonalBordered:
     def __init__(self, d: np.ndarray, border: np.ndarray, corner: float):
         self._d, self._r, self._corner = d, border, corner
         self._pivot = int(np.abs(border).argmax())
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):
             self._inverse = 1.0 / d
         if not corner:
             self._inverse[self._pivot] = 0.0

@@ -179,10 +179,11 @@ class TimeStepper:
                 amplitudes[:, basis.harmonics.index(h)] += value * self.balance.model.system.loads[name]
         return basis.to_real(amplitudes)
 
-    def start_from(self, state: State, at_rest: bool = False) -> Moving:
+    def start_from(self, state: State, at_rest: bool = False, added: float = 0.0) -> Moving:
         """What moves at t = 0 in a balance state, every coordinate in equilibrium with its contact forces.
 
-        at_rest : leave out all but harmonic 0
+        at_rest : leave out all but harmonic 0; added : damping ratio of the term - 2 zeta w M q' that sustains a
+            nonlinear mode
         """
         basis, m = self.balance.basis, self.n_dynamic
         contact_force = state.cycle.force.reshape(len(self.static), -1)
@@ -193,7 +194,9 @@ class TimeStepper:
                 eta += self._at_rest(state)
             elif not at_rest:
                 s = 1j * h * self.omega
-                amplitude = np.linalg.solve(np.diag(self.lam + s * s) + s * self.damping, force[:, i])
+                amplitude = np.linalg.solve(
+                    np.diag(self.lam + s * s - 2 * added * self.omega * s) + s * self.damping, force[:, i]
+                )
                 eta += amplitude.real
                 v += (s * amplitude).real
         angles = 2 * np.pi * np.arange(1, self.options.steps + 1) / self.options.steps

@@ -26,6 +26,7 @@ TOLERANCE = 1e-12  # of the contact residual, relative to the largest contact di
 SWEEPS, SLOW = 60, 0.5  # at most of Gauss-Seidel; factor per sweep from which on it is slow
 LOCAL, DAMPED = 40, 20  # iterations of one pair; from which on its steps are halved
 NEWTON = 60
+SHORTEST = 0.1  # share of a Newton step that is tried before a worse point is taken all the same
 SEPARATES = 4  # as in hbm.contact.law
 
 
@@ -303,6 +304,8 @@ def newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits):
     n_pair, c = x.shape
     A = contact.A
     J = np.empty((n_pair, c, c))
+    best, length = np.inf, 1.0
+    x_best, direction = x.copy(), np.zeros(x.size)
     for it in range(NEWTON):
         for i in range(n_pair):
             bits[i] = abs(
@@ -312,14 +315,20 @@ def newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits):
             J[i] = work[2]
         r = x.ravel() - x_free + times(A, f)
         scale = max(scale, np.abs(x).max())
-        if np.abs(r).max() <= TOLERANCE * scale:
+        error = np.abs(r).max()
+        if error <= TOLERANCE * scale:
             return bits, SWEEPS + it + 1, scale
-        full = np.eye(n_pair * c)
-        for i in range(n_pair):
-            o = i * c
-            full[:, o : o + c] += np.dot(np.ascontiguousarray(A[:, o : o + c]), np.ascontiguousarray(J[i]))
-        length = 1.0 if it < NEWTON // 2 else 0.5
-        x -= length * np.linalg.solve(full, r).reshape(x.shape)
+        if error >= best and length > SHORTEST:  # a kink lies on the way: go less far
+            length *= 0.5
+        else:
+            best, length = error, 1.0
+            x_best[:] = x
+            full = np.eye(n_pair * c)
+            for i in range(n_pair):
+                o = i * c
+                full[:, o : o + c] += np.dot(np.ascontiguousarray(A[:, o : o + c]), np.ascontiguousarray(J[i]))
+            direction = np.linalg.solve(full, r)
+        x[:] = x_best - length * direction.reshape(x.shape)
     return bits, -1, scale
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 from scipy.sparse import issparse
 
 from tribodyn.fem.factor import factorise
@@ -19,6 +19,7 @@ LARGE, SMALL = 20.0, 1e-4  # [m], sizes beyond which the unit of length is doubt
 LIGHT, HEAVY = 50.0, 30_000.0  # [kg/m3]; foams are below, nothing is above
 SOFT, HARD = 1e6, 2e12  # [Pa]; rubber and diamond
 BENT = 0.1  # of its size: more is no small displacement
+RIGID = 1e-12  # of the largest squared frequency, below which the lowest one is rounding
 WATCHED = 6  # modes whose resonance is looked at
 
 
@@ -53,6 +54,14 @@ def odd_materials(materials: Mapping[str, Material]) -> list[str]:
     return remarks
 
 
+def _free(system: SecondOrderSystem) -> bool:
+    """Whether a reduced structure moves as a rigid body but for rounding."""
+    if not isinstance(system.stiffness, np.ndarray):
+        return False
+    squares = eigh(system.stiffness, system.mass, eigvals_only=True, subset_by_index=(0, min(12, len(system.mass) - 1)))
+    return bool(abs(squares[0]) < RIGID * squares[-1])
+
+
 def odd_deflection(
     scene: MeshScene, system: SecondOrderSystem, largest: Callable[[np.ndarray], float], size: float
 ) -> list[str]:
@@ -66,6 +75,8 @@ def odd_deflection(
     try:
         solve = _solver(system.stiffness)
     except (ValueError, LinAlgError):  # nothing holds it but the contact
+        return []
+    if _free(system):
         return []
     for name, load in {**scene.loads.static, **scene.loads.harmonic}.items():
         if name in system.loads:

@@ -1,0 +1,59 @@
+"""A free decay: peaks of a known oscillation, and a friction element against its backbone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.helpers.verification_models import oscillator
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, backbone
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.time.ring_down import from_peaks, ring_down
+
+MASS, STIFFNESS, RATIO = 1.3, 4.0e4, 0.003
+
+
+def test_the_peaks_of_a_linear_decay_give_its_frequency_and_damping():
+    omega, zeta = 150.0, 0.01
+    t = np.arange(6000) * 2 * np.pi / omega / 256
+    damped = omega * np.sqrt(1 - zeta**2)
+    found = from_peaks(t, 3e-6 + 2e-4 * np.exp(-zeta * omega * t) * np.cos(damped * t))
+    np.testing.assert_allclose(found.omega, damped, rtol=1e-5)
+    np.testing.assert_allclose(found.damping, zeta / np.sqrt(1 - zeta**2), rtol=2e-3)
+    assert found.amplitude[0] > found.amplitude[-1]
+    with pytest.raises(ValueError, match="too short"):
+        from_peaks(t[:300], np.cos(omega * t[:300]))
+
+
+def test_a_friction_element_decays_along_its_backbone():
+    """Its frequency is the backbone's; its amplitude falls faster than the damping there says, by (k + k_eq) / k.
+
+    From one turning point to the next k (a_1^2 - a_2^2) / 2 is lost to friction, 2 F (a - s): the slider's own spring
+    holds the same energy at both. The damping of a nonlinear mode counts the same loss against m w^2 a^2.
+    """
+    kt, kn, mu, press = 4.0e3, 5.0e6, 0.4, 50.0
+    parameters = ContactParameters.of(("t1", "n"), [[kt, kn]], friction=mu)
+    balance = HarmonicBalance.of(
+        oscillator(MASS, STIFFNESS, RATIO),
+        Joint("contact", "jenkins", parameters),
+        HarmonicBasis((0, 1, 2, 3), 512),
+        Excitation.of({"normal": press}),
+        1000.0,
+    )
+    slip = mu * press / kt
+    mode = backbone(balance, 0.5 * slip, 20 * slip, options=BackboneOptions(60))
+    decay = ring_down(balance, mode, 150, 256, least=0.6 * slip)
+    amplitude = np.linalg.norm(mode.response[:, 0][:, mode.order == 1], axis=1)
+    inside = (decay.amplitude > 2.5 * slip) & (decay.amplitude < 15 * slip)
+    assert inside.sum() > 10
+    at = np.log(decay.amplitude[inside])
+    omega, zeta = (np.interp(at, np.log(amplitude), values) for values in (mode.omega, mode.damping))
+    np.testing.assert_allclose(decay.omega[inside], omega, rtol=1e-3)
+    friction = zeta - RATIO * np.sqrt(STIFFNESS / MASS) / omega  # the dashpot's part keeps its ratio
+    faster = friction * MASS * omega**2 / STIFFNESS + zeta - friction
+    np.testing.assert_allclose(decay.damping[inside], faster, rtol=1e-2)
+    assert np.abs(decay.damping[inside] / zeta - 1).max() > 0.015
