@@ -1,4 +1,4 @@
-"""Sparse factorisation of a symmetric matrix: PARDISO where it is installed, else SuperLU after METIS."""
+"""Sparse factorisation of a symmetric matrix: PARDISO where it is installed, else SuperLU after METIS; or multigrid."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, triu
 from scipy.sparse.linalg import splu
+
+from tribodyn.fem.multigrid import Multigrid
 
 # Relative residual of the softest direction that still counts as regular. Measured: a plate 2000 times longer than
 # thick reaches 0.05, a body that can move rigidly 6 to 1000.
@@ -30,20 +32,25 @@ class Factor(Protocol):
     def solve(self, rhs: np.ndarray) -> np.ndarray: ...
 
 
-def factorise(K: Any, definite: bool = True, solver: str | None = None) -> Factor:
+def factorise(K: Any, definite: bool = True, solver: str | None = None, shapes: np.ndarray | None = None) -> Factor:
     """Factorise a sparse symmetric real matrix once, for many right-hand sides.
 
     K : (n, n) scipy.sparse; definite : K is positive definite (False for a shifted, indefinite matrix)
-    solver : "pardiso" or "superlu", the best available by default
+    solver : "pardiso" or "superlu", the best available by default; "multigrid" has no factor and iterates
+    shapes : (n, k) motions that K hardly resists, for multigrid
     Raises  SingularStiffness where K is singular, as when a body can still move rigidly; MemoryError
     """
     K = csr_matrix(K)
     if solver is None:
         solver = "pardiso" if pardiso_available() else "superlu"
-    elif solver not in ("pardiso", "superlu"):
-        raise ValueError(f"no solver '{solver}': there are pardiso, superlu")
+    elif solver not in ("pardiso", "superlu", "multigrid"):
+        raise ValueError(f"no solver '{solver}': there are pardiso, superlu, multigrid")
     try:
-        factor: Factor = Pardiso(K, definite) if solver == "pardiso" else SuperLU(K, definite)
+        factor: Factor
+        if solver == "multigrid":
+            factor = Multigrid(K, shapes)
+        else:
+            factor = Pardiso(K, definite) if solver == "pardiso" else SuperLU(K, definite)
         regular = softest_residual(K, factor.solve) < SINGULAR
     except (RuntimeError, ArithmeticError):
         regular = False

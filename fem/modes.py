@@ -54,6 +54,7 @@ def modes(
                     OPinv=LinearOperator(K.shape, matvec=factor.solve, dtype=float),
                     v0=np.random.default_rng(0).standard_normal(size),
                     maxiter=RESTARTS,
+                    tol=getattr(factor, "tolerance", 0.0),  # of solutions by iteration
                 )
             except ArpackNoConvergence as trouble:
                 raise ValueError(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.command import leave
-from tribodyn.workflows.benchmarks import scaling
+from tribodyn.workflows.benchmarks import large_fe, scaling
 
 
 def test_small_sizes_converge_and_memory_is_their_own(
@@ -36,3 +36,19 @@ def test_the_slope_is_the_exponent() -> None:
     assert scaling.slope(rows) == pytest.approx(1.25, rel=1e-12)
     assert "power of 1.25" in scaling.as_text(rows)
     assert np.isfinite(scaling.slope(rows[:2]))
+
+
+def test_a_reduction_is_measured_in_three_ways(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pyamg")
+    monkeypatch.setattr(large_fe, "MODES", 4)
+    rows = [large_fe.measure(size, way, n_patch=3) for size in ((4, 1), (12, 2)) for way in large_fe.WAYS]
+    assert [row.way for row in rows] == [*large_fe.WAYS] * 2
+    assert rows[0].dofs == rows[1].dofs == rows[2].dofs < rows[3].dofs
+    assert len({row.masters for row in rows}) == 1
+    multigrid = rows[5]
+    assert multigrid.error < 1e-8
+    assert multigrid.iterations > 1
+    text = large_fe.as_text(rows)
+    assert "by hand: seconds grow with the power" in text
+    with pytest.raises(ValueError, match='no size "30": there are 30k'):
+        large_fe.run(["30"], lambda said: None)

@@ -19,6 +19,7 @@ def bench(
     *,
     quick: Flag = False,
     scaling: Flag = False,
+    fe: Annotated[tuple[str, ...], Parameter(name="--fe", negative=(), consume_multiple=False)] = (),
     out: Path = Path("scaling.png"),
     as_json: Json = False,
 ) -> None:
@@ -30,11 +31,20 @@ def bench(
         Harmonics 0+1 and 0+3 on one thread, in under a minute; with --scaling up to 13 x 13 contact nodes.
     scaling
         Time and memory of one response at 0+3 from 5 x 5 to 31 x 31 contact nodes instead, with a plot.
+    fe
+        Time and memory of a reduction at "30k", "100k", "300k" or "1M" DOFs instead, beside plain statements of the
+        same library and beside multigrid; can be repeated.
     out
-        File of that plot.
+        File of the plot of --scaling.
     as_json
         Print JSON for machines.
     """
+    if fe:
+        from tribodyn.workflows.benchmarks import large_fe
+
+        costs = large_fe.run(fe, aside)
+        print(json.dumps(large_fe.as_records(costs), indent=2) if as_json else large_fe.as_text(costs))
+        return
     if scaling:
         make_room(out, PICTURE)
         _scaling(quick, out, as_json)

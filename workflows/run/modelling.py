@@ -87,7 +87,7 @@ def build(file: SceneFile, folder: Path | None, progress: Progress, chosen: tupl
     else:
         with progress.stage("mesh"):
             mesh, node_sets = make_mesh(file, folder)
-            memory.check(3 * mesh.doflocs.shape[1])
+            memory.check(3 * mesh.doflocs.shape[1], file.mesh_scene.reduction.solver)
         with progress.stage("mass and stiffness"):
             part = make_part(file.mesh_scene, mesh, node_sets, file.folder)
         part, repairs = with_surfaces(file.mesh_scene, part, file.folder)

@@ -13,6 +13,7 @@ from tribodyn.fem.assembly import pieces
 from tribodyn.fem.factor import SingularStiffness
 from tribodyn.fem.interface import COMPONENTS
 from tribodyn.fem.material import Material
+from tribodyn.fem.multigrid import rigid_motions
 from tribodyn.fem.part import Part
 from tribodyn.fem.springs import Spring
 from tribodyn.reduction.craig_bampton import craig_bampton
@@ -68,11 +69,14 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
     # a shank sees the whole static shape of the faces that it pulls at, which no few modes have
     shanks = [np.flatnonzero(row) for name, row in part.system.outputs.items() if name.startswith(BOLTS)]
     extra = np.concatenate([[], *held, *shanks]).astype(int)
+    how: dict[str, Any] = {}
+    if wanted.solver == "multigrid":
+        how = {"solver": "multigrid", "shapes": rigid_motions(part.points)[part.free]}
     try:
-        reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, extra)
+        reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, extra, **how)
     except SingularStiffness:  # a body that no support, joint or load has a master on
         extra = np.union1d(extra, anchors(part, relative_dofs))
-        reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, extra)
+        reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, extra, **how)
     if wanted.interface_modes is not None:
         masters = reduced.info.master_dofs
         touched = np.flatnonzero(np.abs(np.asarray(reduced.interface.B)[:, : len(masters)]).max(axis=0))

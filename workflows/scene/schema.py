@@ -131,6 +131,7 @@ class MeshScene(Scene):
             ("motion", bool(self.motion)),
             ("prescribed", bool(self.prescribed)),
             ("reduction.relative", self.reduction.relative),
+            ("reduction.solver", self.reduction.solver != "direct"),
             ("reduction.interface_modes", self.reduction.interface_modes is not None),
             ("response.stability", self.response.stability),  # perturbations see other waves than the solution does
         ):

@@ -111,6 +111,9 @@ class Reduction(Table):
     """Number of fixed-interface modes."""
     cutoff: Annotated[Frequency, Field(gt=0)] | None = None
     """Frequency up to which fixed-interface modes are kept, instead of their number."""
+    solver: Literal["direct", "multigrid"] = "direct"
+    """How the part's equations are solved: by a factor, or, where none fits the memory, by conjugate gradients with
+    algebraic multigrid, which takes far longer."""
     interface_modes: Annotated[StrictInt, Field(ge=1)] | None = None
     """Replace the masters by this number of characteristic constraint modes."""
     interface_keep: tuple[str, ...] | None = None
@@ -121,6 +124,12 @@ class Reduction(Table):
     def _interface(self) -> Reduction:
         if self.interface_modes is None and self.interface_keep is not None:
             raise ValueError("expected interface_keep only with interface_modes")
+        return self
+
+    @model_validator(mode="after")
+    def _iterates(self) -> Reduction:
+        if self.solver == "multigrid" and self.relative:
+            raise ValueError('expected solver = "direct" with relative = true')
         return self
 
     @model_validator(mode="after")

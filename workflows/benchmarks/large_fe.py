@@ -1,0 +1,173 @@
+"""How the cost of a reduction grows with the mesh: the product, plain statements of the same library, and multigrid.
+
+Everything is measured in a process of its own, so that its peak memory is its own; seconds are processor seconds of one
+thread.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.linalg import LinearOperator, eigsh
+from threadpoolctl import threadpool_limits
+
+from tribodyn.fem.factor import factorise
+from tribodyn.fem.multigrid import rigid_motions
+from tribodyn.fem.part import Part
+from tribodyn.reduction.craig_bampton import master_dofs
+from tribodyn.workflows.run import memory, modelling, part_reduction
+from tribodyn.workflows.scene import scene_file
+
+SIZES = {  # of the beam, name -> elements along it and through its height; 13 x 13 contact nodes in all of them
+    "30k": (24, 6), "100k": (44, 12), "300k": (88, 18), "1M": (170, 36),
+}  # fmt: skip
+WAYS = ("product", "by hand", "multigrid")
+BLOCK, MODES, COLUMNS = 128, 15, 3  # columns : constraint modes that multigrid is measured on
+
+
+@dataclass(frozen=True)
+class FeCost:
+    """One size of the mesh, by one way.
+
+    way : "product", "by hand" or "multigrid"; dofs, masters; seconds : stage -> processor seconds; peak_bytes : memory
+    error : of constraint modes by conjugate gradients against a factor's, relative; iterations : of one of them
+    """
+
+    way: str
+    dofs: int
+    masters: int
+    seconds: dict[str, float]
+    peak_bytes: float
+    error: float = 0.0
+    iterations: float = 0.0
+
+
+def run(sizes: Sequence[str], say: Callable[[str], None]) -> list[FeCost]:
+    """Measure sizes by name, each way in a process of its own.
+
+    Raises  ValueError for a size that is not known
+    """
+    rows = []
+    for size in sizes:
+        if size not in SIZES:
+            raise ValueError(f'no size "{size}": there are {", ".join(SIZES)}')
+        for way in WAYS:
+            say(f"{size} DOFs, {way}")
+            with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as alone:
+                rows.append(alone.submit(measure, SIZES[size], way).result())
+    return rows
+
+
+def measure(size: tuple[int, int], way: str, n_patch: int = 13) -> FeCost:
+    """One size by one way, on one thread."""
+    changes = [f"geometry.n_length={size[0]}", f"geometry.n_height={size[1]}", f"geometry.n_patch={n_patch}"]
+    file = scene_file.read("beam", [*changes, f"reduction.modes={MODES}"])
+    scene = file.part_scene
+    with threadpool_limits(1), TemporaryDirectory() as folder:
+        mesh, node_sets = modelling.make_mesh(file, Path(folder))
+        memory.forget_peak()
+        clock = _Clock()
+        part = modelling.make_part(scene, mesh, node_sets, file.folder)
+        clock("assembly")
+        if way == "product":
+            reduced = part_reduction.reduce(scene, part)
+            clock("reduction")
+            found = FeCost(way, part.system.n_dof, len(reduced.info.master_dofs), clock.seconds, memory.peak())
+        elif way == "by hand":
+            found = _by_hand(part, clock)
+        else:
+            found = _multigrid(part, clock)
+    return found
+
+
+class _Clock:
+    """Processor seconds from call to call."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._last = time.process_time()
+
+    def __call__(self, stage: str) -> None:
+        now = time.process_time()
+        self.seconds[stage], self._last = now - self._last, now
+
+
+def _split(part: Part) -> tuple[np.ndarray, np.ndarray]:
+    masters = np.unique(master_dofs(part.system, part.interface))
+    return np.setdiff1d(np.arange(part.system.n_dof), masters), masters
+
+
+def _by_hand(part: Part, clock: _Clock) -> FeCost:
+    """The reduction as plain statements on the same solver, with what it holds at once."""
+    s, m = _split(part)
+    K, M = csr_matrix(part.system.stiffness), csr_matrix(part.system.mass)
+    K_ss, M_ss = K[s][:, s], M[s][:, s]
+    factor = factorise(K_ss)
+    clock("factor")
+    inverse = LinearOperator(K_ss.shape, matvec=factor.solve, dtype=float)
+    _, phi = eigsh(K_ss, k=MODES, M=M_ss, sigma=0.0, OPinv=inverse, v0=np.ones(len(s)))
+    clock("modes")
+    psi = -factor.solve(K[s][:, m].toarray())
+    clock("constraint modes")
+    basis = np.zeros((part.system.n_dof, len(m) + MODES))
+    basis[m, np.arange(len(m))] = 1.0
+    basis[s] = np.hstack([psi, phi])
+    stiffness, _ = basis.T @ (K @ basis), basis.T @ (M @ basis)
+    clock("projection")
+    assert stiffness.shape == (len(m) + MODES,) * 2
+    return FeCost("by hand", part.system.n_dof, len(m), clock.seconds, memory.peak())
+
+
+def _multigrid(part: Part, clock: _Clock) -> FeCost:
+    """Some constraint modes by conjugate gradients; the factor that they are compared with comes last."""
+    s, m = _split(part)
+    K = csr_matrix(part.system.stiffness)
+    K_ss, some = K[s][:, s], np.linspace(0, len(m) - 1, COLUMNS).astype(int)
+    rhs = -K[s][:, m[some]].toarray()
+    clock("split")
+    solver: Any = factorise(K_ss, solver="multigrid", shapes=rigid_motions(part.points)[part.free][s])
+    clock("set-up")
+    before = solver.iterations
+    found = solver.solve(rhs)
+    clock("constraint modes")
+    clock.seconds["constraint modes"] /= COLUMNS  # of one
+    peak = memory.peak()
+    exact = factorise(K_ss).solve(rhs)
+    error = float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
+    iterations = (solver.iterations - before) / COLUMNS
+    return FeCost("multigrid", part.system.n_dof, len(m), clock.seconds, peak, error, iterations)
+
+
+def as_records(rows: Sequence[FeCost]) -> list[dict[str, Any]]:
+    """The rows for JSON."""
+    return [asdict(row) for row in rows]
+
+
+def as_text(rows: Sequence[FeCost]) -> str:
+    """The rows for people, with exponents of seconds and memory over DOFs where there are several sizes."""
+    lines = []
+    for row in rows:
+        told = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in row.seconds.items())
+        more = f", {row.iterations:.0f} iterations, error {row.error:.1e}" if row.way == "multigrid" else ""
+        lines.append(
+            f"{row.dofs:9d} DOFs, {row.masters} masters, {row.way:10} {row.peak_bytes / 1e9:6.2f} GB: {told}{more}"
+        )
+    for way in dict.fromkeys(row.way for row in rows):
+        own = [row for row in rows if row.way == way]
+        if len({row.dofs for row in own}) > 1:
+            size = np.log([row.dofs for row in own])
+            powers = [
+                np.polyfit(size, np.log(y), 1)[0]
+                for y in ([sum(r.seconds.values()) for r in own], [r.peak_bytes for r in own])
+            ]
+            lines.append(f"{way}: seconds grow with the power {powers[0]:.2f} of the DOFs, memory with {powers[1]:.2f}")
+    return "\n".join(lines)
