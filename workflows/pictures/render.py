@@ -95,7 +95,7 @@ def figures(
     found: dict[str, Callable[[], Figure]] = {}
     if result.part is not None and result.fields is not None:
         found["part"] = partial(part_picture, result, deformation, wear)
-    if len(result.patch.faces):
+    if len(result.patch.faces) and result.patch.in_one_plane:
         found["contact"] = partial(contact_picture, result, wear)
     wheel = render_wheel.wheel_of(result)
     if wheel is not None and result.fields is not None:

@@ -51,8 +51,10 @@ def meetings(frequency: np.ndarray, n_sectors: int, slow: float, fast: float) ->
     frequency : (n_diameter, family) of the nodal diameters from 0 on [Hz], taken as the same at all speeds of the range
     slow, fast : ends of the range [Hz], slow above 0
     """
-    found = []
-    for order in range(1, int(frequency.max() / slow) + 1):
+    found: list[Meeting] = []
+    if np.isnan(frequency).all():
+        return found
+    for order in range(1, int(np.nanmax(frequency) / slow) + 1):
         diameter = diameter_of(order, n_sectors)
         if diameter >= len(frequency):
             continue
@@ -62,13 +64,20 @@ def meetings(frequency: np.ndarray, n_sectors: int, slow: float, fast: float) ->
     return found
 
 
+def _top(families: Families) -> float:
+    """A little above the highest frequency [Hz]."""
+    return 1.08 * max(float(np.nanmax(values)) for values in families.values() if not np.isnan(values).all())
+
+
 def nodal_diameters(families: Families) -> Figure:
     """Frequencies over nodal diameters, for each state of the contact."""
     with axes_of(7.2, 4.8) as (figure, axes):
         for state, values in families.items():
             _families(axes, values, *STATES[state])
         axes.set(xlabel="nodal diameter", ylabel="frequency / Hz", title="Nodal diameters")
-        axes.set_ylim(0, 1.08 * max(float(values.max()) for values in families.values()))
+        axes.set_ylim(
+            0, 1.08 * max(float(np.nanmax(values)) for values in families.values() if not np.isnan(values).all())
+        )
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         figure.legend(loc="outside lower center", ncols=len(families))
     return figure
@@ -93,9 +102,9 @@ def campbell(
         top = 1.3 * float(found["stuck"][:, :, 0].max())
         for i, (order, color) in enumerate(zip(orders, shades(len(orders)), strict=True)):
             axes.plot(rpm, found["stuck"][:, i, 0], color=color, label=f"stuck, engine order {order}")
-            axes.plot(rpm, order * speeds, ":", color=color, lw=1)
+            axes.plot(rpm, abs(order) * speeds, ":", color=color, lw=1)
             for speed in critical.get(order, ()):
-                axes.plot(60 * speed, order * speed, "o", color=RED, ms=6, zorder=4)
+                axes.plot(60 * speed, abs(order) * speed, "o", color=RED, ms=6, zorder=4)
         axes.plot([], [], "o", color=RED, ms=6, label="critical speed")
         axes.set(xlabel="speed / rpm", ylabel="frequency / Hz", title="Campbell diagram, first mode", ylim=(0, top))
         axes.set_xlim(0, rpm[-1])
@@ -111,7 +120,7 @@ def safe(families: Families, n_sectors: int, slow: float, fast: float) -> Figure
     if not 0 < slow < fast:
         raise ValueError(f"a SAFE diagram from {slow:g} to {fast:g} Hz: give two speeds above 0, the lower one first")
     most = max(len(values) for values in families.values()) - 1
-    top = 1.08 * max(float(values.max()) for values in families.values())
+    top = _top(families)
     with axes_of(7.6, 5.2) as (figure, axes):
         orders = np.arange(1, int(top / slow) + 2)
         places = np.array([diameter_of(int(order), n_sectors) for order in orders])

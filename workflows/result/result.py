@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from tribodyn.hbm.continuation.branch import Branch
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PEAKS = 3  # of a response that does not wear, shown in pictures
+
+SAME_PLANE = 0.95  # cosine between the normals of faces from which on they are drawn in one plane
 
 
 @dataclass(frozen=True)
@@ -58,8 +62,43 @@ class Patch:
 
     @property
     def flat(self) -> np.ndarray:
-        """(n_pair, 2) positions in the mean tangential plane, from the middle of the patch [m]."""
-        return np.asarray((self.points - self.points.mean(0)) @ self.frames.mean(0)[:2].T)
+        """(n_pair, 2) positions in the mean tangential plane, from the middle of the patch [m].
+
+        Faces that do not look the same way lie each in its own plane, one above the other along t2
+        """
+        if self.in_one_plane:
+            return np.asarray((self.points - self.points.mean(0)) @ self.frames.mean(0)[:2].T)
+        placed, top = np.zeros((len(self.points), 2)), 0.0
+        own = [self._alone(self.face_of == face) for face in range(self.face_of.max() + 1)]
+        space = 0.2 * min(float(np.ptp(face[:, 1])) for face in own)
+        for face, points in enumerate(own):
+            points[:, 1] += top - points[:, 1].min()
+            top = float(points[:, 1].max()) + space
+            placed[self.face_of == face] = points
+        return placed - (placed.min(axis=0) + placed.max(axis=0)) / 2
+
+    @property
+    def face_of(self) -> np.ndarray:
+        """(n_pair,) number of the connected face that each pair belongs to, from 0, in the order of the pairs."""
+        n = len(self.points)
+        first = np.repeat(self.faces[:, 0], self.faces.shape[1])
+        links = coo_matrix((np.ones(self.faces.size), (first, self.faces.ravel())), shape=(n, n))
+        return np.asarray(connected_components(links, directed=False)[1])
+
+    @property
+    def in_one_plane(self) -> bool:
+        """Whether all faces look the same way, or there is one only."""
+        if not len(self.faces):
+            return True
+        of = self.face_of
+        normals = np.array([self.frames[of == face, 2].mean(axis=0) for face in range(of.max() + 1)])
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        return bool((normals @ normals.T).min() > SAME_PLANE)
+
+    def _alone(self, pairs: np.ndarray) -> np.ndarray:
+        """Positions of some pairs in their own mean plane."""
+        points = self.points[pairs]
+        return np.asarray((points - points.mean(0)) @ self.frames[pairs].mean(0)[:2].T)
 
     def moved(self, mesh: np.ndarray, points: np.ndarray, frames: np.ndarray) -> Patch:
         """The same patch elsewhere on the part, at the nodes of the mesh (n_node, 3) [m] nearest to its points."""

@@ -120,6 +120,7 @@ def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]
 
 def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], folder: Path | None = None) -> Part:
     """Mass, stiffness, loads, outputs and contact of the mesh, held where the scene says; its files are in `folder`."""
+    sector.check_sectors(scene)
     material = part_reduction.material(scene, mesh)
     loads = {
         name: make_load(load, mesh, material, folder or Path())

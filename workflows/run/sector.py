@@ -21,9 +21,6 @@ def sector(scene: MeshScene, part: Part) -> Sector:
     """
     wheel = scene.wheel
     assert wheel is not None
-    for made_for in blades_of_parts(scene):
-        if made_for != wheel.sectors:
-            raise ValueError(f"wheel.sectors = {wheel.sectors}, but the part is made for n_blades = {made_for}")
     cuts = [tuple(name for name in part.node_sets if name.rpartition(".")[2] == side) for side in SEAM]
     if wheel.seam is None and all(cuts):
         (right, *_), (left, *_) = cuts
@@ -40,12 +37,17 @@ def sector(scene: MeshScene, part: Part) -> Sector:
     return rotation.spun(scene, part, found) if wheel.speed else found
 
 
-def blades_of_parts(scene: MeshScene) -> set[int]:
-    """The number of blades that parts of a scene are made for, where they say one."""
+def check_sectors(scene: MeshScene) -> None:
+    """Raise ValueError where a part of the scene is made for another number of sectors than its wheel has."""
+    if scene.wheel is None:
+        return
     tables = list(scene.bodies.values()) if isinstance(scene, StructureScene) else []
     own = scene.geometry if isinstance(scene, PartScene | StructureScene) else None
     given = [table.parameters for table in (*tables, own) if table is not None]
-    return {int(of["n_blades"]) for of in given if "n_blades" in of}
+    for parameters in given:
+        made_for = parameters.get("n_blades", scene.wheel.sectors)
+        if made_for != scene.wheel.sectors:
+            raise ValueError(f"wheel.sectors = {scene.wheel.sectors}, but the part is made for n_blades = {made_for}")
 
 
 def reduced(scene: MeshScene, full: Sector) -> ReducedSector:

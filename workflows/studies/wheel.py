@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from tribodyn.fem.cyclic import Sector
+from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
@@ -53,9 +54,17 @@ class Wheel:
         return joints.contact_stiffness(self.scene, travelling_wave(self.reduced, 0))
 
     def diagram(self, diameters: Sequence[int], families: int, stuck: bool, full: bool = False) -> np.ndarray:
-        """Frequencies (n_diameter, families) [Hz] of nodal diameters, of the reduced or of the full sector."""
+        """Frequencies (n_diameter, families) [Hz] of nodal diameters, of the reduced or of the full sector.
+
+        nan where the contact is open and rotation carries away what only it holds
+        """
         sector = self.full if full else self.reduced.sector
-        return nodal_diameters(sector, diameters, families, self.springs if stuck else None)
+        try:
+            return nodal_diameters(sector, diameters, families, self.springs if stuck else None)
+        except StaticDivergence:
+            if stuck:
+                raise
+            return np.full((len(diameters), families), np.nan)
 
     def wave(self, engine_order: int | None = None, frequency: tuple[float, float] | None = None) -> HarmonicBalance:
         """The balance under a travelling wave; engine order and range of frequencies [Hz] default to the scene's."""
@@ -142,6 +151,6 @@ def campbell(
 
 def critical_speeds(speeds: np.ndarray, frequency: np.ndarray, order: int) -> list[float]:
     """Speeds [Hz] at which an engine order meets a frequency (n_speed,) of its wave [Hz]."""
-    miss = frequency - order * speeds
+    miss = frequency - abs(order) * speeds
     cross = np.flatnonzero((miss[:-1] > 0) != (miss[1:] > 0))
     return [float(speeds[i] + (speeds[i + 1] - speeds[i]) * miss[i] / (miss[i] - miss[i + 1])) for i in cross]

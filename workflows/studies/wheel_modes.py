@@ -72,6 +72,9 @@ class WheelModes:
         """What was found, for people."""
         said = []
         for state, values in self.families.items():
+            if np.isnan(values).all():
+                said.append(f"contact {state}: rotation carries away what only the contact holds")
+                continue
             low, high = values[:, 0].min(), values[:, 0].max()
             said.append(f"first family, contact {state}: {low:.6g} to {high:.6g} Hz")
         for state, met in self.meetings().items():
@@ -101,15 +104,15 @@ def study(
         raise ValueError("--from and --to: give speeds above 0, the lower one first")
     if count < 2:
         raise ValueError(f"--speeds {count}: a Campbell diagram needs 2 at least")
-    if any(order < 1 for order in orders):
-        raise ValueError("--order: engine orders are 1 or more")
+    if 0 in orders:
+        raise ValueError("--order: engine orders are 1 or more, or -1 or less for waves against the rotation")
     with limited(file.scene.solver.threads):
         wheel = build(file)
         own = wheel.scene.wheel
         assert own is not None
         diameters = range(wheel.n_sectors // 2 + 1)
         found = {state: wheel.diagram(diameters, families, state == "stuck") for state in ("free", "stuck")}
-        chosen = tuple(orders) or (max(own.engine_order, 1),)
+        chosen = tuple(orders) or (own.engine_order or 1,)
         speeds, waves = np.zeros(0), dict[str, np.ndarray]()
         if fast is not None:
             speeds, waves = campbell(wheel, fast, count, chosen, 1)

@@ -1,0 +1,74 @@
+"""The turbine wheel on a coarse mesh: forces balance on every body, every contact has its own wear and life."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tribodyn as td
+from tribodyn.geometry import bladed_sector
+from tribodyn.workflows.result import summary
+
+COARSE = (
+    *("bodies.blade.n_span=2", "bodies.blade.n_along=3", "bodies.blade.n_up=2", "bodies.disk.n_axial=2"),
+    *("bodies.damper.n_damper=1", "bodies.blade.hub_radius=200 mm"),
+)
+JOINTS = {"root_right", "root_left", "damper_right", "damper_left", "shroud"}
+
+
+@pytest.fixture(scope="module")
+def found() -> dict[str, td.BodyForces]:
+    return {one.body: one for one in td.body_forces(td.read_scene("turbine", COARSE))}
+
+
+@pytest.mark.parametrize("body", ["blade", "damper"])
+def test_contact_forces_carry_the_centrifugal_load(found: dict[str, td.BodyForces], body: str) -> None:
+    """Acceptance 18.1: to 1e-8."""
+    one = found[body]
+    assert not one.held
+    assert one.imbalance < 1e-8
+    assert set(one.joints) == (JOINTS if body == "blade" else {"damper_right", "damper_left"})
+    assert found["disk"].held
+
+
+def test_centrifugal_load_of_the_damper_is_that_of_its_drawing(found: dict[str, td.BodyForces]) -> None:
+    """Mass of the trapezoidal prism times speed squared times the radius of its centre; it moves out by some 1e-3."""
+    p, speed, density = bladed_sector.Parameters(), 2 * np.pi * 100, 8200.0
+    low, high = (p.gap_bottom + share * (p.gap_top - p.gap_bottom) for share in (p.damper_low, p.damper_high))
+    tall = p.platform_height * (p.damper_high - p.damper_low)
+    centre = p.under + p.damper_low * p.platform_height + tall * (low + 2 * high) / (3 * (low + high))
+    expected = density * p.damper_length * tall * (low + high) / 2 * speed**2 * centre
+    assert np.linalg.norm(found["damper"].load) == pytest.approx(expected, rel=2e-3)
+
+
+def test_every_contact_is_told_by_itself() -> None:
+    changes = ("wear.at=860 Hz", "wear.max_steps=2", "wear.step=1 um", "wear.lost_below=0.999", "reduction.modes=8")
+    file = td.read_scene("turbine", (*COARSE, *changes, 'contacts.damper_left.wear={coefficient = "1e4 um3/J"}'))
+    model = td.build(file)
+    result = td.result_of(file, model.part, model.balance, td.wear(file, model.balance))
+    joints = summary.by_joint(result)
+    assert set(joints) == JOINTS
+    worn = {name: joint for name, joint in joints.items() if joint["energy_J"] > 0}
+    assert "shroud" in worn
+    for name, joint in worn.items():
+        coefficient = 1e-14 if name == "damper_left" else 2e-14
+        assert joint["volume_m3"] == pytest.approx(coefficient * joint["energy_J"], rel=1e-9)
+    assert all(pairs > 0 for pairs in (joint["pairs"] for joint in joints.values()))
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ("bodies.blade.gap_top=30 mm", r"gap_top is 0.03: give less than gap_bottom"),
+        ("bodies.blade.bulb_width=10 mm", r"bulb_width is 0.01: give more than neck_width"),
+        ("bodies.disk.disk_radius=180 mm", r"disk_radius is 0.18: give a radius below .* the bottom of the slot"),
+        ("bodies.damper.damper_length=60 mm", r"damper_length is 0.06: give at most platform_length"),
+        ("wheel.sectors=23", "wheel.sectors = 23, but the part is made for n_blades = 24"),
+        ("wheel.seam=", r'wheel.seam is missing, .* \["disk.cyclic_right", "disk.cyclic_left"\]'),
+        ("wheel=", "sector is for a"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(change: str, sentence: str) -> None:
+    with pytest.raises(ValueError, match=sentence) as raised:
+        td.build(td.read_scene("turbine", (*COARSE, change)))
+    assert "\n" not in str(raised.value)
