@@ -114,8 +114,10 @@ def lines(found: Sequence[BodyForces]) -> list[str]:
     for one in found:
         said.append(f"{one.body}: static load {_vector(one.load)} N")
         said += [f"  {name}: {_vector(force)} N" for name, force in one.joints.items()]
-        held = ", the rest is carried by supports" if one.held else ""
-        said.append(f"  out of balance by {one.imbalance:.1e} of it{held}")
+        if one.held:
+            said.append(f"  supports and neighbours: {_vector(-one.load - sum(one.joints.values()))} N")
+        else:
+            said.append(f"  out of balance by {one.imbalance:.1e} of the largest")
     return said
 
 
