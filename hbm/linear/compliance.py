@@ -60,10 +60,15 @@ class ContactCompliance:
             if basis.has_static and 0 in positions:
                 self._check_balance(self.groups[-1][0])
         self.error = max(e.error for e, _ in self.groups)
-        self.shared_real = len(self.groups) == 1 and not np.iscomplexobj(self.groups[0][0].w0)
+        self.shared_real = self._one_real()
         self.coarse = self._coarse_modes()
         self._points: dict[float, CompliancePoint] = {}
         self._active: tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray]]] | None = None
+
+    def _one_real(self) -> bool:
+        """Whether one real symmetric system serves all harmonics."""
+        first = self.groups[0][0]
+        return len(self.groups) == 1 and first.hermitian and not np.iscomplexobj(first.w0)
 
     def _check_balance(self, expansion: Expansion) -> None:
         """Raise UnbalancedLoad where static loads push a rigid motion of a structure that nothing holds."""
@@ -85,7 +90,7 @@ class ContactCompliance:
         other.base = None if self.base is None else self.basis.transfer(self.base, basis)
         kept = [(e, [basis.harmonics.index(old[p]) for p in ps if old[p] in basis.harmonics]) for e, ps in self.groups]
         other.groups = [(expansion, positions) for expansion, positions in kept if positions]
-        other.shared_real = len(other.groups) == 1 and not np.iscomplexobj(other.groups[0][0].w0)
+        other.shared_real = other._one_real()
         return other
 
     def _coarse_modes(self) -> np.ndarray:

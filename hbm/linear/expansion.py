@@ -11,9 +11,9 @@ A structure that nothing holds has rigid modes R, K_s R = 0 and B R = 0. With K_
 matrix above exists and R are modes like the others; their true Lambda, zero, stands in S. At s = 0 they cannot move:
 the static loads must be in equilibrium.
 
-which holds for any Hermitian damping matrix; with Coriolis forces C is not Hermitian and all modes are kept. The error
-falls like (|s| / omega_next)^order and is measured against a direct solve. What s multiplies is small beside W_0 and
-Phi: single precision keeps it exact enough.
+with L'(s) = Phi^H (I - s C W(s)), which for a Hermitian damping matrix is L(-s*)^H. With Coriolis forces C is not
+Hermitian; L' then comes from the same recursion with C^H. The error falls like (|s| / omega_next)^order and is measured
+against a direct solve. What s multiplies is small beside W_0 and Phi: single precision keeps it exact enough.
 Source  block elimination of modal coordinates (ours); static correction of truncated modes as in MacNeal 1971.
 """
 
@@ -69,6 +69,7 @@ class Expansion:
     w0 : (n_port, n_port) W_0; b : (n_port, m) modes; e : (order - 2, n_port, m) W_k C Phi s_max^(k+1) at the ports,
         all three views of `columns` = [w0, b, e_0, ...]
     w0_single, b_single : those of the contacts in single precision
+    e_in : the same of C^H, whose adjoint makes L'; e itself where C is Hermitian
     higher : order - 1 matrices (n_port, n_port) W_k s_max^k / unit, views of `single`, which holds them side by side
     error : relative, at s_max, against a direct solve
     rigid : (n, r) motions that nothing resists, mass-normalised; the first r modes
@@ -90,7 +91,8 @@ class Expansion:
             "the part can move as a rigid body even with all contacts stuck: clamp it, add a spring, "
             "or raise the contact stiffness"
         )
-        count = n if n < ALL_MODES_BELOW or system.gyroscopic is not None else TRUNCATIONS[-1][0]
+        count = n if n < ALL_MODES_BELOW else TRUNCATIONS[-1][0]
+        self.hermitian = system.gyroscopic is None
         self.rigid = np.zeros((n, 0))
         # a rigid mode comes out of the eigenvalue problem as rounding of the stiffest ones, of either sign
         rounding = n * np.finfo(float).eps * np.max(np.diag(stuck).real / np.diag(mass).real)
@@ -126,8 +128,7 @@ class Expansion:
         del stuck, free
         few = np.linspace(0, len(ports) - 1, min(len(ports), COMPARED_PORTS)).astype(int)
         before = np.inf
-        truncations = TRUNCATIONS if system.gyroscopic is None else ()
-        for m, order in (c for c in truncations if c[0] < len(lam)):  # tried between the probe and a few ports
+        for m, order in (c for c in TRUNCATIONS if c[0] < len(lam)):  # tried between the probe and a few ports
             self._build(lam[:m], phi[:, :m], factor, order, np.concatenate([force.conj().T, ports[few]]))
             moved = self.at(s).apply(np.eye(N_PROBE), slice(0, N_PROBE))[N_PROBE:]
             error = float(np.abs(moved - exact[few]).max() / np.abs(exact).max())
@@ -167,12 +168,19 @@ class Expansion:
         self.b[:] = at_ports @ phi
         # the largest compliance, so that no unit of length or force leaves the range of single precision
         self.unit = float(np.max(np.diag(self.w0).real + (np.abs(self.b) ** 2 / lam).sum(axis=1))) or 1.0
+        adjoint = cphi if self.hermitian else damping.conj().T @ phi
         for k in range(order - 1):
             if k < n_e:
                 self.e[k][:] = at_ports @ y[:, p:] * self.s_unit ** (k + 1)
-                self.t[k] = cphi.conj().T @ y[:, p:]
+                self.t[k] = adjoint.conj().T @ y[:, p:]
             y_before, y = y, -quasi_static(damping @ y + mass @ y_before)
             self.higher[k][:] = at_ports @ y[:, :p] * (self.s_unit ** (k + 1) / self.unit)
+        self.e_in = self.e
+        if not self.hermitian:
+            self.e_in, y_before, y = [], np.zeros_like(adjoint), adjoint if full else quasi_static(adjoint)
+            for k in range(n_e):
+                self.e_in.append(at_ports @ y * self.s_unit ** (k + 1))
+                y_before, y = y, -quasi_static(damping.conj().T @ y + mass @ y_before)
         self.left = np.ascontiguousarray(self.columns[:, p:].T)
         r = self.rigid.shape[1]
         self.lam = np.concatenate([np.zeros(r), lam[r:]])
@@ -281,7 +289,7 @@ class PortCompliance:
         """Displacement of the ports in `rows` under forces (n, ...) at the ports in `columns`."""
         x, ratio = self.expansion, self.ratio
         z = _product(x.b[columns].conj().T, force).astype(complex)
-        for k, e in enumerate(x.e, start=1):
+        for k, e in enumerate(x.e_in, start=1):
             z -= ratio**k * _product(e[columns].conj().T, force)
         y = self.through_core(z)
         out = _product(x.b[rows], y) + _product(x.w0[rows, columns], force)
@@ -296,7 +304,7 @@ class PortCompliance:
         x, s, ratio = self.expansion, self.s, self.ratio
         z, dz = _product(x.b.conj().T, force).astype(complex), np.zeros(len(x.lam), complex)
         d_core = 2 * s * np.eye(len(x.lam)) + x.c
-        for k, (e, t) in enumerate(zip(x.e, x.t, strict=True), start=1):
+        for k, (e, t) in enumerate(zip(x.e_in, x.t, strict=True), start=1):
             part = _product(e.conj().T, force)
             z -= ratio**k * part
             dz -= k * ratio ** (k - 1) / x.s_unit * part

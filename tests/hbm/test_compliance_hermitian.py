@@ -10,6 +10,7 @@ from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.linear import expansion
 from tribodyn.reduction.model import ReducedModel
 
 N_PAIR, N = 4, 40
@@ -126,3 +127,37 @@ def test_newton_direction_equals_the_derivative(balance):
     up, down = (balance.evaluate(omega, x + sign * step * direction).residual for sign in (1, -1))
     dense = balance.linearise(state).dense() @ direction.ravel()
     assert np.abs((up - down).ravel() / (2 * step) - dense).max() < 1e-5 * np.abs(dense).max()
+
+
+@pytest.mark.parametrize("is_complex", [False, True])
+def test_coriolis_forces_in_few_modes_against_a_direct_solve(is_complex):
+    """The expansion leaves modes out though damping and Coriolis forces couple them; its slope too."""
+    rng = np.random.default_rng(5)
+    n = 120
+    omega = np.geomspace(20, 4e4, n)
+
+    def matrix(rows, columns):
+        real = rng.normal(size=(rows, columns))
+        return real + 1j * rng.normal(size=(rows, columns)) if is_complex else real
+
+    basis = np.linalg.qr(matrix(n, n))[0]
+    half = matrix(n, n)
+    damping = basis.conj().T @ (np.diag(0.03 * omega) + 1e-2 * half @ half.conj().T) @ basis
+    gyroscopic = basis.conj().T @ (half - half.conj().T) @ basis
+    stiffness = basis.conj().T @ np.diag(omega**2) @ basis
+    system = SecondOrderSystem(np.eye(n), stiffness, damping, gyroscopic=gyroscopic)
+    ports = matrix(9, n)
+    found = expansion.Expansion(system, ports[:3], np.full(3, 1e3), ports, OMEGA)
+    assert found.n_mode < n
+    assert found.order > 2
+    dynamic = stiffness + ports[:3].conj().T @ (1e3 * ports[:3])
+    force = rng.normal(size=9) + 1j * rng.normal(size=9)
+    for w in (0.0, 0.3 * OMEGA, OMEGA):
+        s = 1j * w
+        q = np.linalg.solve(dynamic + s * (damping + gyroscopic) + s**2 * np.eye(n), ports.conj().T @ force)
+        exact = ports @ q
+        assert np.abs(found.at(s).apply(force) - exact).max() < 1e-8 * np.abs(exact).max()
+    step = 1e-5 * OMEGA
+    ahead, behind = (found.at(1j * (0.5 * OMEGA + d)).apply(force) for d in (step, -step))
+    slope = found.at(0.5j * OMEGA).slope(force)
+    assert np.abs(slope - (ahead - behind) / (2j * step)).max() < 1e-5 * np.abs(slope).max()
