@@ -111,6 +111,8 @@ class FreeVibration:
         if 1 not in self.basis.harmonics:
             raise ValueError("nonlinear modes need harmonic 1 among the harmonics")
         system, b = model.system, np.asarray(model.interface.B)
+        if system.gyroscopic is not None:
+            raise ValueError("nonlinear modes know no Coriolis forces: leave them out, wheel.coriolis = false")
         names = balance.compliance.output_names
         if not names or (output is not None and output not in names):
             raise ValueError(

@@ -133,6 +133,8 @@ class TimeStepper:
             )
         self.balance, self.omega, self.options = balance, omega, options
         system = model.system
+        if system.gyroscopic is not None:
+            raise ValueError("time integration knows no Coriolis forces: leave them out, wheel.coriolis = false")
         lam, phi = _free_modes(system)
         self.h = 2 * np.pi / omega / options.steps
         m = self.n_dynamic = max(1, int(np.sum(lam < (RESOLVED / self.h) ** 2)))
