@@ -94,7 +94,7 @@ def picture(found: Decay) -> Figure:
     """The decay, and frequency and damping from its peaks beside the backbone."""
     d = found.decay
     unit, scale = length_unit(d.amplitude.max())
-    with axes_of(7.2, 7.6, rows=3) as (figure, (top, upper, lower)):
+    with axes_of(7.2, 7.6, rows=3, share=False) as (figure, (top, upper, lower)):
         top.plot(1e3 * d.time, scale * d.displacement, color=BLUE, lw=0.7)
         top.set(xlabel="time / ms", ylabel=f"displacement / {unit}", title="Free decay")
         upper.semilogx(scale * found.amplitude, found.mode.frequency, color=BLUE, label="backbone")
