@@ -15,7 +15,7 @@ from scipy import stats
 
 import tribodyn as td
 from tests.helpers.command import leave
-from tribodyn.workflows.designs import design, pool, study_file
+from tribodyn.workflows.designs import design, pool, sensitivity_picture, study_file
 from tribodyn.workflows.designs import study as studies
 from tribodyn.workflows.designs.sensitivity import influences
 from tribodyn.workflows.designs.space import Space
@@ -40,7 +40,7 @@ MEDIAN = 1e8
 def _no_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """They take longer than all the rest."""
     if "command" not in request.node.name:
-        monkeypatch.setattr(studies, "draw", lambda found, folder: None)
+        monkeypatch.setattr(studies, "draw", lambda study, found, folder: None)
         monkeypatch.setattr(td.Lives, "plot", lambda self: Figure())
 
 
@@ -218,6 +218,8 @@ def test_lives_that_did_not_end_are_lower_bounds(tmp_path: Path, monkeypatch: py
     assert [q.at_least for q in found.quantiles] == [False, False, True]
     assert found.quantiles[0].value == pytest.approx(exact(0.1), rel=0.05)
     assert "at least" in found.lines()[-len(VARY) - 2]
+    few = td.lives(study(runs=64, lives={"model_error": 0, "shares": [0.8]}), tmp_path / "few")
+    assert few.quantiles[0].at_least  # below the lowest bound, but as many as that may survive
 
 
 def test_indices_of_correlated_variables_are_those_of_a_linear_function() -> None:
@@ -229,6 +231,24 @@ def test_indices_of_correlated_variables_are_those_of_a_linear_function() -> Non
     assert found["b"].first == pytest.approx((1 + 2 * 0.6) ** 2 / variance, abs=0.01)
     assert found["a"].total == pytest.approx(4 * (1 - 0.36) / variance, abs=0.01)
     assert found["b"].total == pytest.approx((1 - 0.36) / variance, abs=0.01)
+
+
+def test_a_study_of_lists_has_the_indices_of_its_box(tmp_path: Path) -> None:
+    lists = {"a": [1.0, 2.0, 3.0, 4.0], "b": [0.0, 0.5, 1.0, 1.5]}
+    tables = {"study": {"scene": "beam", "design": "grid"}, "vary": lists}
+    read = study_file.parse(tables, "mine.toml", Path())
+    rows = design.runs(read)
+    a, b = (np.array([row[key] for row in rows]) for key in "ab")
+    columns = {"run": np.arange(1, 17), "status": np.full(16, "complete", dtype=object), "a": a, "b": b}
+    table = td.StudyTable("mine", columns | {"peak_hz_first": np.exp(a + 2 * b)}, ("a", "b"))
+    told = sensitivity_picture.indices(Space.of(read, lists=True), table)
+    found = {one.key: one.first for one in told["peak_hz_first"][1]}
+    whole = 3.0**2 + (2 * 1.5) ** 2  # variance of a linear function of uniform variables
+    assert found == pytest.approx({"a": 9 / whole, "b": 9 / whole}, abs=0.01)
+    sensitivity_picture.picture("mine", told).savefig(tmp_path / "mine.png")
+    texts = {"study": {"scene": "beam", "design": "grid"}, "vary": {"a": ["x", "y"]}}
+    with pytest.raises(td.SceneError, match=r"vary.a: expected a distribution"):
+        Space.of(study_file.parse(texts, "mine.toml", Path()), lists=True)
 
 
 def test_a_surrogate_says_how_far_it_is_off_where_runs_are_left_out() -> None:

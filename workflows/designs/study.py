@@ -9,9 +9,10 @@ from typing import Any
 
 import tomli_w
 
-from tribodyn.workflows.designs import cluster, design, life_picture, parallel_picture, pool
+from tribodyn.workflows.designs import cluster, design, life_picture, parallel_picture, pool, sensitivity_picture
 from tribodyn.workflows.designs.journal import Journal
 from tribodyn.workflows.designs.shared_models import shared
+from tribodyn.workflows.designs.space import Space
 from tribodyn.workflows.designs.study_file import Study
 from tribodyn.workflows.designs.table import StudyTable, table, write
 from tribodyn.workflows.designs.task import Row, Task
@@ -80,11 +81,11 @@ def run(
                 write(found, folder)
         assert found is not None
         if drawn:
-            draw(found, folder)
+            draw(study, found, folder)
     return found
 
 
-def draw(found: StudyTable, folder: Path) -> None:
+def draw(study: Study, found: StudyTable, folder: Path) -> None:
     """Pictures of a study, as far as its runs make any."""
     if found.count("complete"):
         found.plot().savefig(folder / "study.png")
@@ -92,6 +93,12 @@ def draw(found: StudyTable, folder: Path) -> None:
             found.plot_parallel().savefig(folder / "parallel.png")
         if life_picture.possible(found):
             found.plot_distribution().savefig(folder / "life.png")
+        try:
+            told = sensitivity_picture.indices(Space.of(study, lists=True), found)
+        except SceneError:  # a key that is no number
+            told = {}
+        if told:
+            sensitivity_picture.picture(found.name, told).savefig(folder / "sensitivity.png")
 
 
 def _finished(tasks: Sequence[Task], workers: int, scheduler: str) -> Iterator[Row]:

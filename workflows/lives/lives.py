@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy import stats
 
 from tribodyn.workflows.accuracy.statement import QUANTITIES
 from tribodyn.workflows.designs import study as studies
@@ -42,7 +43,7 @@ class Quantile:
 
     low, high : of the wanted confidence, from the surrogate and the runs that are missing
     low_in_all, high_in_all : with the model's own error as well; the same where that is not known
-    at_least : runs ended before what they were to tell, so that the value is a lower bound
+    at_least : runs ended before what they were to tell, or survived, and the quantile may be one of theirs
     """
 
     share: float
@@ -63,7 +64,8 @@ class Quantile:
 class Lives:
     """A number as a distribution.
 
-    table : of the full runs; runs, cheap_runs, missing : how many have the number, cheap ones, how many lack it
+    table : of the full runs; runs : that have the number; open : of them, those with only a lower bound of it
+    cheap_runs : cheap ones; missing : runs that lack the number
     explained : share of the variance that the surrogate explains where runs are left out
     scatter : standard deviation of the number's logarithm; of the number itself where it is not always above 0
     model_error : relative, None where it is not known; model_error_of : where it is from, or why it is not known
@@ -77,6 +79,7 @@ class Lives:
     influences: tuple[Influence, ...]
     confidence: float
     runs: int
+    open: int
     cheap_runs: int
     missing: int
     explained: float
@@ -89,8 +92,8 @@ class Lives:
 
     def record(self) -> dict[str, Any]:
         """Plain data for machines."""
-        own = ("name", "number", "confidence", "runs", "cheap_runs", "missing", "explained", "scatter", "logarithmic",
-               "model_error", "model_error_of")  # fmt: skip
+        own = ("name", "number", "confidence", "runs", "open", "cheap_runs", "missing", "explained", "scatter",
+               "logarithmic", "model_error", "model_error_of")  # fmt: skip
         return {
             **{name: getattr(self, name) for name in own},
             "quantiles": [{"name": q.name, **asdict(q)} for q in self.quantiles],
@@ -99,7 +102,8 @@ class Lives:
 
     def lines(self) -> list[str]:
         """What a reader is told."""
-        runs = f"{self.runs} runs" + (f" and {self.cheap_runs} cheap ones" if self.cheap_runs else "")
+        runs = f"{self.runs} runs" + (f" ({self.open} of them survived, or ended before)" if self.open else "")
+        runs += f" and {self.cheap_runs} cheap ones" if self.cheap_runs else ""
         known = "not known: " + self.model_error_of if self.model_error is None else self.model_error_of
         error = "" if self.model_error is None else f"{100 * self.model_error:.2g} %, "
         found = [
@@ -111,7 +115,7 @@ class Lives:
         for q in self.quantiles:
             ends = f"{q.low:.4g} .. {q.high:.4g}"
             own = "" if self.model_error is None else f"{q.low_in_all:.4g} .. {q.high_in_all:.4g}"
-            least = "  (at least: runs ended before)" if q.at_least else ""
+            least = "  at least: some parts survive, or their runs ended before" if q.at_least else ""
             found.append(f"{q.name:8}{q.value:12.4g}   {ends:26}{own}{least}".rstrip())
         scatter = f"{100 * self.scatter:.3g} %" if self.logarithmic else f"{self.scatter:.3g}"
         found.append(f"scatter {scatter}; measured exactly, a key leaves of it (first and total Sobol index):")
@@ -164,7 +168,7 @@ def run(
         progress.say(f"after {done} runs P{100 * shares[0]:.6g} is known within {100 * half:.2g} %: runs are added")
         points = quantiles.next_runs(sample, found.surrogate, shares[0], min(BATCH, wanted.most - done))
         added += [space.run_of(point) for point in points]
-    studies.draw(table, folder)
+    studies.draw(study, table, folder)
     error, source = _model_error(study, space, table, folder, progress)
     told = _told(study, table, cheap, space, found, sample, shares, error, source)
     (folder / "lives.json").write_text(json.dumps(told.record(), indent=2) + "\n", encoding="utf-8")
@@ -176,18 +180,32 @@ def run(
 class _Fit:
     """A surrogate of a number.
 
-    logarithmic : of its logarithm; bound : lowest value that is only a lower bound; failed : share of runs without
+    logarithmic : of its logarithm; open : runs of which only a lower bound is known, bound : the lowest of them
+    failed : share of runs without
     """
 
     surrogate: Surrogate
     logarithmic: bool
     bound: float
+    open: int
     runs: int
     failed: float
+
+    def at_least(self, share: float, high: float, confidence: float) -> bool:
+        """Whether a quantile may belong to values of which only a lower bound is known.
+
+        So where its upper end reaches one of them, and where as many parts as its share leaves may have such values:
+        the surrogate is smooth, and a part that survives is not a part that lives a little longer
+        """
+        if not self.open:
+            return False
+        most = stats.beta.ppf(0.5 + confidence / 2, self.open + 1, self.runs - self.open)  # Clopper and Pearson 1934
+        return bool(high >= self.bound or share >= 1 - most)
 
     @classmethod
     def of(cls, space: Space, table: StudyTable, cheap: StudyTable | None, number: str) -> _Fit:
         values, bounds = _values(table, number)
+        open_ = np.isfinite(bounds)
         good = np.isfinite(values)
         if not good.any():
             raise SolveFailed(f"no run has a {number}; the first: {table.columns['sentence'][0]}")
@@ -199,23 +217,24 @@ class _Fit:
             below = space.coordinates(space.points_of(cheap.columns)[fine]), _scaled(rough[fine], logarithmic)
         points = space.coordinates(space.points_of(table.columns)[good])
         surrogate = Surrogate.fitted(points, _scaled(values[good], logarithmic), below)
-        return cls(surrogate, logarithmic, bounds, int(good.sum()), 1 - float(np.mean(good)))
+        bound = float(np.min(bounds, initial=np.inf, where=open_))
+        return cls(surrogate, logarithmic, bound, int(open_.sum()), int(good.sum()), 1 - float(np.mean(good)))
 
 
-def _values(table: StudyTable, number: str) -> tuple[np.ndarray, float]:
-    """A number of the runs, nan where there is none, and the lowest one that is only a lower bound.
+def _values(table: StudyTable, number: str) -> tuple[np.ndarray, np.ndarray]:
+    """A number of the runs, nan where there is none; and that of runs where it is only a lower bound, nan elsewhere.
 
     A life that did not end within its run counts as the cycles that the run came to
     """
     if number not in table.computed:
         raise ValueError(f'{table.name} has no number "{number}": there are {", ".join(table.computed) or "none"}')
-    values, bound = np.asarray(table.columns[number], float), np.inf
+    values = np.asarray(table.columns[number], float)
+    bounds = np.full(len(values), np.nan)
     if number == LIFE and "cycles" in table.columns:
         ended = np.asarray(table.columns["cycles"], float)
         open_ = np.isnan(values) & (ended > 0) & (table.columns["status"] == "complete")
-        values = np.where(open_, ended, values)
-        bound = float(ended[open_].min(initial=np.inf))
-    return values, bound
+        values, bounds = np.where(open_, ended, values), np.where(open_, ended, bounds)
+    return values, bounds
 
 
 def _scaled(values: np.ndarray, logarithmic: bool) -> np.ndarray:
@@ -284,7 +303,7 @@ def _told(
     scatter = float(np.sqrt((body.mean - middle) ** 2 @ body.weight))
     return Lives(
         study.name, wanted.number, table, tuple(told), influences(space, found.surrogate.mean), wanted.confidence,
-        found.runs, 0 if cheap is None else cheap.count("complete"), len(table.columns["run"]) - found.runs,
+        found.runs, found.open, 0 if cheap is None else cheap.count("complete"), len(table.columns["run"]) - found.runs,
         found.surrogate.explained, scatter, found.logarithmic, error, source, back(body.mean), body.weight,
     )  # fmt: skip
 
@@ -299,8 +318,10 @@ def _quantile(found: _Fit, sample: Sample, share: float, confidence: float, erro
     (own_low, all_low), (own_high, all_high) = ([float(back(end)) for end in side] for side in ends)
     if fewest == 0 and found.failed:
         own_low = all_low = 0.0 if found.logarithmic else -np.inf
-    value = float(back(sample.quantile(share)))
-    return Quantile(share, value, own_low, own_high, all_low, all_high, own_high >= found.bound)
+    # the median of the draws: the expected function is smoother than what it stands for, and its own quantiles too near
+    value = float(back(np.median(quantiles.drawn(sample, found.surrogate, share))))
+    least = found.at_least(share, own_high, confidence)
+    return Quantile(share, value, own_low, own_high, all_low, all_high, least)
 
 
 def _shifted(draws: np.ndarray, error: float | None, logarithmic: bool) -> tuple[np.ndarray, np.ndarray]:
