@@ -134,7 +134,10 @@ class StateVector:
         rate = np.sqrt(np.maximum(stepper.lam, 0.0) + stepper.omega**2)
         self._stepper = stepper
         self._shape = stepper.balance.memory.shape
-        spring = np.sqrt(stepper.balance.contact.stiffness[:, : self._shape[1]]).ravel()
+        k, n_state = stepper.balance.contact.stiffness, self._shape[1]
+        if n_state > k.shape[1]:  # sliders of many springs, which share those of the pair
+            k = np.repeat(k.mean(axis=1, keepdims=True) / n_state, n_state, axis=1)
+        spring = np.sqrt(k[:, :n_state]).ravel()
         spring[spring == 0] = 1.0
         self._weight = np.concatenate([rate, np.full(len(rate), 1 / stepper.h), spring])
 
