@@ -1,4 +1,4 @@
-"""Newton-Krylov for the balance: inexact directions, a line search, a direct fallback, and an outcome in words."""
+"""Newton-Krylov for the balance: inexact directions, a line search, a direct fallback, and an outcome."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, Linearisation, State
 from tribodyn.hbm.contact.law import ContactCycle
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
 
 ZERO_SIZE = 1e-6  # size of x, relative to the start, below which a solution counts as zero
@@ -85,13 +85,13 @@ class NewtonOptions:
 class Solved(Generic[EvaluatedThere]):
     """Where Newton ended.
 
-    outcome : "converged" or a sentence
+    outcome : CONVERGED, or what went wrong
     steps, products : Newton steps and Krylov products spent
     history : relative residual after each step, the start first
     """
 
     state: EvaluatedThere
-    outcome: str
+    outcome: Outcome[SolveEnd]
     steps: int
     products: int
     history: tuple[float, ...]
@@ -137,7 +137,7 @@ def solve(
         if error <= wanted:
             return Solved(state, CONVERGED, step - 1, products, tuple(history))
         if not np.isfinite(error):
-            return Solved(state, "the residual is not a finite number", step - 1, products, tuple(history))
+            return Solved(state, SolveEnd.NOT_FINITE.say(), step - 1, products, tuple(history))
         linear = balance.linearise(state)
         target = max(min(forcing, options.krylov), 0.3 * wanted / error, 1e-12)
         try:
@@ -156,23 +156,27 @@ def solve(
             try:
                 direction = np.linalg.solve(linear.dense(), -state.residual.ravel()).reshape(state.residual.shape)
             except np.linalg.LinAlgError:  # nothing holds the contact in some direction
-                why = f"singular Jacobian at relative residual {error:.1e}"
+                why = SolveEnd.SINGULAR.say(f" {error:.1e}")
                 return Solved(state, why, step, products, tuple(history))
         state, new_error = _search(balance, omega, state, direction, error, x_lin, least, options.shortest)
         history.append(new_error)
         if new_error >= error * (1 - 1e-10):
             if new_error <= options.tolerance:
                 break
-            return Solved(state, f"no descent from relative residual {error:.1e}", step, products, tuple(history))
+            return Solved(state, SolveEnd.NO_DESCENT.say(f" {error:.1e}"), step, products, tuple(history))
         forcing = 0.5 * (new_error / error) ** 1.5
         error = new_error
         if step > 1 and error > max(options.slowest * history[-3], options.tolerance):
-            return Solved(state, f"slow descent at relative residual {error:.1e}", step, products, tuple(history))
-    outcome = CONVERGED if error <= options.tolerance else f"not converged in {options.max_steps} steps: {error:.1e}"
+            return Solved(state, SolveEnd.SLOW_DESCENT.say(f" {error:.1e}"), step, products, tuple(history))
+    outcome = CONVERGED
+    if error > options.tolerance:
+        outcome = SolveEnd.STEPS_SPENT.say(f" {options.max_steps} steps: {error:.1e}")
     off = error * FORCE_ACCURACY / _finer(balance, state, x_lin, least)
     if error <= options.tolerance and off > FORCE_UNKNOWN and _leans(balance, state, x_lin):
         far = float(np.abs(state.x).max())
-        outcome = f"the contact slides away, {far:.1e} m, and its forces are known to {off:.0%} only: nothing holds it"
+        outcome = SolveEnd.SLIDES_AWAY.say(
+            f" {far:.1e} m, and its forces are known to {off:.0%} only: nothing holds it"
+        )
     return Solved(state, outcome, len(history) - 1, products, tuple(history))
 
 
@@ -262,5 +266,5 @@ def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptio
                     return Solution(last.state, CONVERGED, steps, products, last.history)
             else:
                 stride *= 0.5
-    outcome = f"{first.outcome}; load ramp stopped at {factor:.0%}: {CURES}"
+    outcome = first.outcome.kind.say(f"{first.outcome.detail}; load ramp stopped at {factor:.0%}: {CURES}")
     return Solution(first.state, outcome, steps, products, first.history)

@@ -1,4 +1,6 @@
-"""Why a curve or a wear run ended: members of enumerations that carry the beginning of the sentence a user reads.
+"""How a solve, a curve or a wear run ended: members of enumerations.
+
+Each member carries the beginning of the sentence that a user reads.
 
 What decides asks for the member; the sentence is made from it and is never read back.
 """
@@ -7,10 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Generic, Self, TypeVar
-
-CONVERGED = "converged"
-"""The outcome of a solve that reached its tolerance; any other outcome is a sentence on what went wrong."""
+from typing import Final, Generic, Self, TypeVar
 
 Kind = TypeVar("Kind", bound="End")
 
@@ -34,13 +33,37 @@ class End(Enum):
         return Outcome(self, detail)
 
 
+class SolveEnd(End):
+    """How a solve ended."""
+
+    CONVERGED = "converged"
+    STEPS_SPENT = "not converged in"
+    NO_DESCENT = "no descent from relative residual"
+    SLOW_DESCENT = "slow descent at relative residual"
+    NOT_FINITE = "the residual is not a finite number"
+    SINGULAR = "singular Jacobian at relative residual"
+    NO_DIRECTION = "no direction to correct along:"
+    SLIDES_AWAY = "the contact slides away,"
+    SITE_NOT_FOUND = "the site of a duty was not found in"
+    AT_FOLD = "the curve turns back at a fold,"
+    INTEGRATION_FAILED = "time integration failed:"
+    NOT_PERIODIC = "not periodic after"
+    LEAVES_BRANCH = "no motion stays on the branch within"
+    STAYS_ON_BRANCH = "the motion stays on the branch"
+
+
+CONVERGED: Final = SolveEnd.CONVERGED.say()
+"""The outcome of a solve that reached its tolerance."""
+
+
 class BranchEnd(End):
-    """Why a response curve ended."""
+    """Why a curve of solutions ended."""
 
     REACHED = "reached"
     ENDED = "ended at"
     TURNED_BACK = "turned back to"
     CLOSED = "closed curve"
+    POINTS_DONE = "stopped after"
 
 
 class WearEnd(End):

@@ -15,7 +15,7 @@ from scipy.sparse import csr_matrix, kron
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.law import ContactCycle
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 
 
 @dataclass
@@ -35,8 +35,13 @@ class DenseSolution:
     omega: float
     q: np.ndarray
     x: np.ndarray
-    outcome: str
+    outcome: Outcome[SolveEnd]
     steps: int
+
+    @property
+    def converged(self) -> bool:
+        """Whether the residual is below the tolerance."""
+        return self.outcome.kind is SolveEnd.CONVERGED
 
 
 @dataclass
@@ -82,7 +87,7 @@ class DenseBalance:
         self.profile.balance += perf_counter() - clock
         scale = np.linalg.norm(self.force)
         q = start.ravel().copy()
-        outcome = f"not converged in {max_steps} steps"
+        outcome = SolveEnd.STEPS_SPENT.say(f" {max_steps} steps")
         steps = 0
         while True:
             x, cycle, residual = self.residual(linear, q)

@@ -18,7 +18,7 @@ from tribodyn.hbm.balance import Linearisation, State
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.krylov import gmres
 from tribodyn.hbm.newton import NewtonOptions, Solution, relative_residual
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED, SolveEnd
 
 
 @dataclass(frozen=True)
@@ -162,11 +162,11 @@ def correct(
     """
     place = _Place.at(path, start.p, start.x)
     history = [place.error]
-    forcing, products, outcome = 1e-2, 0, ""
+    forcing, products, outcome = 1e-2, 0, CONVERGED
     while place.error > options.tolerance:
         steps = len(history) - 1
         if steps == options.max_steps:
-            outcome = f"not converged in {steps} steps: {place.error:.1e}"
+            outcome = SolveEnd.STEPS_SPENT.say(f" {steps} steps: {place.error:.1e}")
             break
         balance, _ = path.place(place.value)
         target = max(min(forcing, 0.1), 0.3 * options.tolerance / place.error, 1e-12)
@@ -177,17 +177,17 @@ def correct(
                 linear, slope, border, metric, (-place.state.residual, 0.0), target, options.max_products
             )
         except BorderFailed as reason:
-            outcome = str(reason)
+            outcome = SolveEnd.NO_DIRECTION.say(f" {reason}")
             break
         products += spent
         new = place.search(path, direction)
         history.append(new.error)
         if new.error >= place.error * (1 - 1e-10):
-            outcome = f"no descent from relative residual {place.error:.1e}"
+            outcome = SolveEnd.NO_DESCENT.say(f" {place.error:.1e}")
             break
         forcing = 0.5 * (new.error / place.error) ** 1.5
         place = new
-    return Solution(place.state, outcome or CONVERGED, len(history) - 1, products, tuple(history)), place.value
+    return Solution(place.state, outcome, len(history) - 1, products, tuple(history)), place.value
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.newton import Solution
-from tribodyn.hbm.outcome import BranchEnd, Outcome
+from tribodyn.hbm.outcome import BranchEnd, Outcome, SolveEnd
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Branch:
     response : (n_point, n_output, n_coeff) Fourier coefficients of the outputs [m]
     contact : (n_point, n_pair * n_component, n_coeff) relative displacement [m]
     energy : (n_point,) dissipated energy per cycle, all pairs [J]
-    outcome : for each point "converged" or a sentence that says what went wrong
+    outcome : for each point CONVERGED, or what went wrong
     newton_steps : (n_point,) Newton steps spent
     end : why and where the branch ends; its text is a sentence
     folds : indices of the points that are folds, where the branch turns back
@@ -32,7 +32,7 @@ class Branch:
     response: np.ndarray
     contact: np.ndarray
     energy: np.ndarray
-    outcome: tuple[str, ...]
+    outcome: tuple[Outcome[SolveEnd], ...]
     newton_steps: np.ndarray
     end: Outcome[BranchEnd]
     folds: tuple[int, ...] = ()
@@ -43,6 +43,11 @@ class Branch:
     def ended(self) -> BranchEnd:
         """Why the branch ends."""
         return self.end.kind
+
+    @property
+    def converged(self) -> np.ndarray:
+        """(n_point,) whether the point is a solution."""
+        return np.array([outcome.kind is SolveEnd.CONVERGED for outcome in self.outcome])
 
     @property
     def frequency(self) -> np.ndarray:
@@ -75,7 +80,7 @@ class BranchBuilder:
         self.value: list[float] = []
         self.x: list[np.ndarray] = []
         self.folds: list[int] = []
-        self._rows: list[tuple[float, np.ndarray, float, str, int]] = []
+        self._rows: list[tuple[float, np.ndarray, float, Outcome[SolveEnd], int]] = []
         self._output_names: tuple[str, ...] = ()
 
     def add(self, value: float, solution: Solution, fold: bool = False) -> None:

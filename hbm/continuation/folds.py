@@ -23,7 +23,7 @@ from tribodyn.hbm.continuation.methods.arc_length import Options
 from tribodyn.hbm.continuation.parameter import FREQUENCY, Parameter
 from tribodyn.hbm.continuation.stepper import Stepper
 from tribodyn.hbm.newton import NewtonOptions, Solution
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED, BranchEnd, Outcome
 from tribodyn.hbm.threads import single
 
 FREQUENCY_SCALE = 0.1  # relative change of frequency that is as long as one of the whole state; it sets the steps alone
@@ -60,7 +60,7 @@ class FoldCurve:
     parameter_name : what was changed; parameter : (n_point,) its values; omega : (n_point,) of the folds [rad/s]
     output_names; response : (n_point, n_output, n_coeff) [m]; contact : (n_point, n_contact, n_coeff) [m]
     cusps : indices of the points next to which the parameter turns back: two folds meet there and vanish
-    end : sentence that says where and why it ends
+    end : why and where it ends; its text is a sentence
     """
 
     parameter_name: str
@@ -70,7 +70,7 @@ class FoldCurve:
     response: np.ndarray
     contact: np.ndarray
     cusps: tuple[int, ...]
-    end: str
+    end: Outcome[BranchEnd]
 
     def amplitude(self, output: str) -> np.ndarray:
         """(n_point,) vibration amplitude of an output at the folds [m]."""
@@ -130,11 +130,12 @@ def track_fold(
         here = surface.first(start, Direction(flat, omega), float(np.sign(stop - start)))
     except NoFold as reason:
         raise ValueError(f"no fold near {omega / (2 * np.pi):.6g} Hz at {path.say(start)}: {reason}") from None
-    line, step, end = [here], options.step, ""
+    line, step = [here], options.step
+    end: Outcome[BranchEnd] | None = None
     low, high = min(start, stop), max(start, stop)
-    while not end:
+    while end is None:
         if len(line) >= options.max_points:
-            end = f"ended at {path.say(here.value)}: {options.max_points} points were allowed"
+            end = BranchEnd.ENDED.say(f" {path.say(here.value)}: {options.max_points} points were allowed")
             break
         there, trouble = None, ""
         while there is None and step >= options.min_step:
@@ -143,7 +144,7 @@ def track_fold(
             except NoFold as reason:
                 step, trouble = 0.5 * step, str(reason)
         if there is None:
-            end = f"ended at {path.say(here.value)}: {trouble}"
+            end = BranchEnd.ENDED.say(f" {path.say(here.value)}: {trouble}")
             break
         bound = low if there.value < low else high if there.value > high else None
         if bound is not None:
@@ -151,9 +152,9 @@ def track_fold(
             guess = here.place + (there.place - here.place) * share
             try:
                 there = surface.at(bound, guess, here)
-                end = f"{'turned back to' if bound == start else 'reached'} {path.say(bound)}"
+                end = (BranchEnd.TURNED_BACK if bound == start else BranchEnd.REACHED).say(f" {path.say(bound)}")
             except NoFold as reason:
-                end = f"ended at {path.say(here.value)}: {reason}"
+                end = BranchEnd.ENDED.say(f" {path.say(here.value)}: {reason}")
                 break
         line.append(there)
         step = float(np.clip(surface.next_step(here, there, step), options.min_step, options.max_step))
@@ -323,7 +324,7 @@ class _Surface:
         turned = self._length(metric, there.tangent - here.tangent, there.change - here.change)
         return step * float(np.clip(0.25 / max(turned, 1e-9), 0.5, 2.0))
 
-    def curve(self, line: list[_Fold], end: str) -> FoldCurve:
+    def curve(self, line: list[_Fold], end: Outcome[BranchEnd]) -> FoldCurve:
         """The result."""
         value = np.array([f.value for f in line])
         balance = self._path.make(line[0].value)

@@ -17,7 +17,7 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.free_vibration import FreeVibration, Point
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED, BranchEnd, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
 
 # Newton steps up to which the next step grows, and from which it shrinks; this moves the points, not the curve.
@@ -53,9 +53,9 @@ class Backbone:
     output_names, response : (n_point, n_output, n_coeff) Fourier coefficients of the outputs [m]
     contact : (n_point, n_pair * n_component, n_coeff) relative displacement [m]
     energy : (n_point,) dissipated energy per cycle, all pairs [J]
-    outcome : for each point "converged" or a sentence; newton_steps : (n_point,)
+    outcome : for each point CONVERGED, or what went wrong; newton_steps : (n_point,)
     reference_omega : of the mode at rest, stuck where the static load keeps the contact closed [rad/s]
-    end : sentence that says where and why the backbone ends
+    end : why the backbone ends; its text is a sentence
     """
 
     modal_amplitude: np.ndarray
@@ -68,10 +68,15 @@ class Backbone:
     response: np.ndarray
     contact: np.ndarray
     energy: np.ndarray
-    outcome: tuple[str, ...]
+    outcome: tuple[Outcome[SolveEnd], ...]
     newton_steps: np.ndarray
     reference_omega: float
-    end: str
+    end: Outcome[BranchEnd]
+
+    @property
+    def converged(self) -> np.ndarray:
+        """(n_point,) whether the point is a solution."""
+        return np.array([outcome.kind is SolveEnd.CONVERGED for outcome in self.outcome])
 
     @property
     def frequency(self) -> np.ndarray:
@@ -91,7 +96,7 @@ class Backbone:
         return self.reference_omega / (2 * np.pi)
 
 
-_Solved = tuple[Point, str, int]
+_Solved = tuple[Point, Outcome[SolveEnd], int]
 
 
 @single
@@ -121,14 +126,16 @@ def backbone(
     return _result(problem, solved, end)
 
 
-def _walk(problem: FreeVibration, start: float, goal: float, options: BackboneOptions) -> tuple[list[_Solved], str]:
+def _walk(
+    problem: FreeVibration, start: float, goal: float, options: BackboneOptions
+) -> tuple[list[_Solved], Outcome[BranchEnd]]:
     """Points from the logarithm of the amplitude `start` to `goal`, and how the walk ends."""
     first = problem.first_guess(np.exp(start))
     fixed = np.zeros(len(first.coordinates))
     fixed[-1] = 1.0
     solved = [_newton(problem, first, fixed, options.newton)]
     if solved[0][1] != CONVERGED:
-        return solved, f"ended at the start: {solved[0][1]}"
+        return solved, BranchEnd.ENDED.say(f" the start: {solved[0][1]}")
     longest = abs(goal - start) / max(options.n_points - 1, 1)
     step, tangent = longest, np.sign(goal - start) * fixed
     weight = np.ones(len(fixed))
@@ -146,19 +153,19 @@ def _walk(problem: FreeVibration, start: float, goal: float, options: BackboneOp
         if found[1] != CONVERGED or not smooth:
             step *= 0.5
             if step < options.min_step * longest:
-                return [*solved, found], f"ended: {found[1]}"
+                return [*solved, found], BranchEnd.ENDED.say(f" its last point: {found[1]}")
             continue
         solved.append(found)
         if last:
-            return solved, "reached the amplitude asked for"
+            return solved, BranchEnd.REACHED.say(" the amplitude asked for")
         if (found[0].coordinates[-1] - start) * (goal - start) < 0:
-            return solved, "came back to where it began"
+            return solved, BranchEnd.TURNED_BACK.say(" where it began")
         tangent = turned / size
         if found[2] <= FEW_NEWTON_STEPS:
             step = min(longest, 1.6 * step)
         elif found[2] >= MANY_NEWTON_STEPS:
             step *= 0.6
-    return solved, f"stopped after {options.max_points} points"
+    return solved, BranchEnd.POINTS_DONE.say(f" {options.max_points} points")
 
 
 def _newton(problem: FreeVibration, point: Point, normal: np.ndarray, options: NewtonOptions) -> _Solved:
@@ -178,13 +185,14 @@ def _newton(problem: FreeVibration, point: Point, normal: np.ndarray, options: N
                 break
             length *= 0.5
         if best is point:
-            return point, f"no descent from relative residual {error:.1e}", step + 1
+            return point, SolveEnd.NO_DESCENT.say(f" {error:.1e}"), step + 1
         point, error = best, best_error
-    outcome = CONVERGED if error <= options.tolerance else f"not converged in {options.max_steps} steps: {error:.1e}"
-    return point, outcome, options.max_steps
+    if error <= options.tolerance:
+        return point, CONVERGED, options.max_steps
+    return point, SolveEnd.STEPS_SPENT.say(f" {options.max_steps} steps: {error:.1e}"), options.max_steps
 
 
-def _result(problem: FreeVibration, solved: list[_Solved], end: str) -> Backbone:
+def _result(problem: FreeVibration, solved: list[_Solved], end: Outcome[BranchEnd]) -> Backbone:
     points = [p for p, _, _ in solved]
     basis = problem.basis
     t = problem.balance.contact.tangential

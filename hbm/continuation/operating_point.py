@@ -182,7 +182,7 @@ class AtPeak:
 
     def _highest_maximum(self, branch: Branch) -> int:
         """Point of a branch that is the highest of those that are higher than both their neighbours."""
-        good = np.array([outcome == CONVERGED for outcome in branch.outcome])
+        good = branch.converged
         height = np.where(good, branch.amplitude(self.output), -1.0)
         inner = np.flatnonzero(
             good[1:-1] & (height[1:-1] > 0) & (height[1:-1] >= height[:-2]) & (height[1:-1] >= height[2:])

@@ -16,7 +16,7 @@ import numpy as np
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.time_integration import Options, PeriodicMotion
@@ -34,7 +34,7 @@ class FoldInTime:
     point : of the fold in the branch; omega : of the fold by harmonic balance [rad/s]
     in_time : last frequency at which the integrated motion stays on the branch [rad/s]; amplitude : there [m]
     resolution : to which in_time is known, relative
-    outcome : "converged", or why there is no such frequency within the bracket
+    outcome : CONVERGED, or why there is no such frequency within the bracket
     """
 
     point: int
@@ -42,7 +42,12 @@ class FoldInTime:
     in_time: float
     amplitude: float
     resolution: float
-    outcome: str
+    outcome: Outcome[SolveEnd]
+
+    @property
+    def found(self) -> bool:
+        """Whether the end of the branch in time was found within the bracket."""
+        return self.outcome.kind is SolveEnd.CONVERGED
 
 
 @dataclass(frozen=True)
@@ -121,16 +126,16 @@ def fold_in_time(
         motion = march(balance, start, omega, options)
         moved = motion.coefficients(motion.x, balance.basis)
         near = np.linalg.norm(moved - start.x)
-        if motion.outcome == CONVERGED and all(near < np.linalg.norm(moved - other.x) for other in others):
+        if motion.periodic and all(near < np.linalg.norm(moved - other.x) for other in others):
             inside, last, stayed = omega, amplitude_in_time(balance, motion, output), True
         else:
             outside, left = omega, True
     hertz = branch.omega[fold] / (2 * np.pi)
     outcome = CONVERGED
     if not stayed:
-        outcome = f"no motion stays on the branch within {100 * bracket:g} % of its fold at {hertz:.6g} Hz"
+        outcome = SolveEnd.LEAVES_BRANCH.say(f" {100 * bracket:g} % of its fold at {hertz:.6g} Hz")
     elif not left:
-        outcome = f"the motion stays on the branch {100 * bracket:g} % beyond its fold at {hertz:.6g} Hz"
+        outcome = SolveEnd.STAYS_ON_BRANCH.say(f" {100 * bracket:g} % beyond its fold at {hertz:.6g} Hz")
     return FoldInTime(fold, float(branch.omega[fold]), inside, last, 2 * bracket / 2**bisections, outcome)
 
 

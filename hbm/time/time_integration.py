@@ -20,7 +20,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact import compiled_law
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.time import time_step
 from tribodyn.hbm.time.period_search import Period, PeriodSearch
@@ -64,7 +64,7 @@ class PeriodicMotion:
     status : (n_pair,) bits of what happened: STICKS | SLIPS | SEPARATES
     drift : change of the state over the period, relative to the vibration (both as square roots of energy)
     periods : periods integrated in all; iterations : contact iterations per step, on average over the last period
-    outcome : "converged" or a sentence
+    outcome : CONVERGED, or what went wrong
     slopes : derivatives of the law along the period, see `time_step.Record`, or None if not asked for
     """
 
@@ -79,8 +79,13 @@ class PeriodicMotion:
     drift: float
     periods: int
     iterations: float
-    outcome: str
+    outcome: Outcome[SolveEnd]
     slopes: np.ndarray | None
+
+    @property
+    def periodic(self) -> bool:
+        """Whether the motion repeats itself to the tolerance."""
+        return self.outcome.kind is SolveEnd.CONVERGED
 
     @property
     def frequency(self) -> float:
@@ -339,7 +344,7 @@ def leave_alone(
     for _ in range(periods):
         found = search.step(motion)
         motion = found.end
-        whole = _result(stepper, found, search.periods, "")
+        whole = _result(stepper, found, search.periods, CONVERGED)
         energy.append(float(whole.energy.sum()))
         amplitude.append(np.sqrt(2 * whole.outputs.var(axis=1)))
     late, swing = np.array(energy[periods // 2 :]), np.array(amplitude[periods // 2 :])
@@ -368,11 +373,13 @@ def _to_periodic(stepper: TimeStepper, motion: Moving, options: Options, with_sl
         return _result(stepper, found, search.periods, CONVERGED)
     hint = "; is the motion stable there?" if search.periods < options.max_periods else ""
     smallest = search.best.drift
-    outcome = f"not periodic after {search.periods} periods: drift {found.drift:.1e}, smallest {smallest:.1e}{hint}"
+    outcome = SolveEnd.NOT_PERIODIC.say(
+        f" {search.periods} periods: drift {found.drift:.1e}, smallest {smallest:.1e}{hint}"
+    )
     return _result(stepper, found, search.periods, outcome)
 
 
-def _result(stepper: TimeStepper, period: Period, periods: int, outcome: str) -> PeriodicMotion:
+def _result(stepper: TimeStepper, period: Period, periods: int, outcome: Outcome[SolveEnd]) -> PeriodicMotion:
     record = period.record
     components = stepper.balance.contact.components
     before = np.roll(record.x, 1, axis=0), np.roll(record.f, 1, axis=0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import Outcome, SolveEnd
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.time_integration import Options, PeriodicMotion
@@ -29,7 +29,7 @@ class Verification:
     step_error : of the time integration itself, in amplitude and energy, estimated with half the steps (Richardson);
         nan where no periodic motion was found
     drift, periods : how periodic the time integration is, and after how many periods
-    outcome : "converged" or the sentence of the time integration
+    outcome : of the time integration: CONVERGED, or what went wrong
     motion : the last period
     """
 
@@ -44,7 +44,7 @@ class Verification:
     step_error: float
     drift: float
     periods: int
-    outcome: str
+    outcome: Outcome[SolveEnd]
     motion: PeriodicMotion
 
     @property
@@ -88,7 +88,7 @@ def verify(balance: HarmonicBalance, state: State, options: Options | None = Non
         energy=float((energy.sum() - motion.energy.sum()) / whole) if whole > 0 else 0.0,
         energy_pairs=float(np.abs(energy - motion.energy).max() / whole) if whole > 0 else 0.0,
         preload=_relative(balance.preload(state), motion.preload),
-        step_error=_step_error(balance, state, options, motion, whole) if motion.outcome == CONVERGED else float("nan"),
+        step_error=_step_error(balance, state, options, motion, whole) if motion.periodic else float("nan"),
         drift=motion.drift,
         periods=motion.periods,
         outcome=motion.outcome,

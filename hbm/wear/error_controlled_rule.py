@@ -17,7 +17,7 @@ import numpy as np
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
-from tribodyn.hbm.outcome import Outcome, WearEnd
+from tribodyn.hbm.outcome import Outcome, SolveEnd, WearEnd
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.wear.evolution import (
     WearProblem,
@@ -327,7 +327,7 @@ def _stage(
         if settled and np.all(np.abs(after - omega) <= accuracy * omega):
             return found
         if rounds > MAX_CORRECTIONS:
-            lost = f"the site of a duty was not found in {MAX_CORRECTIONS} solves"
+            lost = SolveEnd.SITE_NOT_FOUND.say(f" {MAX_CORRECTIONS} solves")
             return replace(found, points=tuple(replace(p, solution=replace(p.solution, outcome=lost)) for p in points))
         x = solution.state.x + balance.follow(worn_at, after - omega)
         omega, gain = after, turned

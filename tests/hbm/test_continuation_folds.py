@@ -22,7 +22,7 @@ def test_fold_against_the_load_is_where_the_discriminant_vanishes(duffing_branch
     i = branch.folds[which]
     x = branch.contact[i].reshape(1, 1, -1)
     line = track_fold(parameter.load(duffing.balance(), 2.0), 1.0, 0.1, branch.omega[i], x)
-    assert line.end == "reached load factor 0.1"
+    assert str(line.end) == "reached load factor 0.1"
     assert line.parameter[0] == 1.0
     assert line.parameter[-1] == 0.1
     assert len(line.omega) < 50
@@ -41,7 +41,7 @@ def test_two_folds_meet_in_a_cusp_and_the_line_goes_round_it(duffing_branch):
     i, other = branch.folds
     x = branch.contact[i].reshape(1, 1, -1)
     line = track_fold(parameter.load(duffing.balance(), 2.0), 1.0, 0.01, branch.omega[i], x)
-    assert line.end == "turned back to load factor 1"
+    assert str(line.end) == "turned back to load factor 1"
     assert len(line.cusps) == 1
     assert high <= line.parameter.min() < 1.05 * high
     np.testing.assert_allclose(line.omega[-1], branch.omega[other], rtol=1e-8)
@@ -67,7 +67,7 @@ def test_fold_of_a_sampled_contact_is_followed_over_its_kinks():
     branch = arc_length.follow(balance, 0.5, 1.9, arc_length.Options(bounds=(0.4, 2.5), max_points=60))
     i = branch.folds[0]
     line = track_fold(parameter.load(balance, 1.6), 1.0, 2.0, branch.omega[i], branch.contact[i].reshape(1, 1, -1))
-    assert line.end == "reached load factor 2"
+    assert str(line.end) == "reached load factor 2"
     anew = arc_length.follow(balance.with_load(2.0), 0.5, 1.9, arc_length.Options(max_points=60))
     np.testing.assert_allclose(line.omega[-1], anew.omega[anew.folds[0]], rtol=1e-6)
 

@@ -14,6 +14,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.expansion import SingularStuckSystem
 from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.stability.chatter import chatter, sign_changes
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.wear.law import Exposure
@@ -95,7 +96,7 @@ def test_rigid_modes_agree_with_time_integration():
     theirs = motion.coefficients(motion.outputs, balance.basis)
     ours = balance.outputs(solution.state)
     assert np.abs(ours - theirs).max() < 2e-3 * np.abs(theirs).max()
-    assert motion.outcome == "converged"
+    assert motion.outcome == CONVERGED
 
 
 def test_a_part_that_nothing_holds_is_refused():

@@ -16,6 +16,7 @@ from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.stability.exponents import stability
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.time_integration import Options
@@ -82,7 +83,7 @@ def test_time_integration_and_stability_do_not_see_the_units(length, force):
     options = Options(steps=256)
     one = time_integration.integrate(plain, OMEGA, a.state, options)
     two = time_integration.integrate(other, OMEGA, b.state, options)
-    assert one.outcome == two.outcome == "converged"
+    assert one.outcome == two.outcome == CONVERGED
     assert abs(one.periods - two.periods) <= 3
     np.testing.assert_allclose(two.x / length, one.x, atol=1e-6 * np.abs(one.x).max())
     leading_one, leading_two = stability(plain, a.state).exponents[0], stability(other, b.state).exponents[0]

@@ -14,6 +14,7 @@ from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.time.time_integration import Options
 from tribodyn.hbm.time.verify import verify
 from tribodyn.reduction.model import ReducedModel
@@ -53,7 +54,7 @@ def test_planar_friction_on_an_ellipse_agrees_with_time_integration(across):
         balance, state = solved("coulomb_planar", components, parameters, excitation, 190.0, top)
         assert state.cycle.status[0] & SLIPS
         result = verify(balance, state, Options(steps=2048))
-        assert result.outcome == "converged"
+        assert result.outcome == CONVERGED
         errors.append(result.largest)
     assert errors[-1] < 5e-3
     assert errors[-1] < errors[0]
@@ -66,7 +67,7 @@ def test_constant_load_agrees_with_time_integration(transitions):
     balance, state = solved("jenkins_constant", ("t1",), parameters, excitation, 100.0, 9, transitions)
     assert state.cycle.status[0] == STICKS | SLIPS
     result = verify(balance, state, Options(steps=2048))
-    assert result.outcome == "converged"
+    assert result.outcome == CONVERGED
     assert result.largest < 2e-3
 
 
@@ -77,7 +78,7 @@ def test_normal_contact_alone_agrees_with_time_integration(transitions):
     balance, state = solved("unilateral", ("n",), parameters, excitation, 210.0, 9, transitions)
     assert state.cycle.status[0] == STICKS | SEPARATES
     result = verify(balance, state, Options(steps=2048))
-    assert result.outcome == "converged"
+    assert result.outcome == CONVERGED
     assert result.largest < 2e-3
     assert balance.energy(state)[0] == 0.0
 

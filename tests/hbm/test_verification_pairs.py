@@ -15,6 +15,7 @@ from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.time.time_integration import Options
 from tribodyn.hbm.time.verify import Verification, verify
 
@@ -41,7 +42,7 @@ def slab_verified(
     solution = newton.solve_from_rest(balance, omega)
     assert solution.converged
     result = verify(balance, solution.state, Options(steps=steps))
-    assert result.outcome == "converged"
+    assert result.outcome == CONVERGED
     return solution.state.cycle.status, (result.largest, result.waveform["edge"], result.contact), result
 
 
@@ -98,7 +99,7 @@ def test_four_periodic_motions_at_one_frequency_and_time_integration_finds_each(
             found[lifting] = verify(balance, solution.state, Options(steps=512))
     assert sorted(found) == [5, 15, 50, 55]
     for result in found.values():
-        assert result.outcome == "converged"
+        assert result.outcome == CONVERGED
         assert max(result.largest, result.waveform["edge"], result.contact) < 0.01
 
 
@@ -122,7 +123,7 @@ def test_coupled_structure_near_resonance_approaches_time_integration(law):
         solution = newton.solve_from_rest(balance, omega)
         assert solution.converged
         result = verify(balance, solution.state, Options(steps=2048))
-        assert result.outcome == "converged"
+        assert result.outcome == CONVERGED
         assert np.all(solution.state.cycle.status == STICKS | SLIPS | SEPARATES)
         errors.append(max(result.largest, result.contact))
     assert all(b < a for a, b in pairwise(errors))

@@ -15,6 +15,7 @@ from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.time.time_integration import Options
 from tribodyn.hbm.time.verify import verify
 
@@ -66,7 +67,7 @@ def test_jenkins_element_approaches_time_integration_with_more_harmonics():
         solution = newton.solve_from_rest(balance, omega)
         assert solution.converged
         result = verify(balance, solution.state, Options(steps=4096))
-        assert result.outcome == "converged"
+        assert result.outcome == CONVERGED
         waveform.append(result.waveform["mass"])
         energy.append(abs(result.energy))
     assert all(b < 0.7 * a for a, b in pairwise(waveform))
@@ -105,7 +106,7 @@ def test_unilateral_contact_with_preload_approaches_time_integration(press):
         solution = newton.solve_from_rest(balance, omega)
         assert solution.converged
         result = verify(balance, solution.state, Options(steps=2048))
-        assert result.outcome == "converged"
+        assert result.outcome == CONVERGED
         assert solution.state.cycle.status[0] & 4  # it does separate
         errors.append(max(result.contact, abs(result.preload)))
     assert all(b < a for a, b in pairwise(errors))

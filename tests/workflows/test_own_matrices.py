@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 import tribodyn as td
 from tribodyn.hbm.linear.recovery import coordinates
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.reduction.matrix_files import read_matrix
 
 MASS = np.diag([1.0, 0.8, 1.2, 0.6])
@@ -99,7 +100,7 @@ def test_one_law_on_any_rows_agrees_with_integration_in_time() -> None:
     cycle = problem.peak(30.0, 70.0)
     assert (cycle.status & 2).any()
     found = problem.verify(cycle, steps=512)
-    assert found.outcome == "converged"
+    assert found.outcome == CONVERGED
     assert found.largest < 0.01
     assert problem.integrate(cycle.frequency, cycle, steps=256).frequency == pytest.approx(cycle.frequency)
 

@@ -93,7 +93,7 @@ def test_a_body_that_slides_away_is_no_solution(tmp_path: Path) -> None:
         balance = built(pulled, tmp_path).balance
         omega = 2 * np.pi * 4e3
         solved = newton.solve(balance, omega, balance.stuck(omega))
-        outcomes.append(solved.outcome)
+        outcomes.append(str(solved.outcome))
         if solved.converged:
             assert balance.preload(solved.state) == pytest.approx(0.5e6 * 0.04 * 0.014, rel=1e-2)
     assert outcomes[0] == "converged"

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.workflows.accuracy.trade_table import NAMES, QUANTITIES, Trade, TradeRow, key_of, load
+from tribodyn.workflows.accuracy.trade_table import ANSWERED, NAMES, QUANTITIES, Trade, TradeRow, key_of, load
 from tribodyn.workflows.scene.scene_file import SceneFile, read
 from tribodyn.workflows.scene.units import to_si
 
@@ -189,7 +188,7 @@ def _usable(rows: Sequence[TradeRow], asked: Sequence[str]) -> list[TradeRow]:
     """
     quantities = {_judged_by(rows, quantity) for quantity in asked}
     said = [q for q in quantities if any(row.values[q] is not None for row in rows)]
-    good = [row for row in rows if row.tunable and row.outcome == CONVERGED]
+    good = [row for row in rows if row.tunable and row.outcome == ANSWERED]
     return [row for row in good if all(row.values[q] is not None for q in said)] if said else []
 
 

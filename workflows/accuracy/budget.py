@@ -11,7 +11,6 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.sampling import sampling_error
 from tribodyn.hbm.continuation import harmonic_choice
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.wear.step_error import UNKNOWN, step_error
 from tribodyn.workflows.accuracy import accuracy
 from tribodyn.workflows.accuracy.trade_table import NAMES, QUANTITIES, Trade
@@ -69,7 +68,7 @@ def _of_response(balance: HarmonicBalance, result: Result) -> Iterator[BudgetEnt
     frf = result.response
     if frf is None:
         return
-    good = np.array([outcome == CONVERGED for outcome in frf.outcome])
+    good = frf.converged
     height = np.where(good, frf.amplitude(frf.output_names[0]), -1.0)
     best = int(np.argmax(height))
     omega = float(frf.omega[best])

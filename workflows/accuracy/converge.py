@@ -20,12 +20,11 @@ from matplotlib.ticker import NullLocator
 from matplotlib.tri import Triangulation
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.accuracy import limit
 from tribodyn.workflows.accuracy.knobs import Ladder, Setting, study_of, study_path
 from tribodyn.workflows.accuracy.limit import Limit
 from tribodyn.workflows.accuracy.measure import Measured, measure
-from tribodyn.workflows.accuracy.trade_table import NAMES, QUANTITIES
+from tribodyn.workflows.accuracy.trade_table import ANSWERED, NAMES, QUANTITIES
 from tribodyn.workflows.pictures.style import BLUE, GREEN, GREY, ORANGE, STYLE
 from tribodyn.workflows.scene import scene_file
 
@@ -107,7 +106,7 @@ def _climb(scene: str, ladder: Ladder, base: tuple[str, ...], most: float, say: 
         known = [(s.size, v) for s, grid in zip(settings, measured, strict=True) if (v := _values(grid, quantity))]
         if len(known) >= 3:
             limits[quantity] = limit_of([size for size, _ in known], [values for _, values in known])
-    finest = next((grid[0] for grid in reversed(measured) if grid[0].outcome == CONVERGED), None)
+    finest = next((grid[0] for grid in reversed(measured) if grid[0].outcome == ANSWERED), None)
     if finest is None:
         raise RuntimeError(f"{ladder.name}: no grid has an answer, the finest says: {measured[-1][0].outcome}")
     own = scene_file.read(scene, base).scene
@@ -122,7 +121,7 @@ def _climb(scene: str, ladder: Ladder, base: tuple[str, ...], most: float, say: 
             worst={q: _worst(_values(grid, q), limits.get(q)) for q in QUANTITIES},
             map_difference=None if grid[0] is finest else map_difference(grid[0], finest),
             seconds=sum(one.seconds for one in grid),
-            outcome=next((one.outcome for one in grid if one.outcome != CONVERGED), CONVERGED),
+            outcome=next((one.outcome for one in grid if one.outcome != ANSWERED), ANSWERED),
         )
         for setting, grid in zip(settings, measured, strict=True)
     )
@@ -131,9 +130,9 @@ def _climb(scene: str, ladder: Ladder, base: tuple[str, ...], most: float, say: 
 
 def _values(grid: Sequence[Measured], quantity: str) -> list[float]:
     """What the placements of a grid answer, the grid itself first; none where that failed."""
-    if grid[0].outcome != CONVERGED or grid[0].values[quantity] is None:
+    if grid[0].outcome != ANSWERED or grid[0].values[quantity] is None:
         return []
-    return [v for one in grid if one.outcome == CONVERGED and (v := one.values[quantity]) is not None]
+    return [v for one in grid if one.outcome == ANSWERED and (v := one.values[quantity]) is not None]
 
 
 def _off(value: float | None, end: Limit | None) -> float | None:
@@ -193,7 +192,7 @@ def as_text(studies: Sequence[Study]) -> str:
         lines.append(_line(study.ladder.ljust(width), "pairs", "seconds", [_name(q) for q in shown], "map"))
         for row in study.rows:
             maps = "" if row.map_difference is None else f"{100 * row.map_difference:.1f} %"
-            failed = "" if row.outcome == CONVERGED else f"  {row.outcome}"
+            failed = "" if row.outcome == ANSWERED else f"  {row.outcome}"
             cells = [_cell(row, q) for q in shown]
             seconds = f"{row.seconds:.1f}"
             lines.append(_line(row.setting.ljust(width), str(row.pairs), seconds, cells, maps + failed))
@@ -242,7 +241,7 @@ def _judgement(row: GridRow, quantities: Sequence[str]) -> str:
 
 def picture(study: Study) -> Figure:
     """Errors against the number of pairs, the work on the finest grid, and where coarser grids differ from it."""
-    shown = [m for m in study.measured if m.outcome == CONVERGED]
+    shown = [m for m in study.measured if m.outcome == ANSWERED]
     finest, some = shown[-1], shown[:-1][-3:]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.1 + 2.5 * len(some), 3.6), layout="constrained")

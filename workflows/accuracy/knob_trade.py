@@ -6,11 +6,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.accuracy.knobs import Knob, Setting, chosen, knobs_of, study_of
 from tribodyn.workflows.accuracy.limit import limit_of
 from tribodyn.workflows.accuracy.measure import Measured, measure
-from tribodyn.workflows.accuracy.trade_table import NAMES, QUANTITIES, Trade, TradeRow, key_of, known_of, plain
+from tribodyn.workflows.accuracy.trade_table import (
+    ANSWERED,
+    NAMES,
+    QUANTITIES,
+    Trade,
+    TradeRow,
+    key_of,
+    known_of,
+    plain,
+)
 from tribodyn.workflows.scene import scene_file
 
 BASE = "base"
@@ -160,4 +168,4 @@ def _cell(row: TradeRow, quantity: str) -> str:
 
 
 def _failure(row: TradeRow) -> str:
-    return "" if row.outcome == CONVERGED else f"  {row.outcome}"
+    return "" if row.outcome == ANSWERED else f"  {row.outcome}"

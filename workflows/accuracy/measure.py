@@ -9,9 +9,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm.continuation.operating_point import AtFrequency, OperatingPoint
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
-from tribodyn.workflows.accuracy.trade_table import QUANTITIES
+from tribodyn.workflows.accuracy.trade_table import ANSWERED, QUANTITIES
 from tribodyn.workflows.run import memory, modelling, pipeline, settings, wear_run
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import free_deflection
@@ -50,10 +49,10 @@ def measure(file: SceneFile, wears: bool = True, refined: bool = True) -> Measur
         model = modelling.build(file, None, Progress())
         balance, interface = model.balance, model.reduced.interface
         depth = energy = np.zeros(interface.n_pair)
-        outcome = CONVERGED
+        outcome = ANSWERED
         try:
             point = _peak(file, model, refined)
-            outcome = point.solution.outcome
+            outcome = str(point.solution.outcome)
             if point.solution.converged:
                 energy = balance.energy(point.state)
                 values["peak_hz"] = point.state.omega / (2 * np.pi)
@@ -95,7 +94,7 @@ def _peak(file: SceneFile, model: modelling.Model, refined: bool) -> OperatingPo
     branch = pipeline.follow_response(file.scene, balance, lambda share, note: None)
     pipeline.check_branch(branch)
     height = branch.amplitude(settings.OUTPUT)
-    best = int(np.argmax(np.where([outcome == CONVERGED for outcome in branch.outcome], height, -1.0)))
+    best = int(np.argmax(np.where(branch.converged, height, -1.0)))
     x = branch.contact[best].reshape(balance.contact.n_pair, len(balance.contact.components), balance.basis.n_coeff)
     omega = float(branch.omega[best])
     if refined:

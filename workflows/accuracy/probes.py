@@ -17,7 +17,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import harmonic_choice
 from tribodyn.hbm.continuation.operating_point import NoPeak, OperatingPoint, Site
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import Outcome, SolveEnd
 from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.time.time_integration import IntegrationFailed, Options
 from tribodyn.hbm.time.verify import verify
@@ -78,7 +78,7 @@ class InTime:
     """The same cycle by direct time integration; differences relative to it.
 
     own_error : of the integration itself; stable : of the balance solution by Hill's method
-    outcome : "converged", or why there is no periodic motion to compare with
+    outcome : CONVERGED, or why there is no periodic motion to compare with
     """
 
     amplitude: float
@@ -86,7 +86,7 @@ class InTime:
     preload: float
     own_error: float
     stable: bool
-    outcome: str
+    outcome: Outcome[SolveEnd]
 
 
 def states(file: SceneFile, balance: HarmonicBalance, result: Result) -> list[State]:
@@ -121,7 +121,7 @@ def _at_response_peak(site: Site, balance: HarmonicBalance, result: Result) -> S
     curve = result.response
     if curve is None:
         return None
-    height = np.where([o == CONVERGED for o in curve.outcome], curve.amplitude(curve.output_names[0]), -1.0)
+    height = np.where(curve.converged, curve.amplitude(curve.output_names[0]), -1.0)
     best = int(np.argmax(height))
     if height[best] <= 0 or balance.contact.n_pair == 0:
         return None
@@ -164,7 +164,7 @@ def in_time(state: State) -> InTime:
     try:
         found = verify(state.balance, state.here.state, options)
     except IntegrationFailed as failure:
-        return InTime(np.nan, np.nan, np.nan, np.nan, stable, str(failure))
+        return InTime(np.nan, np.nan, np.nan, np.nan, stable, SolveEnd.INTEGRATION_FAILED.say(f" {failure}"))
     output = next(iter(found.amplitude.values()), 0.0)
     return InTime(output, found.energy, found.preload, found.step_error, stable, found.outcome)
 

@@ -7,11 +7,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.accuracy.accuracy import OF_WEAR, Choice, parsed, table_of, tuned
 from tribodyn.workflows.accuracy.knobs import Study, study_of
 from tribodyn.workflows.accuracy.measure import Measured, measure
-from tribodyn.workflows.accuracy.trade_table import NAMES, QUANTITIES, Trade
+from tribodyn.workflows.accuracy.trade_table import ANSWERED, NAMES, QUANTITIES, Trade
 from tribodyn.workflows.scene import scene_file
 
 
@@ -88,7 +87,7 @@ def finest(trade: Trade, choice: Choice, quantities: Sequence[str]) -> tuple[str
     """
     found: list[str] = []
     for chosen in (row for row in choice.rows if trade.of(row.knob)[-1].overrides):
-        good = [row for row in trade.of(chosen.knob) if row.tunable and row.outcome == CONVERGED]
+        good = [row for row in trade.of(chosen.knob) if row.tunable and row.outcome == ANSWERED]
         measured = [row for row in good if any(row.values[q] is not None for q in quantities)]
         found += (measured or good)[-1].overrides
     return tuple(found)
@@ -104,7 +103,7 @@ def _concerned(more: Sequence[str], study: Study, choice: Choice) -> list[str]:
 def _measured(file: scene_file.SceneFile, wears: bool, refined: bool, say: Callable[[str], None]) -> Measured:
     found = measure(file, wears, refined)
     say(f"{'; '.join(file.overrides)}: {found.seconds:.1f} s, {found.outcome}")
-    if found.outcome != CONVERGED:
+    if found.outcome != ANSWERED:
         raise RuntimeError(f"{file.name} with {'; '.join(file.overrides)}: {found.outcome}")
     return found
 

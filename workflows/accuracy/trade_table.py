@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.accuracy.knobs import study_of
 from tribodyn.workflows.accuracy.limit import limit_of
 from tribodyn.workflows.result.whole_file import replacing
@@ -19,6 +18,7 @@ from tribodyn.workflows.scene.scene_file import SceneFile
 
 FORMAT = "tribodyn trade 2"
 KEY_VERSION = 2  # of the defaults and meanings of the schema that keys of tables rest on
+ANSWERED = "converged"  # in tables: every answer that was asked for is there
 QUANTITIES = ("peak_hz", "peak_m", "energy_J", "preload_N", "depth_m", "life_cycles")
 NAMES = ("peak frequency", "amplitude", "energy", "preload", "depth", "life")
 
@@ -31,7 +31,7 @@ class TradeRow:
     values : by QUANTITIES in SI units, None where there is none
     errors : relative to where the knob's values tend to; doubts : how far off that limit itself may be
     seconds : of one processor; share : of the seconds of the base, asked for the same answers
-    memory : largest of the process [bytes]; outcome : "converged" or a sentence
+    memory : largest of the process [bytes]; outcome : ANSWERED, or why answers are missing
     """
 
     knob: str
@@ -51,7 +51,7 @@ class TradeRow:
     def worst(self) -> float:
         """Largest relative error of all quantities; inf where the setting failed."""
         known = [abs(error) for error in self.errors.values() if error is not None]
-        return max(known, default=0.0) if self.outcome == CONVERGED else float("inf")
+        return max(known, default=0.0) if self.outcome == ANSWERED else float("inf")
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Trade:
 def known_of(rows: Iterable[TradeRow], quantity: str) -> list[tuple[float, float]]:
     """Size and value of the rows that say a quantity, from coarse to fine."""
     return [
-        (row.size, value) for row in rows if row.outcome == CONVERGED and (value := row.values[quantity]) is not None
+        (row.size, value) for row in rows if row.outcome == ANSWERED and (value := row.values[quantity]) is not None
     ]
 
 

@@ -13,7 +13,7 @@ from time import process_time
 import numpy as np
 
 from tribodyn.hbm.continuation.operating_point import NoPeak
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import SolveEnd
 from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload
 from tribodyn.workflows.accuracy import probes
 from tribodyn.workflows.accuracy.probes import Answers, InTime, State, relative
@@ -211,7 +211,7 @@ def _statement(
     trouble = ""
     for state, check in concerned:
         where = "of the unworn contact" if not state.row else f"after {state.cycles:.3g} cycles"
-        if check.outcome != CONVERGED:
+        if check.outcome.kind is not SolveEnd.CONVERGED:
             trouble = f"time integration finds no periodic motion {where}: {check.outcome}"
             break
         miss = abs({"amplitude": check.amplitude, "preload": check.preload}.get(name, check.energy))

@@ -16,7 +16,6 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time.time_integration import LeftAlone, Options, leave_alone
@@ -97,7 +96,7 @@ class Comparison:
             "step_error": found.step_error if np.isfinite(found.step_error) else None,
             "periods": found.periods,
             "drift": found.drift,
-            "outcome": found.outcome,
+            "outcome": str(found.outcome),
             "seconds": self.seconds,
             "left_alone": None if self.left_alone is None else self._left_alone(self.left_alone),
         }
@@ -178,7 +177,7 @@ def compare(
             found = verify(balance, solution.state, options)
             stable = exponents.stability(balance, solution.state).stable
             left_alone = None
-            if not stable or found.outcome != CONVERGED:
+            if not stable or not found.motion.periodic:
                 left_alone = leave_alone(balance, target, solution.state, LEFT_ALONE, options)
     return Comparison(balance, solution, found, stable, row, steps, time.perf_counter() - start, left_alone)
 
@@ -207,7 +206,7 @@ def _start(
         balance = unworn.with_gap(unworn.contact.gap + worn.depth).with_load(load)
         return balance, worn.omega, _carried(worn.displacement, basis, balance)
     frf = result.response
-    good = [] if frf is None else [i for i, outcome in enumerate(frf.outcome) if outcome == CONVERGED]
+    good = [] if frf is None else np.flatnonzero(frf.converged).tolist()
     if frf is None or not good:
         raise ValueError("the result has no response curve to start from: run its scene first")
     height = frf.amplitude(frf.output_names[0])

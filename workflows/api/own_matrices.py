@@ -23,7 +23,7 @@ from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import Outcome, SolveEnd
 from tribodyn.hbm.stability import exponents as floquet
 from tribodyn.hbm.time import time_integration as time
 from tribodyn.hbm.time import verify
@@ -124,17 +124,17 @@ class Structure:
 class Cycle:
     """One periodic vibration as the harmonic balance has it.
 
-    state : what was solved; outcome : "converged" or a sentence
+    state : what was solved; outcome : why the solve ended; its text is a sentence
     """
 
     problem: HarmonicBalance
     state: State
-    outcome: str
+    outcome: Outcome[SolveEnd]
 
     @property
     def converged(self) -> bool:
         """Whether it is a solution."""
-        return self.outcome == CONVERGED
+        return self.outcome.kind is SolveEnd.CONVERGED
 
     @property
     def frequency(self) -> float:

@@ -133,7 +133,7 @@ def _measure(balance: HarmonicBalance, harmonics: str, threads: int, windows: tu
         harmonics=harmonics,
         threads=threads,
         points=len(branch.omega),
-        converged=sum(outcome == newton.CONVERGED for outcome in branch.outcome),
+        converged=int(branch.converged.sum()),
         unknowns=balance.n_unknown,
         dense_unknowns=balance.model.system.n_dof * balance.basis.n_coeff,
         seconds=seconds,

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.benchmarks import extremes_wear
-from tribodyn.workflows.benchmarks.extremes_judge import REFUSED, WRONG, Verdict, sampled_honestly, tried
+from tribodyn.workflows.benchmarks.extremes_judge import CONVERGED, REFUSED, WRONG, Verdict, sampled_honestly, tried
 from tribodyn.workflows.benchmarks.extremes_models import Body, beam, lattice, rigid, scaled
 
 QUICK = 8  # the quick table has every eighth cell

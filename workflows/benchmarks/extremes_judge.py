@@ -16,11 +16,10 @@ from tribodyn.hbm.contact.sampling import sampling_error
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.linear import recovery
 from tribodyn.hbm.newton import NewtonOptions, Solution
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.reference import DenseBalance
 from tribodyn.workflows.benchmarks.extremes_march import force_error
 
-REFUSED, WRONG = "refused", "wrong"
+CONVERGED, REFUSED, WRONG = "converged", "refused", "wrong"  # what is said of a cell
 LARGEST_DENSE = 1600  # unknowns up to which the dense reference is solved
 DENSE_TOLERANCE = 1e-9  # of the excitation, that the dense reference leaves
 NEWTON = NewtonOptions().tolerance  # of the displacement, that the solver leaves
@@ -49,7 +48,7 @@ def tried(balance: HarmonicBalance, omega: float) -> tuple[Verdict, Solution]:
     """Solve from rest, as a user gets it, and judge."""
     solution = arc_length.solve_along_load(balance, omega)
     if not solution.converged:
-        return Verdict(REFUSED, solution.outcome), solution
+        return Verdict(REFUSED, str(solution.outcome)), solution
     return judged(balance, solution.state), solution
 
 
@@ -239,7 +238,7 @@ class _Dense:
         omega, dense = self._state.omega, self._dense
         try:
             found = dense.solve(omega, start, tolerance=DENSE_TOLERANCE, max_steps=25)
-            if found.outcome != CONVERGED:
+            if not found.converged:
                 return None
             finer = dense.solve(omega, found.q, tolerance=0.0, max_steps=3)
         except np.linalg.LinAlgError:

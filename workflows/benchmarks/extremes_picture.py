@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.benchmarks.extremes import Trial, counts
-from tribodyn.workflows.benchmarks.extremes_judge import REFUSED, WRONG
+from tribodyn.workflows.benchmarks.extremes_judge import CONVERGED, REFUSED, WRONG
 from tribodyn.workflows.pictures.style import BLUE, ORANGE, RED, STYLE
 
 COLOUR = {CONVERGED: BLUE, REFUSED: ORANGE, WRONG: RED}

@@ -8,13 +8,13 @@ from functools import partial
 import numpy as np
 
 from tribodyn.hbm.continuation.operating_point import AtFrequency
-from tribodyn.hbm.outcome import CONVERGED, WearEnd
+from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
 from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.step_error import UNKNOWN, step_error
-from tribodyn.workflows.benchmarks.extremes_judge import REFUSED, WRONG, Verdict
+from tribodyn.workflows.benchmarks.extremes_judge import CONVERGED, REFUSED, WRONG, Verdict
 from tribodyn.workflows.benchmarks.extremes_models import Body
 from tribodyn.workflows.run.references import free_deflection
 

@@ -19,7 +19,6 @@ from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm.continuation.methods import natural
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.pictures.plots import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
 from tribodyn.workflows.run import memory, modelling, settings
@@ -89,7 +88,7 @@ def measure(n_patch: int, points: int = POINTS) -> SizeCost:
         setup_seconds=clock[2] - clock[1],
         response_seconds=clock[4] - clock[3],
         points=len(branch.omega),
-        converged=sum(outcome == CONVERGED for outcome in branch.outcome),
+        converged=int(branch.converged.sum()),
         newton_steps=int(branch.newton_steps.sum()),
         compliance_error=balance.compliance.error,
         peak_bytes=memory.peak(),

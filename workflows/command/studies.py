@@ -302,7 +302,7 @@ def backbone(
                 ("at rest", f"{found.reference_omega / (2 * math.pi):.6g} Hz"),
                 ("frequency", f"{hertz[0]:.6g} -> {hertz[-1]:.6g} Hz"),
                 ("damping", f"{damping[0]:.4g} -> {damping[-1]:.4g} %, largest {damping.max():.4g} %"),
-                ("end", found.end),
+                ("end", str(found.end)),
             ]
         )
         print(folder / "backbone.csv", folder / "backbone.png", sep="\n")

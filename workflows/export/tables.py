@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.result.result import Result
 
 Table = Mapping[str, np.ndarray]
@@ -61,7 +60,7 @@ def response(result: Result) -> Table:
     columns |= {
         "energy_J": frf.energy,
         "newton_steps": frf.newton_steps,
-        "converged": np.array([outcome == CONVERGED for outcome in frf.outcome]),
+        "converged": frf.converged,
     }
     if result.stability is not None:
         columns |= {"stable": result.stability.stable, "growth_1_per_s": result.stability.growth}

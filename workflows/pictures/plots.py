@@ -11,7 +11,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.pictures import maps
 from tribodyn.workflows.pictures.figures import axes_of, force_unit, heading, length_unit, save, status_name, titled
@@ -57,7 +56,7 @@ def frequency_response(result: Result) -> Figure:
             axes.plot(hertz, scale * result.references.free, "--", color=GREY, label="free (contact absent)")
             axes.plot(hertz, scale * result.references.stuck, ":", color=INK, label="stuck (closed, no slip)")
         if result.response is not None:
-            good = np.array([outcome == CONVERGED for outcome in result.response.outcome])
+            good = result.response.converged
             amplitude = scale * result.response.amplitude(result.response.output_names[0])
             _curve(axes, result, good, amplitude, scale)
         if result.wear is not None and result.wear_steps:
@@ -222,7 +221,7 @@ def output_amplitudes(result: Result) -> Figure:
     """Amplitude of every observed output over frequency."""
     frf = result.response
     assert frf is not None
-    good = np.array([outcome == CONVERGED for outcome in frf.outcome])
+    good = frf.converged
     with axes_of() as (figure, axes):
         heights = {name: np.where(good, frf.amplitude(name), np.nan) for name in frf.output_names}
         unit, scale = length_unit(float(np.nanmax(list(heights.values()))))

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.pictures.plots import loop_size
 from tribodyn.workflows.pictures.style import CYCLE, GREY, INK
 from tribodyn.workflows.result.result import Result
@@ -73,7 +72,7 @@ def _response(results: Sequence[tuple[str, Result]]) -> Chart:
                 style = {"dash": dash, "color": GREY if label == "free" else INK, "width": 1}
                 data.append(_line(f"{name}: {label}", hertz, 1e3 * height, line=style, **more))
         if frf is not None:
-            good = np.array([outcome == CONVERGED for outcome in frf.outcome])
+            good = frf.converged
             for k, output in enumerate(frf.output_names):
                 height = np.where(good, 1e3 * frf.amplitude(output), np.nan)
                 more = {"line": {"color": color}} if k == 0 else {"visible": "legendonly"}

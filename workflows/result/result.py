@@ -14,7 +14,6 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.result.facts import BudgetEntry, Facts, Stage
 
@@ -394,7 +393,7 @@ class Result:
 
 def peaks(frf: Branch, count: int = PEAKS) -> np.ndarray:
     """Points of the highest local maxima of a curve's first output, by frequency; else the highest point."""
-    height = np.where([o == CONVERGED for o in frf.outcome], frf.amplitude(frf.output_names[0]), -1.0)
+    height = np.where(frf.converged, frf.amplitude(frf.output_names[0]), -1.0)
     inner = np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:]) & (height[1:-1] > 0)) + 1
     best = inner[np.argsort(-height[inner])][:count] if len(inner) else np.array([int(np.argmax(height))])
     return np.asarray(best[np.argsort(frf.omega[best])])

@@ -11,16 +11,16 @@ import hashlib
 import io
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import h5py
 import numpy as np
 
 from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.outcome import BranchEnd, End, Outcome, WearEnd
+from tribodyn.hbm.outcome import BranchEnd, End, Outcome, SolveEnd, WearEnd
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.result.facts import BudgetEntry, Facts, Stage
 from tribodyn.workflows.result.result import (
@@ -36,13 +36,15 @@ from tribodyn.workflows.result.result import (
 )
 from tribodyn.workflows.result.whole_file import replacing
 
-FORMAT = "tribodyn result 2"
+FORMAT = "tribodyn result 3"
 USER_BLOCK = 512  # bytes before the HDF5 content, the least that HDF5 allows
 MARK = b"tribodyn result, sha256 of what follows this block: "
 FIELD = {"frf": "response"}  # groups of the file that have another name than the field of a Result
 
+Ended = TypeVar("Ended", bound=End)
 KIND = "end_kind"  # attribute with the name of the member whose sentence stands in "end"
 ENDS: dict[type, type[End]] = {Branch: BranchEnd, WearHistory: WearEnd}
+KINDS = "outcome_kind"  # attribute with the names of the members whose sentences stand in "outcome"
 BUDGET = "error_budget"  # attribute of the group facts that holds the entries of the budget as JSON
 
 # group -> (type, {array: (dimensions, unit)}); what is not an array is an attribute of the group
@@ -197,8 +199,15 @@ def _write(file: h5py.File, result: Result) -> None:
                 _write_array(file, group, item.name, np.asarray(value, dtype), *arrays[item.name])
             elif isinstance(value, Outcome):
                 group.attrs[item.name], group.attrs[KIND] = str(value), value.kind.name
+            elif item.name == "outcome":
+                group.attrs[item.name] = _strings(str(outcome) for outcome in value)
+                group.attrs[KINDS] = _strings(outcome.kind.name for outcome in value)
             else:
-                group.attrs[item.name] = value if isinstance(value, str) else np.array(value, dtype=h5py.string_dtype())
+                group.attrs[item.name] = value if isinstance(value, str) else _strings(value)
+
+
+def _strings(values: Iterable[str]) -> np.ndarray:
+    return np.array(list(values), dtype=h5py.string_dtype())
 
 
 def _write_array(
@@ -269,12 +278,19 @@ def _read(group: h5py.Group, kind: type, arrays: Mapping[str, Any]) -> Any:
             value = group[item.name][()]
             values[item.name] = tuple(value.tolist()) if str(item.type).startswith("tuple") else value
         elif item.name == "end":
-            end = ENDS[kind][group.attrs[KIND]]
-            values[item.name] = end.say(str(group.attrs[item.name]).removeprefix(end.value))
+            values[item.name] = _outcome(ENDS[kind], str(group.attrs[KIND]), str(group.attrs[item.name]))
+        elif item.name == "outcome":
+            said = zip(group.attrs[KINDS], group.attrs[item.name], strict=True)
+            values[item.name] = tuple(_outcome(SolveEnd, str(name), str(text)) for name, text in said)
         else:
             value = group.attrs[item.name]
             values[item.name] = value if isinstance(value, str) else tuple(str(entry) for entry in value)
     return kind(**values)
+
+
+def _outcome(ends: type[Ended], name: str, sentence: str) -> Outcome[Ended]:
+    end = ends[name]
+    return end.say(sentence.removeprefix(end.value))
 
 
 def _attributes(attributes: h5py.AttributeManager) -> dict[str, Any]:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.wear.events import events
 from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload, cycles_to_share
 from tribodyn.workflows.accuracy import budget, statement
@@ -119,7 +118,7 @@ def _peak(result: Result) -> dict[str, Any]:
         }
     if frf is not None:
         amplitude = frf.amplitude(frf.output_names[0])
-        best = int(np.argmax(np.where([outcome == CONVERGED for outcome in frf.outcome], amplitude, -1.0)))
+        best = int(np.argmax(np.where(frf.converged, amplitude, -1.0)))
         hertz, height = float(frf.frequency[best]), float(amplitude[best])
         at_end = best in (0, len(amplitude) - 1)
         return {"peak_hz": [hertz, hertz], "peak_m": [height, height], "preload_N": None, "peak_at_end": at_end}
@@ -131,7 +130,7 @@ def _stable_peak(result: Result) -> dict[str, Any]:
     frf, marks = result.response, result.stability
     if frf is None or marks is None:
         return dict.fromkeys(("peak_is_stable", "stable_peak_hz", "stable_peak_m"))
-    height = np.where([outcome == CONVERGED for outcome in frf.outcome], frf.amplitude(frf.output_names[0]), -1.0)
+    height = np.where(frf.converged, frf.amplitude(frf.output_names[0]), -1.0)
     stable = np.where(marks.stable, height, -1.0)
     best, found = int(np.argmax(stable)), bool(stable.max() >= 0)
     return {
@@ -155,7 +154,7 @@ def _curve(result: Result) -> dict[str, Any]:
     }
     if frf is None:
         return numbers
-    good = np.array([outcome == CONVERGED for outcome in frf.outcome])
+    good = frf.converged
     if result.stability is not None:
         where = zip(result.stability.omega / (2 * np.pi), result.stability.kinds, strict=True)
         numbers["unstable_points"] = int(np.sum(good & ~result.stability.stable))

@@ -12,7 +12,6 @@ from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.stability import exponents
 from tribodyn.workflows.result.result import CurveStability, ShearBounds
 
@@ -66,7 +65,7 @@ def shear_bounds(
     low, high = np.full((2, n), np.nan), np.full((2, n), np.nan)
     stuck, failed = np.zeros(n), np.zeros(n, int)
     for i in range(n):
-        if branch.outcome[i] == CONVERGED:
+        if branch.converged[i]:
             x = branch.contact[i].reshape(balance.contact.n_pair, -1, branch.contact.shape[2])
             found = residual_shear.response_bounds(balance, branch.omega[i], x, None, newton)
             failed[i] = np.sum(~found.converged)

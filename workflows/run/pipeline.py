@@ -12,7 +12,7 @@ import numpy as np
 from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.outcome import CONVERGED, BranchEnd
+from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.accuracy import verdict
 from tribodyn.workflows.accuracy.budget import with_budget
@@ -115,5 +115,5 @@ def follow_response(scene: Scene, balance: HarmonicBalance, advance: Callable[[f
 
 def check_branch(branch: Branch | None) -> None:
     """Raise SolveFailed where a response curve did not come to its end."""
-    if branch is not None and (branch.outcome[-1] != CONVERGED or branch.ended is BranchEnd.ENDED):
+    if branch is not None and (not branch.converged[-1] or branch.ended is BranchEnd.ENDED):
         raise SolveFailed(f"the frequency response {branch.end}")

@@ -8,7 +8,6 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.result.result import Result, WornResponses
 
 
@@ -47,5 +46,5 @@ def curves(
 
 
 def _amplitude(curve: Branch) -> np.ndarray:
-    good = [outcome == CONVERGED for outcome in curve.outcome]
+    good = curve.converged
     return np.where(good, curve.amplitude(curve.output_names[0]), np.nan)

@@ -9,7 +9,7 @@ import numpy as np
 
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import arc_length
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import SolveEnd
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time.folds_in_time import FoldInTime, fold_in_time
 from tribodyn.hbm.time.time_integration import IntegrationFailed
@@ -31,11 +31,11 @@ class FoldsFound:
         return [
             {
                 "balance_hz": fold.omega / (2 * np.pi),
-                "time_hz": fold.in_time / (2 * np.pi) if fold.outcome == CONVERGED else None,
-                "difference": fold.omega / fold.in_time - 1 if fold.outcome == CONVERGED else None,
+                "time_hz": fold.in_time / (2 * np.pi) if fold.found else None,
+                "difference": fold.omega / fold.in_time - 1 if fold.found else None,
                 "resolution": fold.resolution,
                 "amplitude_m": fold.amplitude,
-                "outcome": fold.outcome,
+                "outcome": str(fold.outcome),
             }
             for fold in self.folds
         ]
@@ -56,7 +56,7 @@ def find(file: SceneFile, progress: Progress, bracket: float = 0.02) -> FoldsFou
         with progress.stage("frequency response"):
             options = arc_length.Options(newton=settings.newton_options(file.scene))
             branch = arc_length.follow(balance, low, high, options)
-        if branch.outcome[0] != CONVERGED:
+        if not branch.converged[0]:
             raise SolveFailed(f"the frequency response {branch.end}")
         found = []
         for fold in branch.folds:
@@ -65,5 +65,6 @@ def find(file: SceneFile, progress: Progress, bracket: float = 0.02) -> FoldsFou
                     found.append(fold_in_time(balance, branch, fold, settings.OUTPUT, bracket=bracket))
                 except IntegrationFailed as failure:
                     omega = float(branch.omega[fold])
-                    found.append(FoldInTime(fold, omega, omega, float("nan"), bracket, str(failure)))
+                    why = SolveEnd.INTEGRATION_FAILED.say(f" {failure}")
+                    found.append(FoldInTime(fold, omega, omega, float("nan"), bracket, why))
     return FoldsFound(branch, tuple(found))

@@ -10,7 +10,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone, BackboneOptions, backbone
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
@@ -61,7 +60,7 @@ def follow(file: SceneFile, asked: Way, progress: Progress) -> Backbone:
         with progress.stage("backbone"):
             options = BackboneOptions(asked.points, newton=settings.newton_options(file.scene))
             found = backbone(balance, asked.start, asked.stop, asked.mode, settings.OUTPUT, options, asked.modal)
-    if CONVERGED not in found.outcome:
+    if not found.converged.any():
         raise SolveFailed(f"the backbone {found.end}")
     return found
 
@@ -113,4 +112,4 @@ def picture(found: Backbone) -> Figure:
 
 
 def _good(found: Backbone) -> np.ndarray:
-    return np.array([outcome == CONVERGED for outcome in found.outcome])
+    return found.converged

@@ -20,6 +20,7 @@ from tribodyn.hbm.continuation.folds import FoldOptions, track_fold
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.continuation.parameter import Parameter
+from tribodyn.hbm.outcome import BranchEnd, Outcome
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
@@ -41,7 +42,7 @@ class Track:
 
     what : "peak" or "fold"; name, unit : of the number that changes; value : (n,) of it
     frequency : (n,) [Hz]; amplitude : (n,) of the response [m]; cusps : indices of points where a line of folds turns
-    end : sentence
+    end : why and where it ends; its text is a sentence
     """
 
     what: str
@@ -51,7 +52,7 @@ class Track:
     frequency: np.ndarray
     amplitude: np.ndarray
     cusps: tuple[int, ...]
-    end: str
+    end: Outcome[BranchEnd]
 
     def record(self) -> dict[str, Any]:
         """For machines."""
@@ -62,7 +63,7 @@ class Track:
             "frequency_hz": self.frequency.tolist(),
             "amplitude_m": self.amplitude.tolist(),
             "cusps": list(self.cusps),
-            "end": self.end,
+            "end": str(self.end),
         }
 
 
@@ -121,7 +122,7 @@ def _peaks(
 ) -> Track:
     site = settings.peak_of(file.scene)
     found: list[tuple[float, OperatingPoint]] = []
-    end = f"reached {path.say(stop)}"
+    end = BranchEnd.REACHED.say(f" {path.say(stop)}")
     for done, value in enumerate(np.linspace(start, stop, points), start=1):
         balance = path.make(value)
         if found:
@@ -130,7 +131,7 @@ def _peaks(
         if not found or not point.solution.converged:  # the peak has left its branch: looked for afresh
             point = site.first(balance)
         if not point.solution.converged:
-            end = f"ended at {path.say(value)}: {point.solution.outcome}"
+            end = BranchEnd.ENDED.say(f" {path.say(value)}: {point.solution.outcome}")
             break
         found.append((value, point))
         on_point(done)
@@ -141,7 +142,8 @@ def _peaks(
     at_limit = np.flatnonzero(np.min(np.abs(frequency[:, None] / file.scene.response.frequency - 1), axis=1) < LIMIT)
     if len(at_limit):
         where = path.say(values[at_limit[0]])
-        end += f"; from {where} on some are no peaks but ends of response.frequency: widen it"
+        beyond = f"; from {where} on some are no peaks but ends of response.frequency: widen it"
+        end = end.kind.say(end.detail + beyond)
     return Track("peak", path.name, path.unit, values, frequency, amplitude, (), end)
 
 

@@ -13,8 +13,8 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm.continuation.operating_point import NoPeak
-from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.accuracy import measure
+from tribodyn.workflows.accuracy.trade_table import ANSWERED
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.studies import fit_file
@@ -27,13 +27,13 @@ class Varied:
     """A scene with one change.
 
     change : overrides, joined by ";", empty for the scene itself; values : answers by name, SI units, None where there
-    is none; fitted : overrides that a fit found for it; outcome : "converged" or why answers are missing
+    is none; fitted : overrides that a fit found for it; outcome : ANSWERED or why answers are missing
     """
 
     change: str
     values: Answers
     fitted: tuple[str, ...] = ()
-    outcome: str = CONVERGED
+    outcome: str = ANSWERED
 
 
 def changed(scene: str, overrides: Sequence[str], changes: Sequence[str]) -> dict[str, SceneFile]:
@@ -103,7 +103,7 @@ def as_text(rows: Sequence[Varied]) -> str:
     for row in rows:
         own: Answers = {} if row is rows[0] else rows[0].values
         cells = "".join(f"{_beside(row.values.get(name), own.get(name)):>24}" for name in names)
-        why = "" if row.outcome == CONVERGED else f": {row.outcome}"
+        why = "" if row.outcome == ANSWERED else f": {row.outcome}"
         fitted = f" (fitted: {'; '.join(row.fitted)})" if row.fitted else ""
         lines.append(f"{cells}  {row.change or 'the scene'}{fitted}{why}")
     return "\n".join(lines)

@@ -140,7 +140,7 @@ class _Sweep:
             value, solution = self._solve(here)
             if not solution.converged:
                 if self._step <= self._options.min_step:
-                    return "" if self._jump(here) else solution.outcome
+                    return "" if self._jump(here) else str(solution.outcome)
                 self._step = max(0.25 * self._step, self._options.min_step)
                 continue
             response = self._outputs(value, solution)

@@ -19,7 +19,7 @@ from tribodyn.hbm.continuation.branch import Branch, BranchBuilder
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.newton import NewtonOptions, Solution
-from tribodyn.hbm.outcome import CONVERGED, BranchEnd
+from tribodyn.hbm.outcome import BranchEnd, SolveEnd
 from tribodyn.hbm.threads import single
 
 EXTRAPOLATION_DEGREE = 2  # higher ones amplify the kinks of the contact
@@ -106,7 +106,7 @@ def _by_arc_length(
         newton=options.newton,
     )
     curve = arc_length.follow(path, here, value, way)
-    arrived = curve.parameter[-1] == value and curve.outcome[-1] == CONVERGED
+    arrived = curve.parameter[-1] == value and curve.converged[-1]
     if not (arrived or curve.folds):
         return failed
     builder.truncate(len(builder.value) - 1)
@@ -118,7 +118,7 @@ def _by_arc_length(
     else:
         solution = arc_length.solve_along_load(*path.place(value), options.newton)
         if not solution.converged:
-            why = f"the curve turns back at a fold, {path.say(fold)}; arc_length goes round it"
+            why = SolveEnd.AT_FOLD.say(f" {path.say(fold)}; arc_length goes round it")
             solution = replace(solution, outcome=why)
     builder.add(value, solution)
     return solution

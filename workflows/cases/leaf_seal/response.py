@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 
 from tribodyn import (
-    CONVERGED,
     OUTPUT,
     SEPARATES,
     STICKS,
@@ -126,7 +125,7 @@ def respond(file: SceneFile) -> LeafResponse:
     assert part is not None
     branch = follow_response(file, balance)
     seconds = time.process_time() - start
-    if branch.outcome[-1] != CONVERGED:  # only the last point of a branch may be unsolved
+    if not branch.converged[-1]:  # only the last point of a branch may be unsolved
         if len(branch.omega) == 1:
             raise SolveFailed(f"the frequency response {branch.end}")
         branch = _without_last(branch)

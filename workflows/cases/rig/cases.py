@@ -15,7 +15,6 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tribodyn import (
-    CONVERGED,
     Branch,
     Patch,
     References,
@@ -157,4 +156,4 @@ def _stage(rig: Rig, run: RigWear, share: float, tell: Callable[[str], None]) ->
 
 def solved(branch: Branch) -> np.ndarray:
     """(n_point,) whether each point was solved."""
-    return np.array([outcome == CONVERGED for outcome in branch.outcome])
+    return branch.converged

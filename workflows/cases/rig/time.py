@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tribodyn import CONVERGED, OUTPUT, IntegrationFailed, TimeOptions, verify_in_time
+from tribodyn import OUTPUT, IntegrationFailed, TimeOptions, verify_in_time
 from tribodyn.workflows.cases.rig.model import Cycle, Rig
 
 STEPS, PERIODS, DRIFT = 1024, 200, 1e-5  # per period; periods to settle in; of the state over one period
@@ -27,11 +27,7 @@ class InTime:
     preload: float | None
     amplitude: float | None
     outcome: str
-
-    @property
-    def periodic(self) -> bool:
-        """Whether a periodic motion was found."""
-        return self.outcome == CONVERGED
+    periodic: bool = False
 
 
 def in_time(rig: Rig, cycle: Cycle) -> InTime:
@@ -43,4 +39,5 @@ def in_time(rig: Rig, cycle: Cycle) -> InTime:
     except IntegrationFailed as failure:
         return InTime(None, None, None, str(failure))
     amplitude = found.amplitude[OUTPUT]
-    return InTime(float(found.motion.energy.sum()), found.motion.preload, amplitude, found.outcome)
+    energy = float(found.motion.energy.sum())
+    return InTime(energy, found.motion.preload, amplitude, str(found.outcome), found.motion.periodic)
