@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import tribodyn as td
 from tests.helpers.pages import README, ROOT, SHOWN, fences, follow, name, pages, prepare, runs, shell
 
 FIRST = "./tribodyn run beam"
@@ -59,6 +60,24 @@ def test_the_first_command_draws_what_is_shown(after_the_first_command: Path) ->
         assert abs(shown.width / shown.height / (made.width / made.height) - 1) < 0.02
         apart = np.subtract(*(np.asarray(one.convert("RGB").resize(size), float) for one in (shown, made)))
     assert np.abs(apart).mean() < 5  # of 255: the same picture, up to fonts and rounding
+
+
+LABELS = ("peak frequency", "amplitude at the peak", "friction energy per cycle", "preload", "wear depth", "life")
+
+
+def test_the_readme_says_what_the_verdict_of_the_beam_says(after_the_first_command: Path) -> None:
+    """Its errors depend on how far the verdict's seconds reach, so that a slow machine has larger ones."""
+    readme = README.read_text(encoding="utf-8")
+    verdict = td.load(after_the_first_command / "results/beam").summary()["verdict"]
+    unit = {"mm": 1e-3, "million": 1e6, "Hz": 1.0, "J": 1.0, "N": 1.0}
+    for label, quantity in zip(LABELS, verdict, strict=True):
+        (line,) = [line for line in readme.splitlines() if re.match(rf"\| {label} +\| [\d.]+ ", line)]
+        value, error, dominated_by = (cell.strip() for cell in line.strip("|").split("|")[1:])
+        number, name = value.split()[:2]
+        judged = verdict[quantity]
+        assert float(number) * unit[name] == pytest.approx(judged["value"], rel=2e-3), label
+        assert judged["error"] / 1.5 < float(error.strip(" %")) / 100 < 1.5 * judged["error"], (label, judged)
+        assert dominated_by == judged["dominated_by"], (label, judged)
 
 
 def test_every_fence_is_known() -> None:
