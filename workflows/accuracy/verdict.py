@@ -24,22 +24,25 @@ from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 
+DEFAULT_SECONDS = (10.0, 60.0)  # bounds of what the measurements may take where the scene does not say
 MOST = 0.8  # of the seconds, for more harmonics, which matter most
 HALF = 0.5  # of the seconds that are left, for one measurement of several
 CONTRADICTION = 3.0  # times the estimated error, from which on time integration contradicts the balance
 RESPONSE = ("amplitude", "energy", "preload")
 
 
-def judge(file: SceneFile, model: Model, result: Result, progress: Progress) -> Verdict:
+def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spent: float) -> Verdict:
     """Measure the errors of a finished result on its own scene and state what may be stated.
 
     The scene's [verdict] says which measurements are made and limits their processor seconds
+    spent : seconds that the run has taken, which limit the measurements where the scene does not
     """
     wanted, clock = file.scene.verdict, process_time()
-    skipped = f"the {wanted.seconds:g} s of verdict.seconds are used up"
+    allowed = wanted.seconds or float(np.clip(spent, *DEFAULT_SECONDS))
+    skipped = f"the {allowed:.3g} s of verdict.seconds are used up"
 
     def left() -> float:
-        return wanted.seconds - (process_time() - clock)
+        return allowed - (process_time() - clock)
 
     try:
         with processor_seconds(HALF * left()):
@@ -51,7 +54,7 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress) -> 
     parts: list[Contribution] = list(_of_budget(result))
     with progress.stage("verdict: harmonics"):
         finer = list(probes.each(seen, probes.with_more_harmonics, MOST * left()))
-        lost = f"lost with more harmonics, or beyond the {wanted.seconds:g} s of verdict.seconds"
+        lost = f"lost with more harmonics, or beyond the {allowed:.3g} s of verdict.seconds"
         parts += _of_harmonics(result, seen, finer, values["life"], lost)
     with progress.stage("verdict: mesh"):
         parts += (

@@ -88,7 +88,8 @@ def run(
         with progress.stage("error budget"):
             result = with_budget(file, model.balance, result)
         if scene.verdict.enabled:
-            result = replace(result, verdict=verdict.judge(file, model, result, progress).dumped())
+            found = verdict.judge(file, model, result, progress, keep.clock.seconds())
+            result = replace(result, verdict=found.dumped())
         return keep(replace(result, stage=Stage.COMPLETE))
 
 

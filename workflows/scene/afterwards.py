@@ -33,8 +33,9 @@ class VerdictOptions(Table):
 
     enabled: StrictBool = True
     """Judge the result when the run is done."""
-    seconds: Annotated[Number, Field(gt=0)] = 60.0
-    """Processor seconds that the measurements may take together; what they do not reach is not known."""
+    seconds: Annotated[Number, Field(gt=0)] | None = None
+    """Processor seconds that the measurements may take together; what they do not reach is not known. By default as
+    long as the run itself took, but 10 s at least and 60 s at most."""
     mesh: StrictBool = True
     """Solve the unworn contact on a coarser mesh."""
     in_time: StrictBool = False
