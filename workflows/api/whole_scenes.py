@@ -10,8 +10,9 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
+from tribodyn.fem.material import Material
 from tribodyn.workflows.accuracy import converge as grids
 from tribodyn.workflows.accuracy import knob_trade, promise, verification, wear_steps
 from tribodyn.workflows.accuracy.converge import Study as GridStudy
@@ -19,15 +20,30 @@ from tribodyn.workflows.accuracy.promise import Check
 from tribodyn.workflows.accuracy.trade_table import Trade
 from tribodyn.workflows.accuracy.verification import Comparison
 from tribodyn.workflows.accuracy.wear_steps import WearStepTable
-from tribodyn.workflows.api.scenes import Overrides, Report, Source, load, override_texts, read_scene, reporter
-from tribodyn.workflows.benchmarks.bench import Timing
+from tribodyn.workflows.api.scenes import (
+    Overrides,
+    Report,
+    Source,
+    load,
+    override_texts,
+    read_scene,
+    reporter,
+    result_file,
+)
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.studies import fit_file, tracking
+from tribodyn.workflows.studies import fit_file, inspection, tracking
 from tribodyn.workflows.studies import folds as fold_study
 from tribodyn.workflows.studies.folds import FoldsFound
 from tribodyn.workflows.studies.identification import Identification
+from tribodyn.workflows.studies.inspection import Inspection
 from tribodyn.workflows.studies.posterior import Posterior
 from tribodyn.workflows.studies.tracking import Track
+
+if TYPE_CHECKING:  # what takes long to import is imported where it is needed
+    from tribodyn.workflows.benchmarks.bench import Timing
+    from tribodyn.workflows.benchmarks.extremes import Trial
+    from tribodyn.workflows.benchmarks.fuzz import Tried
+    from tribodyn.workflows.benchmarks.scaling import SizeCost
 
 Place = str | PathLike[str]
 
@@ -162,3 +178,84 @@ def benchmark(quick: bool = True, *, progress: Report = None) -> list[Timing]:
     from tribodyn.workflows.benchmarks import bench
 
     return bench.run(quick, reporter(progress).say)
+
+
+def extremes(quick: bool = True, *, progress: Report = None) -> tuple[Trial, ...]:
+    """Try the solver at its numerical extremes: each setting converged and checked, or refused with a sentence.
+
+    quick : every eighth setting, on smaller models
+    """
+    from tribodyn.workflows.benchmarks import extremes as table
+
+    return table.run(quick, reporter(progress).say)
+
+
+def scaling(sizes: Sequence[int] = (7, 13), *, progress: Report = None) -> list[SizeCost]:
+    """Set-up, memory and seconds of a response of the beam scene on n x n contact nodes, for each n."""
+    from tribodyn.workflows.benchmarks import scaling as table
+
+    return table.run(sizes, reporter(progress).say)
+
+
+def fuzz(
+    scene: Place,
+    *,
+    runs: int | None = None,
+    seed: int = 0,
+    seconds: float = 10.0,
+    workers: int = 1,
+    overrides: Overrides = (),
+    progress: Report = None,
+) -> list[Tried]:
+    """Give every key of a scene thirty nasty values, one at a time, each in a process of its own.
+
+    runs : how many pairs of key and value, drawn with `seed`, all by default; seconds : of the processor a run may take
+    """
+    from tribodyn.workflows.benchmarks import fuzz as tries
+    from tribodyn.workflows.command import main
+
+    say = reporter(progress).say
+    return tries.fuzz(fspath(scene), override_texts(overrides), runs, seed, seconds, workers, say, command=main.main)
+
+
+def inspect(
+    what: Place, *, unit: str = "m", material: Material | None = None, modes: int = 0, overrides: Overrides = ()
+) -> Inspection:
+    """Say what a mesh, a deck, a CAD file or a scene holds: size, mass, bodies, groups, worst element, gaps, oddities.
+
+    unit : of length of a file that is no scene; material : of its bodies where the file gives none
+    modes : how many natural frequencies are wanted, free of contact
+    """
+    return inspection.inspect(fspath(what), override_texts(overrides), unit, material, modes)
+
+
+def export(
+    result: Result | Place, to: Sequence[str], folder: str | PathLike[str], mesh_ending: str = ".xdmf"
+) -> list[Path]:
+    """Write a result in the formats of other programs, each into a folder of its name; the files written.
+
+    to : of vtk, csv, parquet, mat, uff, mesh, npz, mtx, abaqus; mesh_ending : format of the mesh
+    """
+    from tribodyn.workflows.export import formats
+
+    held = result if isinstance(result, Result) else load(result)
+    return list(formats.write(held, to, Path(folder), mesh_ending))
+
+
+def report(results: Sequence[Place], path: str | PathLike[str]) -> Path:
+    """Write one HTML file that shows results and opens anywhere, without a network; its path.
+
+    results : folders or files; several are shown side by side, with differences from the first
+    """
+    from tribodyn.workflows.report import page
+
+    if not results:
+        raise ValueError("report: give the folder or file of a result")
+    given = [Path(one) for one in results]
+    files, loaded = [result_file(one) for one in given], [load(one) for one in given]
+    names = [str(one.provenance["scene_name"]) for one in loaded]
+    if len(set(names)) < len(names):
+        names = [file.parent.name or str(one) for file, one in zip(files, given, strict=True)]
+    if len(set(names)) < len(names):
+        names = [str(file) for file in files]
+    return page.write(list(zip(names, loaded, files, strict=True)), Path(path))

@@ -22,20 +22,12 @@ def report(*result: Path, out: Path | None = None) -> None:
     out
         The .html file; report.html beside the first result by default.
     """
-    from tribodyn.workflows.api import scenes
-    from tribodyn.workflows.report import page
+    from tribodyn.workflows.api import scenes, whole_scenes
 
     if not result:
         raise ValueError("report: give the folder or file of a result")
     make_room(out, (".html",))
-    files = [scenes.result_file(path) for path in result]
-    loaded = [scenes.load(path) for path in result]
-    names = [one.provenance["scene_name"] for one in loaded]
-    if len(set(names)) < len(names):
-        names = [path.parent.name or str(path) for path in files]
-    if len(set(names)) < len(names):
-        names = [str(path) for path in files]
-    print(page.write(list(zip(names, loaded, files, strict=True)), out or files[0].parent / "report.html"))
+    print(whole_scenes.report(result, out or scenes.result_file(result[0]).parent / "report.html"))
 
 
 COMMANDS = (report,)
