@@ -10,6 +10,8 @@ import numpy as np
 
 from tribodyn.geometry import blocks, checks, grid
 
+MESH = ("n_length", "n_width", "n_height")  # numbers of elements
+
 
 @dataclass(frozen=True)
 class Parameters:

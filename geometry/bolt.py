@@ -11,6 +11,8 @@ from tribodyn.geometry import blocks, checks, rings
 
 CORE = 0.55  # of the radius of the shank: where its square core ends
 
+MESH = ("n_around", "n_grip", "n_nut", "n_end", "n_head")  # numbers of elements
+
 
 @dataclass(frozen=True)
 class Parameters:

@@ -13,6 +13,8 @@ import numpy as np
 
 from tribodyn.geometry import blocks, checks, grid, rings
 
+MESH = ("n_side", "n_pad", "n_field", "n_lap", "n_end", "n_length")  # numbers of elements
+
 
 @dataclass(frozen=True)
 class Parameters:

@@ -9,6 +9,8 @@ import numpy as np
 
 from tribodyn.geometry import blocks, checks, rings
 
+MESH = ("n_around", "n_height")  # numbers of elements
+
 
 @dataclass(frozen=True)
 class Parameters:

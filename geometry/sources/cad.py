@@ -59,6 +59,18 @@ def read_drawing(path: Path) -> RawMesh:
         return msh.from_gmsh(gmsh)
 
 
+def default_size(path: Path) -> float:
+    """Size of the elements where none is asked for, in the unit of the file; raises ValueError as `read` does."""
+    with session() as gmsh:
+        _solids(gmsh, path)
+        return _tenth(gmsh.model)
+
+
+def _tenth(model: Any) -> float:
+    box = np.array(model.getBoundingBox(-1, -1)).reshape(2, 3)
+    return float(np.ptp(box, axis=0).max()) / ELEMENTS_ALONG
+
+
 def _solids(gmsh: Any, path: Path) -> dict[str, int]:
     """Import the solids of a file: name -> tag."""
     gmsh.option.setString("Geometry.OCCTargetUnit", "")
@@ -94,8 +106,7 @@ def _meshed(gmsh: Any, path: Path, shapes: Mapping[str, int], sizes: Sizes) -> R
         model.setVisibility(model.getEntities(), 0)
         model.setVisibility([(3, *shapes.values())], 1, recursive=True)
         gmsh.option.setNumber("Mesh.MeshOnlyVisible", 1)
-    box = np.array(model.getBoundingBox(-1, -1)).reshape(2, 3)
-    everywhere = sizes.everywhere or float(np.ptp(box, axis=0).max()) / ELEMENTS_ALONG
+    everywhere = sizes.everywhere or _tenth(model)
     for values in ((everywhere,), sizes.bodies.values(), sizes.faces.values()):
         if any(not value > 0 for value in values):
             raise ValueError(f"CAD file '{path}': element sizes must be above zero")

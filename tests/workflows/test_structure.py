@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from tribodyn.geometry import blocks
+from tribodyn.geometry.gmsh_session import session
 from tribodyn.hbm import newton
 from tribodyn.hbm.contact import law
+from tribodyn.workflows.accuracy import probes
 from tribodyn.workflows.result import summary
 from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
@@ -382,3 +384,29 @@ def test_what_a_bolt_clamps_carries_its_force_on_small_faces_too(tmp_path: Path)
     found = newton.solve(balance, omega, balance.stuck(omega), newton.NewtonOptions(tolerance=1e-10))
     assert found.converged
     assert balance.preload(found.state) == pytest.approx(1000.0, rel=1e-6)
+
+
+def test_every_body_of_a_scene_is_made_coarser_or_the_mesh_is_said_to_be_given(tmp_path: Path) -> None:
+    """Parts by their counts, CAD files by their sizes; a mesh file cannot be made again."""
+    file = scene_file.parse(BLOCKS, "blocks.toml", folder=tmp_path)
+    coarse = probes.coarser(file).scene
+    assert (coarse.bodies["lower"].parameters["n_length"], coarse.bodies["upper"].parameters["n_length"]) == (3, 2)
+    with session() as gmsh:
+        gmsh.model.occ.addBox(0, 0, 0, 40, 10, 10)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(tmp_path / "box.step"))
+    drawn = (
+        'mesh = "box.step"\nunit = "mm"\nface_sizes = { "face 2" = "3 mm" }\ntranslation = ["55 mm", "3 mm", "10 mm"]'
+    )
+    own = BLOCKS[: BLOCKS.index("[bodies.upper]")] + f'[bodies.upper]\n{drawn}\nmaterial = "aluminium"\n'
+    tail = (
+        BLOCKS[BLOCKS.index("[contacts.lap]") :]
+        .replace("upper.z_min", "upper.face 5")
+        .replace("upper.z_max", "upper.face 6")
+    )
+    coarse = probes.coarser(scene_file.parse(own + tail, "drawn.toml", folder=tmp_path)).scene
+    assert coarse.bodies["upper"].size == pytest.approx(6e-3)  # a tenth of 40 mm, and half as much again
+    assert coarse.bodies["upper"].face_sizes == {"face 2": pytest.approx(4.5e-3)}
+    given = (own + tail).replace("box.step", "box.msh").replace('face_sizes = { "face 2" = "3 mm" }\n', "")
+    with pytest.raises(ValueError, match=r"mesh of \[bodies.upper\] is given"):
+        probes.coarser(scene_file.parse(given, "given.toml", folder=tmp_path))

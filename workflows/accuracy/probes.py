@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from time import process_time
 
 import numpy as np
 
 from tribodyn.geometry import parts
+from tribodyn.geometry.sources import cad
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import harmonic_choice
 from tribodyn.hbm.continuation.operating_point import NoPeak, OperatingPoint, Site
@@ -27,8 +29,10 @@ from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import delta_max, free_deflection
+from tribodyn.workflows.scene.body import Geometry
 from tribodyn.workflows.scene.scene_file import SceneFile, parse
 from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.scene.structure import Body, StructureScene
 
 CLIMB = (3, 5, 7, 9)  # highest harmonics that the estimate climbs through: each start is near enough for Newton
 FURTHER = 6  # harmonics beyond the kept ones that it looks at, where more than CLIMB are kept
@@ -169,24 +173,44 @@ def in_time(state: State) -> InTime:
     return InTime(output, found.energy, found.preload, found.step_error, stable, found.outcome)
 
 
-def coarser(file: SceneFile) -> SceneFile | None:
-    """The scene on a mesh with fewer elements along every edge, None where its mesh cannot be made again."""
+def coarser(file: SceneFile) -> SceneFile:
+    """The scene on a mesh with fewer elements along every edge of every body.
+
+    Raises  ValueError where the mesh of a body cannot be made again
+    """
     scene = file.scene
-    if not isinstance(scene, PartScene) or scene.geometry.part is None:
-        return None
-    part = parts.load(scene.geometry.part)
-    fewer = parts.rescaled(part, part.Parameters(**scene.geometry.parameters), COARSER)
-    if not fewer:
-        return None
-    texts = [f"geometry.{name}={count}" for name, count in fewer.items()]
+    tables: dict[str, Geometry | Body] = {}
+    if isinstance(scene, PartScene | StructureScene) and scene.geometry is not None:
+        tables["geometry"] = scene.geometry
+    elif isinstance(scene, StructureScene) and not scene.decks:
+        tables = {f"bodies.{name}": body for name, body in scene.bodies.items()}
+    if not tables:
+        raise ValueError("matrices and decks have a mesh that is given")
+    texts = [text for key, table in tables.items() for text in _fewer_elements(key, table, file.folder)]
     return parse(file.text, f"{file.name}.toml", (*file.overrides, *texts), file.folder)
 
 
-def on_coarser_mesh(file: SceneFile, harmonics: tuple[int, ...]) -> tuple[Answers, float] | None:
-    """Answers of the unworn contact on a coarser mesh, and its delta_max [m]; None where there is none."""
+def _fewer_elements(key: str, table: Geometry | Body, folder: Path) -> list[str]:
+    """Overrides that give a body fewer elements; raises ValueError where there are none."""
+    if table.part_name is not None:
+        part = parts.load(table.part_name)
+        fewer = parts.rescaled(part, part.Parameters(**table.parameters), COARSER)
+        if not fewer:
+            raise ValueError(f"the part of [{key}] lists no counts of elements in MESH")
+        return [f"{key}.{name}={count}" for name, count in fewer.items()]
+    if isinstance(table, Geometry) or Path(str(table.mesh)).suffix.lower() not in cad.ENDINGS:
+        raise ValueError(f"the mesh of [{key}] is given: compare two meshes with tribodyn converge")
+    size = table.size or table.unit * cad.default_size(folder / str(table.mesh))
+    faces = ", ".join(f'"{name}" = {face / COARSER:.6g}' for name, face in table.face_sizes.items())
+    return [f"{key}.size={size / COARSER:.6g}", *([f"{key}.face_sizes={{{faces}}}"] if faces else [])]
+
+
+def on_coarser_mesh(file: SceneFile, harmonics: tuple[int, ...]) -> tuple[Answers, float]:
+    """Answers of the unworn contact on a coarser mesh, and its delta_max [m].
+
+    Raises  ValueError where there is no coarser mesh; RuntimeError where it has no solution
+    """
     other = coarser(file)
-    if other is None:
-        return None
     model = modelling.build(other, None, Progress(), harmonics)
     scene, balance = other.scene, model.balance
     site, load = scene_peak(other), 1.0
@@ -195,7 +219,7 @@ def on_coarser_mesh(file: SceneFile, harmonics: tuple[int, ...]) -> tuple[Answer
         site, load = duty.site, duty.load
     point = site.first(balance.with_load(load))
     if not point.solution.converged:
-        return None
+        raise RuntimeError(f"{point.solution.outcome}")
     area = balance.model.interface.area
     deepest = delta_max(scene, free_deflection(balance), area) if scene.wear is not None else float("nan")
     return Answers.of(balance.with_load(load), point), deepest

@@ -158,17 +158,17 @@ def _of_mesh(
         yield from _unknown(source, skipped)
         return
     except (ValueError, RuntimeError) as refusal:
-        yield from _unknown(source, f"on a coarser mesh: {refusal}")
-        return
-    if found is None:
-        yield from _unknown(source, "this mesh cannot be made coarser: compare two meshes with tribodyn converge")
+        yield from _unknown(source, f"no coarser mesh: {refusal}")
         return
     coarse, deepest = found
     ours, how = Answers.of(seen[0].balance, seen[0].here), "a coarser mesh"
     for quantity, a, b in _pairs(coarse, ours):
         yield Contribution(source, quantity, relative(a, b), how)
     reach = result.facts.delta_max_m
-    if result.wear_steps and reach is not None:
+    if result.wear_steps and not (reach and np.isfinite(deepest)):
+        for quantity in ("depth", "life"):
+            yield Contribution(source, quantity, None, "the free body does not say how deep the contact can wear")
+    elif result.wear_steps and reach:
         depth = relative(deepest, reach)
         yield Contribution(source, "depth", depth, how)
         yield Contribution(source, "life", depth + relative(coarse.energy, ours.energy), how)
