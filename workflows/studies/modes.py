@@ -85,7 +85,7 @@ def record(found: Backbone) -> dict[str, Any]:
         "reference_hz": found.reference_omega / (2 * np.pi),
         **{name: values[good].tolist() for name, values in columns.items()},
         "rows": [dict(zip(columns, map(float, row), strict=True)) for row in np.array([*columns.values()]).T[good]],
-        "end": found.end,
+        "end": str(found.end),
     }
 
 
