@@ -23,7 +23,7 @@ def exponents(balance: HarmonicBalance, state: State, options: Options | None = 
     if size > MAX_STATES:
         raise ValueError(f"{size} state variables are too many for Floquet multipliers: use the method hill")
     motion = integrate(balance, state.omega, state, options, with_slopes=True)
-    if motion.outcome != "converged":
+    if not motion.periodic:
         raise ValueError(f"no periodic motion near this state: {motion.outcome}")
     multipliers = np.linalg.eigvals(monodromy(stepper, motion))
     multipliers = multipliers[np.abs(multipliers) > LEAST_MULTIPLIER]

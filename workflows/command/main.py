@@ -223,7 +223,7 @@ def verify(
     else:
         print_lines(found.lines())
         print(picture)
-    if found.found.outcome != "converged":
+    if not found.found.motion.periodic:
         raise SolveFailed(f"the time integration found no periodic motion: {found.found.outcome}")
 
 
