@@ -203,12 +203,16 @@ def make_load(load: StaticLoad, mesh: Any, material: Any, folder: Path) -> Load:
 
 def reduce_part(scene: MeshScene, part: Part) -> ReducedModel:
     """The part on its contact and load nodes and a few modes, damped and held as the scene says."""
+    return part_reduction.with_prescribed(scene, part, damped(scene, plain_model(scene, part)))
+
+
+def plain_model(scene: MeshScene, part: Part) -> ReducedModel:
+    """The same, not damped and with nothing prescribed; of a wheel one wave of it."""
     if scene.wheel is not None:
         small = sector.reduced(scene, sector.sector(scene, part))
-        return damped(scene, travelling_wave(small, scene.wheel.engine_order))
+        return travelling_wave(small, scene.wheel.engine_order)
     reduced = hold(part_reduction.reduce(scene, part), part.held)
-    reduced = damped(scene, replace(reduced, info=replace(reduced.info, joints=dict(part.joints))))
-    return part_reduction.with_prescribed(scene, part, reduced)
+    return replace(reduced, info=replace(reduced.info, joints=dict(part.joints)))
 
 
 def damped(scene: Scene, reduced: ReducedModel) -> ReducedModel:

@@ -16,7 +16,6 @@ from filelock import FileLock
 from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.excitation import Excitation
-from tribodyn.reduction.held import hold
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.workflows.run import modelling, part_reduction, settings
 from tribodyn.workflows.run.contact_surfaces import surface_gap
@@ -32,11 +31,14 @@ LATE: Any = {
     "response": {"frequency", "references", "points", "method", "stability", "bounds", "options"},
 }  # fmt: skip
 """What a scene may change without another part or reduction."""
+OF_STRESS = ("contact", "loads")  # ... but not where a wheel spins: its stress is that of its contact at rest
 
 
 def early_of(scene: PartScene) -> str:
     """What a part and its reduction are made of: equal texts, equal models."""
-    return json.dumps(scene.model_dump(mode="json", exclude=LATE), sort_keys=True)
+    spins = scene.wheel is not None and scene.wheel.speed > 0
+    late = {key: what for key, what in LATE.items() if not (spins and key in OF_STRESS)}
+    return json.dumps(scene.model_dump(mode="json", exclude=late), sort_keys=True)
 
 
 @dataclass
@@ -128,7 +130,7 @@ def _made(file: SceneFile) -> tuple[Part, ReducedModel]:
     with TemporaryDirectory() as folder:
         mesh, node_sets = modelling.make_mesh(file, Path(folder))
     part = modelling.make_part(scene, mesh, node_sets, file.folder)
-    return part, hold(part_reduction.reduce(scene, part), part.held)
+    return part, modelling.plain_model(scene, part)
 
 
 def reaction(file: SceneFile, model: modelling.Model, state: State) -> float:
