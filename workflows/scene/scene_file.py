@@ -168,11 +168,13 @@ def _override(data: dict[str, Any], text: str) -> None:
 
 def _sentence(problem: Any, kind_of_file: type[BaseModel]) -> str:
     """One clause out of a problem that pydantic found: the key, what was expected, what was given."""
-    location = [item for item in problem["loc"] if isinstance(item, (str, int))]
     kind, given, context = problem["type"], problem["input"], problem.get("ctx", {})
-    key = _key(location)
+    whole = [item for item in problem["loc"] if isinstance(item, (str, int))]
+    location, table = _walked(whole, kind_of_file)
+    known = _table(table) is not table or location[-1:] == [] or location[-1] in table.model_fields
+    key = _key(location if known or kind == "extra_forbidden" else location[:-1])
     if kind == "extra_forbidden":
-        return unknown_key(key, _fields(location[:-1], kind_of_file))
+        return unknown_key(key, list(table.model_fields))
     if kind == "missing":
         return f"{key} is missing"
     if kind == "value_error":
@@ -205,16 +207,22 @@ def _key(location: Sequence[str | int]) -> str:
     return key or "the scene"
 
 
-def _fields(location: Sequence[str | int], kind: type[BaseModel]) -> list[str]:
-    """Names of the keys that the table at a location may have."""
+def _walked(location: Sequence[str | int], kind: type[BaseModel]) -> tuple[list[str | int], Any]:
+    """A location without the names of types, which pydantic puts where a value may be of several, and its table."""
     table: Any = kind
-    for item in location:
+    kept: list[str | int] = []
+    for item in location[:-1]:
         if isinstance(item, int):  # of a list of tables, which `_table` has entered
+            kept.append(item)
             continue
-        table = table.model_fields[item].annotation if _table(table) is table else get_args(table)[1]
+        known = _table(table) is table
+        if known and item not in table.model_fields:
+            continue
+        kept.append(item)
+        table = table.model_fields[item].annotation if known else get_args(table)[1]
         if not _is_mapping(table):  # else dict[str, Table], whose next key is a name
             table = _table(table) or table
-    return list(table.model_fields)
+    return [*kept, *location[-1:]], table
 
 
 def _table(annotation: Any) -> Any:
