@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shutil
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -21,16 +20,15 @@ FOLLOWED_ELSEWHERE = {"docs/tutorials/own_part.md"}  # in test_own_part, which l
 
 @pytest.fixture(scope="session")
 def after_the_first_command(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder where the first command of README and site has run."""
+    """A folder where the first command of README and site has run; pytest keeps the tests of a file in one process."""
     folder = prepare(tmp_path_factory.mktemp("first"))
     shell(FIRST, folder)
     return folder
 
 
-def with_something(long: bool) -> list[Any]:
-    """Pages in which something runs; those with the first command come to one process, which runs it once."""
+def with_something(long: bool) -> list[Path]:
     return [
-        pytest.param(page, marks=[pytest.mark.xdist_group(FIRST)] if f"{FIRST}\n" in page.read_text("utf-8") else [])
+        page
         for page in pages()
         if name(page) not in FOLLOWED_ELSEWHERE
         and any((f.language == "sh" and f.word == "long") if long else runs(f) for f in fences(page))
@@ -54,7 +52,6 @@ def test_the_long_commands_of_a_page_run(page: Path, tmp_path: Path) -> None:
     follow(page, tmp_path, long=True)
 
 
-@pytest.mark.xdist_group(FIRST)
 def test_the_first_command_draws_what_is_shown(after_the_first_command: Path) -> None:
     pictures = after_the_first_command / "results/beam/pictures"
     curves = {"frf", "cycles_per_step", "peak", "preload", "depth", "energy", "status", "hysteresis"}
@@ -66,7 +63,6 @@ def test_the_first_command_draws_what_is_shown(after_the_first_command: Path) ->
     assert np.abs(apart).mean() < 5  # of 255: the same picture, up to fonts and rounding
 
 
-@pytest.mark.xdist_group(FIRST)
 def test_the_readme_says_what_the_verdict_of_the_beam_says(after_the_first_command: Path) -> None:
     """Its errors depend on how far the verdict's seconds reach, so that a slow machine has larger ones."""
     readme = README.read_text(encoding="utf-8")
