@@ -165,13 +165,15 @@ def _of_mesh(
     for quantity, a, b in _pairs(coarse, ours):
         yield Contribution(source, quantity, relative(a, b), how)
     reach = result.facts.delta_max_m
-    if result.wear_steps and not (reach and np.isfinite(deepest)):
+    if not result.wear_steps:
+        return
+    if not reach or not np.isfinite([reach, deepest]).all():
         for quantity in ("depth", "life"):
             yield Contribution(source, quantity, None, "the free body does not say how deep the contact can wear")
-    elif result.wear_steps and reach:
-        depth = relative(deepest, reach)
-        yield Contribution(source, "depth", depth, how)
-        yield Contribution(source, "life", depth + relative(coarse.energy, ours.energy), how)
+        return
+    depth = relative(deepest, reach)
+    yield Contribution(source, "depth", depth, how)
+    yield Contribution(source, "life", depth + relative(coarse.energy, ours.energy), how)
 
 
 def _pairs(a: Answers, b: Answers) -> Iterator[tuple[str, float, float]]:

@@ -27,12 +27,10 @@ def export(result: Path, *, to: Formats, out: Path | None = None, mesh_ending: s
     mesh_ending
         Format of the mesh by its ending, such as .vtu, .exo, .msh or .bdf.
     """
-    from tribodyn.workflows.export import formats
-    from tribodyn.workflows.result import store
+    from tribodyn.workflows.api import scenes, whole_scenes
 
     make_room(out)
-    path = result / "result.h5" if result.is_dir() else result
-    for written in formats.write(store.load(path), to, out or path.parent / "export", mesh_ending):
+    for written in whole_scenes.export(result, to, out or scenes.result_file(result).parent / "export", mesh_ending):
         print(written)
 
 

@@ -36,10 +36,12 @@ def fuzz(
     as_json
         Print JSON for machines.
     """
+    from tribodyn.workflows.api import whole_scenes
     from tribodyn.workflows.benchmarks import fuzz as measured
-    from tribodyn.workflows.command import main
 
-    tried = measured.fuzz(scene, overrides, runs, seed, seconds, workers, aside, command=main.main)
+    tried = whole_scenes.fuzz(
+        scene, runs=runs, seed=seed, seconds=seconds, workers=workers, overrides=overrides, progress=aside
+    )
     wrong = [one for one in tried if not one.good]
     if as_json:
         print(json.dumps({"ends": measured.counts(tried), "wrong": [one.record() for one in wrong]}, indent=2))

@@ -45,7 +45,7 @@ def inspect(
         Print JSON for machines.
     """
     from tribodyn.fem.material import Material
-    from tribodyn.workflows.studies import inspection
+    from tribodyn.workflows.api import whole_scenes
 
     make_room(picture, PICTURE)
     if modes < 0:
@@ -55,7 +55,7 @@ def inspect(
     material = None
     if young is not None and density is not None:
         material = Material(quantity("--young", young, "Pa"), poisson, quantity("--density", density, "kg/m3"))
-    found = inspection.inspect(what, overrides, unit, material, modes)
+    found = whole_scenes.inspect(what, unit=unit, material=material, modes=modes, overrides=overrides)
     if picture is not None:
         from tribodyn.workflows.pictures import groups
 
