@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from tribodyn.workflows.command.words import PICTURE, Flag, Json, Overrides, aside, make_room, print_lines, quantity
+from tribodyn.workflows.command.words import PICTURE, Flag, Json, Overrides, aside, make_room, quantity
 
 Knobs = Annotated[tuple[str, ...], Parameter(name="--knob", negative=(), consume_multiple=False)]
 
@@ -250,64 +249,6 @@ def track(
         print(f"{found.what}: {found.end}", folder / "track.csv", folder / "track.png", sep="\n")
 
 
-def backbone(
-    scene: str,
-    *,
-    start: Annotated[str | None, Parameter(name="--from")] = None,
-    stop: Annotated[str | None, Parameter(name="--to")] = None,
-    mode: int | None = None,
-    points: int | None = None,
-    overrides: Overrides = (),
-    out: Path | None = None,
-    as_json: Json = False,
-) -> None:
-    """Follow a nonlinear mode: frequency and damping against amplitude, as a table and a plot.
-
-    Parameters
-    ----------
-    scene
-        Name of a scene (see `tribodyn list`) or a .toml file; its harmonic loads play no part.
-    start
-        Amplitude of the response to begin at, such as 1um; [backbone] of the scene by default.
-    stop
-        Amplitude to end at, such as 1mm.
-    mode
-        Number of the mode about the static equilibrium, from 0; 0 or that of [backbone] by default.
-    points
-        Points on an easy way; there are more where the backbone bends. 40 or those of [backbone] by default.
-    out
-        Folder of backbone.csv and backbone.png; results/NAME by default.
-    as_json
-        Print JSON for machines.
-    """
-    from tribodyn.workflows.run.progress import Progress, console_progress
-    from tribodyn.workflows.scene import scene_file
-    from tribodyn.workflows.studies import modes
-
-    make_room(out)
-    file = scene_file.read(scene, overrides)
-    ends = [None if end is None else quantity(name, end, "m") for name, end in (("--from", start), ("--to", stop))]
-    asked = modes.way(file, ends[0], ends[1], mode, points)
-    found = modes.follow(file, asked, Progress() if as_json else console_progress())
-    folder = out or Path("results") / file.name
-    folder.mkdir(parents=True, exist_ok=True)
-    modes.write(found, folder / "backbone.csv")
-    modes.picture(found).savefig(folder / "backbone.png")
-    if as_json:
-        print(json.dumps(modes.record(found), indent=2))
-    else:
-        hertz, damping = found.omega / (2 * math.pi), 100 * found.damping
-        print_lines(
-            [
-                ("at rest", f"{found.reference_omega / (2 * math.pi):.6g} Hz"),
-                ("frequency", f"{hertz[0]:.6g} -> {hertz[-1]:.6g} Hz"),
-                ("damping", f"{damping[0]:.4g} -> {damping[-1]:.4g} %, largest {damping.max():.4g} %"),
-                ("end", str(found.end)),
-            ]
-        )
-        print(folder / "backbone.csv", folder / "backbone.png", sep="\n")
-
-
 def identify(
     scene: str,
     task: Path,
@@ -354,4 +295,4 @@ def identify(
         print(found.report(), "", "to go on with what was found:", *(f'  --set "{c}"' for c in changes), sep="\n")
 
 
-COMMANDS = (bench, trade, converge, extremes, track, backbone, identify)
+COMMANDS = (bench, trade, converge, extremes, track, identify)

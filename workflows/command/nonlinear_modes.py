@@ -1,0 +1,160 @@
+"""Words of the command `tribodyn` on nonlinear modes: their backbone, and a free decay in time from one."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from tribodyn.workflows.command.words import Json, Overrides, make_room, print_lines, quantity
+
+if TYPE_CHECKING:  # the program starts sooner without them
+    from tribodyn.workflows.scene.scene_file import SceneFile
+    from tribodyn.workflows.studies.modes import Way
+
+Start = Annotated[str | None, Parameter(name="--from")]
+Stop = Annotated[str | None, Parameter(name="--to")]
+
+
+def backbone(
+    scene: str,
+    *,
+    start: Start = None,
+    stop: Stop = None,
+    mode: int | None = None,
+    points: int | None = None,
+    overrides: Overrides = (),
+    out: Path | None = None,
+    as_json: Json = False,
+) -> None:
+    """Follow a nonlinear mode: frequency and damping against amplitude, as a table and a plot.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene (see `tribodyn list`) or a .toml file; its harmonic loads play no part.
+    start
+        Amplitude of the response to begin at, such as 1um; [backbone] of the scene by default.
+    stop
+        Amplitude to end at, such as 1mm.
+    mode
+        Number of the mode about the static equilibrium, from 0; 0 or that of [backbone] by default.
+    points
+        Points on an easy way; there are more where the backbone bends. 40 or those of [backbone] by default.
+    out
+        Folder of backbone.csv and backbone.png; results/NAME by default.
+    as_json
+        Print JSON for machines.
+    """
+    from tribodyn.workflows.run.progress import Progress, console_progress
+    from tribodyn.workflows.studies import modes
+
+    file, asked, folder = _asked(scene, overrides, start, stop, mode, points, out)
+    found = modes.follow(file, asked, Progress() if as_json else console_progress())
+    modes.write(found, folder / "backbone.csv")
+    modes.picture(found).savefig(folder / "backbone.png")
+    if as_json:
+        print(json.dumps(modes.record(found), indent=2))
+    else:
+        hertz, damping = found.omega / (2 * math.pi), 100 * found.damping
+        print_lines(
+            [
+                ("at rest", f"{found.reference_omega / (2 * math.pi):.6g} Hz"),
+                ("frequency", f"{hertz[0]:.6g} -> {hertz[-1]:.6g} Hz"),
+                ("damping", f"{damping[0]:.4g} -> {damping[-1]:.4g} %, largest {damping.max():.4g} %"),
+                ("end", str(found.end)),
+            ]
+        )
+        print(folder / "backbone.csv", folder / "backbone.png", sep="\n")
+
+
+def ring_down(
+    scene: str,
+    *,
+    start: Start = None,
+    stop: Stop = None,
+    mode: int | None = None,
+    points: int | None = None,
+    periods: int = 400,
+    steps: int = 256,
+    overrides: Overrides = (),
+    out: Path | None = None,
+    as_json: Json = False,
+) -> None:
+    """Let a nonlinear mode decay freely in time: frequency and damping from its peaks, beside the backbone.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene (see `tribodyn list`) or a .toml file; its harmonic loads play no part.
+    start
+        Amplitude of the response at which the decay ends, such as 1um; [backbone] of the scene by default.
+    stop
+        Amplitude at which it begins, such as 1mm.
+    mode
+        Number of the mode about the static equilibrium, from 0; 0 or that of [backbone] by default.
+    points
+        Points of the backbone on an easy way; 40 or those of [backbone] by default.
+    periods
+        Periods after which the decay ends at the latest.
+    steps
+        Time steps per period.
+    out
+        Folder of ring_down.csv and ring_down.png; results/NAME by default.
+    as_json
+        Print JSON for machines.
+    """
+    from tribodyn.workflows.run.progress import Progress, console_progress
+    from tribodyn.workflows.studies import decay
+
+    file, asked, folder = _asked(scene, overrides, start, stop, mode, points, out)
+    found = decay.follow(file, asked, periods, steps, Progress() if as_json else console_progress())
+    decay.write(found, folder / "ring_down.csv")
+    decay.picture(found).savefig(folder / "ring_down.png")
+    said = decay.record(found)
+    if as_json:
+        print(json.dumps(said, indent=2))
+        return
+    first, last = said["rows"][0], said["rows"][-1]
+    print_lines(
+        [
+            ("amplitude", f"{first['amplitude_m']:.4g} -> {last['amplitude_m']:.4g} m"),
+            ("frequency", f"{first['frequency_hz']:.6g} -> {last['frequency_hz']:.6g} Hz"),
+            ("damping", f"{100 * first['damping']:.4g} -> {100 * last['damping']:.4g} %"),
+            ("from the backbone", f"frequency at most {_percent(said['largest_frequency_difference'])} off"),
+            ("", f"damping at most {_percent(said['largest_damping_difference'])} off"),
+        ]
+    )
+    print(folder / "ring_down.csv", folder / "ring_down.png", sep="\n")
+
+
+def _asked(
+    scene: str,
+    overrides: Overrides,
+    start: str | None,
+    stop: str | None,
+    mode: int | None,
+    points: int | None,
+    out: Path | None,
+) -> tuple[SceneFile, Way, Path]:
+    """The scene, what of its nonlinear mode is asked for, and the folder for what is found, which is made."""
+    from tribodyn.workflows.scene import scene_file
+    from tribodyn.workflows.studies import modes
+
+    make_room(out)
+    file = scene_file.read(scene, overrides)
+    ends = [None if end is None else quantity(name, end, "m") for name, end in (("--from", start), ("--to", stop))]
+    asked = modes.way(file, ends[0], ends[1], mode, points)
+    folder = out or Path("results") / file.name
+    folder.mkdir(parents=True, exist_ok=True)
+    return file, asked, folder
+
+
+def _percent(share: float | None) -> str:
+    return "(no common amplitude)" if share is None else f"{100 * share:.3g} %"
+
+
+COMMANDS = (backbone, ring_down)
