@@ -75,9 +75,7 @@ def nodal_diameters(families: Families) -> Figure:
         for state, values in families.items():
             _families(axes, values, *STATES[state])
         axes.set(xlabel="nodal diameter", ylabel="frequency / Hz", title="Nodal diameters")
-        axes.set_ylim(
-            0, 1.08 * max(float(np.nanmax(values)) for values in families.values() if not np.isnan(values).all())
-        )
+        axes.set_ylim(0, _top(families))
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         figure.legend(loc="outside lower center", ncols=len(families))
     return figure
