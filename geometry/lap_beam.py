@@ -77,9 +77,9 @@ def build(parameters: Parameters, path: str | Path) -> None:
     strip = np.linspace(row, p.lap / 2, p.n_end + 1)
     parts.append(blocks.Block(-strip[::-1], y, below, "beam", lap))
     parts.append(blocks.Block(strip, y, below, "beam", lap))
-    x = grid.towards_end(p.lap / 2 - p.length, -p.lap / 2, p.n_length, p.grading)
-    parts += [blocks.Block(x, y, z, "beam", {"u-": "end"}) for z in (below, above)]
     end = p.lap / 2 - p.length
+    x = grid.towards_end(end, -p.lap / 2, p.n_length, p.grading)
+    parts += [blocks.Block(x, y, z, "beam", {"u-": "end"}) for z in (below, above)]
     made = blocks.body(parts)
     at = {"tip": (end, 0.0, 0.0), "top": (end, 0.0, half)}
     nodes = {name: np.array([np.linalg.norm(made.nodes - place, axis=1).argmin()]) for name, place in at.items()}

@@ -14,7 +14,6 @@ import numpy as np
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import ContactParameters
 
 EXACT = 1e-11  # relative residual of the state at rest
@@ -63,21 +62,16 @@ def memory(balance: HarmonicBalance, x: np.ndarray) -> np.ndarray:
 
 def tangents(balance: HarmonicBalance, x: np.ndarray) -> dict[str, np.ndarray]:
     """Springs (n_pair, n_component) [N/m] at rest in x, of the joints whose springs follow from their own numbers."""
-    still = np.zeros((*x.shape, balance.basis.n_coeff))
+    contact, basis = balance.contact, balance.basis
+    own = [joint for joint in contact.joints if getattr(joint.module, "OWN_STIFFNESS", False)]
+    if not own:
+        return {}
+    still = np.zeros((*x.shape, basis.n_coeff))
     still[:, :, 0] = x
-    found = {}
-    for joint in balance.contact.joints:
-        if getattr(joint.module, "OWN_STIFFNESS", False):
-            found[joint.name] = _tangent(balance, joint, still)
-    return found
-
-
-def _tangent(balance: HarmonicBalance, joint: Joint, still: np.ndarray) -> np.ndarray:
-    jac = balance.contact.cycle(still, balance.basis, balance.memory).jacobian
+    jac = contact.cycle(still, basis, balance.memory).jacobian
     assert jac is not None
-    n, m = balance.basis.n_coeff, len(balance.contact.components)
-    each = np.diagonal(jac, axis1=1, axis2=2).reshape(-1, m, n)[:, :, balance.basis.harmonics.index(1)]
-    return np.maximum(each[np.ix_(joint.rows, balance.contact.columns(joint))], 0.0)
+    each = np.diagonal(jac, axis1=1, axis2=2).reshape(still.shape)[:, :, basis.harmonics.index(1)]
+    return {joint.name: np.maximum(each[np.ix_(joint.rows, contact.columns(joint))], 0.0) for joint in own}
 
 
 def _smooth(parameters: ContactParameters) -> ContactParameters:

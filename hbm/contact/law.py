@@ -1,6 +1,6 @@
 """Contact laws: what a law file offers, the parameters it sees, and how it is found by its name.
 
-A law is a module `hbm/contact/<name>.py`, or a file of one's own, with
+A law is a module `hbm/contact/laws/<name>.py`, or a file of one's own, with
 
 - `COMPONENTS` : the component tuples it accepts, such as (("t1", "t2", "n"),)
 - `Parameters` : its own numbers with their units, see `tribodyn.declare`; none where the class is missing

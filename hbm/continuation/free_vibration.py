@@ -192,12 +192,10 @@ class FreeVibration:
             s = 1j * h * omega
             undamped = (self.lam if h else self.held) + s * s - 2 * zeta * omega * s
             border, corner = (self.reference, 0.0) if h == 1 else (np.zeros(self.n), 1.0)
-            if self.proportional:
+            if self.proportional or not h:
                 factors.append(DiagonalBordered(undamped + s * np.diag(self.damping), border, corner))
-            elif h:
-                factors.append(DenseBordered(s * self.damping + np.diag(undamped), border, corner))
             else:
-                factors.append(DiagonalBordered(undamped, border, corner))
+                factors.append(DenseBordered(s * self.damping + np.diag(undamped), border, corner))
         rhs = self._rhs(self.U.T @ self.basis.to_complex(g), a)
         if self.basis.has_static:
             rhs[:-1, 0] += self.static_load

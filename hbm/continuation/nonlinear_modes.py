@@ -84,11 +84,16 @@ class Backbone:
         return self.omega / (2 * np.pi)
 
     @property
+    def first_harmonic(self) -> np.ndarray:
+        """(n_point,) amplitude of the chosen output in the first harmonic [m]."""
+        row = self.response[:, self.output_names.index(self.output)]
+        found: np.ndarray = np.linalg.norm(row[:, self.order == 1], axis=1)
+        return found
+
+    @property
     def acceleration(self) -> np.ndarray:
         """(n_point,) largest acceleration of the chosen output in the first harmonic [m/s2]."""
-        row = self.response[:, self.output_names.index(self.output)]
-        first = self.order == 1
-        return self.omega**2 * np.linalg.norm(row[:, first], axis=1)
+        return self.omega**2 * self.first_harmonic
 
     @property
     def reference_frequency(self) -> float:

@@ -26,7 +26,8 @@ class RingDown:
     """A free decay and what its peaks say.
 
     time : (n,) [s]; displacement : (n,) of the output about its mean [m]
-    amplitude : (k,) [m]; omega : (k,) [rad/s]; damping : (k,) ratio, all at the middles of the lines
+    amplitude : (k,) [m]; omega : (k,) [rad/s]; damping : (k,) logarithmic decrement of a period over 2 pi; all at the
+        middles of the lines
     """
 
     time: np.ndarray
@@ -37,20 +38,18 @@ class RingDown:
 
 
 @single
-def ring_down(
-    balance: HarmonicBalance, mode: Backbone, periods: int, steps: int = 256, point: int = -1, least: float = 0.0
-) -> RingDown:
-    """Let the structure swing freely from a point of its backbone.
+def ring_down(balance: HarmonicBalance, mode: Backbone, periods: int, steps: int = 256, least: float = 0.0) -> RingDown:
+    """Let the structure swing freely from the last point of its backbone.
 
-    periods : at most so many, of the frequency at the start; steps : per period; point : of the backbone
+    periods : at most so many, of the frequency at the start; steps : per period
     least : amplitude of the output at which to end [m]
     Raises  ValueError for models with no equation of motion in time, IntegrationFailed
     """
     free = balance.with_load(0.0)
-    omega = float(mode.omega[point])
+    omega = float(mode.omega[-1])
     stepper = TimeStepper(free, omega, Options(steps=steps))
-    x = mode.contact[point].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
-    moving = stepper.start_from(free.evaluate(omega, x), added=float(mode.damping[point]))
+    x = mode.contact[-1].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
+    moving = stepper.start_from(free.evaluate(omega, x), added=float(mode.damping[-1]))
     row, found = balance.compliance.output_names.index(mode.output), []
     for _ in range(periods):
         moving, record, _, _ = stepper.period(moving)
@@ -64,15 +63,15 @@ def ring_down(
     return from_peaks(time, displacement)
 
 
-def from_peaks(time: np.ndarray, displacement: np.ndarray, fitted: int = FITTED) -> RingDown:
+def from_peaks(time: np.ndarray, displacement: np.ndarray) -> RingDown:
     """Frequency and damping by amplitude of a decaying oscillation (n,), sampled at equal steps.
 
-    fitted : neighbouring half periods of a line; raises ValueError for fewer than one line has
+    Raises  ValueError for fewer half periods than one line has
     """
     y = displacement
     turns = np.flatnonzero((y[1:-1] - y[:-2]) * (y[2:] - y[1:-1]) < 0) + 1
-    if len(turns) < fitted + 2:
-        raise ValueError(f"a decay of {len(turns)} peaks is too short: {fitted + 2} are needed")
+    if len(turns) < FITTED + 2:
+        raise ValueError(f"a decay of {len(turns)} peaks is too short: {FITTED + 2} are needed")
     step = time[1] - time[0]
     before, at, after = y[turns - 1], y[turns], y[turns + 1]
     bend = before - 2 * at + after
@@ -81,8 +80,8 @@ def from_peaks(time: np.ndarray, displacement: np.ndarray, fitted: int = FITTED)
     height = at - 0.25 * (before - after) * shift
     middle = 0.5 * (instant[1:] + instant[:-1])
     size = np.abs(np.diff(height)) / 2
-    rows = np.arange(len(middle) - fitted + 1)[:, None] + np.arange(fitted)
-    half = np.arange(fitted) - (fitted - 1) / 2
+    rows = np.arange(len(middle) - FITTED + 1)[:, None] + np.arange(FITTED)
+    half = np.arange(FITTED) - (FITTED - 1) / 2
     omega = np.pi / ((middle[rows] @ half) / (half @ half))
     falling = (np.log(size[rows]) @ half) / (half @ half)  # per half period
     return RingDown(time, y - height.mean(), np.exp(np.log(size[rows]).mean(axis=1)), omega, -falling / np.pi)

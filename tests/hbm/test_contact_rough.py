@@ -86,6 +86,28 @@ def test_beyond_yield_the_loading_is_continuous_and_unloading_keeps_a_plastic_de
     np.testing.assert_allclose(4 / 3 * E_STAR * root * (d - depth) ** 1.5, one.loading(d), rtol=1e-12)
 
 
+@pytest.mark.parametrize("tangent", [0.0, 620e6, 0.05 * YOUNG])
+def test_beyond_yield_two_spheres_are_twice_one_sphere_on_a_rigid_flat(tangent):
+    """Ghaednia et al. 2019, eq. 5, 6 and 23 to 30, for one sphere: twice the radius and E*, half the approach."""
+    S, ratio, C = 331.7e6, tangent / YOUNG, 1.295 * np.exp(0.736 * POISSON)
+    R, E = 2 * RADIUS, YOUNG / (1 - POISSON**2)
+    critical = (np.pi * C * S / (2 * E)) ** 2 * R
+    w = np.append(1.9 * (1 + 1e-9), np.geomspace(2, 200, 30))
+    delta = w * critical
+    a_e, a_p = np.sqrt(R * delta), R * np.pi * C * S / (2 * E) * np.sqrt(w * (w / 1.9) ** (0.14 * np.exp(23 * S / E)))
+    softer = 2 * np.sqrt(1 / (S / YOUNG)) * ratio ** (1 - (delta - critical) / R)
+    softer /= (4 - 3 * np.exp(-2 * np.sqrt(YOUNG / S) * ratio)) * (1 - ratio)
+    hardness = 2.84 - 0.92 * (1 - np.cos(np.pi * (a_e + (a_p - a_e) * np.exp(-softer)) / R))
+    plastic = np.exp(-0.25 * w ** (5 / 12)) * w**1.5 + 4 * hardness / C * (1 - np.exp(-0.04 * w ** (5 / 9))) * w
+    plastic *= 4 / 3 * (R / E) ** 2 * (C * np.pi * S / 2) ** 3
+    known = plastic + (4 / 3 * E * np.sqrt(R) * delta**1.5 - plastic) * (1 - np.exp(-3.3 * ratio))
+    one = rough.asperity((YOUNG, POISSON, RADIUS, S, tangent))
+    assert one.onset == pytest.approx(2 * 1.9 * critical)
+    off = one.loading(2 * delta) / known - 1
+    assert np.abs(off).max() < 6e-3  # the jump that is taken off
+    assert np.abs(off[w > 20]).max() < 1e-8
+
+
 def test_a_face_is_the_sum_of_its_asperities_on_loading_and_unloading():
     one, rows = rough.asperity(tuple(STEEL.values())), rough._heights(FACE)
     for deepest in (4e-6, 9e-6, 14e-6):

@@ -14,9 +14,11 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.continuation.free_vibration import DenseBordered, DiagonalBordered
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, backbone
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.linear.expansion import stuck_modes
 from tribodyn.reduction.model import ReducedModel
 
 MASS, STIFFNESS, RATIO = 1.3, 4.0e4, 0.01
@@ -154,3 +156,30 @@ def test_refusals():
         backbone(balance, 1e-6, 1e-5, mode=9)
     with pytest.raises(ValueError, match="does not move"):
         backbone(balance, 1e-6, 1e-5, mode=1)
+
+
+@pytest.mark.parametrize("corner", [0.0, 1.0])
+def test_the_bordered_solve_of_proportional_damping_equals_the_dense_one(corner):
+    """Also where the dynamic stiffness of the reference mode itself vanishes: at its resonance."""
+    rng = np.random.default_rng(7)
+    d = rng.normal(size=8) + 1j * rng.normal(size=8)
+    border, rhs = rng.normal(size=8), rng.normal(size=9) + 1j * rng.normal(size=9)
+    border[3] = 5.0
+    if corner:
+        border[:] = 0.0
+    else:
+        d[3] = 0.0
+    exact = DenseBordered(np.diag(d), border, corner).solve(rhs)
+    np.testing.assert_allclose(DiagonalBordered(d, border, corner).solve(rhs), exact, rtol=1e-12)
+
+
+def test_modes_of_a_free_chain_are_the_closed_form():
+    """n equal masses in a row: omega_i = 2 sqrt(k / m) sin(i pi / 2 n), the first of them a rigid motion."""
+    n, k, m = 12, 3e7, 0.2
+    chain = k * (np.diag([1.0, *[2.0] * (n - 2), 1.0]) - np.eye(n, k=1) - np.eye(n, k=-1))
+    squares, shapes, free = stuck_modes(chain, m * np.eye(n))
+    assert free.tolist() == [True] + [False] * (n - 1)
+    assert squares[0] == 0.0
+    np.testing.assert_allclose(squares[1:], 4 * k / m * np.sin(np.arange(1, n) * np.pi / (2 * n)) ** 2, rtol=1e-10)
+    np.testing.assert_allclose(m * shapes.T @ shapes, np.eye(n), atol=1e-10)
+    np.testing.assert_allclose(chain @ shapes, m * shapes * squares, atol=1e-9 * k)

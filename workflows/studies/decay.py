@@ -9,55 +9,44 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from tribodyn.hbm.continuation.nonlinear_modes import Backbone, BackboneOptions, backbone
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.continuation.nonlinear_modes import Backbone
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time.ring_down import RingDown, ring_down
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
 from tribodyn.workflows.result.columns import write_columns
-from tribodyn.workflows.run import modelling, settings
+from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.studies.modes import Way
+from tribodyn.workflows.studies import modes
 
 
 @dataclass(frozen=True)
 class Decay:
-    """mode : the backbone, converged to its last point; decay : from there; amplitude : (n_point,) of the output along
-    the backbone, first harmonic [m]
-    """
+    """mode : the backbone, converged to its last point; decay : from there."""
 
     mode: Backbone
     decay: RingDown
 
-    @property
-    def amplitude(self) -> np.ndarray:
-        """(n_point,) of the output along the backbone, first harmonic [m]."""
-        return self.mode.acceleration / self.mode.omega**2
-
     def at(self, values: np.ndarray) -> np.ndarray:
         """Values (n_point,) along the backbone at the amplitudes of the decay, nan beyond its ends."""
-        inside = np.interp(np.log(self.decay.amplitude), np.log(self.amplitude), values, np.nan, np.nan)
+        inside = np.interp(np.log(self.decay.amplitude), np.log(self.mode.first_harmonic), values, np.nan, np.nan)
         return np.asarray(inside)
 
 
-def follow(file: SceneFile, asked: Way, periods: int, steps: int, progress: Progress) -> Decay:
+def follow(file: SceneFile, asked: modes.Way, periods: int, steps: int, progress: Progress) -> Decay:
     """Follow the backbone, then let the structure swing freely from its last point down to the first amplitude.
 
     Raises  ValueError for what cannot be; SolveFailed where the backbone ends before the amplitude asked for
     """
     with limited(file.scene.solver.threads):
         balance = modelling.build(file, None, progress).balance
-        with progress.stage("backbone"):
-            options = BackboneOptions(asked.points, newton=settings.newton_options(file.scene))
-            mode = backbone(balance, asked.start, asked.stop, asked.mode, settings.OUTPUT, options, asked.modal)
-        if set(mode.outcome) != {CONVERGED}:
+        mode = modes.along(file, balance, asked, progress)
+        if not mode.converged.all():
             raise SolveFailed(f"the backbone {mode.end}")
         with progress.stage("free decay"):
-            least = float(mode.acceleration[0] / mode.omega[0] ** 2)
-            return Decay(mode, ring_down(balance, mode, periods, steps, least=least))
+            return Decay(mode, ring_down(balance, mode, periods, steps, least=float(mode.first_harmonic[0])))
 
 
 def record(found: Decay) -> dict[str, Any]:
@@ -97,11 +86,11 @@ def picture(found: Decay) -> Figure:
     with axes_of(7.2, 7.6, rows=3, share=False) as (figure, (top, upper, lower)):
         top.plot(1e3 * d.time, scale * d.displacement, color=BLUE, lw=0.7)
         top.set(xlabel="time / ms", ylabel=f"displacement / {unit}", title="Free decay")
-        upper.semilogx(scale * found.amplitude, found.mode.frequency, color=BLUE, label="backbone")
+        upper.semilogx(scale * found.mode.first_harmonic, found.mode.frequency, color=BLUE, label="backbone")
         upper.semilogx(scale * d.amplitude, d.omega / (2 * np.pi), ".", color=ORANGE, ms=4, label="peaks of the decay")
         upper.set(ylabel="frequency / Hz")
         upper.legend(fontsize=9)
-        lower.semilogx(scale * found.amplitude, 100 * found.mode.damping, color=BLUE)
+        lower.semilogx(scale * found.mode.first_harmonic, 100 * found.mode.damping, color=BLUE)
         lower.semilogx(scale * d.amplitude, 100 * d.damping, ".", color=ORANGE, ms=4)
         lower.set(xlabel=f"amplitude / {unit}", ylabel="damping ratio / %")
         lower.set_ylim(bottom=0)

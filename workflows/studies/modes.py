@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone, BackboneOptions, backbone
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
@@ -56,13 +57,17 @@ def follow(file: SceneFile, asked: Way, progress: Progress) -> Backbone:
     Raises  ValueError for what cannot be; SolveFailed where not even the first point is found
     """
     with limited(file.scene.solver.threads):
-        balance = modelling.build(file, None, progress).balance
-        with progress.stage("backbone"):
-            options = BackboneOptions(asked.points, newton=settings.newton_options(file.scene))
-            found = backbone(balance, asked.start, asked.stop, asked.mode, settings.OUTPUT, options, asked.modal)
+        found = along(file, modelling.build(file, None, progress).balance, asked, progress)
     if not found.converged.any():
         raise SolveFailed(f"the backbone {found.end}")
     return found
+
+
+def along(file: SceneFile, balance: HarmonicBalance, asked: Way, progress: Progress) -> Backbone:
+    """The backbone of a scene whose balance is made already."""
+    with progress.stage("backbone"):
+        options = BackboneOptions(asked.points, newton=settings.newton_options(file.scene))
+        return backbone(balance, asked.start, asked.stop, asked.mode, settings.OUTPUT, options, asked.modal)
 
 
 def follow_backbone(file: SceneFile, start: float, stop: float, *, mode: int = 0, points: int = 40) -> Backbone:
@@ -72,7 +77,7 @@ def follow_backbone(file: SceneFile, start: float, stop: float, *, mode: int = 0
 
 def record(found: Backbone) -> dict[str, Any]:
     """The converged points for machines."""
-    good = _good(found)
+    good = found.converged
     columns = {
         "modal_amplitude": found.modal_amplitude,
         "frequency_hz": found.frequency,
@@ -97,7 +102,7 @@ def write(found: Backbone, path: Path) -> None:
 
 def picture(found: Backbone) -> Figure:
     """Frequency and damping ratio against amplitude."""
-    good = _good(found)
+    good = found.converged
     unit, scale = length_unit(found.amplitude[good].max())
     amplitude = scale * found.amplitude[good]
     with axes_of(7.2, 5.6, rows=2) as (figure, (upper, lower)):
@@ -109,7 +114,3 @@ def picture(found: Backbone) -> Figure:
         lower.set(xscale="log", xlabel=f"amplitude in the mode at rest / {unit}", ylabel="damping ratio / %")
         lower.set_ylim(bottom=0)
     return figure
-
-
-def _good(found: Backbone) -> np.ndarray:
-    return found.converged
