@@ -16,8 +16,8 @@ class SecondOrderSystem:
     mass, stiffness : (n, n) symmetric (Hermitian for one harmonic index of a cyclic part), sparse or dense [kg], [N/m]
     damping : (n, n) like stiffness, or None for none [N s/m]
     loads : name -> (n,) force per unit of the named load [N/N]
-    gyroscopic : (n, n) antisymmetric (anti-Hermitian), the Coriolis matrix G of a turning frame, or None [N s/m]
     outputs : name -> (n,) row that observes a displacement, output = row . q [m/m]
+    gyroscopic : (n, n) antisymmetric (anti-Hermitian), the Coriolis matrix G of a turning frame, or None [N s/m]
     """
 
     mass: Any

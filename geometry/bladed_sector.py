@@ -29,6 +29,7 @@ SHARED = (
 )  # with geometry.blade
 
 LAP = 0.1  # part of its length by which the flank of the slot starts and ends below that of the root
+BELOW_PLATFORM = 2e-3  # that opens between the posts of the disk and the platforms [m]
 PARTING = 4e-4  # that opens between root and slot beside the flanks [m]
 
 
@@ -53,7 +54,8 @@ class Parameters:
     n_along, n_up : contact nodes along and up a shroud contact face, at vertices
     n_span, n_through : elements along the span and through the airfoil
     n_side, n_end : elements of shroud and platform beside the airfoil and before and behind it
-    n_platform, n_neck, n_flank : elements of the platform, the neck and a flank of the root along the radius
+    n_platform, n_neck : elements of the platform and the neck of the root along the radius
+    n_flank : of a flank of the root along the radius, and of its bulb
     n_axial : elements of the disk along the axis; n_slot, n_post : of the slot's flank, and from slot to seam
     n_disk : elements of the disk below the slot along the radius; n_damper : of the damper along the axis
     """
@@ -136,6 +138,12 @@ class Parameters:
                 f"geometry.disk_radius is {self.disk_radius}: give a radius below {self.bottom:.4g} m, the bottom of "
                 "the slot"
             )
+        if self.slot(LAP)[1] >= self.post_top:
+            raise ValueError(
+                f"geometry.neck_height is {self.neck_height}: give more than "
+                f"{self.under - self.post_top - LAP * self.flank_height:.4g}, or the posts of the disk end below the "
+                "flanks of its slot"
+            )
         if self.slot(1 + LAP)[0] >= 0.9 * self.bottom * np.tan(self.pitch / 2):
             raise ValueError(
                 f"geometry.bulb_width is {self.bulb_width}: the disk has no room for it between its seams; give less, "
@@ -170,6 +178,11 @@ class Parameters:
     def bottom(self) -> float:
         """Height z of the bottom of the slot [m]."""
         return self.flank_top - self.flank_height - self.bulb_height - PARTING
+
+    @property
+    def post_top(self) -> float:
+        """Height z of the top of the disk's posts, below the lowest corners of the platforms [m]."""
+        return self.under * float(np.cos(self.pitch / 2)) - BELOW_PLATFORM
 
     def slot(self, t: float) -> np.ndarray:
         """Point y, z (2,) of the line of the right flank, 0 at its upper and 1 at its lower edge on the root [m]."""
@@ -259,9 +272,8 @@ def _root(p: Parameters, base: Platform, rows: tuple[int, ...]) -> list[blocks.B
 def _disk(p: Parameters) -> blocks.Body:
     """Two posts beside the slot and the disk below them, down to the bore."""
     half = p.platform_length / 2
-    top = p.under * np.cos(p.pitch / 2) - 2e-3  # the platforms do not touch the posts
     upper, lower = p.slot(LAP), p.slot(1 + LAP)
-    wall = [np.array([lower[0], p.bottom]), lower, upper, np.array([upper[0], top])]
+    wall = [np.array([lower[0], p.bottom]), lower, upper, np.array([upper[0], p.post_top])]
 
     def placed(profile: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
         def at(q: np.ndarray) -> np.ndarray:

@@ -44,8 +44,8 @@ def craig_bampton(
     n_modes : fixed-interface modes kept, or cutoff : all of them up to this frequency [Hz]; give one of the two
     extra_masters : DOFs of the system to keep besides those of the contact and of point loads and outputs
     contact_stiffness : (n_pair, n_component) [N/m], for an estimate of the stuck state too; solver : see fem.factor
-    shapes : (n_full, k) motions that the system hardly resists, for the solver multigrid
     attached : loads whose static response with the masters held joins the modes, so that statics under them are exact
+    shapes : (n_full, k) motions that the system hardly resists, for the solver multigrid
     Returns the model; coordinates are the masters in ascending order, then the modes; loads and outputs are projected.
         info: masters (DOFs of the system), n_full, n_masters, n_modes, factorisation, first_omitted_frequency [Hz],
         free_frequency [Hz] of the first ten modes and free_frequency_error, their estimated relative error by
@@ -155,9 +155,11 @@ def fixed_interface_modes(
 def with_static_shapes(
     forces: Sequence[np.ndarray], K_ss: Any, M_ss: Any, factor: Factor, omega: np.ndarray, phi: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Modes and, behind them, the static shapes of forces (n_slave,) on the slaves, orthogonal to all before them.
+    """Modes joined by the static shapes of forces (n_slave,) on the slaves, by the method of Rayleigh and Ritz.
 
-    Returns omega (k + j,), those of the shapes by Rayleigh's quotient, and phi (n_slave, k + j), of unit modal mass
+    K_ss, M_ss : (n_slave, n_slave) [N/m], [kg]; factor : of K_ss; omega (k,) [rad/s], phi (n_slave, k) : the modes
+    Returns omega (k + j,) [rad/s], ascending, and phi (n_slave, k + j) of unit modal mass, orthogonal in mass and
+        stiffness; j <= number of forces, as a shape that the modes hold already adds nothing
     """
     for force in forces:
         if not force.any():

@@ -47,7 +47,7 @@ def outputs(mesh, node_sets, faces, order):
 
 @pytest.mark.parametrize("order", [3, 4])
 def test_a_face_of_a_wheel_split_into_named_contacts_equals_the_one_contact(tmp_path, order):
-    """Acceptance 13.1: nodes on the cuts belong to two joints, each with its share of the area."""
+    """Nodes on the cuts belong to two joints, each with its share of the area."""
     mesh, node_sets = small.read(tmp_path / "s.msh")
     groups = dict(mesh.boundaries)
     for side in ("right", "left"):
@@ -84,7 +84,7 @@ def tips(one, wheel, outputs, everywhere, order):
 
 
 def test_linear_waves_with_coriolis_forces_are_the_whole_wheel(turning):
-    """Acceptance 18.2: contacts stuck, to 1e-8; waves along and against the rotation differ."""
+    """Contacts stuck, to 1e-8; waves along and against the rotation differ."""
     heights = []
     for order in (2, -2):
         one, wheel = small.wave_and_wheel(turning, order)
@@ -104,7 +104,7 @@ def slipping(balance):
 
 
 def test_friction_with_coriolis_forces_is_the_whole_wheel(turning):
-    """Acceptance 18.2: slipping and separating, to 1e-6, in every sector."""
+    """Slipping and separating, to 1e-6, in every sector."""
     one, wheel = small.wave_and_wheel(turning, 1)
     here, everywhere = slipping(one), slipping(wheel)
     expected, there = tips(one, wheel, one.outputs(here), wheel.outputs(everywhere), 1)
@@ -112,7 +112,7 @@ def test_friction_with_coriolis_forces_is_the_whole_wheel(turning):
 
 
 def test_unequal_blades_with_coriolis_forces_solve_the_equations_of_the_whole_wheel(turning):
-    """Acceptance 18.2: the balance of blades that differ against the dense equations of motion, to 1e-6."""
+    """The balance of blades that differ against the dense equations of motion, to 1e-6."""
     factors = 1 + np.array([0.03, -0.02, 0.01, -0.04, 0.02, 0.0, -0.01, 0.04])
     _, wheel = small.wave_and_wheel(turning, 1, harmonics=(0, 1), stiffness=factors)
     state = slipping(wheel)

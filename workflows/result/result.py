@@ -63,17 +63,17 @@ class Patch:
     def flat(self) -> np.ndarray:
         """(n_pair, 2) positions in the mean tangential plane, from the middle of the patch [m].
 
-        Faces that do not look the same way lie each in its own plane, one above the other along t2
+        Faces that do not look the same way are each drawn in their own plane, one above the other along t2.
         """
         if self.in_one_plane:
             return np.asarray((self.points - self.points.mean(0)) @ self.frames.mean(0)[:2].T)
-        placed, top = np.zeros((len(self.points), 2)), 0.0
-        own = [self._alone(self.face_of == face) for face in range(self.face_of.max() + 1)]
+        placed, top, of = np.zeros((len(self.points), 2)), 0.0, self.face_of
+        own = [self._alone(of == face) for face in range(of.max() + 1)]
         space = 0.2 * min(float(np.ptp(face[:, 1])) for face in own)
         for face, points in enumerate(own):
             points[:, 1] += top - points[:, 1].min()
             top = float(points[:, 1].max()) + space
-            placed[self.face_of == face] = points
+            placed[of == face] = points
         return placed - (placed.min(axis=0) + placed.max(axis=0)) / 2
 
     @property

@@ -134,6 +134,12 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
     loads |= rods
     geometry = scene.geometry if isinstance(scene, PartScene | StructureScene) else None
     turning = None if geometry is None else geometry.no_turning
+    masses = bodies.masses(scene, folder or Path()) if isinstance(scene, StructureScene) else []
+    if masses and scene.wheel is not None and scene.wheel.speed:
+        raise ValueError(
+            f"wheel.speed: there is a lumped mass at {masses[0].at}, whose spin softening and Coriolis forces are not "
+            "modelled: make it a body, or leave wheel.speed out"
+        )
     return fem_part.build(
         mesh,
         node_sets,
@@ -149,7 +155,7 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
         springs=[*springs(scene), *(rod for rod in rods.values() if rod.stiffness)],
         held=[] if turning is None else [NoMeanRotation(turning)],
         constraints=bodies.constraints(scene, folder or Path()) if isinstance(scene, StructureScene) else (),
-        masses=bodies.masses(scene, folder or Path()) if isinstance(scene, StructureScene) else (),
+        masses=masses,
     )
 
 

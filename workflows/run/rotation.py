@@ -59,7 +59,9 @@ def spun(scene: MeshScene, part: Part, cut: Sector) -> Sector:
 
 
 def stuck_index_0(scene: MeshScene, sector: Sector) -> tuple[csr_matrix, csr_matrix, np.ndarray]:
-    """Stiffness (m, m) [N/m] of sectors that move alike with their contacts stuck, contact map (n_c, m), springs."""
+    """Stiffness (m, m) [N/m] of sectors that move alike with their contacts stuck, contact map (n_c, m), and contact
+    springs (n_pair, n_component) [N/m].
+    """
     system, B = at_index(sector, 0)
     model = ReducedModel(sector.system, sector.interface, info=ModelInfo(joints=sector.joints))
     springs = joints.contact_stiffness(scene, model)

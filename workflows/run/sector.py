@@ -55,12 +55,12 @@ def reduced(scene: MeshScene, full: Sector) -> ReducedSector:
 
     Raises  ValueError where it cannot stand, by itself or at its speed
     """
-    turning = scene.wheel is not None and scene.wheel.speed > 0
+    assert scene.wheel is not None
+    speed = scene.wheel.speed
     try:
-        kept = rotation.distributed(scene, full) if turning else ()
+        kept = rotation.distributed(scene, full) if speed else ()
         return reduce_sector(full, scene.reduction.modes, scene.reduction.cutoff, kept)
     except ValueError as trouble:
-        if scene.wheel is None or not turning:
+        if not speed:
             raise
-        rpm = 60 * scene.wheel.speed
-        raise ValueError(f"at wheel.speed = {rpm:.6g} rpm {trouble}, or let it turn slower") from None
+        raise ValueError(f"at wheel.speed = {60 * speed:.6g} rpm {trouble}, or let it turn slower") from None

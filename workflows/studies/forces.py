@@ -30,7 +30,7 @@ class BodyForces:
     """Static forces on a body, their sums (3,) along x, y, z [N].
 
     load : of the static loads, of centrifugal force where it has moved to; joints : joint -> force of that contact
-    held : whether a support or a spring carries some of it too
+    held : whether a support, a spring or a prescribed displacement carries some of it too
     """
 
     body: str
@@ -68,6 +68,8 @@ def study(file: SceneFile) -> list[BodyForces]:
     sets = {name: named(part.node_sets, name) for name in bodies} or {"part": np.arange(len(part.points))}
     free = np.zeros(3 * len(part.points), bool)
     free[part.free] = True
+    for given in scene.prescribed.values():
+        free[part.free[part.dofs(given.group, given.axis)]] = False
     found = []
     for name, nodes in sets.items():
         joints = {joint: on[nodes].sum(axis=0) for joint, on in contact.items() if on[nodes].any()}
@@ -80,7 +82,7 @@ def _loads(scene: MeshScene, part: Part, loads: Any, q: np.ndarray) -> np.ndarra
     """Static loads at the nodes (n_node, 3) [N]; those of a turning frame grow with the static displacement q."""
     total = np.zeros(len(part.free))
     for (harmonic, name), value in loads.items():
-        if harmonic == 0:
+        if harmonic == 0 and name in part.system.loads:  # a prescribed displacement is none of the part's
             total += np.real(value) * part.system.loads[name]
     full = np.zeros(3 * len(part.points))
     full[part.free] = total

@@ -28,6 +28,7 @@ from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.joints import contact_stiffness
 from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies.forces import study as body_forces
 from tribodyn.workflows.studies.identification import Measured, Parameter, fit
 
 
@@ -49,6 +50,14 @@ def test_the_force_at_the_screws_is_the_preload(rig):
         cycle = rig.with_height(height).with_force(force).cycle()
         assert cycle.preload > 5.0
         assert cycle.reaction == pytest.approx(cycle.preload, rel=1e-9)
+
+
+def test_forces_at_rest_leave_a_prescribed_height_to_what_holds_the_part():
+    """Both contact faces are of the one part: what they give to it adds up to nothing."""
+    (part,) = body_forces(scene_file.read("rig", COARSE))
+    assert part.held
+    assert not part.load.any()
+    assert np.abs(part.joints["contact"]).max() < 1e-9
 
 
 def test_no_interference_no_preload(rig):
