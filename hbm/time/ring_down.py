@@ -19,6 +19,7 @@ from tribodyn.hbm.threads import single
 from tribodyn.hbm.time.time_integration import IntegrationFailed, Options, TimeStepper
 
 FITTED = 6  # neighbouring half periods of a line
+UNEVEN = 0.25  # spread of their lengths from which on the peaks are those of several modes
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ def ring_down(balance: HarmonicBalance, mode: Backbone, periods: int, steps: int
 def from_peaks(time: np.ndarray, displacement: np.ndarray) -> RingDown:
     """Frequency and damping by amplitude of a decaying oscillation (n,), sampled at equal steps.
 
-    Raises  ValueError for fewer half periods than one line has
+    Raises  ValueError for fewer half periods than one line has, IntegrationFailed where several modes ring
     """
     y = displacement
     turns = np.flatnonzero((y[1:-1] - y[:-2]) * (y[2:] - y[1:-1]) < 0) + 1
@@ -82,6 +83,13 @@ def from_peaks(time: np.ndarray, displacement: np.ndarray) -> RingDown:
     size = np.abs(np.diff(height)) / 2
     rows = np.arange(len(middle) - FITTED + 1)[:, None] + np.arange(FITTED)
     half = np.arange(FITTED) - (FITTED - 1) / 2
+    length = np.diff(middle[rows], axis=1)  # half of the time between two maxima, or two minima
+    spread = np.ptp(length, axis=1) / length.mean(axis=1)
+    if (spread > UNEVEN).any():
+        raise IntegrationFailed(
+            f"the decay is no single oscillation: its half periods differ by {spread.max():.0%} between neighbours, "
+            "because other modes ring too; begin at a smaller amplitude, or end at a larger one"
+        )
     omega = np.pi / ((middle[rows] @ half) / (half @ half))
     falling = (np.log(size[rows]) @ half) / (half @ half)  # per half period
     return RingDown(time, y - height.mean(), np.exp(np.log(size[rows]).mean(axis=1)), omega, -falling / np.pi)

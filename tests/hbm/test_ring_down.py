@@ -13,6 +13,7 @@ from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, backbone
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.time.ring_down import from_peaks, ring_down
+from tribodyn.hbm.time.time_integration import IntegrationFailed
 
 MASS, STIFFNESS, RATIO = 1.3, 4.0e4, 0.003
 
@@ -27,6 +28,10 @@ def test_the_peaks_of_a_linear_decay_give_its_frequency_and_damping():
     assert found.amplitude[0] > found.amplitude[-1]
     with pytest.raises(ValueError, match="too short"):
         from_peaks(t[:300], np.cos(omega * t[:300]))
+    lopsided = np.exp(-zeta * omega * t) * (np.cos(omega * t) + 0.2 * np.cos(2 * omega * t))
+    np.testing.assert_allclose(from_peaks(t, lopsided).omega, omega, rtol=1e-3)
+    with pytest.raises(IntegrationFailed, match="other modes ring too"):
+        from_peaks(t, np.cos(omega * t) + 0.3 * np.cos(4.3 * omega * t))
 
 
 def test_a_friction_element_decays_along_its_backbone():
