@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import tomllib
 
 import numpy as np
 import pytest
 
 from tests.helpers.coarse_scenes import BLADE, RIG
+from tests.helpers.pages import ROOT, fences
 from tribodyn.workflows.api.studies import cycle_at
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.run import modelling
@@ -180,6 +182,8 @@ def test_a_life_without_wear_and_a_run_that_stops_early_are_told():
 def test_the_file_that_comes_with_the_program_is_sound_and_the_command_prints(tmp_path, capsys):
     task = fit_file.read(scene_file.CASES / "rig" / "rig.fit.toml")
     assert set(task.parameters) == {"mating_height", "damping"}
+    (shown,) = (fence.text for fence in fences(ROOT / "docs/howto/identify.md") if fence.word == "rig.fit.toml")
+    assert fit_file.parse(tomllib.loads(shown)) == task
     (tmp_path / "fit.toml").write_text(PARAMETER + MEASURED, encoding="utf-8")
     words = ["identify", "rig", str(tmp_path / "fit.toml"), *(w for o in RIG for w in ("--set", o))]
     with pytest.raises(SystemExit) as stop:

@@ -31,7 +31,7 @@ SIZES = {  # of the beam, name -> elements along it and through its height; 13 x
     "30k": (24, 6), "100k": (44, 12), "300k": (88, 18), "1M": (170, 36),
 }  # fmt: skip
 WAYS = ("product", "by hand", "multigrid")
-BLOCK, MODES, COLUMNS = 128, 15, 3  # columns : constraint modes that multigrid is measured on
+MODES, COLUMNS = 15, 3  # columns : constraint modes that multigrid is measured on
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 from tribodyn.workflows.command.words import Flag, Json, make_room, quantity
 
 if TYPE_CHECKING:
+    from tribodyn.workflows.designs.study_file import Study
     from tribodyn.workflows.designs.table import StudyTable
+    from tribodyn.workflows.run.progress import Progress
 
 TOLD = 5  # runs that are not complete, before the rest is only counted
 
@@ -47,13 +49,8 @@ def study(
         Print JSON for machines.
     """
     from tribodyn.workflows.designs import study as studies
-    from tribodyn.workflows.designs import study_file
-    from tribodyn.workflows.run.progress import Progress, console_progress
 
-    make_room(out)
-    read = study_file.read(file)
-    folder = out or Path("results") / read.name
-    progress = Progress() if as_json else console_progress()
+    read, folder, progress = _begun(file, out, as_json)
     try:
         found = studies.run(read, folder, progress, workers, scheduler, resume, retry)
     except KeyboardInterrupt:
@@ -110,15 +107,10 @@ def lives(
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.designs import study_file
     from tribodyn.workflows.lives import lives as distributions
-    from tribodyn.workflows.run.progress import Progress, console_progress
 
-    make_room(out)
     share = None if rare is None else quantity("--rare", rare, "")
-    read = study_file.read(file)
-    folder = out or Path("results") / read.name
-    progress = Progress() if as_json else console_progress()
+    read, folder, progress = _begun(file, out, as_json)
     try:
         found = distributions.run(read, folder, progress, workers, scheduler, resume, share)
     except KeyboardInterrupt:
@@ -127,6 +119,16 @@ def lives(
         print(json.dumps(found.record(), indent=2))
         return
     print(*troubles(found.table), *found.lines(), folder / "lives.json", folder / "lives.png", sep="\n")
+
+
+def _begun(file: Path, out: Path | None, as_json: bool) -> tuple[Study, Path, Progress]:
+    """A study, the folder that it leaves its tables in, and who is told how far it is."""
+    from tribodyn.workflows.designs import study_file
+    from tribodyn.workflows.run.progress import Progress, console_progress
+
+    make_room(out)
+    read = study_file.read(file)
+    return read, out or Path("results") / read.name, Progress() if as_json else console_progress()
 
 
 def _stopped(word: str, file: Path, folder: Path) -> str:

@@ -20,8 +20,8 @@ def shared(
 ) -> Iterator[tuple[list[Task], Callable[[int], None]]]:
     """The runs with the files through which they share what they are made of, and a function to call as a run ends.
 
-    A file is named by a hash of its content's origin, and removed with the last run that reads it. A study that is
-    killed leaves its files to the one that resumes it. One process alone shares nothing.
+    A file is named by a hash of all that its content is made of, and removed with the last run that reads it. A study
+    that is killed leaves its files to the one that resumes it. One process alone shares nothing.
     """
     if workers == 1 and not scheduler:
         yield list(tasks), lambda number: None

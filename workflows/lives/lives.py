@@ -325,9 +325,10 @@ def _quantile(found: _Fit, sample: Sample, share: float, confidence: float, erro
 
 
 def _shifted(draws: np.ndarray, error: float | None, logarithmic: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Draws of a quantile without and with the model's own error: one unknown factor between 1 - error and 1 + error.
+    """Draws of a quantile without and with the model's own error: one unknown factor for all of them.
 
-    The error of a verdict is a sum of parts without their signs, so that nothing within it is likelier than the rest
+    Its size is evenly distributed, as a verdict's error is a sum of parts without their signs: between 1 - error and
+    1 + error, or, where draws are logarithms, between 1 and 1 + error or the reciprocal of that, which stays positive
     """
     if not error:
         return draws, draws

@@ -133,9 +133,11 @@ def sample(
     trial : parameters by name -> (n_measured + n_predicted,) values above 0; SolveFailed where there are none
     predicted : name -> unit of the numbers that follow; priors : of some parameters, the others are spread evenly over
         the bounds of their unknowns; most : trials
-    Raises  ValueError without an error of a measured number, without emcee, or where half of the trials fail
+    Raises  ValueError without an error of a measured number, or without emcee; SolveFailed where more than half of the
+        trials fail
     Source  ensemble sampler with the stretch move: Goodman and Weare 2010, doi 10.2140/camcos.2010.5.65; Gaussian
-        process in place of the model, its variance added to that of the errors: Kennedy and O'Hagan 2001
+        process in place of the model, its variance added to that of the errors: Kennedy and O'Hagan 2001, doi
+        10.1111/1467-9868.00294
     """
     errors = np.array([m.error or 0.0 for m in measured])
     if not (errors > 0).all():
@@ -147,16 +149,18 @@ def sample(
     names = dict(predicted or {})
     target = np.log([m.value for m in measured])
     trials = _Trials(box, trial, len(target) + len(names))
-    share = qmc.Sobol(len(parameters), seed=np.random.default_rng(seed)).random(min(FIRST * len(parameters), most))
-    trials.make(share)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "The balance properties of Sobol", UserWarning)  # as many as there may be
+        first = qmc.Sobol(len(parameters), seed=np.random.default_rng(seed)).random(min(FIRST * len(parameters), most))
+    trials.make(first)
     while True:
         levels = trials.levels()
         chain, length = _chains(box, levels[: len(target)], target, errors, seed)
-        sure = _uncertainty(levels[: len(target)], errors, chain[:: max(len(chain) // 400, 1)])
+        spread = chain[:: max(len(chain) // 400, 1)]
+        sure = _uncertainty(levels[: len(target)], errors, box.coordinates(spread))
         if sure.max() <= ENOUGH or trials.count + BATCH > most:
             break
-        spread = chain[:: max(len(chain) // 400, 1)]
-        trials.make(_apart(spread, sure, box.points(np.array(trials.shares))))
+        trials.make(_apart(spread, sure, np.array(trials.shares)))
     thin = chain[:: max(len(chain) // 4000, 1)]
     draw = np.random.default_rng(seed)
     coordinates = box.coordinates(thin)
@@ -186,9 +190,6 @@ class _Box:
     def coordinates(self, share: np.ndarray) -> np.ndarray:
         """Of order 1, for the processes."""
         return np.asarray(np.sqrt(12) * (share - 0.5))
-
-    def points(self, share: np.ndarray) -> np.ndarray:
-        return share.reshape(-1, len(self.parameters))
 
     def log_prior(self, share: np.ndarray) -> np.ndarray:
         """(n,) of shares (n, k), up to a constant; -inf outside."""
@@ -269,8 +270,7 @@ def _chains(
     best = start[np.argsort(-likely)[: 2 * WALKERS]]  # the better ones of points all over the bounds
     first = best[draw.choice(len(best), WALKERS, replace=False)]
     sampler = emcee.EnsembleSampler(WALKERS, k, log_probability, vectorize=True)
-    sampler._random = np.random.RandomState(seed)
-    sampler.run_mcmc(emcee.State(first, random_state=sampler._random.get_state()), STEPS)
+    sampler.run_mcmc(emcee.State(first, random_state=np.random.RandomState(seed).get_state()), STEPS)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         time = float(np.max(sampler.get_autocorr_time(tol=0)))
@@ -279,9 +279,8 @@ def _chains(
     return np.asarray(chain), STEPS / time if np.isfinite(time) else 0.0
 
 
-def _uncertainty(levels: Sequence[Level], errors: np.ndarray, share: np.ndarray) -> np.ndarray:
+def _uncertainty(levels: Sequence[Level], errors: np.ndarray, coordinates: np.ndarray) -> np.ndarray:
     """(n,) largest standard deviation of a process over the error of its measurement."""
-    coordinates = np.sqrt(12) * (share - 0.5)
     each = [level.mean_and_deviation(coordinates)[1] / error for level, error in zip(levels, errors, strict=True)]
     return np.asarray(np.max(each, axis=0))
 

@@ -37,9 +37,7 @@ def picture(found: Posterior) -> Figure:
                     shown = columns[:: max(len(columns) // POINTS, 1)]
                     pane.plot(shown[:, j], shown[:, i], ".", color=BLUE, ms=2, alpha=0.4)
                     if j == 0:
-                        pane.set_ylabel(
-                            f"{told[i].name} / {told[i].unit}" if told[i].unit else told[i].name, fontsize=8
-                        )
+                        pane.set_ylabel(_label(told[i]), fontsize=8)
                 pane.xaxis.set_major_locator(MaxNLocator(3))
                 pane.tick_params(labelsize=7)
         for j, pane in enumerate(panes[-1]):
