@@ -288,6 +288,8 @@ def identify(
             known.plot().savefig(out)
         print(json.dumps(known.record(), indent=2) if as_json else "\n".join(known.lines()))
         return
+    if out is not None:
+        raise ValueError("--out is the picture of a posterior: give --posterior too")
     found, changes = whole_scenes.fit(scene, task, overrides=overrides, progress=aside)
     if as_json:
         print(json.dumps({**found.record(), "set": changes}, indent=2))
