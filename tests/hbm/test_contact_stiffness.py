@@ -156,6 +156,20 @@ def test_rectangle_against_published_fits(ratio):
     assert (k_n, k_across, k_along) == pytest.approx((fit_n, fit_across, fit_along), rel=0.07)
 
 
+@pytest.mark.parametrize(("ratio", "within"), [(1e4, 1e-3), (1e6, 5e-4), (1e9, 3e-4)])
+def test_a_long_strip_is_the_slender_conductor(ratio, within):
+    """Capacity of a slender body, L / 2 (1/W + (1 - pi^2/12) / W^3), W = ln(4 L/w) + ln 2 - 1, a strip of width w as a
+    wire of radius w/4 (Jackson, Am. J. Phys. 68 (2000) 789-799)."""
+    W = log(4 * ratio) + log(2) - 1
+    capacity = ratio / 2 * (1 / W + (1 - pi**2 / 12) / W**3)
+    k_n, along = rectangular_punch(ratio, 1.0, 1.0, 0.3, inf, 0.0)
+    _, across = rectangular_punch(1.0, ratio, 1.0, 0.3, inf, 0.0)
+    assert k_n * (1 - 0.3**2) == pytest.approx(pi * capacity, rel=within)
+    assert along < across < k_n
+    # far from its ends a strip under shear across it is a plane problem, as stiff as under pressure; along it is softer
+    assert across == pytest.approx(k_n, rel=3 / W)
+
+
 def _love(x, y):
     r = np.hypot(x, y)
     return x * np.log(y + r) + y * np.log(x + r)
@@ -256,6 +270,7 @@ def test_ratio_beside_the_published_patches(sides, published):
     ("call", "word"),
     [
         (lambda: rectangular_punch(0.0, 1e-3, *STEEL), "a is 0"),
+        (lambda: rectangular_punch(1.0, 1e-10, *STEEL), "check their units"),
         (lambda: rectangular_punch(1e-3, 1e-3, 210e9, 0.6, 210e9, 0.3), "nu1"),
         (lambda: rectangular_punch(1e-3, 1e-3, inf, 0.3, inf, 0.3), "elastic"),
         (lambda: rectangular_punch(1e-3, 1e-3, *STEEL, edge_radius=1e-4), "give load"),
