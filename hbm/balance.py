@@ -23,6 +23,8 @@ from tribodyn.hbm.krylov import gmres
 from tribodyn.hbm.linear.compliance import CompliancePoint, ContactCompliance
 from tribodyn.reduction.model import ReducedModel
 
+ROUNDING = 1e-13  # of the work that a pair's force and motion could do at most
+
 
 @dataclass(frozen=True)
 class State:
@@ -196,11 +198,15 @@ class HarmonicBalance:
         """(n_pair,) friction work per cycle, both tangential components [J].
 
         The normal spring is elastic: what work its sampled force does when a pair lifts is an error of sampling. A pair
-        that sticks throughout is elastic too: what is left of its work is rounding, and would be taken for slow wear.
+        that sticks throughout, or lifts without slip, is elastic too: what is left of its work is rounding, and would be
+        taken for slow wear.
         """
         t = self.contact.tangential
-        work = self.basis.work_per_cycle(state.cycle.force[:, t], state.x[:, t]).sum(axis=1)
-        return np.where(state.cycle.status == STICKS, 0.0, work)
+        force, x = state.cycle.force[:, t], state.x[:, t]
+        work = self.basis.work_per_cycle(force, x).sum(axis=1)
+        sizes = [np.linalg.norm(c[..., int(self.basis.has_static) :], axis=(1, 2)) for c in (force, x)]
+        most = np.pi * self.basis.harmonics[-1] * sizes[0] * sizes[1]
+        return np.where((state.cycle.status == STICKS) | (np.abs(work) <= ROUNDING * most), 0.0, work)
 
     def preload(self, state: State) -> float:
         """Static normal force of the whole contact [N]; zero where the law has no normal component."""

@@ -73,6 +73,7 @@ class WearEnd(End):
     PRELOAD_LOST = "preload fell below"
     LOST_AT_REST = "preload at rest fell below"
     NO_SLIP = "no pair slips any more: wear has stopped"
+    NEVER_SLIPS = "no pair ever slips: nothing wears"
     FADED = "wear has faded out"
     NO_LOSS = "the wear law takes nothing off where pairs slip"
     STEPS_DONE = "stopped after"
@@ -88,7 +89,7 @@ class WearEnd(End):
     @property
     def survived(self) -> bool:
         """Whether wear has ended by itself while the contact still holds (shakedown)."""
-        return self in (WearEnd.NO_SLIP, WearEnd.FADED)
+        return self in (WearEnd.NO_SLIP, WearEnd.NEVER_SLIPS, WearEnd.FADED)
 
     @property
     def failed(self) -> bool:

@@ -225,7 +225,9 @@ def reason_to_stop(
         return WearEnd.PRELOAD_LOST.say(f" {problem.lost_below:.3g} of its first value in joint {lost}")
     left = f", the contact survives with {state.depth.max():.4g} m worn at most and {preload:.4g} N of preload left"
     if state.rate.max() <= 0.0:
-        return WearEnd.NO_LOSS.say() if state.work.max() > 0.0 else WearEnd.NO_SLIP.say(left)
+        if state.work.max() > 0.0:
+            return WearEnd.NO_LOSS.say()
+        return (WearEnd.NO_SLIP if len(rows) else WearEnd.NEVER_SLIPS).say(left)
     fading = rows and state.work.sum() < FADED_SHARE * rows[0].energy.sum()
     if fading and state.rate.max() * ENDLESS < step_depth:
         return WearEnd.FADED.say(left)

@@ -12,6 +12,7 @@ from tribodyn.geometry import blocks
 from tribodyn.geometry.gmsh_session import session
 from tribodyn.hbm import newton
 from tribodyn.hbm.contact import law
+from tribodyn.hbm.outcome import WearEnd
 from tribodyn.workflows.accuracy import probes
 from tribodyn.workflows.result import summary
 from tribodyn.workflows.run import modelling, pipeline
@@ -377,13 +378,28 @@ def test_a_bolt_that_crosses_nothing_is_one_sentence(tmp_path: Path) -> None:
         built(STACK.replace('second = "b.x_max"\npreload', 'second = "a.x_min"\npreload'), tmp_path)
 
 
-def test_what_a_bolt_clamps_carries_its_force_on_small_faces_too(tmp_path: Path) -> None:
+def lap() -> str:
+    """The bolted lap joint of the site."""
     text = (Path(__file__).parents[2] / "docs/howto/several-bodies.md").read_text(encoding="utf-8")
-    balance = built(text.split("```toml lap.toml\n")[1].split("```")[0], tmp_path).balance.with_load(0.0)
+    return text.split("```toml lap.toml\n")[1].split("```")[0]
+
+
+def test_a_joint_that_never_slips_survives_instead_of_a_number_of_cycles(tmp_path: Path) -> None:
+    held = ('bolts.m6.preload="9 kN"', 'loads.harmonic.shake.value="1 N"', 'wear.at="3 kHz"', "response.points=3")
+    result = pipeline.run(scene_file.parse(lap(), "lap.toml", (*held, *QUIET), tmp_path), None, Progress())
+    assert result.wear is not None
+    assert result.wear.end.kind is WearEnd.NEVER_SLIPS
+    assert result.wear.ended.survived
+    assert result.wear.cycles.tolist() == [0.0]
+    assert "no pair ever slips: nothing wears, the contact survives" in result.state
+
+
+def test_what_a_bolt_clamps_carries_its_force_on_small_faces_too(tmp_path: Path) -> None:
+    balance = built(lap(), tmp_path).balance.with_load(0.0)
     omega = 2 * np.pi * 4e3
     found = newton.solve(balance, omega, balance.stuck(omega), newton.NewtonOptions(tolerance=1e-10))
     assert found.converged
-    assert balance.preload(found.state) == pytest.approx(1000.0, rel=1e-6)
+    assert balance.preload(found.state) == pytest.approx(3000.0, rel=1e-6)
 
 
 def test_every_body_of_a_scene_is_made_coarser_or_the_mesh_is_said_to_be_given(tmp_path: Path) -> None:
