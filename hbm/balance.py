@@ -198,7 +198,7 @@ class HarmonicBalance:
         """(n_pair,) friction work per cycle, both tangential components [J].
 
         The normal spring is elastic: what work its sampled force does when a pair lifts is an error of sampling. A pair
-        that sticks throughout, or lifts without slip, is elastic too: what is left of its work is rounding, and would be
+        that sticks throughout, or lifts without slip, is elastic too: what is left of its work is rounding and would be
         taken for slow wear.
         """
         t = self.contact.tangential

@@ -47,7 +47,7 @@ def rectangular_punch(
     E1, nu1, E2, nu2 : Young's moduli [Pa] and Poisson's ratios of the bodies, E = inf for a rigid one
     edge_radius : radius of the four edges [m], 0 for sharp ones
     load : normal load [N], needed where the edges are round because the contact grows onto them
-    Raises  ValueError: an argument that cannot be, sides that differ by more than LONGEST, or round edges without a load
+    Raises  ValueError: an argument that cannot be, sides beyond LONGEST, or round edges without a load
     Source  see the module; normal and shear problems uncoupled, see ElasticPair
     """
     require_positive(a=a, b=b)
