@@ -52,6 +52,12 @@ class Joint:
         return int(self.module.n_state(self.parameters.components))
 
 
+def joint_transitions(joints: Joint | Sequence[Joint]) -> str:
+    """How forces of these joints are taken best: "located" where all their laws can, else "sampled"."""
+    every = [joints] if isinstance(joints, Joint) else joints
+    return "located" if all(hasattr(joint.module, "located") for joint in every) else "sampled"
+
+
 @dataclass(frozen=True)
 class Contact:
     """All joints of one contact interface; every pair belongs to exactly one of them.
@@ -163,7 +169,7 @@ class Contact:
     @property
     def locates(self) -> bool:
         """Whether every law locates its transitions between samples."""
-        return all(hasattr(joint.module, "located") for joint in self.joints)
+        return joint_transitions(self.joints) == "located"
 
     def joint(self, name: str) -> Joint:
         """The joint of this name; raises ValueError with the names that there are."""

@@ -15,7 +15,7 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.branch import Branch, amplitude
 from tribodyn.hbm.continuation.methods import adaptive, arc_length
 from tribodyn.hbm.newton import NewtonOptions, Solution
-from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.outcome import CONVERGED, SolveEnd
 
 SCAN_TOLERANCE = 0.03  # of the response between the points of the first search
 COARSEST = 0.05  # longest step of the first search, share of its range
@@ -26,6 +26,10 @@ SCANNED = 3
 # peak is less, and a peak that emerges passes this at once
 OVERTAKES = 1.2
 APART = 1e-3  # relative distance of frequencies from which on two peaks are two
+NEAR = (
+    1e-3  # relative distance to the zero of the slope within which a point beside failed solves is taken for the peak
+)
+TRIED = 3  # maxima of a scan that are refined in turn, the highest first
 
 
 class NoPeak(ValueError):
@@ -112,6 +116,8 @@ class AtPeak:
     start, stop : range that the first search scans [rad/s], from `start` on; n_scan : its steps where nothing bends are
         up to five times as long as of so many points
     tolerance : relative, on the frequency of the peak
+    highest : amplitude that no linear response inside the range passes, with the contact free or stuck, at load factor
+        1 [m]: a tracked peak as high is not overtaken, and none is looked for
     """
 
     output: str
@@ -119,6 +125,7 @@ class AtPeak:
     stop: float
     n_scan: int = 60
     tolerance: float = 1e-5
+    highest: float = np.inf
     newton: NewtonOptions = field(default_factory=NewtonOptions)
 
     def first(self, balance: HarmonicBalance) -> OperatingPoint:
@@ -135,12 +142,16 @@ class AtPeak:
             newton=self.newton,
         )
         branch = adaptive.follow(balance, self.start, self.stop, scan)
-        best = self._highest_maximum(branch)
-        x = branch.contact[best].reshape(balance.contact.n_pair, len(balance.contact.components), balance.basis.n_coeff)
-        near = branch.omega[max(best - 1, 0) : best + 2]
-        width = float(np.ptp(near)) / max(len(near) - 1, 1)
-        found = self._refine(balance, branch.omega[best], x, 0.5 * width)
-        return OperatingPoint(found.solution, found.amplitude, found.response, found.solves + len(branch.omega))
+        solves = len(branch.omega)
+        for best in self._maxima(branch)[:TRIED]:
+            contact = branch.contact[best]
+            x = contact.reshape(balance.contact.n_pair, len(balance.contact.components), balance.basis.n_coeff)
+            width = float(np.ptp(branch.omega[best - 1 : best + 2])) / 2
+            found = self._refine(balance, branch.omega[best], x, 0.5 * width)
+            solves += found.solves
+            if found.solution.converged:
+                break
+        return replace(found, solves=solves)
 
     def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
         """Refine from a neighbouring peak."""
@@ -152,6 +163,8 @@ class AtPeak:
         point : the tracked peak
         Returns the peak and the balance solves spent, those of a sweep without any peak apart
         """
+        if OVERTAKES * point.amplitude >= self.highest * balance.load_factor:
+            return None, 0
         needed = max((h for h, _ in balance.excitation.loads), default=0)
         few = balance.with_harmonics(tuple(h for h in balance.basis.harmonics if h <= max(SCANNED, needed)))
         try:
@@ -180,15 +193,15 @@ class AtPeak:
         """Relative accuracy that the frequency is wanted with."""
         return self.tolerance
 
-    def _highest_maximum(self, branch: Branch) -> int:
-        """Point of a branch that is the highest of those that are higher than both their neighbours."""
+    def _maxima(self, branch: Branch) -> np.ndarray:
+        """Points of a branch that are higher than both their neighbours, the highest first."""
         good = branch.converged
         height = np.where(good, branch.amplitude(self.output), -1.0)
         inner = np.flatnonzero(
             good[1:-1] & (height[1:-1] > 0) & (height[1:-1] >= height[:-2]) & (height[1:-1] >= height[2:])
         )
         if len(inner):
-            return int(inner[np.argmax(height[inner + 1])]) + 1
+            return inner[np.argsort(-height[inner + 1], kind="stable")] + 1
         if height.max(initial=0.0) <= 0.0:
             raise NoPeak(f"no resonance peak of {self.output}: it does not vibrate between {_range(branch)}")
         end = float(branch.omega[int(np.argmax(height))] / (2 * np.pi))
@@ -253,7 +266,14 @@ class AtPeak:
                 f"the resonance peak of {self.output} has moved beyond {hertz:.5g} Hz, the highest frequency that is "
                 "modelled: extend response.frequency"
             )
-        return OperatingPoint.of(balance, best.solution, self.output, solves)
+        found = best.solution
+        if abs(best.distance) > NEAR * best.omega:
+            hertz, rises = best.omega / (2 * np.pi), "rises" if best.slope > 0 else "falls"
+            lost = SolveEnd.SITE_NOT_FOUND.say(
+                f" {solves} solves: the curve ends at {hertz:.5g} Hz, where it still {rises}"
+            )
+            found = replace(found, outcome=lost)
+        return OperatingPoint.of(balance, found, self.output, solves)
 
 
 def _range(branch: Branch) -> str:

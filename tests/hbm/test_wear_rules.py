@@ -14,7 +14,7 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import SEPARATES
 from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak, BesidePeak, Correction, OperatingPoint
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.outcome import WearEnd
+from tribodyn.hbm.outcome import SolveEnd, WearEnd
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.events import events
@@ -346,6 +346,33 @@ def test_a_peak_is_overtaken_by_a_higher_one_that_a_sweep_meets(problem: WearPro
     moved, _ = beside.overtaken(problem.balance, beside.next(problem.balance, 1.01 * lower.state.omega, lower.state.x))
     assert moved is not None
     assert moved.state.omega == pytest.approx(1.01 * highest.state.omega, rel=1e-4)
+
+
+def test_no_higher_peak_is_looked_for_above_what_any_linear_response_reaches(problem: WearProblem) -> None:
+    site = AtPeak("tip", 250.0, 1200.0)
+    point = site.first(problem.balance)
+    low, high = 1.1 * point.amplitude, 2 * point.amplitude
+    assert replace(site, highest=low).overtaken(problem.balance, point) == (None, 0)
+    assert replace(site, highest=high).overtaken(problem.balance, point)[1] > 0
+    assert replace(site, highest=high).overtaken(problem.balance.with_load(0.5), point) == (None, 0)
+
+
+def test_a_point_beside_failed_solves_is_no_peak(problem: WearProblem, monkeypatch: pytest.MonkeyPatch) -> None:
+    site = AtPeak("tip", 250.0, 1200.0)
+    peak = site.first(problem.balance).state
+    below = site.next(problem.balance, 0.99 * peak.omega, peak.x)
+    assert below.solution.converged
+    assert below.state.omega == pytest.approx(peak.omega, rel=1e-4)
+    solve = newton.solve
+
+    def ends(balance: HarmonicBalance, omega: float, *rest: object) -> newton.Solution:
+        found = solve(balance, omega, *rest)
+        return found if omega < 0.97 * peak.omega else replace(found, outcome=SolveEnd.NO_DESCENT.say(" 1"))
+
+    monkeypatch.setattr(newton, "solve", ends)
+    stopped = site.next(problem.balance, 0.96 * peak.omega, peak.x)
+    assert stopped.solution.outcome.kind is SolveEnd.SITE_NOT_FOUND
+    assert "where it still rises" in str(stopped.solution.outcome)
 
 
 LEAP_DEPTH, SECOND = 2e-5, 520.0  # depth [m] from which on a second place is the higher one, and its frequency [rad/s]

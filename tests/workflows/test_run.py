@@ -20,7 +20,7 @@ from tribodyn.workflows.result import store
 from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.summary import summary
-from tribodyn.workflows.run import checkpoint, fields, modelling, pipeline
+from tribodyn.workflows.run import checkpoint, fields, modelling, pipeline, references
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import read
 
@@ -113,6 +113,24 @@ def test_references_peak_where_the_modes_are(finished: Result) -> None:
     assert finished.wear is not None
     # without contact the peak is the free one, 1 % damping: amplitudes agree where the grid of 5 Hz allows
     assert finished.wear.amplitude[-1] >= 0.99 * references.free.max()
+
+
+def test_the_highest_linear_response_is_that_of_a_fine_grid(tmp_path: Path) -> None:
+    balance = modelling.build(read("beam", SMALL), tmp_path, Progress()).balance
+    low, high = 2 * np.pi * 300.0, 2 * np.pi * 1000.0
+    highest = references.highest_linear(balance, "response", low, high)
+    drawn = references.linear_references(balance, "response", 2 * np.pi * 410.0, 2 * np.pi * 430.0)
+    assert highest == pytest.approx(drawn.free.max(), rel=1e-3)
+    only_stuck = references.linear_references(balance, "response", 2 * np.pi * 500.0, high)
+    assert references.highest_linear(balance, "response", 2 * np.pi * 500.0, high) == pytest.approx(
+        max(only_stuck.free.max(), only_stuck.stuck.max()), rel=1e-3
+    )
+
+
+def test_transitions_are_located_where_every_law_can(tmp_path: Path) -> None:
+    for law, wanted in (("jenkins", "located"), ("coulomb_planar", "sampled")):
+        file = read("beam", [*SMALL, 'harmonics.transitions="auto"', f"contact.law={law}"])
+        assert modelling.build(file, tmp_path, Progress()).balance.basis.transitions == wanted
 
 
 def test_killed_runs_resume_to_the_same_bits(tmp_path: Path) -> None:

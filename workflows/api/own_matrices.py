@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.hbm import continuation, newton
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.joint import Joint, joint_transitions
 from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation import nonlinear_modes as modes
 from tribodyn.hbm.continuation.branch import Branch, amplitude
@@ -104,17 +104,19 @@ class Structure:
         static: Mapping[str, float] | None = None,
         harmonic: Mapping[int, Mapping[str, complex]] | None = None,
         samples: int = 128,
-        transitions: str = "sampled",
+        transitions: str = "auto",
         tolerance: float = 1e-8,
     ) -> Balance:
         """The harmonic balance of the structure under loads.
 
         up_to : highest excitation frequency that will be asked for [Hz]
         static : load -> N; harmonic : order -> {load -> complex amplitude F of Re F exp(i order w t) [N]}
-        samples : time samples of a cycle; transitions : "located" finds stick, slip and lift between them
+        samples : time samples of a cycle; transitions : "located" finds stick, slip and lift between them, "sampled"
+            does not, "auto" does where every contact law can
         Raises  ValueError for unknown loads, orders that are not kept, laws that do not fit
         """
-        basis = HarmonicBasis(tuple(harmonics), samples, transitions)
+        chosen = joint_transitions(self.joints) if transitions == "auto" else transitions
+        basis = HarmonicBasis(tuple(harmonics), samples, chosen)
         loads = Excitation.of(static, harmonic)
         made = HarmonicBalance.of(self.model, self.joints, basis, loads, HZ * up_to)
         return Balance(made, NewtonOptions(tolerance=tolerance))

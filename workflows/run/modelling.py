@@ -24,6 +24,7 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.fem.thermal import Heating, temperature_at
 from tribodyn.hbm import rest
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.joint import joint_transitions
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -249,6 +250,8 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
     harmonics, gap = scene.harmonics, reduced.interface.gap
     all_joints = joints.make_joints(scene, reduced)
 
+    transitions = joint_transitions(all_joints) if harmonics.transitions == "auto" else harmonics.transitions
+
     turned: dict[str, float] = {}
     top = settings.response_range(scene)[1]
     if isinstance(scene, StructureScene) and scene.bolts and part is not None:
@@ -262,7 +265,7 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
         turned = tightening.tightened(scene, stiffness, alone, top)
 
     def balance(kept: tuple[int, ...]) -> HarmonicBalance:
-        basis = HarmonicBasis(kept, harmonics.samples, harmonics.transitions)
+        basis = HarmonicBasis(kept, harmonics.samples, transitions)
         if not basis.has_static and np.any(np.abs(gap) > NO_GAP):
             raise ValueError("the contact has gaps, which act in harmonic 0: keep it in harmonics.kept")
         base = ground_motion(scene, part, basis) if isinstance(scene, MeshScene) and part is not None else None

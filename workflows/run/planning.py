@@ -100,7 +100,7 @@ def plan(file: SceneFile) -> Plan:
         pairs, masters = _contact(built, mesh, node_sets, free)
         held = int(isinstance(built, PartScene) and built.geometry.no_turning is not None)
         modes, cutoff = built.reduction.modes, built.reduction.cutoff
-    basis = HarmonicBasis(scene.harmonics.kept or LIKELY, scene.harmonics.samples, scene.harmonics.transitions)
+    basis = HarmonicBasis(scene.harmonics.kept or LIKELY, scene.harmonics.samples)
     n_component = len(components(scene))
     contact = pairs * n_component
     model = masters + (modes if modes is not None else 50) - held

@@ -13,6 +13,7 @@ from tribodyn.workflows.result.result import References
 from tribodyn.workflows.scene.schema import MeshScene, Scene
 
 POINTS = 401
+POINTS_BETWEEN = 41  # beside the resonances themselves
 MODES = 100
 
 
@@ -26,6 +27,15 @@ def linear_references(balance: HarmonicBalance, output: str, start: float, stop:
     return References(omega, _amplitudes(balance, None, output, omega), stuck)
 
 
+def highest_linear(balance: HarmonicBalance, output: str, start: float, stop: float) -> float:
+    """Largest amplitude of an output from one frequency to another [rad/s], free or stuck [m]; infinite where loose."""
+    states = (None, balance.contact.stiffness)
+    at = [np.linspace(start, stop, POINTS_BETWEEN), *(_resonances(balance, springs) for springs in states)]
+    omega = np.unique(np.clip(np.concatenate(at), start, stop))
+    highest = float(max(_amplitudes(balance, springs, output, omega).max() for springs in states))
+    return np.inf if np.isnan(highest) else highest
+
+
 def delta_max(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:
     """The depth that wear steps are a share of: largest approach of the pairs without their contact [m].
 
@@ -35,6 +45,20 @@ def delta_max(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:
     if isinstance(scene, MeshScene) and scene.wheel is not None:
         return float(0.5 * approach @ area / area.sum())
     return float(approach.max())
+
+
+def _resonances(balance: HarmonicBalance, springs: np.ndarray | None) -> np.ndarray:
+    """Frequencies at which a loaded harmonic meets a mode, free or stuck [rad/s]."""
+    found = [np.zeros(0)]
+    orders = {order for order, _ in balance.excitation.loads}
+    if balance.excitation.base is not None:
+        orders.update(balance.basis.harmonics)
+    for h in sorted(orders - {0}):
+        system, B = balance.model.at_harmonic(h)
+        stiffness = system.stiffness if springs is None else stuck_stiffness(system.stiffness, B, springs)
+        lam = sla.eigvalsh(stiffness, system.mass, subset_by_index=(0, min(MODES, system.n_dof) - 1))
+        found.append(np.sqrt(np.maximum(lam, 0.0)) / h)
+    return np.concatenate(found)
 
 
 def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: str, omega: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -59,20 +59,24 @@ def peak_of(scene: Scene) -> AtPeak:
     return AtPeak(OUTPUT, *response_range(scene), scene.response.points, newton=newton_options(scene))
 
 
-def mission(scene: Scene) -> tuple[Duty, ...]:
-    """Where the cycles that wear are taken: the scene's one place, or the duties of its mission."""
+def mission(scene: Scene, highest: float = np.inf) -> tuple[Duty, ...]:
+    """Where the cycles that wear are taken: the scene's one place, or the duties of its mission.
+
+    highest : amplitude of the largest linear response, see `AtPeak` [m]
+    """
     assert scene.wear is not None
     if not scene.wear.mission:
-        return (Duty(site_of(scene, scene.wear.at)),)
-    return tuple(Duty(site_of(scene, duty.at), duty.share, duty.load) for duty in scene.wear.mission)
+        return (Duty(site_of(scene, scene.wear.at, highest)),)
+    return tuple(Duty(site_of(scene, duty.at, highest), duty.share, duty.load) for duty in scene.wear.mission)
 
 
-def site_of(scene: Scene, place: Place) -> AtFrequency | AtPeak | BesidePeak:
-    """A place of the scene's response."""
+def site_of(scene: Scene, place: Place, highest: float = np.inf) -> AtFrequency | AtPeak | BesidePeak:
+    """A place of the scene's response; highest : as for `mission`."""
     if place.frequency is not None:
         return AtFrequency(OUTPUT, 2 * np.pi * place.frequency, newton_options(scene))
     assert place.peak is not None
-    return peak_of(scene) if place.peak == 1.0 else BesidePeak(peak_of(scene), place.peak)
+    peak = replace(peak_of(scene), highest=highest)
+    return peak if place.peak == 1.0 else BesidePeak(peak, place.peak)
 
 
 def step_limit(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:

@@ -16,7 +16,7 @@ from tribodyn.hbm.wear.history import WearHistory, WearRow, history, rows_to_res
 from tribodyn.hbm.wear.law import JointWear
 from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.run import settings
+from tribodyn.workflows.run import references, settings
 from tribodyn.workflows.run.checkpoint import Keeper
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.fields import with_shown
@@ -71,7 +71,8 @@ def wear_problem(
     area = balance.model.interface.area
     vibrating, resting = (0.0, lost_below) if at_rest else (lost_below, None)
     any_joint = scene.wear.lost_of == "any"
-    return WearProblem(balance, settings.mission(scene), wear, area, vibrating, resting, any_joint)
+    highest = references.highest_linear(balance, settings.OUTPUT, *settings.response_range(scene))
+    return WearProblem(balance, settings.mission(scene, highest), wear, area, vibrating, resting, any_joint)
 
 
 def evolve(

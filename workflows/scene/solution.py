@@ -160,9 +160,10 @@ class Harmonics(Table):
     """Highest harmonic that kept = "auto" may keep; 15 by default."""
     samples: Annotated[StrictInt, Field(ge=4, le=65536)] = 128
     """Time samples of one cycle."""
-    transitions: Literal["sampled", "located"] = "sampled"
+    transitions: Literal["auto", "sampled", "located"] = "auto"
     """"sampled" takes contact forces at equidistant samples; "located" finds the instants of stick, slip, contact and
-    separation."""
+    separation; "auto" locates them where every contact law of the scene can. A contact that touches for less than the
+    time between two samples is lost on sampled forces."""
 
     @property
     def automatic(self) -> bool:
