@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import functools
 import importlib
+import inspect
 import re
+import sys
 import textwrap
 import tomllib
 from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal, get_args, get_origin
@@ -71,7 +75,9 @@ def scene_keys(kind: type[BaseModel], without: type[BaseModel] | None = None) ->
         if without is not None and any(path == other and table is known for other, known in _tables(without, ())):
             continue
         lines += [f"## `[{'.'.join(path)}]`", "", _paragraph(table.__doc__), ""]
-        rows = [_row(name, field) for name, field in table.model_fields.items() if _is_key(name, field, path)]
+        said = _below_keys(table)
+        keys = [(name, field) for name, field in table.model_fields.items() if _is_key(name, field, path)]
+        rows = [_row(name, field, said.get(name)) for name, field in keys]
         lines += _table(("key", "unit", "default", "meaning"), rows)
     return "\n".join(lines)
 
@@ -109,9 +115,9 @@ def _is_mapping(annotation: Any) -> bool:
     return get_origin(annotation) is dict or any(_is_mapping(inner) for inner in get_args(annotation))
 
 
-def _row(name: str, field: Any) -> tuple[str, ...]:
+def _row(name: str, field: Any, meaning: str | None) -> tuple[str, ...]:
     marks = [*field.metadata, *_marks(field.annotation)]
-    if not field.description:
+    if not meaning:
         raise ValueError(f"the key {name} of a scene has no meaning written below it")
     units = [mark.unit for mark in marks if isinstance(mark, Quantity)]
     axes = AXES in marks
@@ -119,8 +125,23 @@ def _row(name: str, field: Any) -> tuple[str, ...]:
     bounds = [f"{word} {getattr(mark, key):g}" for mark in marks for key, word in BOUNDS if hasattr(mark, key)]
     choices = [repr(choice).replace("'", '"') for choice in _choices(field.annotation)]
     notes = [f"One of {', '.join(f'`{c}`' for c in choices)}." if choices else "", _bounds(bounds)]
-    meaning = " ".join(filter(None, [_paragraph(field.description), *notes]))
-    return f"`{name}`", unit, _default(field), meaning
+    return f"`{name}`", unit, _default(field), " ".join(filter(None, [_paragraph(meaning), *notes]))
+
+
+@functools.cache
+def _below_keys(kind: type[BaseModel]) -> dict[str, str]:
+    """The text below every key of a table, from the source of its class and of those that it inherits from."""
+    meanings: dict[str, str] = {}
+    for table in reversed(kind.__mro__):
+        module = sys.modules[table.__module__]
+        if not module.__name__.startswith("tribodyn"):
+            continue
+        written = ast.walk(ast.parse(inspect.getsource(module)))
+        body = next((w.body for w in written if isinstance(w, ast.ClassDef) and w.name == table.__name__), [])
+        for key, text in pairwise(body):
+            if isinstance(key, ast.AnnAssign) and isinstance(key.target, ast.Name) and isinstance(text, ast.Expr):
+                meanings[key.target.id] = inspect.cleandoc(str(ast.literal_eval(text.value)))
+    return meanings
 
 
 def _bounds(bounds: list[str]) -> str:

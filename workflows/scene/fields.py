@@ -14,10 +14,11 @@ from tribodyn.workflows.scene.units import to_si
 class Table(BaseModel):
     """A table of the scene file: nothing may be added to it, nothing changed.
 
-    The text below a key is its meaning; the list of keys in the documentation is made from it.
+    The text below a key is its meaning; the list of keys in the documentation is made from it. The documentation reads
+    it from the source: to let pydantic do so costs every command half a second.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 @dataclass(frozen=True)
