@@ -402,8 +402,8 @@ def test_what_a_bolt_clamps_carries_its_force_on_small_faces_too(tmp_path: Path)
     assert balance.preload(found.state) == pytest.approx(3000.0, rel=1e-6)
 
 
-def test_every_body_of_a_scene_is_made_coarser_or_the_mesh_is_said_to_be_given(tmp_path: Path) -> None:
-    """Parts by their counts, CAD files by their sizes; a mesh file cannot be made again."""
+def test_every_body_of_a_scene_is_made_coarser_or_the_elements_of_all_are_halved(tmp_path: Path) -> None:
+    """Parts by their counts, CAD files by their sizes; a mesh file cannot be made again, but its elements cut."""
     file = scene_file.parse(BLOCKS, "blocks.toml", folder=tmp_path)
     coarse = probes.coarser(file).scene
     assert (coarse.bodies["lower"].parameters["n_length"], coarse.bodies["upper"].parameters["n_length"]) == (3, 2)
@@ -424,5 +424,24 @@ def test_every_body_of_a_scene_is_made_coarser_or_the_mesh_is_said_to_be_given(t
     assert coarse.bodies["upper"].size == pytest.approx(6e-3)  # a tenth of 40 mm, and half as much again
     assert coarse.bodies["upper"].face_sizes == {"face 2": pytest.approx(4.5e-3)}
     given = (own + tail).replace("box.step", "box.msh").replace('face_sizes = { "face 2" = "3 mm" }\n', "")
-    with pytest.raises(ValueError, match=r"mesh of \[bodies.upper\] is given"):
-        probes.coarser(scene_file.parse(given, "given.toml", folder=tmp_path))
+    file = scene_file.parse(given, "given.toml", folder=tmp_path)
+    finer, factor, how = probes.on_another_mesh(file, 20_000)
+    assert [finer.scene.bodies[name].halved for name in ("lower", "upper")] == [1, 1]
+    assert (factor, how) == (probes.OF_HALVED, "halved elements")
+    assert probes.on_another_mesh(scene_file.parse(BLOCKS, "blocks.toml", folder=tmp_path), 20_000)[1] == 1.0
+    with pytest.raises(ValueError, match=r"its elements halved would have some 8e\+05 DOFs"):
+        probes.on_another_mesh(file, 100_000)
+
+
+def test_the_error_of_a_mesh_that_is_given_is_told_by_its_halved_elements(tmp_path: Path) -> None:
+    """Peak of a beam from a mesh file: what the verdict would say covers the distance to elements of a quarter size."""
+    bar(tmp_path)
+    text = BAR.replace('["700 Hz", "900 Hz"]', '["300 Hz", "1200 Hz"]\npoints = 60').replace('"900 N"', '"1 N"')
+    text = text.replace('modal = "1 %"', 'modal = "3 %"') + f'[contact]\ngroup = "patch_7"\nvertices_only = true\n{LAW}'
+    text += "tangential_stiffness = 3e5\nnormal_stiffness = 4e5\n"
+    files = [scene_file.parse(text, "bar.toml", (f"geometry.halved={n}",), tmp_path) for n in range(2)]
+    mesh, sets = modelling.make_mesh(files[1], tmp_path)
+    assert (mesh.nelements, len(sets["tip"])) == (8 * 16, 1)
+    found = [probes.unworn(file, (0, 1))[0].hertz for file in files]
+    error = probes.OF_HALVED * (found[0] / found[1] - 1)
+    assert 0.3 * error < found[0] / 461.658 - 1 < error  # the peak with geometry.halved=2

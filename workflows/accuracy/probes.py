@@ -30,6 +30,7 @@ from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import delta_max, free_deflection
 from tribodyn.workflows.scene.body import Geometry
+from tribodyn.workflows.scene.decks import Deck
 from tribodyn.workflows.scene.scene_file import SceneFile, parse
 from tribodyn.workflows.scene.schema import PartScene
 from tribodyn.workflows.scene.structure import Body, StructureScene
@@ -37,6 +38,8 @@ from tribodyn.workflows.scene.structure import Body, StructureScene
 CLIMB = (3, 5, 7, 9)  # highest harmonics that the estimate climbs through: each start is near enough for Newton
 FURTHER = 6  # harmonics beyond the kept ones that it looks at, where more than CLIMB are kept
 COARSER = 2 / 3  # of the elements along every edge of a part
+OF_HALVED = 2.0  # times the difference to elements of half the size bounds the error of a mesh from first order on
+MOST_HALVED = 200_000  # DOFs of a mesh of halved elements that a verdict solves
 # shares of the life at which states are looked at: more of the late ones, where the peak moves fast
 STATES = (0.0, 0.25, 0.5, 0.65, 0.8, 0.9)
 STEPS, STEPS_PER_HARMONIC = 256, 32  # time steps per period; per period of the highest harmonic kept
@@ -173,44 +176,70 @@ def in_time(state: State) -> InTime:
     return InTime(output, found.energy, found.preload, found.step_error, stable, found.outcome)
 
 
+class Given(ValueError):
+    """A mesh that cannot be made again."""
+
+
+def on_another_mesh(file: SceneFile, n_dof: int) -> tuple[SceneFile, float, str]:
+    """The scene on a coarser mesh, or with elements of half the size where its mesh is given.
+
+    n_dof : of the scene's own mesh
+    Returns the scene, what the difference to it is multiplied by, and what it is
+    Raises  ValueError where there is no other mesh, or halved elements are too many for a verdict
+    """
+    try:
+        return coarser(file), 1.0, "a coarser mesh"
+    except Given:
+        if 8 * n_dof > MOST_HALVED:
+            raise ValueError(
+                f"the mesh is given, and its elements halved would have some {8 * n_dof:.2g} DOFs, beyond the "
+                f"{MOST_HALVED:.2g} that a verdict solves: compare with a run on another mesh"
+            ) from None
+    texts = [f"{key}.halved={table.halved + 1}" for key, table in _meshed(file).items()]
+    finer = parse(file.text, f"{file.name}.toml", (*file.overrides, *texts), file.folder)
+    return finer, OF_HALVED, "halved elements"
+
+
+def _meshed(file: SceneFile) -> dict[str, Geometry | Body | Deck]:
+    """The tables of a scene that give a mesh, by their keys; raises ValueError without one."""
+    scene = file.scene
+    if isinstance(scene, PartScene | StructureScene) and scene.geometry is not None:
+        return {"geometry": scene.geometry}
+    if not isinstance(scene, StructureScene):
+        raise ValueError("matrices come without a mesh")
+    tables: dict[str, Geometry | Body | Deck] = {f"bodies.{name}": body for name, body in scene.bodies.items()}
+    return tables | {f"decks.{name}": deck for name, deck in scene.decks.items()}
+
+
 def coarser(file: SceneFile) -> SceneFile:
     """The scene on a mesh with fewer elements along every edge of every body.
 
-    Raises  ValueError where the mesh of a body cannot be made again
+    Raises  Given where the mesh of a body cannot be made again, ValueError where there is no mesh
     """
-    scene = file.scene
-    tables: dict[str, Geometry | Body] = {}
-    if isinstance(scene, PartScene | StructureScene) and scene.geometry is not None:
-        tables["geometry"] = scene.geometry
-    elif isinstance(scene, StructureScene) and not scene.decks:
-        tables = {f"bodies.{name}": body for name, body in scene.bodies.items()}
-    if not tables:
-        raise ValueError("matrices and decks have a mesh that is given")
-    texts = [text for key, table in tables.items() for text in _fewer_elements(key, table, file.folder)]
+    texts = [text for key, table in _meshed(file).items() for text in _fewer_elements(key, table, file.folder)]
     return parse(file.text, f"{file.name}.toml", (*file.overrides, *texts), file.folder)
 
 
-def _fewer_elements(key: str, table: Geometry | Body, folder: Path) -> list[str]:
-    """Overrides that give a body fewer elements; raises ValueError where there are none."""
-    if table.part_name is not None:
+def _fewer_elements(key: str, table: Geometry | Body | Deck, folder: Path) -> list[str]:
+    """Overrides that give a body fewer elements; raises Given where there are none."""
+    if not isinstance(table, Deck) and table.part_name is not None:
         part = parts.load(table.part_name)
         fewer = parts.rescaled(part, part.Parameters(**table.parameters), COARSER)
         if not fewer:
-            raise ValueError(f"the part of [{key}] lists no counts of elements in MESH")
+            raise Given(f"the part of [{key}] lists no counts of elements in MESH")
         return [f"{key}.{name}={count}" for name, count in fewer.items()]
-    if isinstance(table, Geometry) or Path(str(table.mesh)).suffix.lower() not in cad.ENDINGS:
-        raise ValueError(f"the mesh of [{key}] is given: compare two meshes with tribodyn converge")
+    if not isinstance(table, Body) or Path(str(table.mesh)).suffix.lower() not in cad.ENDINGS:
+        raise Given(f"the mesh of [{key}] is given")
     size = table.size or table.unit * cad.default_size(folder / str(table.mesh))
     faces = ", ".join(f'"{name}" = {face / COARSER:.6g}' for name, face in table.face_sizes.items())
     return [f"{key}.size={size / COARSER:.6g}", *([f"{key}.face_sizes={{{faces}}}"] if faces else [])]
 
 
-def on_coarser_mesh(file: SceneFile, harmonics: tuple[int, ...]) -> tuple[Answers, float]:
-    """Answers of the unworn contact on a coarser mesh, and its delta_max [m].
+def unworn(other: SceneFile, harmonics: tuple[int, ...]) -> tuple[Answers, float]:
+    """Answers of the unworn contact of a scene on another mesh, and its delta_max [m].
 
-    Raises  ValueError where there is no coarser mesh; RuntimeError where it has no solution
+    Raises  ValueError where it has no peak; RuntimeError where it has no solution
     """
-    other = coarser(file)
     model = modelling.build(other, None, Progress(), harmonics)
     scene, balance = other.scene, model.balance
     site, load = scene_peak(other), 1.0

@@ -146,24 +146,24 @@ def _depth_error(result: Result, seen: Sequence[State], finer: Sequence[Answers 
 def _of_mesh(
     file: SceneFile, result: Result, seen: Sequence[State], seconds: float, skipped: str
 ) -> Iterator[Contribution]:
-    """The first state on a coarser mesh: the difference bounds the error of the finer one from second order on."""
+    """The first state on another mesh, see `probes.on_another_mesh`."""
     source = "mesh and contact grid"
     if not seen:
         yield from _unknown(source, "no state was solved")
         return
     try:
         with processor_seconds(seconds):
-            found = probes.on_coarser_mesh(file, result.harmonics)
+            other, factor, how = probes.on_another_mesh(file, result.facts.full_dofs)
+            there, deepest = probes.unworn(other, result.harmonics)
     except TimeUp:
         yield from _unknown(source, skipped)
         return
     except (ValueError, RuntimeError) as refusal:
-        yield from _unknown(source, f"no coarser mesh: {refusal}")
+        yield from _unknown(source, f"no other mesh: {refusal}")
         return
-    coarse, deepest = found
-    ours, how = Answers.of(seen[0].balance, seen[0].here), "a coarser mesh"
-    for quantity, a, b in _pairs(coarse, ours):
-        yield Contribution(source, quantity, relative(a, b), how)
+    ours = Answers.of(seen[0].balance, seen[0].here)
+    for quantity, a, b in _pairs(there, ours):
+        yield Contribution(source, quantity, factor * relative(a, b), how)
     reach = result.facts.delta_max_m
     if not result.wear_steps:
         return
@@ -171,9 +171,9 @@ def _of_mesh(
         for quantity in ("depth", "life"):
             yield Contribution(source, quantity, None, "the free body does not say how deep the contact can wear")
         return
-    depth = relative(deepest, reach)
+    depth = factor * relative(deepest, reach)
     yield Contribution(source, "depth", depth, how)
-    yield Contribution(source, "life", depth + relative(coarse.energy, ours.energy), how)
+    yield Contribution(source, "life", depth + factor * relative(there.energy, ours.energy), how)
 
 
 def _pairs(a: Answers, b: Answers) -> Iterator[tuple[str, float, float]]:

@@ -17,7 +17,7 @@ from tribodyn.fem.material import AnyMaterial, Material, Orthotropic
 from tribodyn.fem.springs import Mass
 from tribodyn.fem.surface import surface
 from tribodyn.geometry import mesh as mesh_reader
-from tribodyn.geometry import parts, placing
+from tribodyn.geometry import parts, placing, refine
 from tribodyn.geometry.sources import cad, picking
 from tribodyn.workflows.run import decks
 from tribodyn.workflows.scene import structure
@@ -39,9 +39,11 @@ Noted = tuple[Any, dict[str, np.ndarray], tuple[str, ...]]
 def geometry_mesh(geometry: Geometry, folder: Path, scratch: Path) -> Noted:
     """The mesh of [geometry]: read from a file in `folder`, or built and kept in `scratch`."""
     if geometry.mesh is not None:
-        return mesh_reader.read_with_notes(folder / geometry.mesh)
+        mesh, node_sets, notes = mesh_reader.read_with_notes(folder / geometry.mesh)
+        return *refine.halved(mesh, node_sets, geometry.halved), notes
     assert geometry.part_name is not None
-    return *part_mesh(geometry.part_name, geometry.parameters, scratch / "mesh.msh"), ()
+    mesh, node_sets = part_mesh(geometry.part_name, geometry.parameters, scratch / "mesh.msh")
+    return *refine.halved(mesh, node_sets, geometry.halved), ()
 
 
 def assembly(scene: StructureScene, folder: Path, scratch: Path) -> Assembly:
@@ -91,6 +93,7 @@ def _placed(table: structure.Body, folder: Path, path: Path) -> Noted:
         mesh, node_sets = placing.taken(mesh, node_sets, table.volume)
     mesh = placing.placed(mesh, table.unit, np.eye(3), np.zeros(3))
     mesh, node_sets = picking.with_faces(mesh, node_sets, {name: face.rule for name, face in table.faces.items()})
+    mesh, node_sets = refine.halved(mesh, node_sets, table.halved)
     turn, shift = np.eye(3), np.zeros(3)
     for one in table.turns:
         R, point = rotation(one.axis, one.angle), np.array(one.point)

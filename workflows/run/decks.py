@@ -20,6 +20,7 @@ from tribodyn.fem.couplings import DistributedCoupling, Equation, RigidCoupling,
 from tribodyn.fem.loads import Load, Moment, NodalForce, Pressure, Sum
 from tribodyn.fem.material import AnyMaterial, Material, Orthotropic
 from tribodyn.fem.springs import Mass
+from tribodyn.geometry import refine
 from tribodyn.geometry.sources import deck, picking, read
 from tribodyn.workflows.scene.decks import EVERYTHING
 from tribodyn.workflows.scene.decks import Deck as Table
@@ -110,6 +111,7 @@ class _Carrying:
             if rule.body == name:
                 rules[face] = rule.rule
         mesh, node_sets = picking.with_faces(found.mesh, found.node_sets, rules)
+        mesh, node_sets = refine.halved(mesh, node_sets, self.table.halved)
         material = self._material(name, mesh)
         for group in {*node_sets, *(mesh.boundaries or {})}:
             kept = self.faces if group in (mesh.boundaries or {}) else self.sets

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Self
 from pydantic import (
     Field,
     PrivateAttr,
+    StrictInt,
     ValidationInfo,
     model_validator,
 )
@@ -40,6 +41,8 @@ class Geometry(Table):
     """Groups held along some axes only: group = letters out of "xyz"."""
     no_turning: Direction | None = None
     """Axis about which the part as a whole cannot turn."""
+    halved: Annotated[StrictInt, Field(ge=0, le=3)] = 0
+    """How many times every element is cut into eight of half the size, its shape kept."""
     parameters: dict[str, int | float] = Field(default_factory=dict)
     """Parameters of the part, gathered from the other keys of the table."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, StrictInt
 
 from tribodyn.workflows.scene.faces import FaceRule
 from tribodyn.workflows.scene.fields import Table
@@ -41,6 +41,8 @@ class Deck(Table):
     """What is taken from it beside bodies and materials; everything by default."""
     material: str | None = None
     """Material of the scene for elements to which the deck gives none."""
+    halved: Annotated[StrictInt, Field(ge=0, le=3)] = 0
+    """How many times every element of its bodies is cut into eight of half the size, its shape kept."""
     fixed: tuple[str, ...] = ()
     """Groups "body.group" that are clamped besides."""
     fixed_axes: dict[str, str] = Field(default_factory=dict)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import BeforeValidator, Field, PrivateAttr, ValidationInfo, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, StrictInt, ValidationInfo, model_validator
 
 from tribodyn.workflows.scene.body import Geometry, Material, gathered
 from tribodyn.workflows.scene.contact import FaceContact
@@ -54,6 +54,8 @@ class Body(Table):
     """Element sizes at faces of a CAD file: "face 6" = size."""
     faces: dict[str, FaceRule] = Field(default_factory=dict)
     """Faces that are picked by rule, by name."""
+    halved: Annotated[StrictInt, Field(ge=0, le=3)] = 0
+    """How many times every element is cut into eight of half the size, its shape kept."""
     rotation: Rotation | tuple[Rotation, ...] = ()
     """Turn of the body, or several one after the other, before it is moved."""
     translation: Point = (0.0, 0.0, 0.0)
