@@ -52,8 +52,8 @@ def cycle(
     else:
         load[:, 0] = parameters.numbers["normal_load"]
     grid = _grid(basis.dynamic)
-    x_grid = (full @ grid).reshape(n_pair, n_comp, 5, -1)
-    load_grid = (load @ grid).reshape(n_pair, 5, -1)
+    n = grid.shape[1] // 5  # told, as there may be no pair
+    x_grid, load_grid = (full @ grid).reshape(n_pair, n_comp, 5, n), (load @ grid).reshape(n_pair, 5, n)
     k, hs = parameters.stiffness, np.asarray(basis.dynamic, np.int64)
     mu = parameters.numbers.get("friction", np.zeros(n_pair))
     force = np.zeros_like(full)
