@@ -162,10 +162,10 @@ def studies(folder: Path) -> Iterator[Path]:
     bone = td.follow_backbone(td.read_scene("beam", COARSE_BEAM), 1e-6, 2e-3)
     table = td.study(STUDY, folder / "study", workers=1)
     for name, figure in {
-        "blade_nodal_diameters": td.plot_nodal_diameters(families),
-        "blade_safe": td.plot_safe(families, wheel.n_sectors, 110.0, 120.0),
-        "blade_campbell": td.plot_campbell(speeds, waves, orders, critical),
-        "beam_backbone": td.plot_backbone(bone),
+        "blade_nodal_diameters": td.plot_nodal_diameters(families, "blade"),
+        "blade_safe": td.plot_safe(families, wheel.n_sectors, 110.0, 120.0, "blade"),
+        "blade_campbell": td.plot_campbell(speeds, waves, orders, critical, "blade"),
+        "beam_backbone": td.plot_backbone(bone, "beam"),
         "beam_study": table.plot(),
         "beam_life": table.plot_distribution(),
     }.items():

@@ -18,10 +18,11 @@ from scipy.io import loadmat
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridReader
 
-from tests.helpers.synthetic_result import result
+from tests.helpers.synthetic_result import LENGTH, WIDTH, block, result
 from tribodyn.reduction import foreign
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.export import curves, formats, matrices, tables, vtk
+from tribodyn.workflows.pictures import exploded
 from tribodyn.workflows.result import faces, states, store
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import pipeline
@@ -244,33 +245,74 @@ def test_reduced_matrices_are_those_of_the_run(small: Result, tmp_path: Path) ->
     assert "STIFFNESS=K, MASS=M, VISCOUS DAMPING=C" in (tmp_path / "abaqus" / "reduced.inp").read_text()
 
 
-def test_both_faces_of_a_contact_inside_the_mesh() -> None:
-    """Two blocks one upon the other, with nodes of their own at the same places."""
+def two_blocks(fine: int) -> Result:
+    """Two blocks one upon the other, the lower one with a mesh of its own."""
     given = result()
+    part, below = given.part, block(fine, fine // 4, 2)
+    assert part is not None
+    lower = below.points - [0, 0, np.ptp(below.points[:, 2])]
+    both = replace(
+        part, points=np.concatenate([lower, part.points]), cells=np.concatenate([below.cells, part.cells + len(lower)])
+    )
+    assert given.patch is not None
+    patch = replace(given.patch, nodes=given.patch.nodes + len(lower))
+    return replace(given, part=both, patch=patch, facts=replace(given.facts, wear_split=0.25))
+
+
+def test_both_faces_of_a_contact_inside_the_mesh() -> None:
+    """Nodes of both blocks stand at the same places."""
+    given = two_blocks(8)
     part, patch = given.part, given.patch
     assert part is not None
     assert patch is not None
-    below = part.points - [0, 0, np.ptp(part.points[:, 2])]
-    both = replace(
-        part, points=np.concatenate([below, part.points]), cells=np.concatenate([part.cells, part.cells + len(below)])
-    )
-    first, second = faces.faces_of(replace(given, part=both, facts=replace(given.facts, wear_split=0.25)))
-    np.testing.assert_array_equal(first.nodes, patch.nodes + len(below))
-    np.testing.assert_allclose(both.points[second.nodes], patch.points)
-    assert (second.nodes < len(below)).all()
+    (meeting,) = faces.meetings_of(given)
+    first, second = meeting.faces
+    np.testing.assert_array_equal(first.node_of_pair, patch.nodes)
+    np.testing.assert_allclose(part.points[second.node_of_pair], patch.points)
+    assert (second.nodes < patch.nodes.min()).all()
     assert (first.share, second.share) == (0.25, 0.75)
-    depth = np.full(len(patch.area), 1e-3)
-    moved = faces.worn_off((first, second), depth, len(both.points))
+    moved = faces.worn_off((meeting,), np.full(len(patch.area), 1e-3), len(part.points))
     np.testing.assert_allclose(moved[first.nodes, 2], 0.25e-3)  # body 1 lies above, its face is worn upwards
     np.testing.assert_allclose(moved[second.nodes, 2], -0.75e-3)
-    assert len(np.unique(faces.bodies(both))) == 2
+    assert len(np.unique(faces.bodies(part))) == 2
+
+
+def test_a_face_whose_mesh_does_not_match_wears_as_the_pairs_around_its_nodes() -> None:
+    """A depth that is linear over the patch is taken off every node of the other face exactly."""
+    given = two_blocks(20)
+    part, patch = given.part, given.patch
+    assert part is not None
+    assert patch is not None
+    (meeting,) = faces.meetings_of(given)
+    other = meeting.faces[1]
+    assert len(other.nodes) == 6 * 6  # x from 0.15 to 0.2 m in steps of 0.01 m, six nodes across
+    depth = lambda at: 1e-3 + 5e-3 * (at[:, 0] - 0.15) + 0.01 * at[:, 1]  # noqa: E731
+    moved = faces.worn_off((meeting,), depth(patch.points), len(part.points))
+    np.testing.assert_allclose(moved[other.nodes, 2], -0.75 * depth(part.points[other.nodes]), rtol=1e-9)
+    assert not moved[np.setdiff1d(np.arange(len(part.points)), np.concatenate([other.nodes, patch.nodes]))].any()
+
+
+def test_bodies_are_drawn_apart_along_their_faces() -> None:
+    given = two_blocks(20)
+    part, patch = given.part, given.patch
+    assert part is not None
+    assert patch is not None
+    body, moved = faces.bodies(part), exploded.apart(given)
+    between = moved[body == body[patch.nodes[0]]][0] - moved[body != body[patch.nodes[0]]][0]
+    np.testing.assert_allclose(between, [0, 0, exploded.GAP * np.sqrt(patch.area.sum())], atol=1e-12)
+    tied = replace(given, patch=replace(patch, faces=np.zeros((0, 4), int)))  # they touch, and no contact says so
+    moved = exploded.apart(tied)
+    between = moved[body == body[patch.nodes[0]]][0] - moved[body != body[patch.nodes[0]]][0]
+    np.testing.assert_allclose(between, [0, 0, exploded.GAP * np.sqrt(LENGTH * WIDTH)], atol=1e-12)
+    assert not exploded.apart(result()).any()
 
 
 def test_status_at_an_instant_is_that_of_the_force() -> None:
     given = result()
-    loops = given.loops
+    loops, patch = given.loops, given.patch
     assert loops is not None
-    force = np.zeros((1, 3, 3, 4))  # one state, three pairs, t1 t2 n, four instants
+    assert patch is not None
+    force = np.zeros((1, len(patch.area), 3, 4))  # of one state, at four instants
     force[0, 0] = [[0, 4, -5, 0], [0, 4, 0, 0], [10, 10, 10, 0]]  # mu = 0.5: sticks, sticks (5.7 in all), slips, open
     force[0, 1:, 2] = 10.0
     force[0, 2, 0] = 1.0
@@ -279,6 +321,28 @@ def test_status_at_an_instant_is_that_of_the_force() -> None:
     )
     np.testing.assert_array_equal(status[0], [1, 1, 2, 4])
     np.testing.assert_array_equal(status[1:], 1)
+
+
+def test_every_named_contact_slips_at_its_own_friction() -> None:
+    """Two contacts with 0.5 and 0.1: the same forces stick in the one and slip in the other."""
+    given = result()
+    assert given.loops is not None
+    assert given.patch is not None
+    n = len(given.patch.area)
+    scene = json.dumps({"contacts": {"first": {"friction": 0.5}, "second": {"friction": 0.1}, "third": {"law": "own"}}})
+    force = np.zeros((1, n, 3, 2))
+    force[..., 0, :], force[..., 2, :] = 1.0, 10.0
+    joints = json.dumps({"first": [0, 4], "second": [4, 6], "third": [6, n]})
+    several = replace(
+        given,
+        provenance={**given.provenance, "scene": scene},
+        facts=replace(given.facts, joints=joints),
+        loops=replace(given.loops, row=given.loops.row[:1], displacement=force, force=force),
+    )
+    status = states.instant_status(several, 0)
+    assert (status[:4] == 1).all()
+    assert (status[4:6] == 2).all()
+    assert (status[6:] == 1).all()
 
 
 @pytest.mark.parametrize(

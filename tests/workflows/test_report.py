@@ -275,7 +275,7 @@ def test_worn_vertices_of_the_page_are_those_of_the_part() -> None:
     for n, place in zip(*state["moved"], strict=True):
         moved[:, n] = place
     there = given.part.points + data["factor"] * faces.worn_off(
-        faces.faces_of(given), given.wear.depth[-1], len(given.part.points)
+        faces.meetings_of(given), given.wear.depth[-1], len(given.part.points)
     )
     distance = np.linalg.norm(1e3 * there[:, None] - moved.T[None], axis=2).min(axis=0)
     assert distance.max() < 1e-3

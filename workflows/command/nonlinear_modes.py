@@ -55,7 +55,7 @@ def backbone(
     file, asked, folder = _asked(scene, overrides, start, stop, mode, points, out)
     found = modes.follow(file, asked, Progress() if as_json else console_progress())
     modes.write(found, folder / "backbone.csv")
-    modes.picture(found).savefig(folder / "backbone.png")
+    modes.picture(found, file.name).savefig(folder / "backbone.png")
     if as_json:
         print(json.dumps(modes.record(found), indent=2))
     else:

@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.workflows.result.faces import faces_of, worn_off
+from tribodyn.workflows.result.faces import meetings_of, worn_off
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import State, instant_status, over_a_cycle, shown_states, state_of
 
@@ -96,14 +96,15 @@ def part_grid(result: Result, state: State) -> Any:
 
     part = result.part
     assert part is not None
-    faces = faces_of(result)
-    moved = worn_off(faces, state.depth, len(part.points))
+    meetings = meetings_of(result)
+    moved = worn_off(meetings, state.depth, len(part.points))
     grid = pv.UnstructuredGrid({getattr(pv.CellType, part.kind.upper()): part.cells}, part.points + moved)
     grid.point_data["worn_off"] = moved
     depth, contact = np.zeros(len(part.points)), np.zeros(len(part.points), np.int8)
-    for number, face in enumerate(faces):
-        depth[face.nodes] = face.share * state.depth
-        contact[face.nodes] = number + 1
+    for one in meetings:
+        for number, face in enumerate(one.faces):
+            depth[face.nodes] = face.share * (face.weights @ state.depth[one.pairs])
+            contact[face.nodes] = number + 1
     grid.point_data["depth_on_this_face"], grid.point_data["face"] = depth, contact
     if state.field is not None and result.fields is not None:
         terms = result.fields.displacement[state.field]

@@ -12,7 +12,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch as Swatch
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from tribodyn.hbm.contact.law import SEPARATES
 from tribodyn.workflows.pictures.style import DPI, FORMATS, STATUS, STYLE
@@ -36,7 +36,21 @@ def heading(figure: Figure, result: Result, what: str) -> None:
 
 def titled(result: Result, what: str) -> str:
     """A title with the name of the scene."""
-    return f"{result.provenance['scene_name'].replace('_', ' ')}: {what}"
+    return named(result.provenance["scene_name"], what)
+
+
+def named(scene: str, what: str) -> str:
+    """What a picture shows behind the name of its scene, alone where there is none."""
+    return f"{scene.replace('_', ' ')}: {what}" if scene else what[:1].upper() + what[1:]
+
+
+def log_axis(axis: Any, low: float, high: float) -> None:
+    """A logarithmic axis (axes.xaxis or axes.yaxis) with ticks at 1, 2 and 5 in plain numbers where it spans little."""
+    axis.axes.set(**{f"{axis.axis_name}scale": "log"})
+    if low > 0 and high < 100 * low:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high > 5 * low else range(1, 10)))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
 
 
 def save(figure: Figure, stem: Path, formats: Sequence[str] = ("png",), dpi: int | None = None) -> list[Path]:

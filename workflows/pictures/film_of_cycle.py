@@ -14,7 +14,7 @@ from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
 from tribodyn.workflows.pictures import opened as book
 from tribodyn.workflows.pictures import triad
 from tribodyn.workflows.pictures.figures import force_unit, heading, length_unit, scale_bar, status_name
-from tribodyn.workflows.pictures.plots import has_friction, loop_size
+from tribodyn.workflows.pictures.plots import has_friction, loop_size, pair_name
 from tribodyn.workflows.pictures.render import Moving, show
 from tribodyn.workflows.pictures.shots import shoot
 from tribodyn.workflows.pictures.style import BLUE, INK, MOTION_MAP, RED, STATUS, STYLE
@@ -50,7 +50,9 @@ class CycleFilm:
         at = loops.row.tolist().index(row)
         self._status = instant_status(result, at)
         self._loop = _loop(result, at)
-        self._contact = book.opened(result) if len(patch.faces) else None
+        busiest = _busiest(result, at)[0]
+        shown = [one for one in book.contacts(result) if busiest in range(*one.pairs.indices(len(patch.area)))]
+        self._contact = book.opened(result, shown[0]) if shown else None
         self._moving = None
         if self.state.field is not None and result.part is not None and len(patch.faces):
             self._moving = Moving(result, deformation, wear)
@@ -109,8 +111,7 @@ class CycleFilm:
                 axes.set_title(self._moving.factors(self._factor), fontsize=10)
             elif self._contact is not None:
                 show(axes, shown, self._contact.camera, book.AXES, corner)
-                other = "body 2" if len(self._contact.faces) > 1 else "ground"
-                axes.set_title(f"opened contact: body 1 in front, {other} behind", fontsize=10)
+                axes.set_title(f"opened {self._contact.sides}", fontsize=10)
 
     def _shots(self, number: int, sample: int) -> list[np.ndarray]:
         found = []
@@ -121,8 +122,9 @@ class CycleFilm:
             view = self._moving.view(points, values, (0.0, self._top))
             found.append(self._moving.marked(shoot(view, self._moving.camera, VIEW), points))
         if self._contact is not None:
-            paint = book.Status(self._status[:, sample])
-            found.append(shoot(self._contact.view(self.state.depth, self._wear, paint), self._contact.camera, VIEW))
+            own = self._contact.own(self.state)
+            paint = book.Status(self._status[self._contact.pairs, sample])
+            found.append(shoot(self._contact.view(own.depth, self._wear, paint), self._contact.camera, VIEW))
         return found
 
     def _draw_loop(self, axes: Any, result: Result) -> None:
@@ -157,12 +159,19 @@ def _loop(result: Result, at: int) -> tuple[np.ndarray, np.ndarray, str, str]:
     loops, patch = result.loops, result.patch
     assert loops is not None
     assert patch is not None
-    size = loop_size(result)[at] * _drawn_components(result)
-    pair, component = (int(place) for place in np.unravel_index(int(np.argmax(size)), size.shape))
+    pair, component = _busiest(result, at)
     x, f = loops.displacement[at, pair, component], loops.force[at, pair, component]
     x = x - (x.max() + x.min()) / 2
     (unit_x, scale_x), (unit_f, scale_f) = length_unit(float(x.max())), force_unit(float(np.abs(f).max()))
-    return scale_x * x, scale_f * f, f"{patch.components[component]} / {unit_x}", f"force at pair {pair} / {unit_f}"
+    label_f = f"force at {pair_name(result, pair)} / {unit_f}"
+    return scale_x * x, scale_f * f, f"{patch.components[component]} / {unit_x}", label_f
+
+
+def _busiest(result: Result, at: int) -> tuple[int, int]:
+    """The pair and direction whose loop says most."""
+    size = loop_size(result)[at] * _drawn_components(result)
+    pair, component = np.unravel_index(int(np.argmax(size)), size.shape)
+    return int(pair), int(component)
 
 
 def _drawn_components(result: Result) -> np.ndarray:

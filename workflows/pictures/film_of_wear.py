@@ -19,6 +19,7 @@ from tribodyn.workflows.pictures.render import show
 from tribodyn.workflows.pictures.shots import shoot
 from tribodyn.workflows.pictures.style import BLUE, ORANGE, PRESSURE_MAP, RED, STYLE, WEAR_MAP
 from tribodyn.workflows.pictures.view import wear_scale
+from tribodyn.workflows.result.faces import Meeting
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import State, shown_cycles, state_of
 
@@ -38,16 +39,16 @@ class WearFilm:
 
     def __init__(self, result: Result, images: int, wear: float | None = None):
         patch, history = result.patch, result.wear
-        if patch is None or history is None or not result.wear_steps or not len(patch.faces):
+        if patch is None or history is None or not result.wear_steps or not book.contacts(result):
             raise ValueError("the result holds no worn contact with faces: there is no film over wear")
         last = int(np.flatnonzero(history.cycles <= shown_cycles(history))[-1])
         rows = np.unique(np.linspace(0, last, images).round().astype(int))
-        self.states = [state_of(result, int(row)) for row in rows]
+        self.contact = book.opened(result, _most_worn(result, rows))
+        self.states = [self.contact.own(state_of(result, int(row))) for row in rows]
         depth = np.stack([state.depth for state in self.states])
         self._pressure_top = max(float(_pressure(state).max()) for state in self.states)
         self._depth_top = float(depth.max())
-        self.scale = wear or wear_scale(patch, depth)
-        self.contact = book.opened(result)
+        self.scale = wear or wear_scale(self.contact.patch, depth)
         with mpl.rc_context(STYLE):
             self.figure = Figure(figsize=INCHES, layout="constrained")
             halves: Any = self.figure.subfigures(2, 1, height_ratios=[1.8, 1])
@@ -57,10 +58,7 @@ class WearFilm:
             status_legend(upper, present, patch.components)
             self._bars(upper)
             self._marks = _curves(result, lower.subplots(1, 3), rows)
-            other = "body 2" if len(self.contact.faces) > 1 else "ground"
-            heading(
-                self.figure, result, f"wear of the contact, body 1 in front, {other} behind, relief × {self.scale:g}"
-            )
+            heading(self.figure, result, f"wear of the {self.contact.sides}, relief × {self.scale:g}")
             self._start()
 
     @property
@@ -113,6 +111,15 @@ class WearFilm:
         unit, factor = pressure_unit(self._pressure_top)
         norm = PowerNorm(ROOT, 0, factor * self._pressure_top)
         _bar(figure, self._panels["pressure"], norm, PRESSURE_MAP, f"mean pressure / {unit}")
+
+
+def _most_worn(result: Result, rows: np.ndarray) -> Meeting:
+    """The contact that has lost most volume in the last of some rows."""
+    patch, wear = result.patch, result.wear
+    assert patch is not None
+    assert wear is not None
+    volume = wear.depth[rows[-1]] * patch.area
+    return max(book.contacts(result), key=lambda one: float(volume[one.pairs].sum()))
 
 
 def _pressure(state: State) -> np.ndarray:

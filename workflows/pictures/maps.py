@@ -121,6 +121,6 @@ def draw_status(axes: Any, patch: Patch, status: np.ndarray) -> None:
     """The status of each pair on its share of the patch."""
     corners, pair = patch.shares(1e3 * patch.flat)
     colors = [STATUS[int(bits)][1] for bits in status[pair]]
-    axes.add_collection(PolyCollection(list(corners), facecolors=colors, edgecolors=colors, linewidths=0.3))
+    axes.add_collection(PolyCollection(list(corners), facecolors=colors, edgecolors=colors, linewidths=0.6))
     axes.autoscale_view()
     axes.set_aspect("equal")

@@ -13,8 +13,9 @@ import numpy as np
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame
 from tribodyn.workflows.pictures.style import BODY, BODY_2, EDGE, STATUS
 from tribodyn.workflows.pictures.view import polygons
-from tribodyn.workflows.result.faces import Face, bodies, faces_of
-from tribodyn.workflows.result.result import Patch, Result
+from tribodyn.workflows.result.faces import Face, Meeting, bodies, meetings_of
+from tribodyn.workflows.result.result import PartMesh, Patch, Result
+from tribodyn.workflows.result.states import State
 
 AXES = ("t1", "t2", "n")
 MARGIN = 0.35  # of the size of the patch, what is shown around it
@@ -26,12 +27,16 @@ LIFT = 4e-3  # of its size, by which coloured faces lie above their body
 class Opened:
     """What does not change over a series: where the faces lie and how they are looked at.
 
+    name : of the contact among several, else empty; pairs : of the result that are its own; patch : of these alone
     flat : (n_pair, 2) along t1, t2 [m]; size : of the patch [m]; split : share of the depth on body 1
     along : which of t1, t2 the book opens along, hinge : the place of its hinge there [m]
     around : lowest and highest t1, t2 of what is shown [m]
     """
 
-    result: Result
+    name: str
+    pairs: slice
+    patch: Patch
+    part: PartMesh | None
     faces: tuple[Face, ...]
     flat: np.ndarray
     size: float
@@ -41,11 +46,19 @@ class Opened:
     around: tuple[np.ndarray, np.ndarray]
     camera: Camera
 
+    @property
+    def sides(self) -> str:
+        """What stands where, for a title."""
+        of = f" {self.name.replace('_', ' ')}" if self.name else ""
+        return f"contact{of}: body 1 in front, {'body 2' if len(self.faces) > 1 else 'ground'} behind"
+
+    def own(self, state: State) -> State:
+        """What a state says of this contact's pairs."""
+        return state.of(self.pairs)
+
     def view(self, depth: np.ndarray, scale: float, paint: Paint) -> View:
         """Both faces worn by a depth (n_pair,) that is drawn `scale` times as large, and painted."""
-        patch = self.result.patch
-        assert patch is not None
-        layers = []
+        patch, layers = self.patch, []
         for number, share in enumerate((self.split, 1 - self.split)):
             face = self.faces[number] if number < len(self.faces) else None
             block = self._block(face, number == 0, scale * depth)
@@ -68,8 +81,7 @@ class Opened:
         """The elements near a face in the axes of the patch, worn, or a plate where no body is meshed."""
         import pyvista as pv
 
-        patch, part = self.result.patch, self.result.part
-        assert patch is not None
+        patch, part = self.patch, self.part
         sign = -1.0 if below else 1.0
         (x0, y0), (x1, y1) = self.around
         if face is None or part is None:
@@ -102,9 +114,12 @@ class Field:
     map: str
 
     def __call__(self, patch: Patch, points: np.ndarray) -> list[Layer]:
-        import pyvista as pv
-
-        return [Layer(pv.PolyData(points, polygons(patch.faces)), values=self.values, map=self.map, limits=self.limits)]
+        corners, _ = patch.shares(np.column_stack([points, self.values]))
+        flat = corners.reshape(-1, 4)
+        surface = _quadrangles(flat[:, :3])
+        surface.point_data["shown"] = flat[:, 3]
+        surface = surface.clean()
+        return [Layer(surface, values=np.asarray(surface.point_data["shown"]), map=self.map, limits=self.limits)]
 
 
 @dataclass(frozen=True)
@@ -121,18 +136,32 @@ class Status:
         for bits, (_, color) in STATUS.items():
             here = corners[self.status[pair] == bits]
             if len(here):
-                quads = np.column_stack([np.full(len(here), 4), np.arange(4 * len(here)).reshape(-1, 4)]).ravel()
-                layers.append(Layer(pv.PolyData(here.reshape(-1, 3), quads), color, edges=False, flat=True))
+                layers.append(Layer(_quadrangles(here.reshape(-1, 3)), color, edges=False, flat=True))
         outline = pv.PolyData(points, polygons(patch.faces)).extract_feature_edges(
             boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
         )
         return [*layers, Layer(outline, EDGE, edges=False, flat=True)]
 
 
-def opened(result: Result, aspect: float = 1.3) -> Opened:
-    """The opened contact of a result whose contact has faces; aspect : of the view, width over height."""
-    patch, faces = result.patch, faces_of(result)
-    assert patch is not None
+def _quadrangles(corners: np.ndarray) -> Any:
+    """A surface of quadrangles, four points (4 n, 3) each."""
+    import pyvista as pv
+
+    return pv.PolyData(corners, polygons(np.arange(len(corners)).reshape(-1, 4)))
+
+
+def contacts(result: Result) -> tuple[Meeting, ...]:
+    """The contacts of a result that can be opened: those whose faces look one way, alone where there is one patch."""
+    patch = result.patch
+    if patch is None or not len(patch.faces):
+        return ()
+    found = meetings_of(result) or (Meeting("", slice(0, len(patch.area)), patch, ()),)
+    return tuple(one for one in found if one.patch.in_one_plane)
+
+
+def opened(result: Result, contact: Meeting, aspect: float = 1.3) -> Opened:
+    """An opened contact of a result; aspect : of the view, width over height."""
+    patch, faces = contact.patch, contact.faces
     flat = patch.flat
     low, high = flat.min(axis=0), flat.max(axis=0)
     size = float(np.sqrt(np.prod(high - low)))
@@ -145,4 +174,7 @@ def opened(result: Result, aspect: float = 1.3) -> Opened:
     other[:, along] = 2 * hinge - other[:, along]
     look = np.array([-0.3, -0.8, 1.0]) if along == 1 else np.array([-0.8, -0.3, 1.0])
     camera = frame(np.concatenate([corners, other]), look, np.array([0.0, 0, 1]), aspect, 1.05)
-    return Opened(result, faces, flat, size, result.facts.share_of_body_1, along, hinge, around, camera)
+    split = result.facts.share_of_body_1
+    return Opened(
+        contact.name, contact.pairs, patch, result.part, faces, flat, size, split, along, hinge, around, camera
+    )

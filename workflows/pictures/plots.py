@@ -13,7 +13,16 @@ from matplotlib.ticker import MaxNLocator
 
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.pictures import maps
-from tribodyn.workflows.pictures.figures import axes_of, force_unit, heading, length_unit, save, status_name, titled
+from tribodyn.workflows.pictures.figures import (
+    axes_of,
+    force_unit,
+    heading,
+    length_unit,
+    log_axis,
+    save,
+    status_name,
+    titled,
+)
 from tribodyn.workflows.pictures.style import BLUE, CYCLE, GREEN, GREY, INK, ORANGE, RED, STATUS, STYLE, WEAR_MAP
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import has_states, shown_cycles, state_of
@@ -73,12 +82,9 @@ def frequency_response(result: Result) -> Figure:
                 colors = mpl.colormaps[WEAR_MAP](wear.cycles[result.worn.row] / shown_cycles(wear))
                 for omega, amplitude, color in zip(result.worn.omega, result.worn.amplitude, colors, strict=True):
                     axes.plot(omega / (2 * np.pi), scale * amplitude, color=color, lw=1.2)
-        axes.set(
-            yscale="log",
-            xlabel="frequency / Hz",
-            ylabel=f"amplitude / {unit}",
-            title=titled(result, "frequency response"),
-        )
+        drawn = np.concatenate([line.get_ydata() for line in axes.lines])
+        log_axis(axes.yaxis, *_ends(drawn))
+        axes.set(xlabel="frequency / Hz", ylabel=f"amplitude / {unit}", title=titled(result, "frequency response"))
         axes.legend(loc="best", fontsize=9)
     return figure
 
@@ -119,7 +125,7 @@ def cycles_per_step(result: Result) -> Figure:
         axes.set(xlabel="wear step", ylabel=f"cycles in the step{unit}", title=titled(result, "cycles per wear step"))
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         if count.max() > 30 * count.min():
-            axes.set_yscale("log")
+            log_axis(axes.yaxis, *_ends(scale * count))
         else:
             axes.set_ylim(bottom=0)
     return figure
@@ -227,7 +233,8 @@ def output_amplitudes(result: Result) -> Figure:
         unit, scale = length_unit(float(np.nanmax(list(heights.values()))))
         for name, color, style in zip(heights, CYCLE * 3, ["-"] * 6 + ["--"] * 6 + [":"] * 6, strict=False):
             axes.plot(frf.frequency, scale * heights[name], style, color=color, label=name.replace("_", " "))
-        axes.set(yscale="log", xlabel="frequency / Hz", ylabel=f"amplitude / {unit}", title=titled(result, "outputs"))
+        log_axis(axes.yaxis, *_ends(scale * np.concatenate(list(heights.values()))))
+        axes.set(xlabel="frequency / Hz", ylabel=f"amplitude / {unit}", title=titled(result, "outputs"))
         figure.legend(loc="outside lower center", ncols=4)
     return figure
 
@@ -279,12 +286,22 @@ def _loops(result: Result, components: list[int], what: str, asked: Sequence[int
                 (unit_x, scale_x), (unit_f, scale_f) = length_unit(x.max()), force_unit(np.abs(force).max())
                 axes.plot(scale_x * np.append(x, x[0]), scale_f * np.append(force, force[0]), color=BLUE)
                 axes.locator_params(nbins=5)
+                if not force.any():
+                    axes.set(ylim=(-1, 1), yticks=[0])
+                    axes.text(0.5, 0.6, "open all the cycle", transform=axes.transAxes, ha="center", fontsize=10)
                 axes.set_xlabel(f"{patch.components[component]} / {unit_x}", fontsize=10)
-                axes.set_ylabel(f"force at pair {pair} / {unit_f}", fontsize=10)
+                axes.set_ylabel(f"force at {pair_name(result, pair)} / {unit_f}", fontsize=10)
                 if line == 0:
                     axes.set_title(state.label, fontsize=11)
         heading(figure, result, what)
     return figure
+
+
+def pair_name(result: Result, pair: int) -> str:
+    """What a pair is called: its number, and its contact where there are several."""
+    named = result.facts.pairs_of_joints
+    of = next((name for name, pairs in named.items() if pair in range(pairs.start, pairs.stop)), "")
+    return f"pair {pair} of {of.replace('_', ' ')}" if of and len(named) > 1 else f"pair {pair}"
 
 
 def _wear(result: Result) -> WearHistory:
@@ -301,6 +318,13 @@ def cycle_axis(axes: Any, wear: WearHistory) -> float:
     end = f" (the last touch ends at {scale * last:.3g})" if shown < last else ""
     axes.set_xlabel(f"vibration cycles{unit}{end}")
     return scale
+
+
+def _ends(values: np.ndarray) -> tuple[float, float]:
+    """The smallest and the largest of some values above zero."""
+    above = np.asarray(values, float)
+    above = above[np.isfinite(above) & (above > 0)]
+    return (float(above.min()), float(above.max())) if len(above) else (1.0, 10.0)
 
 
 def _largest_amplitude(result: Result) -> float:

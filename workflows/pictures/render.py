@@ -18,21 +18,22 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image, ImageDraw
 
+from tribodyn.workflows.pictures import exploded, render_wheel, triad
 from tribodyn.workflows.pictures import opened as book
-from tribodyn.workflows.pictures import render_wheel, triad
 from tribodyn.workflows.pictures import view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, save, scale_bar, status_legend
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, trimmed
 from tribodyn.workflows.pictures.style import MOTION_MAP, PRESSURE_MAP, RED, STYLE, WEAR_MAP
-from tribodyn.workflows.result.faces import faces_of, worn_off
+from tribodyn.workflows.result.faces import Meeting, bodies, meetings_of, worn_off
 from tribodyn.workflows.result.result import PartMesh, Result
 from tribodyn.workflows.result.states import State, has_states, shown_states
 
 SYSTEM_LIBRARIES = "libgl1 libegl1 libgomp1"
 PROBE = "import pyvista as pv; view = pv.Plotter(off_screen=True); view.add_mesh(pv.Sphere()); view.screenshot()"
 SMOOTH = 2  # subdivisions of the faces of curved elements
-WIDTH = 3.4  # inches of a column
+WIDTH, LEAST = 3.4, 6.0  # inches of a column, and of a picture
 SIZE = (900, 760)  # pixels of a view of the part
+SMALL = 0.07  # of its width: a contact smaller than this is ringed
 
 
 class RenderingUnavailable(RuntimeError):
@@ -95,8 +96,11 @@ def figures(
     found: dict[str, Callable[[], Figure]] = {}
     if result.part is not None and result.fields is not None:
         found["part"] = partial(part_picture, result, deformation, wear)
-    if len(result.patch.faces) and result.patch.in_one_plane:
-        found["contact"] = partial(contact_picture, result, wear)
+    for contact in book.contacts(result):
+        name = f"contact_{contact.name}" if contact.name else "contact"
+        found[name] = partial(contact_picture, result, contact, wear)
+    if result.part is not None and int(bodies(result.part).max()) > 0:
+        found["exploded"] = partial(exploded.exploded_picture, result)
     wheel = render_wheel.wheel_of(result)
     if wheel is not None and result.fields is not None:
         found["wheel"] = partial(render_wheel.wheel_picture, result, wheel, deformation)
@@ -118,8 +122,9 @@ def part_picture(result: Result, deformation: float | None = None, wear: float |
         images.append(moving.marked(shoot(view, moving.camera, SIZE), points))
     images, corner = triad.with_room(trimmed(images))
     with mpl.rc_context({**STYLE, "axes.grid": False}):
-        tall = WIDTH * images[0].shape[0] / images[0].shape[1]
-        figure = Figure(figsize=(WIDTH * len(states) + 0.2, tall + 1.7), layout="constrained")
+        wide = max(WIDTH, LEAST / len(states))
+        tall = wide * images[0].shape[0] / images[0].shape[1]
+        figure = Figure(figsize=(wide * len(states) + 0.2, tall + 1.7), layout="constrained")
         columns = np.atleast_1d(figure.subplots(1, len(states)))
         for axes, state, image, scale, (most, label) in zip(columns, states, images, scales, bars, strict=True):
             show(axes, image, moving.camera, "xyz", corner)
@@ -129,34 +134,32 @@ def part_picture(result: Result, deformation: float | None = None, wear: float |
     return figure
 
 
-def contact_picture(result: Result, wear: float | None = None) -> Figure:
-    """Both faces of the contact opened like a book, in each shown state: depth in relief, status, mean pressure."""
-    assert result.patch is not None
-    states = shown_states(result)
+def contact_picture(result: Result, contact: Meeting, wear: float | None = None) -> Figure:
+    """Both faces of a contact opened like a book, in each shown state: depth in relief, status, mean pressure."""
+    opened = book.opened(result, contact)
+    states = [opened.own(state) for state in shown_states(result)]
     depth = np.stack([state.depth for state in states])
-    wear = wear or drawing.wear_scale(result.patch, depth)
-    contact = book.opened(result)
+    wear = wear or drawing.wear_scale(opened.patch, depth)
     worn, told = bool(depth.max() > 0), [s for s in states if s.status is not None]
     rows = [name for name, there in (("depth", worn), ("status", bool(told)), ("pressure", True)) if there]
     with mpl.rc_context({**STYLE, "axes.grid": False}):
-        figure = Figure(figsize=(WIDTH * len(states) + 0.2, 2.9 * len(rows) + 0.7), layout="constrained")
+        figure = Figure(figsize=(max(WIDTH * len(states), LEAST) + 0.2, 2.9 * len(rows) + 0.7), layout="constrained")
         grid = figure.subplots(len(rows), len(states), squeeze=False)
-        painted = [[_painted(contact, state, name, wear) for state in states] for name in rows]
-        shots = [shoot(view, contact.camera, (900, 690)) for line in painted for view, _ in line]
+        painted = [[_painted(opened, state, name, wear) for state in states] for name in rows]
+        shots = [shoot(view, opened.camera, (900, 690)) for line in painted for view, _ in line]
         images, corner = triad.with_room(trimmed(shots))
         bars = [bar for line in painted for _, bar in line]
         for axes, image, bar in zip(grid.ravel(), images, bars, strict=True):
-            show(axes, image, contact.camera, book.AXES, corner)
+            show(axes, image, opened.camera, book.AXES, corner)
             if bar is not None:
                 scale_bar(figure, axes, *bar)
         for axes, state in zip(grid[0], states, strict=True):
             axes.set_title(state.label, fontsize=10)
         if "status" in rows:
             present = {int(bits) for s in told if s.status is not None for bits in s.status}
-            status_legend(figure, present, result.patch.components)
-        other = "body 2" if len(contact.faces) > 1 else "ground"
+            status_legend(figure, present, opened.patch.components)
         told_scale = f", depth in relief × {wear:g}" if worn else ""
-        heading(figure, result, f"opened contact: body 1 in front, {other} behind{told_scale}")
+        heading(figure, result, f"opened {opened.sides}{told_scale}")
     return figure
 
 
@@ -164,7 +167,7 @@ def show(axes: Any, image: np.ndarray, camera: Camera, names: Sequence[str], cor
     """Show an image of a camera with its axes, drawn around a corner [pixels]."""
     axes.imshow(image)
     axes.axis("off")
-    triad.draw(axes, camera, names, corner, triad.ROOM * min(image.shape[:2]))
+    triad.draw(axes, camera, names, corner, triad.room(image))
 
 
 def _painted(contact: book.Opened, state: State, name: str, wear: float) -> tuple[View, tuple[Any, ...] | None]:
@@ -198,7 +201,7 @@ class Moving:
         assert fields is not None
         self.result, self.part, self.patch, self.deformation = result, part, patch, deformation
         self.size = float(np.ptp(part.points, axis=0).max())
-        self.faces = faces_of(result)
+        self.meetings = meetings_of(result)
         static = drawing.at_rest(fields.displacement, result.harmonics)
         self.rest_scale = deformation or drawing.deformation_scale(static, self.size)
         depth = np.stack([state.depth for state in shown_states(result)])
@@ -209,26 +212,34 @@ class Moving:
         reach = [part.points + self.rest_scale * s for s in static]
         for s in (drawing.swing(d, result.harmonics) for d in fields.displacement):
             reach += [part.points + self.vibration_scale(s) * s, part.points - self.vibration_scale(s) * s]
-        self.camera: Camera = frame(np.concatenate(reach), *drawing.looking(part.points, patch), SIZE[0] / SIZE[1])
+        self.camera: Camera = frame(np.concatenate(reach), *drawing.looking(result), SIZE[0] / SIZE[1])
 
     def vibration_scale(self, vibration: np.ndarray) -> float:
         """The factor that a vibration (n_node, 3) is drawn with."""
         return self.deformation or drawing.deformation_scale(vibration, self.size)
 
     def marked(self, image: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """An image of this camera with the outline of the contact, hidden or not; points : (n_node, 3) as drawn."""
+        """An image of this camera with the outline of the contact, hidden or not, ringed where it is small.
+
+        points : (n_node, 3) as drawn
+        """
         size = image.shape[1], image.shape[0]
-        if not len(self.faces) or not len(self.patch.faces):
-            return image
         corner = self.patch.faces
+        if not len(corner):
+            return image
         edges = np.stack([corner, np.roll(corner, -1, axis=1)], axis=-1).reshape(-1, 2)
         alone, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+        width = max(round(size[0] / 220), 1)
         picture = Image.fromarray(image)
         pen = ImageDraw.Draw(picture)
-        at = [place(self.camera, point, size) for point in points[self.faces[0].nodes]]
+        at = np.array([place(self.camera, point, size) for point in points[self.patch.nodes]])
         for i, j in alone[count == 1]:
             ends = [(at[k][0] * size[0], at[k][1] * size[1]) for k in (i, j)]
-            pen.line(ends, fill=RED, width=max(round(size[0] / 220), 1))
+            pen.line(ends, fill=RED, width=width)
+        low, high = at.min(axis=0) * size, at.max(axis=0) * size
+        if np.linalg.norm(high - low) < SMALL * size[0]:
+            middle, radius = (low + high) / 2, 0.75 * SMALL * size[0]
+            pen.ellipse([*(middle - radius), *(middle + radius)], outline=RED, width=width)
         return np.asarray(picture)
 
     def factors(self, scale: float) -> str:
@@ -251,7 +262,7 @@ class Moving:
     def points(self, state: State, moved: np.ndarray) -> np.ndarray:
         """(n_node, 3) where wear, rest and a motion (n_node, 3) bring the nodes, as drawn [m]."""
         rest = self.rest_scale * drawing.at_rest(self.terms(state), self.result.harmonics)
-        return np.asarray(self.part.points + rest + moved + self.wear * worn_off(self.faces, state.depth, len(rest)))
+        return np.asarray(self.part.points + rest + moved + self.wear * worn_off(self.meetings, state.depth, len(rest)))
 
     def view(self, points: np.ndarray, values: np.ndarray, limits: tuple[float, float]) -> View:
         """The part with its nodes at points (n_node, 3), coloured by values of the nodes."""

@@ -103,7 +103,7 @@ def wheel_picture(result: Result, wheel: Wheel, deformation: float | None = None
             (image,), corner = triad.with_room([shoot(View(layers), camera, (1000, 1000))])
             axes.imshow(image)
             axes.axis("off")
-            triad.draw(axes, camera, "xyz", corner, triad.ROOM * 1000)
+            triad.draw(axes, camera, "xyz", corner, triad.room(image))
             axes.set_title(f"{state.label}\nvibration × {scale:g}", fontsize=10)
             scale_bar(figure, axes, MOTION_MAP, 0.0, factor * largest, f"vibration at one instant / {unit}")
         heading(figure, result, f"wheel of {wheel.n_sectors} sectors, engine order {wheel.engine_order}")

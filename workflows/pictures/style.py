@@ -13,6 +13,7 @@ from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
 BLUE, ORANGE, GREEN, RED, GREY, INK = "#0072b2", "#e69f00", "#009e73", "#d55e00", "#7f858e", "#22262d"
 SKY, YELLOW, PALE, PAPER = "#56b4e9", "#f0e442", "#b9bec6", "white"
 BODY, BODY_2, EDGE = "#c9ced6", "#a9b4c4", "#4a515c"
+BODIES = (BODY, BODY_2, "#d9cfc0", "#b7c4b1")
 WEAR_MAP, PRESSURE_MAP, MOTION_MAP = "viridis", "cividis", "viridis"
 CYCLE = (BLUE, ORANGE, GREEN, RED, SKY, GREY)
 

@@ -10,7 +10,7 @@ import numpy as np
 from tribodyn.workflows.pictures.shots import Camera
 from tribodyn.workflows.pictures.style import BLUE, GREEN, RED
 
-ROOM = 0.2  # of the smaller side of an image, the box that the axes stand in
+ROOM, LEAST = 0.2, 0.14  # of the smaller and of the larger side of an image, the box that the axes stand in
 SHORT = 0.2  # of its length: an axis seen so much from its end is a dot
 COLOURS = (RED, GREEN, BLUE)
 
@@ -20,7 +20,7 @@ def with_room(images: Sequence[np.ndarray]) -> tuple[list[np.ndarray], tuple[flo
 
     Returns the images and the middle of the corner's box [pixels]
     """
-    box = round(ROOM * min(images[0].shape[:2]))
+    box = room(images[0])
     ink = np.any([image.min(axis=2) < 250 for image in images], axis=0)
     height, width = ink.shape
     for top, left in ((height - box, 0), (height - box, width - box), (0, 0), (0, width - box)):
@@ -28,6 +28,11 @@ def with_room(images: Sequence[np.ndarray]) -> tuple[list[np.ndarray], tuple[flo
             return list(images), (left + box / 2, top + box / 2)
     strip = np.full((box, width, 3), 255, np.uint8)
     return [np.concatenate([image, strip]) for image in images], (box / 2, height + box / 2)
+
+
+def room(image: np.ndarray) -> int:
+    """Side of the box that the axes of an image stand in [pixels]."""
+    return round(max(ROOM * min(image.shape[:2]), LEAST * max(image.shape[:2])))
 
 
 def draw(axes: Any, camera: Camera, names: Sequence[str], middle: tuple[float, float], box: float) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.workflows.result.result import Patch
+from tribodyn.workflows.result.result import Patch, Result
 
 INSTANTS = 64  # of a cycle, among which that of the largest swing is looked for
 
@@ -66,9 +66,19 @@ def polygons(faces: np.ndarray) -> np.ndarray:
     return np.column_stack([np.full(len(faces), faces.shape[1]), faces]).ravel()
 
 
-def looking(points: np.ndarray, patch: Patch) -> tuple[np.ndarray, np.ndarray]:
-    """Where to look from, and what is up: a little aside of the face of body 1."""
+def looking(result: Result) -> tuple[np.ndarray, np.ndarray]:
+    """Where to look from, and what is up: a little aside of the face of body 1, a sector with its outside upwards."""
+    part, patch, around = result.part, result.patch, result.facts.around
+    assert patch is not None
+    points = patch.points if part is None else part.points
     normal = patch.frames[:, 2].mean(axis=0)
+    if around is not None:
+        axis = around.axis / np.linalg.norm(around.axis)
+        outside = points.mean(axis=0) - axis * (points.mean(axis=0) @ axis)
+        outside /= np.linalg.norm(outside)
+        aside = np.cross(axis, outside)
+        seen = 1.0 if normal @ aside >= 0 else -1.0
+        return 0.8 * axis + 0.6 * seen * aside + 0.3 * outside, outside
     along = patch.points.mean(axis=0) - points.mean(axis=0)
     along -= normal * (along @ normal)
     if np.linalg.norm(along) < 1e-6 * np.ptp(points, axis=0).max():

@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from tribodyn.workflows.pictures.figures import axes_of
+from tribodyn.workflows.pictures.figures import axes_of, named
 from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, PAPER, RED, WEAR_MAP
 
 Families = Mapping[str, np.ndarray]
@@ -69,12 +69,12 @@ def _top(families: Families) -> float:
     return 1.08 * max(float(np.nanmax(values)) for values in families.values() if not np.isnan(values).all())
 
 
-def nodal_diameters(families: Families) -> Figure:
-    """Frequencies over nodal diameters, for each state of the contact."""
+def nodal_diameters(families: Families, scene: str = "") -> Figure:
+    """Frequencies over nodal diameters, for each state of the contact; scene : its name, for the title."""
     with axes_of(7.2, 4.8) as (figure, axes):
         for state, values in families.items():
             _families(axes, values, *STATES[state])
-        axes.set(xlabel="nodal diameter", ylabel="frequency / Hz", title="Nodal diameters")
+        axes.set(xlabel="nodal diameter", ylabel="frequency / Hz", title=named(scene, "nodal diameters"))
         axes.set_ylim(0, _top(families))
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         figure.legend(loc="outside lower center", ncols=len(families))
@@ -87,12 +87,17 @@ def _families(axes: Any, values: np.ndarray, style: str, color: str, label: str)
 
 
 def campbell(
-    speeds: np.ndarray, found: Mapping[str, np.ndarray], orders: Sequence[int], critical: Mapping[int, Sequence[float]]
+    speeds: np.ndarray,
+    found: Mapping[str, np.ndarray],
+    orders: Sequence[int],
+    critical: Mapping[int, Sequence[float]],
+    scene: str = "",
 ) -> Figure:
     """Frequencies of the first mode of several engine orders' waves over the speed, with the lines of these orders.
 
     speeds : (n_speed,) [Hz]; found : "free" and "stuck" (n_speed, n_order, family) [Hz], as studies.wheel.campbell
     critical : engine order -> speeds [Hz] at which it meets its first stuck frequency
+    scene : its name, for the title
     """
     with axes_of(7.2, 4.8) as (figure, axes):
         rpm = 60 * speeds
@@ -104,16 +109,18 @@ def campbell(
             for speed in critical.get(order, ()):
                 axes.plot(60 * speed, abs(order) * speed, "o", color=RED, ms=6, zorder=4)
         axes.plot([], [], "o", color=RED, ms=6, label="critical speed")
-        axes.set(xlabel="speed / rpm", ylabel="frequency / Hz", title="Campbell diagram, first mode", ylim=(0, top))
+        axes.set(xlabel="speed / rpm", ylabel="frequency / Hz", ylim=(0, top))
+        axes.set_title(named(scene, "Campbell diagram, first mode"))
         axes.set_xlim(0, rpm[-1])
         figure.legend(loc="outside right upper", fontsize=9)
     return figure
 
 
-def safe(families: Families, n_sectors: int, slow: float, fast: float) -> Figure:
+def safe(families: Families, n_sectors: int, slow: float, fast: float, scene: str = "") -> Figure:
     """SAFE diagram: modes over nodal diameters, and what the engine orders reach in a range of speeds.
 
     slow, fast : ends of the range of speeds [Hz]; modes that an engine order meets there are ringed
+    scene : its name, for the title
     """
     if not 0 < slow < fast:
         raise ValueError(f"a SAFE diagram from {slow:g} to {fast:g} Hz: give two speeds above 0, the lower one first")
@@ -142,7 +149,8 @@ def safe(families: Families, n_sectors: int, slow: float, fast: float) -> Figure
                     f"{order}", (place, order * fast), (-9, 3), textcoords="offset points", ha="center", fontsize=8,
                     color=INK, bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
                 )  # fmt: skip
-        axes.set(xlabel="nodal diameter", ylabel="frequency / Hz", title=f"SAFE diagram of {n_sectors} sectors")
+        axes.set(xlabel="nodal diameter", ylabel="frequency / Hz")
+        axes.set_title(named(scene, f"SAFE diagram of {n_sectors} sectors"))
         axes.set_xlim(-0.5, most + 0.5)
         axes.set_ylim(0, top)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.workflows.pictures.plots import loop_size
+from tribodyn.workflows.pictures.plots import loop_size, pair_name
 from tribodyn.workflows.pictures.style import CYCLE, GREY, INK
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import state_of
@@ -115,7 +115,8 @@ def _loops(results: Sequence[tuple[str, Result]]) -> Chart:
             for rank, pair in enumerate(np.argsort(-size[at].sum(axis=1))[:LOOPS]):
                 c = drawn[int(np.argmax(size[at, pair]))]
                 x, f = loops.displacement[at, pair, c], loops.force[at, pair, c]
-                label = f"{name}: {state_of(result, int(row)).label}, pair {pair}, {patch.components[c]}"
+                where = f"{pair_name(result, int(pair))}, {patch.components[c]}"
+                label = f"{name}: {state_of(result, int(row)).label}, {where}"
                 shown = {"visible": True if (at, rank) == (busiest, 0) else "legendonly"}
                 data.append(_line(label, 1e6 * np.append(x, x[0]), np.append(f, f[0]), **shown))
     return _chart(data, "relative displacement / µm", "contact force / N")

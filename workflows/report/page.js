@@ -21,20 +21,17 @@ function viewer(holder) {
   const field = holder.querySelector(".field"), open = holder.querySelector(".open");
   slider.max = slider.value = solid.states.length - 1;
   for (const name of Object.keys(solid.states[0].fields)) field.add(new Option(name, name));
-  const other = new Set(solid.body ? solid.body.other : []);
-  if (!other.size) holder.querySelector(".opener").hidden = true;
-
-  function shifted(xyz, all, chosen) {
-    if (!open.checked || !other.size) return xyz;
-    return xyz.map((axis, a) => axis.map((v, n) => (all || chosen.has(n) ? v + solid.open[a] : v)));
-  }
+  const several = Boolean(solid.body && solid.body.apart);
+  if (!several) holder.querySelector(".opener").remove();
+  const apart = () => several && open.checked;
 
   function traces() {
     const state = solid.states[Number(slider.value)], found = [];
     if (solid.body) {
       const places = solid.body.xyz.map((axis) => axis.slice());
       state.moved[0].forEach((n, k) => { for (let a = 0; a < 3; a++) places[a][n] = state.moved[1][k][a]; });
-      const [x, y, z] = shifted(places, false, other), [i, j, k] = solid.body.ijk;
+      if (apart()) for (let a = 0; a < 3; a++) places[a] = places[a].map((v, n) => v + solid.body.apart[a][n]);
+      const [x, y, z] = places, [i, j, k] = solid.body.ijk;
       found.push({ type: "mesh3d", name: "part", x, y, z, i, j, k, color: "#c9ced6", flatshading: true,
         hoverinfo: "skip", lighting: { ambient: 0.6, diffuse: 0.6, specular: 0 } });
     }
@@ -48,12 +45,13 @@ function viewer(holder) {
       }
     }
     state.faces.forEach((xyz, number) => {
-      const [x, y, z] = shifted(xyz, number === 1, other), [i, j, k] = solid.ijk;
+      const side = solid.sides[number], own = side.pairs.map((p) => values[p]), [i, j, k] = side.ijk;
+      const [x, y, z] = apart() && side.apart ? xyz.map((axis, a) => axis.map((v) => v + side.apart[a])) : xyz;
       found.push({ type: "mesh3d", name: "face " + (number + 1), x, y, z, i, j, k,
-        intensity: isStatus ? values.map((v) => v + 0.5) : values, cmin: low, cmax: high,
+        intensity: isStatus ? own.map((v) => v + 0.5) : own, cmin: low, cmax: high,
         colorscale: isStatus ? scale : "Viridis", showscale: !isStatus && number === 0,
         colorbar: { title: { text: field.value, side: "right" }, thickness: 14, len: 0.8 },
-        text: isStatus ? values.map((v) => (solid.status[v] || ["none"])[0]) : values.map(String), hoverinfo: "text",
+        text: isStatus ? own.map((v) => (solid.status[v] || ["none"])[0]) : own.map(String), hoverinfo: "text",
         lighting: { ambient: 1, diffuse: 0, specular: 0 } });
     });
     holder.querySelector(".label").textContent = state.label + (solid.worn ? ", depth drawn × " + solid.factor : "");
@@ -73,7 +71,7 @@ function viewer(holder) {
   const draw = () => Plotly.react(plot, traces(), layout, config);
   Plotly.newPlot(plot, traces(), layout, config);
   slider.addEventListener("input", draw);
-  for (const control of [field, open]) control.addEventListener("change", draw);
+  for (const control of [field, open]) if (control) control.addEventListener("change", draw);
 }
 
 document.querySelectorAll("[data-solid]").forEach(viewer);

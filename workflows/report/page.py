@@ -242,7 +242,7 @@ def _viewer(number: int) -> str:
         '<label>state <input type="range" class="state" min="0" value="0" step="1"></label>'
         '<output class="label"></output>'
         '<label>colour <select class="field"></select></label>'
-        '<label class="opener"><input type="checkbox" class="open"> open the contact</label></div>'
+        '<label class="opener"><input type="checkbox" class="open"> bodies apart</label></div>'
         '<div class="legend"></div></div>'
     )
 

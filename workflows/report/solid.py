@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
+from tribodyn.workflows.pictures.exploded import apart
 from tribodyn.workflows.pictures.figures import status_name
 from tribodyn.workflows.pictures.style import STATUS
 from tribodyn.workflows.pictures.view import looking, wear_scale
 from tribodyn.workflows.report.charts import plain
-from tribodyn.workflows.result.faces import bodies, faces_of, worn_off
+from tribodyn.workflows.result.faces import bodies, meetings_of, worn_off
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import State, shown_states, state_of
 
@@ -21,52 +23,57 @@ LIFT = 2e-3  # of the patch, by which the colours of a face lie above it
 def solid(result: Result) -> dict[str, Any] | None:
     """Vertices, triangles and fields for the page, lengths in mm; None where the result has no faces of a contact.
 
-    body : x, y, z, i, j, k of the surface of the mesh, and which vertices belong to the body that can be moved away
-    faces : for each face i, j, k over the pairs, and the same of every state
-    states : label, for each state moved vertices of the body, positions of the faces, and fields of the pairs
+    body : x, y, z, i, j, k of the surface of the mesh, and how far each vertex moves when the bodies are drawn apart
+    sides : for each face of each contact its pairs, i, j, k over these, and how far it moves with its body
+    states : label, for each state moved vertices of the body, positions of the sides, and fields of the pairs
     """
     patch, part = result.patch, result.part
     if patch is None or not len(patch.faces):
         return None
     states = _states(result)
-    faces = faces_of(result)
+    meetings = meetings_of(result)
     size = float(np.sqrt(patch.area.sum()))
     factor = wear_scale(patch, np.stack([state.depth for state in states]))
     found: dict[str, Any] = {
         "worn": result.wear is not None,
         "factor": factor,
-        "open": plain(1e3 * 0.8 * size * patch.frames[:, 2].mean(axis=0)),
     }
-    nodes = np.zeros(0, int)
+    nodes, offset = np.zeros(0, int), None
     points = patch.points if part is None else part.points
     found["extent"] = plain(np.ptp(points, axis=0) / np.ptp(points, axis=0).max())
-    towards, up = looking(points, patch)
+    towards, up = looking(result)
     found["camera"] = [plain(1.9 * towards / np.linalg.norm(towards)), plain(up)]
     if part is not None:
         nodes, triangles = _surface(result)
-        body = bodies(part)
-        other = body[nodes] == body[faces[1].nodes[0]] if len(faces) > 1 else np.zeros(len(nodes), bool)
-        alone = len(faces) < 2 or body[faces[0].nodes[0]] == body[faces[1].nodes[0]]
+        offset = apart(result)
         found["body"] = {
             "xyz": plain(1e3 * part.points[nodes].T, 6),
             "ijk": triangles.T.tolist(),
-            "other": [] if alone else np.flatnonzero(other).tolist(),
+            "apart": plain(1e3 * offset[nodes].T, 5) if offset.any() else None,
         }
-    corner = patch.faces
-    found["ijk"] = np.concatenate([corner[:, [0, k, k + 1]] for k in range(1, corner.shape[1] - 1)]).T.tolist()
-    normals = [face.outward for face in faces] or [patch.frames[:, 2]]
-    places = [part.points[face.nodes] for face in faces] if part is not None else [patch.points]
+    sides = [
+        (one.pairs, one.patch, face.points, face.outward, face.share, None if offset is None else offset[face.nodes[0]])
+        for one in meetings
+        for face in one.faces
+    ] or [(slice(0, len(patch.area)), patch, patch.points, patch.frames[:, 2], 0.5, None)]
+    found["sides"] = [
+        {
+            "pairs": np.arange(len(patch.area))[pairs].tolist(),
+            "ijk": np.concatenate([own.faces[:, [0, k, k + 1]] for k in range(1, own.faces.shape[1] - 1)]).T.tolist(),
+            "apart": None if moved is None else plain(1e3 * moved, 5),
+        }
+        for pairs, own, _, _, _, moved in sides
+    ]
     found["states"] = []
     for state in states:
         entry: dict[str, Any] = {"label": state.label, "fields": _fields(result, state)}
         if part is not None:
-            moved = factor * worn_off(faces, state.depth, len(part.points))[nodes]
+            moved = factor * worn_off(meetings, state.depth, len(part.points))[nodes]
             there = np.flatnonzero(moved.any(axis=1))
             entry["moved"] = [there.tolist(), plain(1e3 * (part.points[nodes][there] + moved[there]), 6)]
-        shares = [face.share for face in faces] or [0.5]
         entry["faces"] = [
-            plain(1e3 * (at + (LIFT * size - factor * share * state.depth[:, None]) * normal).T, 6)
-            for at, normal, share in zip(places, normals, shares, strict=True)
+            plain(1e3 * (at + (LIFT * size - factor * share * state.depth[pairs, None]) * outward).T, 6)
+            for pairs, _, at, outward, share, _ in sides
         ]
         found["states"].append(entry)
     found["status"] = {int(bits): [status_name(bits, patch.components), color] for bits, (_, color) in STATUS.items()}
@@ -104,19 +111,21 @@ def _surface(result: Result) -> tuple[np.ndarray, np.ndarray]:
     part = result.part
     assert part is not None
     grid = pv.UnstructuredGrid({getattr(pv.CellType, part.kind.upper()): part.cells}, part.points)
-    grid.point_data["node"] = np.arange(len(part.points))
+    grid.point_data["node"], grid.point_data["body"] = np.arange(len(part.points)), bodies(part)
     shell = grid.extract_surface(nonlinear_subdivision=1, algorithm="dataset_surface").triangulate()
     shell = shell.compute_normals(consistent_normals=True, auto_orient_normals=True, split_vertices=False)
-    distance_free = np.asarray(shell.point_data["node"], float)
-    near = np.round(distance_free).astype(int)
+    near = np.round(np.asarray(shell.point_data["node"], float)).astype(int)
     exact = np.linalg.norm(part.points[np.clip(near, 0, len(part.points) - 1)] - shell.points, axis=1)
     if exact.max() > 1e-6 * np.ptp(part.points, axis=0).max():  # interpolated: look the nodes up by place
-        from scipy.spatial import cKDTree
-
-        near = _nearest_of_same_body(result, np.asarray(shell.points), cKDTree(part.points))
+        near = _nearest(part.points, bodies(part), np.asarray(shell.points), np.asarray(shell.point_data["body"]))
     nodes, where = np.unique(near, return_inverse=True)
     return nodes, where[shell.faces.reshape(-1, 4)[:, 1:]]
 
 
-def _nearest_of_same_body(result: Result, points: np.ndarray, tree: Any) -> np.ndarray:
-    return np.asarray(tree.query(points)[1])
+def _nearest(mesh: np.ndarray, body: np.ndarray, points: np.ndarray, of: np.ndarray) -> np.ndarray:
+    """For each point the nearest node of the mesh that is of the same body."""
+    found = np.zeros(len(points), int)
+    for number in np.unique(np.round(of)):
+        own, here = np.flatnonzero(body == number), np.round(of) == number
+        found[here] = own[cKDTree(mesh[own]).query(points[here])[1]]
+    return found

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.wear.history import WearHistory
@@ -99,9 +98,15 @@ class Patch:
         points = self.points[pairs]
         return np.asarray((points - points.mean(0)) @ self.frames[pairs].mean(0)[:2].T)
 
-    def moved(self, mesh: np.ndarray, points: np.ndarray, frames: np.ndarray) -> Patch:
-        """The same patch elsewhere on the part, at the nodes of the mesh (n_node, 3) [m] nearest to its points."""
-        return replace(self, nodes=cKDTree(mesh).query(points)[1], points=points, frames=frames)
+    def of(self, pairs: slice) -> Patch:
+        """The patch of some pairs alone, with the faces that lie between them."""
+        kept = np.arange(len(self.points))[pairs]
+        number = np.full(len(self.points), -1)
+        number[kept] = np.arange(len(kept))
+        faces = number[self.faces]
+        by_pair = ("nodes", "points", "frames", "area", "gap", "free_deflection")
+        own = {name: getattr(self, name)[pairs] for name in by_pair}
+        return replace(self, faces=faces[(faces >= 0).all(axis=1)], **own)
 
     def shares(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Cut every face into one quadrangle for each of its corners, to show what has one value for each pair.

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,6 +34,12 @@ class State:
     status: np.ndarray | None
     pressure: np.ndarray | None
     field: int | None
+
+    def of(self, pairs: slice) -> State:
+        """The same state of some pairs alone."""
+        status = None if self.status is None else self.status[pairs]
+        pressure = None if self.pressure is None else self.pressure[pairs]
+        return replace(self, depth=self.depth[pairs], status=status, pressure=pressure)
 
 
 def shown_states(result: Result) -> list[State]:
@@ -95,13 +102,17 @@ def counted(number: float) -> str:
     return f"{digits}·10{str(int(power)).translate(str.maketrans('0123456789', '⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
 
 
-def friction_of(result: Result) -> float | None:
-    """The friction coefficient of the scene, None where it has not one for all pairs."""
-    import json
-
-    contact = json.loads(result.provenance["scene"]).get("contact")
-    mu = contact.get("friction") if isinstance(contact, dict) else None
-    return None if mu is None else float(mu)
+def friction_of(result: Result) -> np.ndarray:
+    """(n_pair,) friction coefficient that the scene gives each pair's contact, nan where it gives none."""
+    assert result.patch is not None
+    scene = json.loads(result.provenance["scene"])
+    found = np.full(len(result.patch.area), np.nan)
+    pairs_of_joints = result.facts.pairs_of_joints
+    for name, contact in (scene.get("contacts") or {"": scene.get("contact")}).items():
+        mu = None if contact is None else contact.get("friction")
+        if mu is not None:
+            found[pairs_of_joints.get(name, slice(None))] = mu
+    return found
 
 
 def instant_status(result: Result, at: int) -> np.ndarray:
@@ -120,13 +131,13 @@ def instant_status(result: Result, at: int) -> np.ndarray:
         return status
     normal = force[:, patch.components.index("n")]
     largest = max(float(np.abs(normal).max()), 1e-300)
-    if mu is not None and tangential:
-        limit = mu * normal
+    if np.isfinite(mu).any() and tangential:
+        limit = mu[:, None] * normal
         near = limit - 1e3 * CLOSE * np.abs(limit) - CLOSE * largest
         along, both = np.abs(force[:, tangential]).max(axis=1), np.linalg.norm(force[:, tangential], axis=1)
         # where the limit holds for each direction alone, both together may pass it: then they are no sign of slip
-        planar = bool((both <= limit + 1e3 * CLOSE * largest).all())
-        status = np.where((both if planar else along) >= near, SLIPS, status)
+        planar = ~(both > limit + 1e3 * CLOSE * largest).any(axis=1, keepdims=True)
+        status = np.where(np.where(planar, both, along) >= near, SLIPS, status)
     return np.where(normal <= CLOSE * largest, SEPARATES, status)
 
 

@@ -18,10 +18,7 @@ MODES = 100
 
 
 def linear_references(balance: HarmonicBalance, output: str, start: float, stop: float) -> References:
-    """Amplitudes of an output, free and stuck, from one frequency to another [rad/s], under the loads of the balance.
-
-    The free amplitude is nan where the part is loose without its contact.
-    """
+    """Amplitudes of an output, free and stuck, between two frequencies [rad/s], under the loads of the balance."""
     omega = np.linspace(start, stop, POINTS)
     stuck = _amplitudes(balance, balance.contact.stiffness, output, omega)
     return References(omega, _amplitudes(balance, None, output, omega), stuck)
@@ -64,36 +61,47 @@ def _resonances(balance: HarmonicBalance, springs: np.ndarray | None) -> np.ndar
 def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: str, omega: np.ndarray) -> np.ndarray:
     """Amplitude by the lowest modes and the static remainder of the others; off by (h w / w_omitted)^2 of that.
 
+    Of a part that can move rigidly the remainder is that of K + s M, s the mean (h w)^2, which has none.
     springs : (n_pair, n_component) stuck contact [N/m], through which a moving body 2 pulls, or None for no contact
     """
     basis = balance.basis
     base = None if balance.excitation.base is None else basis.to_complex(balance.excitation.base)
     amplitudes = np.zeros((len(omega), len(basis.harmonics)), complex)
     for position, h in enumerate(basis.harmonics):
+        if not h:
+            continue  # an amplitude is that of the vibration
         system, B = balance.model.at_harmonic(h)
         loads = [value * system.loads[name] for (order, name), value in balance.excitation.loads.items() if order == h]
         force = np.sum([np.zeros(system.n_dof), *loads], axis=0)
         if springs is not None and base is not None:
             force = force + B.conj().T @ (springs.ravel() * base[:, position])
-        if h:
-            force = balance.load_factor * force
+        force = balance.load_factor * force
         if not force.any():
             continue
         stiffness = system.stiffness if springs is None else stuck_stiffness(system.stiffness, B, springs)
-        try:
-            factor = sla.cho_factor(stiffness)
-        except np.linalg.LinAlgError:
-            return np.full(len(omega), np.nan)
+        factor, shift = _factor(stiffness), 0.0
+        if factor is None:
+            shift = float((h * omega.mean()) ** 2)
+            factor = sla.cho_factor(stiffness + shift * system.mass)
         lam, phi = sla.eigh(stiffness, system.mass, subset_by_index=(0, min(MODES, system.n_dof) - 1))
         rate = system.velocity_matrix
         damping = np.zeros((len(lam),) * 2) if rate is None else phi.conj().T @ rate @ phi
         row = system.outputs[output]
         modal = phi.conj().T @ force
-        remainder = row @ sla.cho_solve(factor, force) - (row @ phi) @ (modal / lam)
+        remainder = row @ sla.cho_solve(factor, force) - (row @ phi) @ (modal / (lam + shift))
         for i, s in enumerate(1j * h * omega):
             dynamic = np.diag(lam + s**2) + s * damping
             amplitudes[i, position] = remainder + (row @ phi) @ np.linalg.solve(dynamic, modal)
     return amplitude(basis.to_real(amplitudes))
+
+
+def _factor(stiffness: np.ndarray) -> tuple[np.ndarray, bool] | None:
+    """The Cholesky factor of a stiffness, None where its part can move rigidly, even if rounding lets one pass."""
+    try:
+        factor: tuple[np.ndarray, bool] = sla.cho_factor(stiffness)
+    except np.linalg.LinAlgError:
+        return None
+    return factor if softest_residual(stiffness, lambda b: sla.cho_solve(factor, b)) <= SINGULAR else None
 
 
 def free_deflection(balance: HarmonicBalance) -> np.ndarray:
@@ -111,11 +119,8 @@ def free_deflection(balance: HarmonicBalance) -> np.ndarray:
     for (harmonic, name), value in balance.excitation.loads.items():
         if harmonic == 0:
             force += np.real(value) * system.loads[name]
-    try:
-        factor = sla.cho_factor(system.stiffness)
-    except np.linalg.LinAlgError:
+    factor = _factor(system.stiffness)
+    if factor is None:
         return missing
-    if softest_residual(system.stiffness, lambda b: sla.cho_solve(factor, b)) > SINGULAR:
-        return missing  # it can move rigidly, but rounding let the factorisation pass
     q = sla.cho_solve(factor, force)
     return np.asarray((B @ q)[interface.components.index("n") :: len(interface.components)])

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone, BackboneOptions, backbone
 from tribodyn.hbm.threads import limited
-from tribodyn.workflows.pictures.plots import axes_of, length_unit
+from tribodyn.workflows.pictures.figures import axes_of, length_unit, named
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
 from tribodyn.workflows.result.columns import write_columns
 from tribodyn.workflows.run import modelling, settings
@@ -100,15 +100,15 @@ def write(found: Backbone, path: Path) -> None:
     write_columns(columns, path)
 
 
-def picture(found: Backbone) -> Figure:
-    """Frequency and damping ratio against amplitude."""
+def picture(found: Backbone, scene: str = "") -> Figure:
+    """Frequency and damping ratio against amplitude; scene : its name, for the title."""
     good = found.converged
     unit, scale = length_unit(found.amplitude[good].max())
     amplitude = scale * found.amplitude[good]
     with axes_of(7.2, 5.6, rows=2) as (figure, (upper, lower)):
         upper.plot(amplitude, found.omega[good] / (2 * np.pi), ".-", color=BLUE, ms=4)
         upper.axhline(found.reference_omega / (2 * np.pi), color=GREY, ls="--", lw=1.2, label="at rest")
-        upper.set(ylabel="frequency / Hz", title="Backbone")
+        upper.set(ylabel="frequency / Hz", title=named(scene, "backbone"))
         upper.legend(loc="best", fontsize=9)
         lower.plot(amplitude, 100 * found.damping[good], ".-", color=ORANGE, ms=4)
         lower.set(xscale="log", xlabel=f"amplitude in the mode at rest / {unit}", ylabel="damping ratio / %")

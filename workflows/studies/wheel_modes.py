@@ -52,11 +52,11 @@ class WheelModes:
 
     def figures(self) -> dict[str, Figure]:
         """The pictures by name."""
-        found = {"nodal_diameters": wheel_diagrams.nodal_diameters(self.families)}
+        found = {"nodal_diameters": wheel_diagrams.nodal_diameters(self.families, self.name)}
         if self.slow is not None and self.fast is not None:
-            found["safe"] = wheel_diagrams.safe(self.families, self.n_sectors, self.slow, self.fast)
+            found["safe"] = wheel_diagrams.safe(self.families, self.n_sectors, self.slow, self.fast, self.name)
         if len(self.speeds):
-            found["campbell"] = wheel_diagrams.campbell(self.speeds, self.waves, self.orders, self.critical)
+            found["campbell"] = wheel_diagrams.campbell(self.speeds, self.waves, self.orders, self.critical, self.name)
         return found
 
     def record(self) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from tribodyn.hbm.linear.travelling_wave import at_sector, left_face
 from tribodyn.reduction.cyclic import nodal_diameters
 from tribodyn.workflows.pictures import render, render_wheel
 from tribodyn.workflows.result import store, summary
-from tribodyn.workflows.result.faces import faces_of
+from tribodyn.workflows.result.faces import meetings_of
 from tribodyn.workflows.result.facts import Facts
 from tribodyn.workflows.run import modelling, part_reduction, pipeline, planning, sector
 from tribodyn.workflows.run.progress import Progress
@@ -70,11 +70,11 @@ def test_field_of_the_sector_meets_its_neighbour(finished):
     """From the displacement of all nodes: what the right face sees of the left face of the blade behind is x."""
     wear, patch, part, fields = finished.wear, finished.patch, finished.part, finished.fields
     wheel = render_wheel.wheel_of(finished)
-    left = faces_of(finished)[1]
-    assert part.points[left.nodes] == pytest.approx(wheel.blade(patch.points, 1), abs=1e-12)
+    left = meetings_of(finished)[0].faces[1].node_of_pair
+    assert part.points[left] == pytest.approx(wheel.blade(patch.points, 1), abs=1e-12)
     basis = HarmonicBasis((0, 1))
     for row, field in zip(fields.row, fields.displacement, strict=True):
-        behind = at_sector(basis, field, 1, 40, -1)[left.nodes]
+        behind = at_sector(basis, field, 1, 40, -1)[left]
         relative = field[patch.nodes] - np.einsum("xy,pyc->pxc", wheel.turn.T, behind)
         local = np.einsum("pij,pjc->pic", patch.frames, relative)
         solved = wear.displacement[row].reshape(local.shape)
@@ -101,14 +101,14 @@ def test_forces_on_both_faces_balance_in_the_full_sector(finished, folder):
     model = built(folder)
     wheel, patch, wear = render_wheel.wheel_of(finished), finished.patch, finished.wear
     _, K = assemble(model.part.mesh, part_reduction.material(model_scene()))
-    left = faces_of(finished)[1]
+    left = meetings_of(finished)[0].faces[1].node_of_pair
     clamp = named(model.part.node_sets, "clamp")
     row = int(finished.fields.row[0])
     field = finished.fields.displacement[0, ..., 0]
     force = (K @ field.ravel()).reshape(field.shape)  # that acts on each node from outside
     frames = patch.frames
     on_right = np.einsum("pij,pj->pi", frames, force[patch.nodes])  # by the blade behind, in the frame of this face
-    on_left = np.einsum("pij,pj->pi", frames, force[left.nodes] @ wheel.turn)  # by the next, turned back to it
+    on_left = np.einsum("pij,pj->pi", frames, force[left] @ wheel.turn)  # by the next, turned back to it
     solved = wear.force[row].reshape(len(frames), 3, -1)[..., 0]
     scale = np.abs(solved).max()
     assert np.abs(on_right + solved).max() < 1e-6 * scale
@@ -120,7 +120,7 @@ def test_forces_on_both_faces_balance_in_the_full_sector(finished, folder):
 
     each = np.abs(np.cross(finished.part.points[patch.nodes], force[patch.nodes])).sum()
     assert abs(torque(patch.nodes)) > 0.1 * each
-    assert abs(torque(patch.nodes) + torque(left.nodes)) < 1e-7 * each
+    assert abs(torque(patch.nodes) + torque(left)) < 1e-7 * each
     assert abs(torque(clamp)) < 1e-6 * each
 
 
@@ -147,7 +147,8 @@ def test_pictures(finished, tmp_path):
 def test_worn_face_sinks_between_its_pairs_too(finished):
     patch, part = finished.patch, finished.part
     depth = 1e-3 + 0.1 * (patch.flat[:, 0] - patch.flat[:, 0].min())
-    moved = 2 * faces_of(finished)[0].worn_off(depth, len(part.points))  # half of the depth belongs to each face
+    right = meetings_of(finished)[0].faces[0]
+    moved = 2 * right.worn_off(depth, len(part.points))  # half of the depth belongs to each face
     on_face = np.flatnonzero(moved.any(axis=1))
     assert len(on_face) == (2 * 5 - 1) * (2 * 4 - 1)  # all nodes of the second-order face
     flat = (part.points[on_face] - patch.points.mean(0)) @ patch.frames[0, 0]

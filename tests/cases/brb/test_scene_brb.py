@@ -17,6 +17,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, backbone
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.scene import scene_file
 
 FORCE = 3 * 12249.0
@@ -96,3 +97,19 @@ def test_the_command_gives_rows_by_modal_amplitude(capsys: pytest.CaptureFixture
     swing = (2 * np.pi * first["frequency_hz"]) ** 2 * first["amplitude_m"]
     assert first["acceleration_m_s2"] == pytest.approx(swing, rel=1e-2)
     assert td.scene_names().count("brb_wavy") == 1
+
+
+def test_references_of_a_beam_that_hangs_free_are_those_of_its_dynamic_stiffness():
+    """At some frequencies, free (the halves loose) and stuck, by a direct solve of the whole matrices."""
+    balance = built("brb").balance
+    found = linear_references(balance, "response", 2 * np.pi * 100, 2 * np.pi * 200)
+    system, interface = balance.model.system, balance.model.interface
+    B, k = np.asarray(interface.B), balance.contact.stiffness.ravel()
+    force = sum(value * system.loads[name] for (order, name), value in balance.excitation.loads.items() if order == 1)
+    for at in (0, 137, 400):
+        w = found.omega[at]
+        stuck = system.stiffness + B.T @ (k[:, None] * B)
+        for stiffness, height in ((system.stiffness, found.free), (stuck, found.stuck)):
+            dynamic = stiffness - w**2 * system.mass + 1j * w * system.velocity_matrix
+            wanted = abs(system.outputs["response"] @ np.linalg.solve(dynamic, force))
+            assert height[at] == pytest.approx(wanted, rel=1e-4)

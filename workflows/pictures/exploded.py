@@ -1,0 +1,145 @@
+"""Bodies drawn apart, each moved off the one it touches along the normal of their faces: the exploded view."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from tribodyn.workflows.pictures import triad
+from tribodyn.workflows.pictures import view as drawing
+from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, scale_bar
+from tribodyn.workflows.pictures.opened import Field
+from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot, trimmed
+from tribodyn.workflows.pictures.style import BODIES, PRESSURE_MAP, STYLE, WEAR_MAP
+from tribodyn.workflows.result.faces import bodies, meetings_of
+from tribodyn.workflows.result.result import PartMesh, Result
+from tribodyn.workflows.result.states import shown_states
+
+GAP = 0.8  # between two bodies, of the size of the faces that touch
+ONE_WAY = 0.3  # of the area of touching faces: a smaller sum of their normals is a bore, which says no direction
+TOUCH = 1e-3  # of the size of the smaller body: faces nearer than this touch
+SIZE = (1100, 760)  # pixels
+FLAT = 2.2  # width over height from which on two views stand one above the other
+LIFT = 4e-3  # of the size of a contact, by which its colours lie above the body
+
+
+def apart(result: Result) -> np.ndarray:
+    """(n_node, 3) how far each node moves with its body so that the bodies stand apart, zero where there is one [m]."""
+    part = result.part
+    assert part is not None
+    body = bodies(part)
+    moved = np.zeros((body.max() + 1, 3))
+    if len(moved) == 1:
+        return np.zeros_like(part.points)
+    links = _links(result, part, body)
+    placed = {int(np.argmax([np.ptp(part.points[body == b], axis=0).max() for b in range(len(moved))]))}
+    while True:
+        open_ = {pair: v for pair, v in links.items() if (pair[0] in placed) != (pair[1] in placed)}
+        if not open_:
+            break
+        (first, second), along = max(open_.items(), key=lambda item: float(np.linalg.norm(item[1])))
+        area = float(np.linalg.norm(along))
+        step = GAP * np.sqrt(area) * along / area if area > 0 else along
+        if first in placed:
+            moved[second] = moved[first] + step
+        else:
+            moved[first] = moved[second] - step
+        placed |= {first, second}
+    return np.where(body[:, None] < 0, 0.0, moved[body])
+
+
+def _links(result: Result, part: PartMesh, body: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
+    """Bodies that touch -> sum of area times normal out of the first [m2], zero where faces look all ways."""
+    found: dict[tuple[int, int], np.ndarray] = {}
+    whole: dict[tuple[int, int], float] = {}
+
+    def add(first: int, second: int, along: np.ndarray, area: float) -> None:
+        pair, sign = ((first, second), 1) if first < second else ((second, first), -1)
+        found[pair] = found.get(pair, np.zeros(3)) + sign * along
+        whole[pair] = whole.get(pair, 0.0) + area
+
+    for one in meetings_of(result):
+        if len(one.faces) > 1:
+            first, second = (int(np.bincount(body[face.nodes]).argmax()) for face in one.faces)
+            if first != second:
+                add(first, second, one.patch.area @ one.faces[0].outward, float(one.patch.area.sum()))
+    held = set(found)
+    shells = [_shell(part, body == b) for b in range(body.max() + 1)]
+    for first in range(len(shells)):
+        for second in range(first + 1, len(shells)):
+            if (first, second) not in held:
+                along, area = _touching(shells[first], shells[second])
+                if area > 0:
+                    add(first, second, along, area)
+    return {pair: v if np.linalg.norm(v) > ONE_WAY * whole[pair] else np.zeros(3) for pair, v in found.items()}
+
+
+def _shell(part: PartMesh, mine: np.ndarray) -> Any:
+    import pyvista as pv
+
+    cells = part.cells[mine[part.cells[:, 0]]]
+    shell = drawing.surface(part.points, cells, getattr(pv.CellType, part.kind.upper()), 0).triangulate()
+    return shell.compute_normals(consistent_normals=True, auto_orient_normals=True, split_vertices=False)
+
+
+def _touching(first: Any, second: Any) -> tuple[np.ndarray, float]:
+    """Sum of area times normal (3,) of the triangles of a body that lie on another, and their area [m2]."""
+    a, b = np.reshape(first.bounds, (3, 2)), np.reshape(second.bounds, (3, 2))
+    reach = TOUCH * min(float(np.ptp(a, axis=1).max()), float(np.ptp(b, axis=1).max()))
+    if (np.maximum(a[:, 0], b[:, 0]) > np.minimum(a[:, 1], b[:, 1]) + reach).any():
+        return np.zeros(3), 0.0
+    smaller = np.prod(np.ptp(a, axis=1)) < np.prod(np.ptp(b, axis=1))
+    small, large, sign = (first, second, 1) if smaller else (second, first, -1)
+    middles = small.cell_centers().compute_implicit_distance(large)
+    near = np.abs(np.asarray(middles["implicit_distance"])) < reach
+    area = np.asarray(small.compute_cell_sizes(length=False, volume=False).cell_data["Area"])[near]
+    return sign * (area @ np.asarray(small.cell_data["Normals"])[near]), float(area.sum())
+
+
+def exploded_picture(result: Result) -> Figure:
+    """All bodies apart, from two sides; the contacts are coloured by wear depth, or by pressure where nothing wears."""
+    part, patch = result.part, result.patch
+    assert part is not None
+    assert patch is not None
+    state, offset, body = shown_states(result)[-1], apart(result), bodies(part)
+    points = (part.points + offset)[body >= 0]
+    pressure = np.zeros(len(state.depth)) if state.pressure is None else state.pressure
+    worn = bool(state.depth.max() > 0)
+    unit, factor = (length_unit if worn else pressure_unit)(float((state.depth if worn else pressure).max()))
+    values, map_ = (factor * state.depth, WEAR_MAP) if worn else (factor * pressure, PRESSURE_MAP)
+    limits = (0.0, float(values.max()))
+    layers = []
+    for b in range(body.max() + 1):
+        shell = _shell(part, body == b)
+        shell.points += offset[np.flatnonzero(body == b)[0]]
+        layers.append(Layer(shell, color=BODIES[b % len(BODIES)]))
+    for one in meetings_of(result):
+        lift = LIFT * float(np.sqrt(one.patch.area.sum()))
+        for face in one.faces:
+            there = face.points + lift * face.outward + offset[face.nodes[0]]
+            layers += Field(values[one.pairs], limits, map_)(one.patch, there)
+    towards, up = drawing.looking(result)
+    axis = up / np.linalg.norm(up)
+    with mpl.rc_context({**STYLE, "axes.grid": False}):
+        shots, cameras = [], []
+        for side in (towards + 0.3 * axis, towards - (2 * towards @ axis + 0.3) * axis):
+            cameras.append(frame(points, side, up, SIZE[0] / SIZE[1]))
+            shots.append(shoot(View(layers), cameras[-1], SIZE))
+        images, corner = triad.with_room(trimmed(shots))
+        long = images[0].shape[1] > FLAT * images[0].shape[0]
+        wide = 7.0 if long else 5.0
+        tall = wide * images[0].shape[0] / images[0].shape[1]
+        size = (wide, 2 * tall + 1.6) if long else (2 * wide + 0.2, tall + 1.4)
+        figure = Figure(figsize=size, layout="constrained")
+        grid = figure.subplots(*(2, 1) if long else (1, 2))
+        for axes, image, camera in zip(grid, images, cameras, strict=True):
+            axes.imshow(image)
+            axes.axis("off")
+            triad.draw(axes, camera, "xyz", corner, triad.room(image))
+        label = f"{'total wear depth' if worn else 'mean pressure'} / {unit}, {state.label}"
+        scale_bar(figure, list(grid), map_, *limits, label)
+        heading(figure, result, "bodies apart, from two sides")
+    return figure
