@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,7 +19,9 @@ def named(groups: Mapping[str, np.ndarray], name: str, kind: str = "node set") -
     Raises  ValueError that lists the names which exist, or says that the group is empty
     """
     if name not in groups:
-        raise ValueError(f"the mesh has no {kind} '{name}'; it has {', '.join(sorted(groups)) or 'none'}")
+        near = get_close_matches(name, groups, 1)
+        guess = f" (did you mean '{near[0]}'?)" if near else ""
+        raise ValueError(f"the mesh has no {kind} '{name}'{guess}; it has {', '.join(sorted(groups)) or 'none'}")
     if len(groups[name]) == 0:
         raise ValueError(f"the {kind} '{name}' is empty; check the geometry that defines it")
     return np.asarray(groups[name])

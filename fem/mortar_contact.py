@@ -110,6 +110,15 @@ def apart(one: Side, two: Side, reach: float) -> str:
     facing = float(one.normal[nearest] @ two.normal[other[nearest]])
     if distance.min() <= reach + one.length and facing > 0:
         return "the two contact faces look the same way: give faces that look at each other"
+    between = two.centre[other[nearest]] - one.centre[nearest]
+    inside = float(between @ one.normal[nearest])
+    beside = float(np.linalg.norm(between - inside * one.normal[nearest]))
+    facet = float(np.linalg.norm(one.points[nearest] - one.centre[nearest], axis=1).max())
+    if facing < 0 and inside < -reach and beside < facet:
+        return (
+            f"the bodies overlap: the second face lies about {-inside:.3g} m inside the first body, farther than the "
+            f"{reach:.3g} m that are looked; move a body, or give reach"
+        )
     return (
         f"the two contact faces do not meet: they are about {distance.min():.3g} m apart and the farthest that is "
         f"looked is {reach:.3g} m; move a body, or give reach"

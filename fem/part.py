@@ -70,8 +70,8 @@ class Contact:
         assert self.opposite is not None
         rotation = None if self.turn is None else self.turn.T
         faces = mesh.boundaries or {}
-        first, second = named(faces, self.face, "face"), named(faces, self.opposite, "face")
         try:
+            first, second = named(faces, self.face, "face"), named(faces, self.opposite, "face")
             return facing_halves(
                 mesh, first, second, self.t1, self.components, self.gap, self.vertices_only, rotation,
                 self.pairing, self.reach,
@@ -192,8 +192,16 @@ def build(
     system = SecondOrderSystem(
         mass=part.restricted(M),
         stiffness=part.restricted(K),
-        loads={name: part.force(load.vector(mesh, node_sets, M)) for name, load in loads.items()},
-        outputs={name: part.force(output.vector(mesh, node_sets, M)) for name, output in outputs.items()},
+        loads={name: _felt(part, f"load '{name}'", load.vector(mesh, node_sets, M)) for name, load in loads.items()},
+        outputs={name: _felt(part, f"output '{name}'", of.vector(mesh, node_sets, M)) for name, of in outputs.items()},
     )
     held_rows = np.array([part.force(row) for row in rows]).reshape(len(held), len(free))
     return replace(part, system=system, interface=replace(interface, B=part.rows(interface.B)), held=held_rows)
+
+
+def _felt(part: Part, what: str, vector: np.ndarray) -> np.ndarray:
+    """A load or output (n_dof,) on the free DOFs; raises ValueError where it is on held ones alone."""
+    felt = part.force(vector)
+    if vector.any() and not felt.any():
+        raise ValueError(f"{what} is on nodes alone that are held along its direction: name a group that can move")
+    return felt

@@ -10,6 +10,7 @@ import skfem
 from tribodyn.geometry import mesh as mesh_file
 from tribodyn.geometry.gmsh_session import save, session
 from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation
+from tribodyn.geometry.overlap import overlap
 
 EDGES = (1.0, 0.7, 0.4)
 CELLS = ("tetra10", "hexahedron20", "hexahedron27")
@@ -179,3 +180,24 @@ def test_permutation_refuses_different_elements():
     np.testing.assert_array_equal(reference[permutation(reference, shuffled)], shuffled)
     with pytest.raises(ValueError, match="same element"):
         permutation(reference, 2 * reference - 1)
+
+
+def test_a_body_that_reaches_into_another_is_found_and_one_that_touches_or_is_pressed_in_is_not() -> None:
+    """Share of elements whose middle lies in the other: a half, in place and turned; none of a shaft in its bore."""
+    line = np.linspace
+    lower = skfem.MeshHex2.from_mesh(skfem.MeshHex.init_tensor(line(0, 1, 5), line(0, 1, 5), line(0, 1, 5)))
+    for low, share in ((0.5, 0.5), (1.0, None), (0.9999, None)):
+        upper = skfem.MeshTet2.from_mesh(skfem.MeshTet.init_tensor(line(0, 1, 4), line(0, 1, 4), line(low, low + 1, 5)))
+        turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+        for R in (np.eye(3), turn):
+            pair = [replace(mesh, doflocs=R @ mesh.doflocs) for mesh in (upper, lower)]
+            for one, other in (pair, pair[::-1]):
+                found = overlap(one, other)
+                assert (found is None) if share is None else found[0] == pytest.approx(share, abs=0.05)
+    box = skfem.MeshHex.init_tensor(line(-2, 2, 9), line(-2, 2, 9), line(0, 1, 2))
+    ring, shaft = (
+        skfem.MeshHex2.from_mesh(box.restrict(lambda x, out=out: (np.abs(x[:2]).max(axis=0) > 1) == out))
+        for out in (True, False)
+    )
+    assert overlap(ring, shaft) is None
+    assert overlap(shaft, ring) is None

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from tribodyn.fem.springs import Mass
 from tribodyn.fem.surface import surface
 from tribodyn.geometry import mesh as mesh_reader
 from tribodyn.geometry import parts, placing, refine
+from tribodyn.geometry.overlap import overlap
 from tribodyn.geometry.sources import cad, picking
 from tribodyn.workflows.run import decks
 from tribodyn.workflows.scene import structure
@@ -65,6 +67,7 @@ def assembly(scene: StructureScene, folder: Path, scratch: Path) -> Assembly:
                 bodies.append(Body(name, mesh, node_sets, _material(table, scene.materials), told))
             except ValueError as trouble:
                 raise ValueError(f"bodies.{name}: {trouble}") from None
+        _apart(bodies)
     brought = of_decks(scene, folder)
     bodies += [body for deck in brought.values() for body in deck.bodies]
     points = {name: list(place) for deck in brought.values() for name, place in deck.points.items()}
@@ -74,6 +77,18 @@ def assembly(scene: StructureScene, folder: Path, scratch: Path) -> Assembly:
             raise ValueError(f"couplings.{name} has the name of a point of a deck: give it another")
         points[name] = _middle(whole, coupling)
     return Assembly(bodies, points) if points else whole
+
+
+def _apart(bodies: Sequence[Body]) -> None:
+    """Raise ValueError where a body of a scene lies in another one."""
+    for one, other in permutations(bodies, 2):
+        found = overlap(one.mesh, other.mesh)
+        if found is not None:
+            share, (x, y, z) = found
+            raise ValueError(
+                f"bodies.{one.name} overlaps bodies.{other.name}: {share:.0%} of its elements lie in it, about "
+                f"({x:.4g}, {y:.4g}, {z:.4g}) m: move one of them, or correct its unit"
+            )
 
 
 def of_decks(scene: StructureScene, folder: Path) -> dict[str, decks.Structure]:

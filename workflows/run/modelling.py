@@ -28,7 +28,7 @@ from tribodyn.hbm.contact.joint import joint_transitions
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.linear.expansion import UnbalancedLoad
+from tribodyn.hbm.linear.expansion import SingularStuckSystem, UnbalancedLoad
 from tribodyn.reduction.cyclic import travelling_wave
 from tribodyn.reduction.damping import modal_damping, rayleigh, rayleigh_of_ratios
 from tribodyn.reduction.held import hold
@@ -46,6 +46,7 @@ from tribodyn.workflows.run import (
     tightening,
 )
 from tribodyn.workflows.run.contact_surfaces import mapped_gap, surface_gap
+from tribodyn.workflows.run.oddities import odd_sizes
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.loads import StaticLoad
 from tribodyn.workflows.scene.matrices import MatrixScene
@@ -104,6 +105,9 @@ def build(file: SceneFile, folder: Path | None, progress: Progress, chosen: tupl
                 raise
             shapes = reduced.basis @ unbalanced.shapes
             raise ValueError(unbalanced_load(joints.excite(scene, None), part, shapes)) from None
+        except SingularStuckSystem as singular:
+            odd = [] if part is None else odd_sizes(np.ptp(part.points, axis=0), "give its numbers a unit")
+            raise ValueError("; ".join([str(singular), *odd])) from None
     if model.choice is not None:
         progress.say(model.choice.outcome)
     return model
@@ -339,10 +343,11 @@ def unbalanced_load(excitation: Excitation, part: Part, motions: np.ndarray) -> 
 
     size, reach = float(np.abs(force).sum()), float(np.abs(arm).max())
     where = said(1e3 * centre, 1e-6 * reach)
+    it, what = "them" if len(names) > 1 else "it", " and ".join(filter(None, names)) or "the structure"
     return (
-        f"nothing holds {' and '.join(filter(None, names)) or 'the structure'}, and the static loads on it are not in "
-        f"equilibrium: their resultant is {said(resultant[:3], 1e-9 * size)} N with "
-        f"{said(resultant[3:], 1e-9 * size * reach)} N m about {where} mm: balance them, clamp it or add a spring"
+        f"nothing holds {what}, and the static loads on {it} are not in equilibrium: their resultant is "
+        f"{said(resultant[:3], 1e-9 * size)} N with {said(resultant[3:], 1e-9 * size * reach)} N m about {where} mm: "
+        f"balance them, clamp {it} or add a spring"
     )
 
 

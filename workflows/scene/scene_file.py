@@ -127,7 +127,7 @@ def checked(kind: type[Kind], data: dict[str, Any], label: str, folder: Path | N
     try:
         return kind.model_validate(data, context=None if folder is None else {"folder": folder})
     except ValidationError as error:
-        problems = [_sentence(problem, kind) for problem in error.errors()]
+        problems = [_sentence(problem, kind) for problem in _of_the_kind_meant(error.errors())]
         more = f"; and {len(problems) - MOST_PROBLEMS} more" if len(problems) > MOST_PROBLEMS else ""
         raise SceneError(f"{label}: {'; '.join(problems[:MOST_PROBLEMS])}{more}") from None
 
@@ -164,6 +164,36 @@ def _override(data: dict[str, Any], text: str) -> None:
         table[path[-1]] = tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
         table[path[-1]] = value.strip()
+
+
+def _of_the_kind_meant(problems: Sequence[Any]) -> list[Any]:
+    """Problems without those of the kinds of value that were not meant, where a key takes a list or something else.
+
+    pydantic tells what is wrong with each kind; a list was meant to be one, all else was not. Names of kinds are taken
+    off the end of locations.
+    """
+    found = []
+    for problem in problems:
+        place = tuple(item for item in problem["loc"] if not _is_kind(item))
+        listed = any(str(item).startswith("tuple[") for item in problem["loc"])
+        found.append((place, len(place) < len(problem["loc"]), listed, {**problem, "loc": place}))
+
+    lists = {place: problem["type"] != "tuple_type" for place, _, listed, problem in found if listed}
+
+    def meant(place: tuple[str | int, ...], kinds: bool, listed: bool) -> bool:
+        """Where it belongs to a key of several kinds: whether it tells of the kind that was given."""
+        within = [
+            given for key, given in lists.items() if place[: len(key)] == key and (kinds or len(place) > len(key))
+        ]
+        return not within or within[0] == listed
+
+    told = [problem for place, kinds, listed, problem in found if meant(place, kinds, listed)]
+    return told or [problem for *_, problem in found]
+
+
+def _is_kind(item: str | int) -> bool:
+    """Whether an item of a location names a kind of value, and no key."""
+    return isinstance(item, str) and (item.startswith("function-") or "[" in item)
 
 
 def _sentence(problem: Any, kind_of_file: type[BaseModel]) -> str:

@@ -327,7 +327,15 @@ class StructureScene(MeshScene):
             for coupling in (link.first, link.second):
                 if coupling not in self.couplings:
                     raise ValueError(f"links.{name}: {unknown_key(f'couplings.{coupling}', [*self.couplings])}")
+        for name, tie in self.ties.items():
+            if tie.first == tie.second:
+                raise ValueError(f"ties.{name}: first and second are one face: give the face that it is glued to")
         for name, contact in self.contacts.items():
+            if contact.opposite in contact.groups:
+                raise ValueError(f"contacts.{name}: first and second are one face: give the face that it touches")
+            for tied, tie in self.ties.items():
+                if {tie.first, tie.second} == {*contact.groups, contact.opposite}:
+                    raise ValueError(f"contacts.{name} and ties.{tied} join the same two faces: take one of them out")
             if contact.wear is not None and self.wear is None:
                 raise ValueError(f"contacts.{name}.wear needs [wear], which says how far the wear goes")
         return self
