@@ -52,3 +52,13 @@ def test_a_reduction_is_measured_in_three_ways(monkeypatch: pytest.MonkeyPatch) 
     assert "by hand: seconds grow with the power" in text
     with pytest.raises(ValueError, match='no size "30": there are 30k'):
         large_fe.run(["30"], lambda said: None)
+
+
+def test_an_assembly_is_measured_from_its_files_to_its_reduced_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(large_fe, "MODES", 4)
+    rows = [large_fe.measure_assembly((6, 2, 1, 1), way) for way in large_fe.WAYS[:2]]
+    assert rows[0].dofs == rows[1].dofs
+    assert rows[0].masters == rows[1].masters > 3 * 2 * 3 * 16  # two faces of three joints, the touched nodes of each
+    assert list(rows[0].seconds) == ["files", "assembly", "reduction"]
+    assert list(rows[1].seconds) == ["files", "assembly", "factor", "modes", "constraint modes", "projection"]
+    assert "assembly" in large_fe.ASSEMBLIES

@@ -12,7 +12,9 @@ from tribodyn.geometry import blocks
 from tribodyn.geometry.gmsh_session import session
 from tribodyn.hbm import newton
 from tribodyn.hbm.contact import law
-from tribodyn.hbm.outcome import WearEnd
+from tribodyn.hbm.continuation import nonlinear_modes
+from tribodyn.hbm.outcome import BranchEnd, WearEnd
+from tribodyn.reduction.linear import linear_modes
 from tribodyn.workflows.accuracy import probes
 from tribodyn.workflows.result import summary
 from tribodyn.workflows.run import modelling, pipeline
@@ -230,14 +232,35 @@ BACK = '[loads.static.back]\ngroup = "lower.z_min"\npressure = "0.5 MPa"\n'
 QUIET = ("pictures.renders=false", "pictures.plots=false", "verdict.enabled=false")
 
 
-def test_a_free_structure_of_two_bodies_is_the_limit_of_one_on_weak_springs(tmp_path: Path) -> None:
-    weak = "".join(
-        f'[springs.{body}_{axis}]\ngroup = "{body}"\ndirection = "{axis}"\nstiffness = "1 N/m"\n'
-        for body in ("lower", "upper")
-        for axis in "xyz"
-    )
+WEAK = "".join(
+    f'[springs.{body}_{axis}]\ngroup = "{body}"\ndirection = "{axis}"\nstiffness = "1 N/m"\n'
+    for body in ("lower", "upper")
+    for axis in "xyz"
+)
+
+
+def test_a_free_structure_has_nonlinear_modes_those_of_one_on_weak_springs(tmp_path: Path) -> None:
+    """Backbone of its tenth mode, six of them rigid: from the stuck one it softens and is damped by slip."""
     found = []
-    for text in (FREE + BACK, FREE + BACK + weak):
+    for text in (FREE + BACK, FREE + BACK + WEAK):
+        model = built(text, tmp_path, "damping=")
+        options = nonlinear_modes.BackboneOptions(n_points=3)
+        found.append(nonlinear_modes.backbone(model.balance, 1e-8, 2e-7, 10, options=options))
+    free, held = found
+    stuck, _ = linear_modes(model.reduced, model.balance.contact.stiffness, 11)
+    assert free.frequency[0] == pytest.approx(stuck[10], rel=1e-6)
+    assert free.end.kind is BranchEnd.REACHED
+    for one, other in ((free.omega, held.omega), (free.damping, held.damping), (free.amplitude, held.amplitude)):
+        assert one[-1] == pytest.approx(other[-1], rel=1e-4)
+    assert free.omega[-1] < free.omega[0]
+    # its damping ratio is the friction work over 4 pi times the energy of a mass-normalised mode
+    energy = (free.omega[-1] * free.modal_amplitude[-1]) ** 2 / 2
+    assert free.damping[-1] == pytest.approx(free.energy[-1] / (4 * np.pi * energy), rel=0.02)
+
+
+def test_a_free_structure_of_two_bodies_is_the_limit_of_one_on_weak_springs(tmp_path: Path) -> None:
+    found = []
+    for text in (FREE + BACK, FREE + BACK + WEAK):
         balance = built(text.replace('value = "20 N"', 'value = "450 N"'), tmp_path, "damping=").balance
         omega = 2 * np.pi * 5e3
         solved = newton.solve(balance, omega, balance.stuck(omega), newton.NewtonOptions(tolerance=1e-12, krylov=1e-6))

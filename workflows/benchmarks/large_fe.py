@@ -23,6 +23,7 @@ from threadpoolctl import threadpool_limits
 from tribodyn.fem.factor import factorise
 from tribodyn.fem.multigrid import rigid_motions
 from tribodyn.fem.part import Part
+from tribodyn.geometry import parts
 from tribodyn.reduction.craig_bampton import master_dofs
 from tribodyn.workflows.run import memory, modelling, part_reduction
 from tribodyn.workflows.scene import scene_file
@@ -30,6 +31,9 @@ from tribodyn.workflows.scene import scene_file
 SIZES = {  # of the beam, name -> elements along it and through its height; 13 x 13 contact nodes in all of them
     "30k": (24, 6), "100k": (44, 12), "300k": (88, 18), "1M": (170, 36),
 }  # fmt: skip
+# three posts on a plate, each on a joint of faces that do not match, from four mesh files: elements of the plate along
+# its three axes, and of a post upwards
+ASSEMBLIES = {"assembly": (52, 14, 9, 30)}
 WAYS = ("product", "by hand", "multigrid")
 MODES, COLUMNS = 15, 3  # columns : constraint modes that multigrid is measured on
 
@@ -52,30 +56,47 @@ class FeCost:
 
 
 def run(sizes: Sequence[str], say: Callable[[str], None]) -> list[FeCost]:
-    """Measure sizes by name, each way in a process of its own.
+    """Measure sizes by name, each way in a process of its own; an assembly without multigrid.
 
     Raises  ValueError for a size that is not known
     """
     rows = []
     for size in sizes:
-        if size not in SIZES:
-            raise ValueError(f'no size "{size}": there are {", ".join(SIZES)}')
-        for way in WAYS:
-            say(f"{size} DOFs, {way}")
+        if size not in SIZES | ASSEMBLIES:
+            raise ValueError(f'no size "{size}": there are {", ".join(SIZES | ASSEMBLIES)}')
+        for way in WAYS if size in SIZES else WAYS[:2]:
+            say(f"{size}{' DOFs' if size in SIZES else ''}, {way}")
             with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as alone:
-                rows.append(alone.submit(measure, SIZES[size], way).result())
+                job = alone.submit(measure, SIZES[size], way) if size in SIZES else None
+                rows.append((job or alone.submit(measure_assembly, ASSEMBLIES[size], way)).result())
     return rows
 
 
 def measure(size: tuple[int, int], way: str, n_patch: int = 13) -> FeCost:
-    """One size by one way, on one thread."""
+    """One size of the beam by one way, on one thread."""
     changes = [f"geometry.n_length={size[0]}", f"geometry.n_height={size[1]}", f"geometry.n_patch={n_patch}"]
-    file = scene_file.read("beam", [*changes, f"reduction.modes={MODES}"])
-    scene = file.part_scene
-    with threadpool_limits(1), TemporaryDirectory() as folder:
-        mesh, node_sets = modelling.make_mesh(file, Path(folder))
+    return _measured(lambda folder: scene_file.read("beam", [*changes, f"reduction.modes={MODES}"]), way)
+
+
+def measure_assembly(size: tuple[int, int, int, int], way: str) -> FeCost:
+    """One size of the assembly by one way, on one thread, from its files on."""
+    return _measured(lambda folder: assembly(folder, size), way, files=True)
+
+
+def _measured(scene_of: Callable[[Path], scene_file.SceneFile], way: str, files: bool = False) -> FeCost:
+    """One scene by one way; files : whether the clock starts before its mesh is there."""
+    with threadpool_limits(1), TemporaryDirectory() as name:
+        folder = Path(name)
+        file = scene_of(folder)
+        scene = file.mesh_scene
         memory.forget_peak()
         clock = _Clock()
+        mesh, node_sets = modelling.make_mesh(file, folder)
+        if files:
+            clock("files")
+        else:
+            memory.forget_peak()
+            clock = _Clock()
         part = modelling.make_part(scene, mesh, node_sets, file.folder)
         clock("assembly")
         if way == "product":
@@ -87,6 +108,26 @@ def measure(size: tuple[int, int], way: str, n_patch: int = 13) -> FeCost:
         else:
             found = _multigrid(part, clock)
     return found
+
+
+def assembly(folder: Path, size: tuple[int, int, int, int]) -> scene_file.SceneFile:
+    """Three posts on a plate, their meshes written to files in a folder and read by its scene."""
+    plate, post = parts.load("block"), parts.load("block")
+    plate.build(
+        plate.Parameters(0.3, 0.08, 0.05, n_length=size[0], n_width=size[1], n_height=size[2]), folder / "plate.msh"
+    )
+    post.build(post.Parameters(0.02, 0.02, 0.1, n_length=3, n_width=3, n_height=size[3]), folder / "post.msh")
+    steel = "young = 210e9\npoisson = 0.3\ndensity = 7860.0\n"
+    text = f"[scene]\ntitle = 'Posts on a plate'\n[materials.steel]\n{steel}"
+    text += "[bodies.plate]\nmesh = 'plate.msh'\nmaterial = 'steel'\nfixed = ['x_min']\n"
+    for i, at in enumerate((0.061, 0.143, 0.226), 1):
+        text += f"[bodies.post_{i}]\nmesh = 'post.msh'\nmaterial = 'steel'\ntranslation = [{at}, 0.031, 0.05]\n"
+        text += f"[contacts.joint_{i}]\nfirst = 'post_{i}.z_min'\nsecond = 'plate.z_max'\nt1 = 'x'\n"
+        text += "tangential_stiffness = 1e8\nnormal_stiffness = 1e8\nfriction = 0.3\n"
+    push = "group = 'post_3.z_max'\ndirection = 'x'\n"
+    text += f"[loads.harmonic.shake]\n{push}value = 1.0\n"
+    text += f"[response]\n{push}frequency = [100.0, 200.0]\npoints = 3\n[reduction]\nmodes = {MODES}\n"
+    return scene_file.parse(text, "assembly.toml", (), folder)
 
 
 class _Clock:

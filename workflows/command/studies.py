@@ -32,7 +32,7 @@ def bench(
         Time and memory of one response at 0+3 from 5 x 5 to 31 x 31 contact nodes instead, with a plot.
     fe
         Time and memory of a reduction at "30k", "100k", "300k" or "1M" DOFs instead, beside plain statements of the
-        same library and beside multigrid; can be repeated.
+        same library and beside multigrid, or of an "assembly" of 200 000 DOFs with three joints; can be repeated.
     out
         File of the plot of --scaling.
     as_json
