@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import eigvalsh
 
 from tests.helpers import small_wheel as small
 from tribodyn.fem import cyclic
@@ -18,9 +19,11 @@ from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import SLIPS, ContactParameters
 from tribodyn.hbm.continuation.free_vibration import FreeVibration
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.linear import expansion
 from tribodyn.hbm.linear import travelling_wave as waves
 from tribodyn.hbm.reference import DenseBalance
 from tribodyn.hbm.time.time_integration import integrate
+from tribodyn.reduction import linear
 from tribodyn.reduction.cyclic import reduce_sector, travelling_wave
 from tribodyn.reduction.damping import modal_damping
 
@@ -42,12 +45,21 @@ def outputs(mesh, node_sets, faces, order):
     balance = HarmonicBalance.of(model, joints, HarmonicBasis((0, 1, 2, 3), 128), small.excitation(), 2 * np.pi * 1000)
     found = newton.solve_from_rest(balance, 2 * np.pi * 310, EXACT)
     assert found.converged
-    return balance.outputs(found.state), found.state.cycle.status
+    B = np.asarray(model.interface.B)
+    stuck = linear.stuck_stiffness(np.asarray(model.system.stiffness), B, k)
+    lam = eigvalsh(stuck, np.asarray(model.system.mass))
+    return balance.outputs(found.state), found.state.cycle.status, lam[-1] / lam[0]
 
 
-@pytest.mark.parametrize("order", [3, 4])
-def test_a_face_of_a_wheel_split_into_named_contacts_equals_the_one_contact(tmp_path, order):
-    """Nodes on the cuts belong to two joints, each with its share of the area."""
+@pytest.mark.parametrize("order", [0, 1, 3])
+def test_a_face_of_a_wheel_split_into_named_contacts_equals_the_one_contact(tmp_path, order, monkeypatch):
+    """Nodes on the cuts belong to two joints, each with its share of the area.
+
+    The expansion of the compliance is asked for more than the 5e-10 that a run needs. All blades alike in order 0 are
+    softest beside the springs: what is left there is rounding of its reduced matrices.
+    """
+    monkeypatch.setattr(expansion, "WANTED_ERROR", 1e-13)
+    monkeypatch.setattr(expansion, "ROUNDING", 1e-13)
     mesh, node_sets = small.read(tmp_path / "s.msh")
     groups = dict(mesh.boundaries)
     for side in ("right", "left"):
@@ -56,11 +68,13 @@ def test_a_face_of_a_wheel_split_into_named_contacts_equals_the_one_contact(tmp_
         groups |= {f"{side}_{i}": facets[np.argsort(x)[i : i + 1]] for i in range(len(facets))}
         groups[f"{side}_whole"] = facets
     cut = mesh.with_boundaries(groups)
-    one, status = outputs(cut, node_sets, ["whole"], order)
+    one, status, condition = outputs(cut, node_sets, ["whole"], order)
     assert (status & SLIPS).any()
-    split, _ = outputs(cut, node_sets, range(len(facets)), order)
+    split, _, _ = outputs(cut, node_sets, range(len(facets)), order)
     assert len(facets) > 1
-    assert np.abs(split - one).max() < 1e-12 * np.abs(one).max()
+    within = np.finfo(float).eps * condition if order == 0 else 1e-12
+    assert within < 2e-10
+    assert np.abs(split - one).max() < within * np.abs(one).max()
 
 
 SPEED = 900.0  # rad/s: enough to move a response by per cents
