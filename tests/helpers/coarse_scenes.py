@@ -7,10 +7,11 @@ BLADE = (
     "reduction.cutoff=6 kHz",
     "response.points=40",
     "wear.step=40 %",
+    "verdict.enabled=false",
 )
 RIG = (
     "geometry.n_contact_length=3", "geometry.n_contact_width=5", "reduction.modes=6", "harmonics.kept=[0, 1]",
-    "harmonics.samples=32", "harmonics.transitions=sampled",
+    "harmonics.samples=32", "harmonics.transitions=sampled", "verdict.enabled=false",
 )  # fmt: skip
 QUICK_RIG = (
     *RIG, "damping.modal=6 %", "wear.step=15 %", "wear.lost_below=30 %", "wear.max_steps=60",

@@ -18,7 +18,7 @@ from tribodyn.workflows.run import modelling, pipeline, settings
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import from_json, read
 
-QUICK = ["wear.max_steps=0", "response.points=20"]
+QUICK = ["wear.max_steps=0", "response.points=20", "verdict.enabled=false"]
 
 
 @pytest.fixture

@@ -30,6 +30,7 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 
 SMALL = (
+    "verdict.enabled=false",
     "geometry.n_patch=3",
     "geometry.n_length=2",
     "geometry.n_height=1",

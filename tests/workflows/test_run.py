@@ -34,6 +34,7 @@ SMALL = [
     "wear.rule=thesis",
     "wear.step=30 %",
     "wear.lost_below=0",
+    "verdict.enabled=false",
 ]
 COMMAND = [sys.executable, "-m", "tribodyn", "run", "beam", "--no-pictures"]
 

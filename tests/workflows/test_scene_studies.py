@@ -18,7 +18,7 @@ from tribodyn.workflows.studies.supports import support_work
 
 TINY = (
     "geometry.n_patch=3", "geometry.n_length=2", "geometry.n_height=1", "reduction.modes=3", "harmonics.samples=32",
-    "response.points=8", "wear=",
+    "response.points=8", "wear=", "verdict.enabled=false",
 )  # fmt: skip
 HANGER = (
     'springs.hanger={group = "static_load", direction = "z", stiffness = "1 N/um"}',

@@ -48,6 +48,7 @@ samples = 128
 transitions = "located"
 """
 SMALL = [
+    "verdict.enabled=false",
     "geometry.n_patch=3",
     "geometry.n_length=4",
     "geometry.n_height=1",

@@ -16,6 +16,7 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import read
 
 SMALL = [
+    "verdict.enabled=false",
     "geometry.n_patch=3",
     "geometry.n_length=4",
     "geometry.n_height=1",
