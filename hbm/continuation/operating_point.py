@@ -26,9 +26,7 @@ SCANNED = 3
 # peak is less, and a peak that emerges passes this at once
 OVERTAKES = 1.2
 APART = 1e-3  # relative distance of frequencies from which on two peaks are two
-NEAR = (
-    1e-3  # relative distance to the zero of the slope within which a point beside failed solves is taken for the peak
-)
+NEAR = 1e-3  # relative distance to the peak within which a point beside failed solves is taken for it
 TRIED = 3  # maxima of a scan that are refined in turn, the highest first
 
 
@@ -267,7 +265,8 @@ class AtPeak:
                 "modelled: extend response.frequency"
             )
         found = best.solution
-        if abs(best.distance) > NEAR * best.omega:
+        between = np.inf if uphill is None or other is None else abs(uphill.omega - other.omega)
+        if min(abs(best.distance), between) > NEAR * best.omega:  # sampled forces have kinks, where the slope jumps
             hertz, rises = best.omega / (2 * np.pi), "rises" if best.slope > 0 else "falls"
             lost = SolveEnd.SITE_NOT_FOUND.say(
                 f" {solves} solves: the curve ends at {hertz:.5g} Hz, where it still {rises}"

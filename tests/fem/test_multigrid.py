@@ -14,7 +14,13 @@ from tribodyn.workflows.scene.scene_file import SceneError
 
 pytest.importorskip("pyamg")
 
-SMALL = ("geometry.n_patch=3", "geometry.n_length=6", "geometry.n_height=2", "reduction.modes=6")
+SMALL = (
+    "harmonics.kept=[0, 1]",
+    "geometry.n_patch=3",
+    "geometry.n_length=6",
+    "geometry.n_height=2",
+    "reduction.modes=6",
+)
 
 
 def test_a_model_is_that_of_the_direct_solver() -> None:

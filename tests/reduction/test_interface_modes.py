@@ -19,7 +19,14 @@ from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 
-SMALL = ("geometry.n_patch=3", "geometry.n_length=4", "geometry.n_height=2", "reduction.modes=8", "response.points=30")
+SMALL = (
+    "harmonics.kept=[0, 1]",
+    "geometry.n_patch=3",
+    "geometry.n_length=4",
+    "geometry.n_height=2",
+    "reduction.modes=8",
+    "response.points=30",
+)
 
 
 @pytest.fixture(scope="module")

@@ -24,6 +24,7 @@ from tribodyn.workflows.scene import scene_file
 SMALL = (
     "geometry.n_length=4",
     "geometry.n_height=1",
+    "harmonics.kept=[0, 1]",
     "geometry.n_patch=3",
     "response.points=30",
     "harmonics.samples=64",
@@ -403,11 +404,14 @@ def test_what_no_estimator_covers_is_known_from_the_trade() -> None:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(budget.accuracy, "table_of", lambda _: table)
-        scene = found()
+        scene = found("geometry.n_patch=13")
         assert scene["contact grid"] == (pytest.approx(0.1 / 9), "trade: as with the coarser contact_grid=9")
         assert scene["fe mesh"] == (pytest.approx(0.01), "trade: fe_mesh=1")
         assert "newton" not in scene
-        assert found("geometry.n_patch=5")["contact grid"] == (pytest.approx(0.02), "trade: contact_grid=5")
+        assert found("harmonics.kept=[0, 1]", "geometry.n_patch=5")["contact grid"] == (
+            pytest.approx(0.02),
+            "trade: contact_grid=5",
+        )
         error, how = found("geometry.n_length=6")["fe mesh"]
         assert error is None
         assert "finer settings alone" in how
@@ -416,10 +420,14 @@ def test_what_no_estimator_covers_is_known_from_the_trade() -> None:
 def test_samples_do_not_make_another_setting_where_transitions_are_located() -> None:
     """The trade's harmonics are measured with more samples than the scene has; sampled ones would be another result."""
     for transitions, known in (("located", True), ("sampled", False)):
-        file = scene_file.read("beam", (f'harmonics.transitions="{transitions}"',))
+        file = scene_file.read("beam_thesis", (f'harmonics.transitions="{transitions}"',))
         overrides = ("harmonics.kept=[0, 1]", "harmonics.samples=128")
         assert (budget._compared(file, overrides) == budget.SAME) == known
-    errors = {e.quantity: e.error for e in budget._of_trade(scene_file.read("beam"), ()) if e.source == "harmonics"}
+    errors = {
+        e.quantity: e.error
+        for e in budget._of_trade(scene_file.read("beam", ("harmonics.kept=[0, 1]",)), ())
+        if e.source == "harmonics"
+    }
     assert 0.2 < errors["life"] < 0.3  # a peak that another one overtakes with more harmonics kept
 
 

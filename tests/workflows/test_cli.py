@@ -105,9 +105,9 @@ def test_list_names_every_scene(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_plan_says_what_will_be_modelled(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, _ = leave(["plan", "beam"], capsys)
+    code, out, _ = leave(["plan", "beam_thesis"], capsys)
     assert code == 0
-    for words in ("169 node pairs", "524 DOFs", "1521 in each", "GB", "about 33 steps", "whole run"):
+    for words in ("169 node pairs", "524 DOFs", "1521 in each", "GB", "about 33 steps", "verdict", "whole run"):
         assert words in out
 
 

@@ -31,6 +31,7 @@ from tribodyn.workflows.scene import scene_file
 
 SMALL = (
     "verdict.enabled=false",
+    "harmonics.kept=[0, 1]",
     "geometry.n_patch=3",
     "geometry.n_length=2",
     "geometry.n_height=1",

@@ -21,6 +21,7 @@ from tribodyn.workflows.studies.fit_file import Known, Task, predict
 from tribodyn.workflows.studies.identification import Measured, Parameter, fit
 
 BEAM = (
+    "harmonics.kept=[0, 1]",
     "geometry.n_patch=3", "reduction.modes=5", "harmonics.samples=32", "harmonics.transitions=sampled",
     "response.points=20", "wear.tolerance=20 %", "wear.at=700 Hz",
 )  # fmt: skip

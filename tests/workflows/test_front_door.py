@@ -16,6 +16,7 @@ import tribodyn as td
 from tribodyn.workflows.command import main as cli
 
 SMALL = {
+    "harmonics.kept": [0, 1],
     "geometry.n_patch": 5,
     "geometry.n_length": 4,
     "geometry.n_height": 1,

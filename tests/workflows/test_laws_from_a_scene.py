@@ -14,6 +14,7 @@ from tribodyn.hbm.contact import law as contact_law
 from tribodyn.hbm.wear import law as wear_law
 
 SMALL: dict[str, Any] = {
+    "harmonics.kept": [0, 1],
     "geometry.n_patch": 3,
     "geometry.n_length": 4,
     "geometry.n_height": 1,

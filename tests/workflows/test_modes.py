@@ -15,7 +15,13 @@ from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import read
 
-SMALL = ["geometry.n_patch=3", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=4"]
+SMALL = [
+    "harmonics.kept=[0, 1]",
+    "geometry.n_patch=3",
+    "geometry.n_length=4",
+    "geometry.n_height=1",
+    "reduction.modes=4",
+]
 SET = [word for override in SMALL for word in ("--set", override)]
 
 

@@ -32,13 +32,13 @@ DRAWN = {"fields", "loops", "part"}
 WEAR = {"wear"} | DRAWN
 RUNS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "beam": (
-        ("geometry.n_patch=5", "response.points=6", "wear.max_steps=2"),
+        ("harmonics.kept=[0, 1]", "geometry.n_patch=5", "response.points=6", "wear.max_steps=2"),
         # systems : linear systems that the harmonics see; extra : masters that are neither contact nor modes
         {"pairs": 25, "components": 3, "coefficients": 3, "systems": 1, "groups": ALWAYS | WEAR},
     ),
     "beam, nothing drawn": (
         (
-            "geometry.n_patch=5", "response.points=6", "wear.max_steps=2",
+            "harmonics.kept=[0, 1]", "geometry.n_patch=5", "response.points=6", "wear.max_steps=2",
             "pictures.plots=false", "pictures.renders=false",
         ),
         {"pairs": 25, "components": 3, "coefficients": 3, "systems": 1, "groups": ALWAYS | {"wear"}},
@@ -131,7 +131,9 @@ print(*(name for name in ("gmsh", "pyvista", "vtk", "matplotlib") if name in sys
 
 
 def test_the_command_without_pictures_on_a_mesh_file_loads_neither_mesher_nor_plots(tmp_path: Path) -> None:
-    scene = on_a_mesh_file("beam", ("geometry.n_patch=3", "geometry.n_length=4", "geometry.n_height=1"), tmp_path)
+    scene = on_a_mesh_file(
+        "beam", ("harmonics.kept=[0, 1]", "geometry.n_patch=3", "geometry.n_length=4", "geometry.n_height=1"), tmp_path
+    )
     words = ["run", "beam", "--no-pictures", "--out", str(tmp_path / "out")]
     for text in (*scene, "response.points=6", "wear.max_steps=1"):
         words += ["--set", text]

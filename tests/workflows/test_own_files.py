@@ -121,6 +121,7 @@ CHANGES = {
     'law = "energy"': 'law = "my_wear.py"\nexponent = 1.1',
     'transitions = "located"': 'transitions = "sampled"',
     "modes = 15": "modes = 4",
+    "kept = [0, 1, 2, 3]": "kept = [0, 1]",
     "points = 100": "points = 6",
     'rule = "error_controlled"': 'rule = "thesis"\nmax_steps = 1',
 }
@@ -203,7 +204,8 @@ def test_reading_and_planning_run_none_of_them(scene: Path) -> None:
     with pytest.raises(ValueError, match="which a plan does not run: run the scene"):
         planning.plan(file)
     own_laws = scene_file.read(
-        str(scene), ("geometry.part=beam", "geometry.span=", "geometry.n_patch=3", "geometry.n_length=3")
+        str(scene),
+        ("geometry.part=beam", "geometry.span=", "harmonics.kept=[0, 1]", "geometry.n_patch=3", "geometry.n_length=3"),
     )
     assert planning.plan(own_laws).contact_pairs == 9
     assert not (scene.parent / "ran").exists()

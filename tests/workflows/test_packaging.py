@@ -16,7 +16,15 @@ import tribodyn
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("geometry", "fem", "reduction", "hbm", "workflows")
 OTHERS = 'raise ImportError("this is the module of another package")\n'  # as llama-index-workflows brings one
-SMALL = ["geometry.n_patch=3", "geometry.n_length=2", "geometry.n_height=1", "reduction.modes=3", "wear.max_steps=1", "verdict.enabled=false"]
+SMALL = [
+    "harmonics.kept=[0, 1]",
+    "geometry.n_patch=3",
+    "geometry.n_length=2",
+    "geometry.n_height=1",
+    "reduction.modes=3",
+    "wear.max_steps=1",
+    "verdict.enabled=false",
+]
 
 
 @pytest.fixture(scope="module")

@@ -13,6 +13,7 @@ from tribodyn.workflows.accuracy import refinement
 from tribodyn.workflows.accuracy.statement import QUANTITIES, Contribution, Statement, Verdict
 
 TINY = (
+    "harmonics.kept=[0, 1]",
     "geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "reduction.modes=5", "response.points=20",
     "harmonics.samples=64", "pictures.renders=false",
 )  # fmt: skip

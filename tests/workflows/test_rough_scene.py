@@ -13,6 +13,7 @@ from tribodyn.hbm.contact.law import SLIPS, STICKS
 from tribodyn.workflows.scene import scene_file
 
 SMALL = {
+    "harmonics.kept": [0, 1],
     "geometry.n_patch": 3,
     "geometry.n_length": 3,
     "geometry.n_height": 1,

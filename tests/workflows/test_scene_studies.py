@@ -17,6 +17,7 @@ from tribodyn.workflows.studies import fit_file, variation
 from tribodyn.workflows.studies.supports import support_work
 
 TINY = (
+    "harmonics.kept=[0, 1]",
     "geometry.n_patch=3", "geometry.n_length=2", "geometry.n_height=1", "reduction.modes=3", "harmonics.samples=32",
     "response.points=8", "wear=", "verdict.enabled=false",
 )  # fmt: skip

@@ -28,7 +28,14 @@ from tribodyn.workflows.designs.task import Row, Task
 from tribodyn.workflows.run import reuse
 from tribodyn.workflows.scene import scene_file
 
-TINY = ["geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "response.points=6", "wear="]
+TINY = [
+    "harmonics.kept=[0, 1]",
+    "geometry.n_patch=3",
+    "geometry.n_length=3",
+    "geometry.n_height=1",
+    "response.points=6",
+    "wear=",
+]
 PRESS, FRICTION = "loads.static.press.value", "contact.friction"
 TABLES: dict[str, Any] = {
     "study": {"scene": "beam", "design": "grid", "set": TINY},

@@ -25,7 +25,14 @@ KEYS = {
     "loads.static.press.value": ["15 kN", "18 kN", "20 kN"],
     "contact.friction": [0.3, 0.5],
 }
-SET = ["geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "response.points=8", "wear="]
+SET = [
+    "harmonics.kept=[0, 1]",
+    "geometry.n_patch=3",
+    "geometry.n_length=3",
+    "geometry.n_height=1",
+    "response.points=8",
+    "wear=",
+]
 TABLES: dict[str, Any] = {"study": {"scene": "beam", "design": "grid", "set": SET}, "vary": KEYS}
 RUNS = 6
 PATIENCE = 60.0

@@ -49,6 +49,7 @@ transitions = "located"
 """
 SMALL = [
     "verdict.enabled=false",
+    "harmonics.kept=[0, 1]",
     "geometry.n_patch=3",
     "geometry.n_length=4",
     "geometry.n_height=1",

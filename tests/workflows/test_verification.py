@@ -17,6 +17,7 @@ from tribodyn.workflows.scene.scene_file import read
 
 SMALL = [
     "verdict.enabled=false",
+    "harmonics.kept=[0, 1]",
     "geometry.n_patch=3",
     "geometry.n_length=4",
     "geometry.n_height=1",

@@ -11,6 +11,7 @@ from tribodyn.workflows.accuracy import wear_steps
 from tribodyn.workflows.command import main as cli
 
 SMALL = (
+    "harmonics.kept=[0, 1]",
     "geometry.n_patch=3",
     "geometry.n_length=4",
     "geometry.n_height=1",

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 from math import ceil
 
 from tribodyn.geometry import parts
-from tribodyn.workflows.accuracy import verdict
 from tribodyn.workflows.accuracy.accuracy import OF_WEAR, parsed
 from tribodyn.workflows.accuracy.statement import NAMES, QUANTITIES, Contribution, Verdict, loaded
 from tribodyn.workflows.accuracy.trade_table import QUANTITIES as TRADED
 from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.scene.afterwards import VERDICT_SECONDS
 from tribodyn.workflows.scene.scene_file import SceneFile, parse
 from tribodyn.workflows.scene.schema import PartScene
 
@@ -81,7 +81,7 @@ def to_accuracy(file: SceneFile, accuracy: str, run: Runner, say: Callable[[str]
     asked = tuple(QUANTITIES[TRADED.index(name)] for name in named)
     always = {"verdict.enabled": "true"}
     if file.scene.verdict.seconds is None:
-        always["verdict.seconds"] = f"{verdict.DEFAULT_SECONDS[1]:g}"
+        always["verdict.seconds"] = f"{VERDICT_SECONDS[1]:g}"
     if named and not any(name in OF_WEAR for name in named):
         always["wear"] = ""
     added: dict[str, str] = {}

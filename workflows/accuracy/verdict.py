@@ -24,7 +24,6 @@ from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 
-DEFAULT_SECONDS = (10.0, 60.0)  # bounds of what the measurements may take where the scene does not say
 MOST = 0.8  # of the seconds, for more harmonics, which matter most
 HALF = 0.5  # of the seconds that are left, for one measurement of several
 CONTRADICTION = 3.0  # times the estimated error, from which on time integration contradicts the balance
@@ -38,7 +37,7 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spe
     spent : seconds that the run has taken, which limit the measurements where the scene does not
     """
     wanted, clock = file.scene.verdict, process_time()
-    allowed = wanted.seconds or float(np.clip(spent, *DEFAULT_SECONDS))
+    allowed = wanted.limit(spent)
     skipped = f"the {allowed:.3g} s of verdict.seconds are used up"
 
     def left() -> float:

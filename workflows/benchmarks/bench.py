@@ -83,7 +83,7 @@ def run(quick: bool, say: Callable[[str], None]) -> list[Timing]:
 
 def _problem() -> Callable[[str], HarmonicBalance]:
     """The beam scene's balance for chosen harmonics; mesh and reduction are made once."""
-    file = scene_file.read("beam", ())
+    file = scene_file.read("beam_thesis", ())
     with limited(1):
         model = modelling.build(file, None, Progress())
     reduced, unworn = model.reduced, model.balance
@@ -97,7 +97,7 @@ def _problem() -> Callable[[str], HarmonicBalance]:
 
 
 def _measure(balance: HarmonicBalance, harmonics: str, threads: int, windows: tuple[int, int]) -> Timing:
-    low, high = settings.response_range(scene_file.read("beam", ()).scene)
+    low, high = settings.response_range(scene_file.read("beam_thesis", ()).scene)
     options = natural.Options(n_points=POINTS, newton=NewtonOptions(TOLERANCE))
     natural.follow(balance, high, high * 0.999, replace(options, n_points=2))  # compiles outside the clock
     now = process_time if threads == 1 else perf_counter  # other work on the machine does not count

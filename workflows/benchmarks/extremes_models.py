@@ -69,7 +69,7 @@ class Body:
 
 def beam(n_patch: int) -> Body:
     """The beam scene with n_patch x n_patch contact nodes and its published loads, between free and stuck peak."""
-    file = scene_file.read("beam", (f"geometry.n_patch={n_patch}", "damping="))
+    file = scene_file.read("beam_thesis", (f"geometry.n_patch={n_patch}", "damping="))
     with TemporaryDirectory() as folder:
         model = modelling.build(file, Path(folder), Progress())
     contact, loads = file.part_scene.contact, model.balance.excitation.loads

@@ -75,7 +75,7 @@ def run(sizes: Sequence[str], say: Callable[[str], None]) -> list[FeCost]:
 def measure(size: tuple[int, int], way: str, n_patch: int = 13) -> FeCost:
     """One size of the beam by one way, on one thread."""
     changes = [f"geometry.n_length={size[0]}", f"geometry.n_height={size[1]}", f"geometry.n_patch={n_patch}"]
-    return _measured(lambda folder: scene_file.read("beam", [*changes, f"reduction.modes={MODES}"]), way)
+    return _measured(lambda folder: scene_file.read("beam_thesis", [*changes, f"reduction.modes={MODES}"]), way)
 
 
 def measure_assembly(size: tuple[int, int, int, int], way: str) -> FeCost:

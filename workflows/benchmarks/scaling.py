@@ -64,7 +64,7 @@ def run(sizes: Sequence[int], say: Callable[[str], None]) -> list[SizeCost]:
 def measure(n_patch: int, points: int = POINTS) -> SizeCost:
     """One response curve of the beam scene with n_patch x n_patch contact nodes, on one thread."""
     changes = [f"geometry.n_patch={n_patch}", f"harmonics.kept={HARMONICS}", f"harmonics.samples={SAMPLES}"]
-    file = scene_file.read("beam", changes)
+    file = scene_file.read("beam_thesis", changes)
     scene = file.part_scene
     with threadpool_limits(1), TemporaryDirectory() as folder:
         clock = [time.process_time()]

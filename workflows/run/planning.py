@@ -22,6 +22,7 @@ from tribodyn.workflows.run import memory as memory_use
 from tribodyn.workflows.run.modelling import clamps, make_mesh
 from tribodyn.workflows.run.part_reduction import components
 from tribodyn.workflows.run.settings import check_names
+from tribodyn.workflows.scene.afterwards import VerdictOptions
 from tribodyn.workflows.scene.matrices import MatrixScene
 from tribodyn.workflows.scene.own import is_file
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -31,7 +32,7 @@ FACTOR_SECONDS = 2e-7  # N^1.5 law
 BACK_SUBSTITUTION_SECONDS = 1.5e-7  # for each DOF and right-hand side
 DENSE_SECONDS = 3e-9  # for each cubed coordinate of the reduced model, all eigenvalue problems together
 SOLVE_SECONDS = 6e-8  # of a balance solve, for each squared contact coordinate and harmonic coefficient
-SOLVES_AT_PEAK = 10
+SOLVES_AT_PEAK = {"error_controlled": 40, "thesis": 3}  # a step; the former looks for higher peaks; beam scene
 LIKELY = tuple(range(8))  # harmonics where a scene leaves the choice
 CONTROLLED_STEPS, CONTROLLED_EXPONENT = 23, -0.4  # at a tolerance of 5 %; beam scene
 STEPS_AT_ONE_PERCENT, STEPS_EXPONENT = 411, -0.5  # to loss of contact; Tamatam 2021, table 4.2
@@ -53,11 +54,22 @@ class Plan:
     wear_steps: int | None
     wear_solves: int
     solve_seconds: float
+    verdict: VerdictOptions
+
+    @property
+    def computing_seconds(self) -> float:
+        """Expected time of the run without its verdict [s]."""
+        return self.reduction_seconds + (self.response_solves + self.wear_solves) * self.solve_seconds
+
+    @property
+    def verdict_seconds(self) -> float:
+        """Most processor time that the verdict takes [s]."""
+        return self.verdict.limit(self.computing_seconds) if self.verdict.enabled else 0.0
 
     @property
     def seconds(self) -> float:
         """Expected time of the whole run [s]."""
-        return self.reduction_seconds + (self.response_solves + self.wear_solves) * self.solve_seconds
+        return self.computing_seconds + self.verdict_seconds
 
     def lines(self) -> list[tuple[str, str]]:
         """The plan as pairs of a name and a readable value."""
@@ -73,6 +85,7 @@ class Plan:
             ("reduction", f"about {_time(self.reduction_seconds)}"),
             ("response", f"{self.response_solves} solves, about {response}"),
             ("wear", f"{steps} steps, about {wear}" if self.wear_solves else "none"),
+            ("verdict", f"at most {_time(self.verdict_seconds)}" if self.verdict.enabled else "none"),
             ("whole run", f"about {_time(self.seconds)} on one core, to a factor of three"),
         ]
 
@@ -127,6 +140,7 @@ def plan(file: SceneFile) -> Plan:
         wear_steps=steps,
         wear_solves=solves,
         solve_seconds=5e-3 + SOLVE_SECONDS * contact**2 * basis.n_coeff,
+        verdict=scene.verdict,
     )
 
 
@@ -171,7 +185,7 @@ def _wear(scene: Scene) -> tuple[int | None, int]:
     steps = min(most, likely)
     solves = 0
     for place in [duty.at for duty in scene.wear.mission] or [scene.wear.at]:
-        solves += steps if place.peak is None else steps * SOLVES_AT_PEAK + scene.response.points
+        solves += steps if place.peak is None else steps * SOLVES_AT_PEAK[scene.wear.rule] + scene.response.points
     return (None if share is None else steps), solves
 
 

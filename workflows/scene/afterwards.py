@@ -28,6 +28,9 @@ class Pictures(Table):
     """Factor on wear depth in renders; chosen by size by default."""
 
 
+VERDICT_SECONDS = (10.0, 60.0)  # bounds where the scene does not say
+
+
 class VerdictOptions(Table):
     """What is measured to judge a finished result, see `tribodyn.workflows.accuracy.verdict`."""
 
@@ -40,3 +43,7 @@ class VerdictOptions(Table):
     """Solve the unworn contact on a coarser mesh."""
     in_time: StrictBool = False
     """Integrate the unworn, the middle and the late state in time, which takes longest."""
+
+    def limit(self, spent: float) -> float:
+        """Processor seconds that the measurements may take after a run that took `spent` [s]."""
+        return self.seconds or min(max(spent, VERDICT_SECONDS[0]), VERDICT_SECONDS[1])
