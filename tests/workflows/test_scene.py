@@ -90,7 +90,7 @@ def test_values_arrive_in_si_units() -> None:
     assert scene.contact.tangential_stiffness == 470e6
     assert scene.contact.normal_stiffness == 583e6
     assert scene.geometry.parameters["length"] == 0.2
-    assert scene.geometry.parameters["n_patch"] == 9
+    assert scene.geometry.parameters["n_patch"] == 7
     assert read("beam_thesis").scene.geometry.parameters["n_patch"] == 13
     assert scene.wear is not None
     assert scene.wear.numbers["coefficient"] == 2e-15
