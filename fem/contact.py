@@ -31,7 +31,7 @@ def ground_contact(
 
     mesh : scikit-fem mesh; facets : facets of the face; t1 : (3,) direction whose part along the face is t1
     components : those a scene needs, of t1, t2, n; gap : opening before loading [m], one or (n_pair,)
-    vertices_only : no pairs at mid-side and mid-face nodes
+    vertices_only : no pairs at mid-side and mid-face nodes; without, six-node faces have theirs at mid-side nodes only
     Returns the interface with B over all 3 n_node DOFs of the mesh, pairs in ascending node order
     Raises  ValueError for an empty face, a t1 along the normal, unknown components, a gap of the wrong length
     """
@@ -161,7 +161,7 @@ def _matched(
 ) -> tuple[Surface, np.ndarray, np.ndarray] | None:
     """Face 1, the partners of its nodes on face 2 and their opening (n_pair,) [m]; None where facets do not match."""
     one, two = facet_nodes(mesh, facets_1), facet_nodes(mesh, facets_2)
-    if one.shape[1] != two.shape[1] or len(one) > len(two) or (one.shape[1] == 6 and not vertices_only):
+    if one.shape[1] != two.shape[1] or len(one) > len(two):
         return None
     face_1 = surface(mesh, facets_1, vertices_only)
     points = np.asarray(mesh.doflocs.T)
@@ -170,9 +170,9 @@ def _matched(
     if found is None:
         return None
     partner, opening = nodes[found[0]], found[1]
-    n = 4 if one.shape[1] == 9 else 3
-    place = np.searchsorted(face_1.nodes, one[:, :n])
-    there = {tuple(row) for row in np.sort(two[:, :n], axis=1).tolist()}
+    of_facet = slice(3, 6) if one.shape[1] == 6 and not vertices_only else slice(0, 4 if one.shape[1] == 9 else 3)
+    place = np.searchsorted(face_1.nodes, one[:, of_facet])
+    there = {tuple(row) for row in np.sort(two[:, of_facet], axis=1).tolist()}
     if not all(tuple(row) in there for row in np.sort(partner[place], axis=1).tolist()):
         return None
     return face_1, partner, opening

@@ -3,8 +3,9 @@
 At point A with weight function phi_A the relative displacement is the mean of that of the two faces,
 x_A = (1 / a_A) integral of phi_A (u_1 - u_2), a_A = integral of phi_A > 0. The functions sum to one, so that a
 constant pressure acts on both bodies as its consistent nodal forces. On a whole nine-node facet phi are its shape
-functions: they keep the first and second moments of the face. Where a facet is covered in part, or has three corners,
-phi are the linear functions of its corners, which are positive wherever it is cut.
+functions, on a whole six-node one the linear functions of its sides: they keep the first and second moments of the
+face. Where a facet is covered in part, or with vertices only, phi are the linear functions of its corners, which are
+positive wherever it is cut.
 Source  Puso and Laursen, Computer Methods in Applied Mechanics and Engineering 193, 2004
 """
 
@@ -19,7 +20,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.fem.matching import Mismatch
 from tribodyn.fem.mortar import Side, common, side, tabulate
-from tribodyn.fem.surface import NINE_NODE_QUADS
+from tribodyn.fem.surface import NINE_NODE_QUADS, side_functions, side_polygons
 
 WHOLE = 1 - 1e-6  # part of a facet that counts as all of it
 FEW = 1e-6  # part of a point's own area that is too little to carry anything
@@ -49,19 +50,22 @@ def mortar_halves(
     if not len(shared.weight):
         raise Mismatch(apart(one, two, reach))
     n = one.corners
-    whole = (shared.covered >= WHOLE) & (n == 4) & (not vertices_only)
+    whole = (shared.covered >= WHOLE) & (not vertices_only)
     frames = contact_frames(shared.normal, t1)
     picked = [COMPONENTS.index(c) for c in components]
 
-    nodes = np.unique(np.where(whole[:, None], one.nodes, one.nodes[:, [*range(n)] + [0] * (one.nodes.shape[1] - n)]))
+    carriers = _carriers(one, whole)
+    nodes = np.unique(np.concatenate(carriers))
     place = {int(node): at for at, node in enumerate(nodes)}
     area, gap = np.zeros((2, len(nodes)))
     directions = np.zeros((len(nodes), 3, 3))
     first: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     second: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for i, j, g in shared.each():
-        phi = tabulate(one.nodes.shape[1] if whole[i] else n, shared.xi[:, g])[0] * shared.weight[g]
-        at = np.array([place[int(node)] for node in one.nodes[i, : len(phi)]])
+        xi = shared.xi[:, g]
+        phi = side_functions(xi) if len(carriers[i]) == 3 and whole[i] else tabulate(len(carriers[i]), xi)[0]
+        phi = phi * shared.weight[g]
+        at = np.array([place[int(node)] for node in carriers[i]])
         np.add.at(area, at, phi.sum(axis=1))
         np.add.at(gap, at, phi @ shared.gap[g])
         np.add.at(directions, at, np.einsum("ag,gcx->acx", phi, frames[g]))
@@ -76,19 +80,22 @@ def mortar_halves(
             shape = (len(at), len(picked), len(of), 3)
             found.append((rows, np.broadcast_to(lines, shape).ravel(), np.broadcast_to(columns, shape).ravel()))
 
-    kept = area > FEW * _own_area(one, whole, nodes)
+    kept = area > FEW * _own_area(one, carriers, nodes)
     area, gap, directions = area[kept], gap[kept] / area[kept], directions[kept]
     gap[np.abs(gap) < ROUNDING * one.length] = 0.0
     n_dof = 3 * mesh.doflocs.shape[1]
     B_1, B_2 = (_map(found, kept, area, len(picked), n_dof) for found in (first, second))
     new = np.cumsum(kept) - 1
-    faces = [
-        new[[place[int(node)] for node in of[quad]]]
+    polygons = [
+        of[quad]
         for i, of in enumerate(one.nodes)
-        if shared.covered[i] > 0
+        if shared.covered[i] > 0 and not (n == 3 and whole[i])
         for quad in (NINE_NODE_QUADS if whole[i] else [np.arange(n)])
-        if kept[[place[int(node)] for node in of[quad]]].all()
     ]
+    if n == 3 and whole.any():
+        polygons += list(side_polygons(one.nodes[whole, :3], one.nodes[whole, 3:]))
+    at_points = np.array([[place[int(node)] for node in polygon] for polygon in polygons], dtype=int).reshape(-1, n)
+    faces = new[at_points[kept[at_points].all(axis=1)]]
     interface = ContactInterface(
         components=tuple(components),
         points=one.points.reshape(-1, 3)[_first_place(one.nodes, nodes[kept])],
@@ -96,7 +103,7 @@ def mortar_halves(
         area=area,
         gap=gap,
         B=B_1,
-        faces=np.array(faces, dtype=int).reshape(-1, n),
+        faces=faces,
     )
     return interface, B_2
 
@@ -125,16 +132,21 @@ def apart(one: Side, two: Side, reach: float) -> str:
     )
 
 
-def _own_area(one: Side, whole: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Area of each point if all its facets were covered, to within their distortion [m2]."""
+def _carriers(one: Side, whole: np.ndarray) -> list[np.ndarray]:
+    """The nodes of each facet that carry its pairs: of a whole one all nine or the three at sides, else its corners."""
+    n = one.corners
+    of_whole = slice(None) if n == 4 else slice(3, 6)
+    return [nodes[of_whole] if full else nodes[:n] for nodes, full in zip(one.nodes, whole.tolist(), strict=True)]
+
+
+def _own_area(one: Side, carriers: list[np.ndarray], nodes: np.ndarray) -> np.ndarray:
+    """Least area of each point if all its facets were covered, to within their distortion [m2]."""
     n = one.corners
     corner = one.points[:, :n]
     size = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, -1] - corner[:, 0]), axis=1)
     total = np.zeros(len(nodes))
-    at = np.searchsorted(nodes, one.nodes[:, :n])
-    np.add.at(total, at, np.repeat(size[:, None] / 36, n, axis=1))
-    beyond = np.searchsorted(nodes, one.nodes[whole][:, n:])
-    np.add.at(total, beyond, np.repeat(size[whole][:, None] / 9, one.nodes.shape[1] - n, axis=1))
+    count = [len(of) for of in carriers]
+    np.add.at(total, np.searchsorted(nodes, np.concatenate(carriers)), np.repeat(size / 36, count))
     return total
 
 

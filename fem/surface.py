@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from tribodyn.fem.elements import connectivity, coordinates
 
 # The four quads that a nine-node face shows, in its own node order: corners, mid-sides, middle.
 NINE_NODE_QUADS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
+OPPOSITE = np.array([2, 0, 1])  # corner of a six-node face opposite each of its sides
 FACE_ORDER = 6
 
 
@@ -36,7 +38,8 @@ def surface(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -> Surfa
 
     facets : indices of boundary facets; vertices_only : leave out the mid-side and mid-face nodes
     Tributary areas are the consistent integrals of the shape functions of the nodes kept: 1/36, 4/36, 16/36 of a flat
-    nine-node face, 1/4 or 1/3 with vertices only. They are positive there; six-node faces have none at the corners.
+    nine-node face, 1/4 or 1/3 with vertices only. A six-node face has none at its corners and 1/3 at each mid-side
+    node, which are its nodes here. All nodes keep the first and second moments of a flat face; vertices only do not.
     Raises  ValueError where there are no facets, where they lie inside the body, or where an area is not positive
     """
     facets = np.asarray(facets, dtype=int)
@@ -44,21 +47,68 @@ def surface(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -> Surfa
         raise ValueError("a contact or load surface has no faces; check the geometry that defines it")
     outside(mesh, facets)
     face_nodes = facet_nodes(mesh, facets)
-    weighted, vectors = face_integrals(mesh, facets, vertices_only)
-    if vertices_only:
+    sides = face_nodes.shape[1] == 6 and not vertices_only
+    weighted, vectors = face_integrals(mesh, facets, vertices_only or sides)
+    if sides:  # of the functions 1 - 2 L, L of the corner opposite a side, see `side_functions`
+        weighted, vectors = (of.sum(axis=1, keepdims=True) - 2 * of[:, OPPOSITE] for of in (weighted, vectors))
+        corners, face_nodes = face_nodes[:, :3], face_nodes[:, 3:]
+    elif vertices_only:
         face_nodes = face_nodes[:, : weighted.shape[1]]
     nodes, local = np.unique(face_nodes, return_inverse=True)
     local = local.reshape(face_nodes.shape)
     area = np.bincount(local.ravel(), weighted.ravel())
     if (area <= 1e-9 * area.sum()).any():
-        raise ValueError(
-            "consistent areas vanish at the corners of six-node faces, which tetrahedra have: take their vertices only "
-            "(contact.vertices_only = true in a scene), or mesh with 27-node hexahedra"
-        )
+        raise ValueError("a face is so curved that areas of its nodes vanish; mesh it finer")
     summed = np.stack([np.bincount(local.ravel(), vectors[:, :, i].ravel()) for i in range(3)], axis=1)
     normals = summed / np.linalg.norm(summed, axis=1, keepdims=True)
-    polygons = local if vertices_only else local[:, NINE_NODE_QUADS].reshape(-1, 4)
+    if sides:
+        polygons = side_polygons(corners, local)
+    else:
+        polygons = local if vertices_only else local[:, NINE_NODE_QUADS].reshape(-1, 4)
     return Surface(nodes, coordinates(mesh)[nodes], normals, area, polygons)
+
+
+def side_functions(xi: np.ndarray) -> np.ndarray:
+    """Functions (3, n) of the sides of a triangle at xi (2, n): linear, one in the middle of a side, zero in others.
+
+    They are orthogonal and sum to one, so that their means keep the first and second moments of a flat triangle
+    Source  Crouzeix and Raviart, RAIRO 7, 1973
+    """
+    x, y = xi
+    return np.stack([1 - 2 * y, 2 * (x + y) - 1, 1 - 2 * x])
+
+
+def side_polygons(corners: np.ndarray, sides: np.ndarray) -> np.ndarray:
+    """Triangles (k, 3) between the middles of sides: one in each facet, and what lies around each corner.
+
+    corners, sides : (n_facet, 3) numbers, side j between the corners that are not OPPOSITE it
+    At the rim of the face the small triangles beyond the middles stay out
+    """
+    found = [np.asarray(sides)]
+    around: dict[int, list[tuple[int, int]]] = {}
+    for of, middles in zip(corners.tolist(), sides.tolist(), strict=True):
+        for j, corner in enumerate(of):
+            ends = [middles[k] for k in range(3) if OPPOSITE[k] != j]
+            around.setdefault(corner, []).append((ends[0], ends[1]))
+    for links in around.values():
+        ring = _chain(links)
+        found.append(np.array([(ring[0], a, b) for a, b in pairwise(ring[1:])], dtype=int).reshape(-1, 3))
+    return np.concatenate(found)
+
+
+def _chain(links: list[tuple[int, int]]) -> list[int]:
+    """The numbers that links join, in a row; a ring begins anywhere and does not repeat its first one."""
+    joined: dict[int, list[int]] = {}
+    for a, b in links:
+        joined.setdefault(a, []).append(b)
+        joined.setdefault(b, []).append(a)
+    here = next((a for a, others in joined.items() if len(others) == 1), links[0][0])
+    row, seen = [here], {here}
+    while (step := next((b for b in joined[here] if b not in seen), None)) is not None:
+        row.append(step)
+        seen.add(step)
+        here = step
+    return row
 
 
 def outside(mesh: Any, facets: np.ndarray) -> None:

@@ -9,7 +9,7 @@ import pytest
 import skfem
 
 from tribodyn.fem.assembly import Assembly, Body
-from tribodyn.fem.contact import facing_halves
+from tribodyn.fem.contact import facing_halves, ground_contact
 from tribodyn.fem.loads import Pressure
 from tribodyn.fem.material import Material
 
@@ -71,6 +71,37 @@ def test_rigid_motion_of_both_is_no_relative_motion_and_moments_are_kept(bend):
         assert seen[:, 0] @ interface.area == pytest.approx(1 / 2, rel=1e-13)
         assert seen[:, 0] ** 2 @ interface.area == pytest.approx(1 / 3, rel=1e-13)
         assert (seen[:, 0] * seen[:, 1]) @ interface.area == pytest.approx(-1 / 4, rel=1e-13)
+
+
+@pytest.mark.parametrize("vertices_only", [False, True])
+@pytest.mark.parametrize("pairing", ["ground", "nodes", "mortar"])
+@pytest.mark.parametrize("tets", [False, True])
+def test_a_face_of_one_element_resists_tilting_as_a_uniform_bedding(tets, pairing, vertices_only):
+    """Area, first and second moments of the unit square are kept by all nodes; by its vertices only the first two."""
+    upper = block(L(0, 1, 2), L(0, 1, 2), L(0, 0.3, 2), tets)
+    n = 2 if pairing == "nodes" else 3
+    under = block(L(0, 1, n), L(0, 1, n + (n > 2)), L(-0.4, 0, 2), tets)
+    both = Assembly([Body("upper", upper, {}, STEEL), Body("lower", under, {}, STEEL)])
+    face = both.boundaries["upper.bottom"]
+    if pairing == "ground":
+        interface = ground_contact(both, face, (1, 0, 0), vertices_only=vertices_only)
+    else:
+        other = both.boundaries["lower.top"]
+        interface, B_2 = facing_halves(both, face, other, (1, 0, 0), pairing=pairing, vertices_only=vertices_only)
+        assert (np.abs(B_2).sum(axis=1) > 0).all()
+    tilted = np.zeros((both.doflocs.shape[1], 3))
+    second = []
+    for along in ([1, 0], [0, 1], [1, 1]):
+        tilted[:, 2] = (both.doflocs[:2].T - 0.5) @ along
+        seen = (interface.B @ tilted.ravel())[2::3]
+        assert interface.area @ seen == pytest.approx(0, abs=1e-14)
+        second.append(interface.area @ seen**2)
+    assert (interface.area > 0).all()
+    assert interface.area.sum() == pytest.approx(1.0, rel=1e-13)
+    if not vertices_only:
+        assert second == pytest.approx([1 / 12, 1 / 12, 1 / 6], rel=1e-12)
+    else:  # thrice too stiff at the nodes themselves, and too soft in means over the weights of corners
+        assert (second[0] > 0.2) == (pairing != "mortar")
 
 
 @pytest.mark.parametrize("gap", [1e-6, -1e-6, 0.02])

@@ -166,10 +166,20 @@ def test_contacts_join():
         join([one, replace(two, components=("n",))])
 
 
-def test_contact_refuses():
+def test_a_face_of_tetrahedra_has_its_pairs_at_its_sides():
     mesh = block(tets=True)
-    with pytest.raises(ValueError, match="vertices only"):
-        ground_contact(mesh, mesh.boundaries["bottom"], (1, 0, 0))
+    contact = ground_contact(mesh, mesh.boundaries["bottom"], (1, 0, 0))
+    sides = np.unique(mesh.f2e[:, mesh.boundaries["bottom"]])
+    assert contact.n_pair == len(sides)
+    assert contact.area.sum() == pytest.approx(2.0, rel=1e-12)
+    # drawn, the triangles between the sides leave out the small ones at the rim alone
+    a, b, c = np.moveaxis(contact.points[contact.faces], 1, 0)
+    drawn = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+    assert 1.2 < drawn < 2.0
+    assert len(np.unique(np.sort(contact.faces, axis=1), axis=0)) == len(contact.faces)
+
+
+def test_contact_refuses():
     mesh = block()
     face = mesh.boundaries["bottom"]
     with pytest.raises(ValueError, match="no faces"):
