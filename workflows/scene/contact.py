@@ -95,7 +95,7 @@ class FaceContact(Contact):
     t1: Direction
     """Direction that the first tangential component follows."""
     vertices_only: StrictBool = False
-    """Leave the mid-side nodes of the mesh out."""
+    """Leave the mid-side nodes of the mesh out; without, faces of tetrahedra have their pairs at these alone."""
     gap: Length | None = None
     """Initial gap of all pairs; by default that of the geometry, interference negative, and 0 against the ground."""
     gap_map: str | None = None
