@@ -26,8 +26,12 @@ PICTURES = HERE / "gallery" / "pictures"
 PAGE = HERE / "gallery" / "pictures.md"
 DPI, FILM_DPI, FILM_IMAGES = 100, 55, 16
 COLOURS = 256  # of a picture on the site
-WIDTHS = {"phone": 400, "desk": 1280}
-ELSEWHERE = {("beam", "patch"): "beam_patch", ("beam", "frf"): "beam_frf", ("blade", "wheel"): "blade_wheel"}
+WIDTHS = {"phone": 390, "desk": 1280}
+ELSEWHERE = {
+    ("beam", "patch"): "beam_patch", ("beam", "frf"): "beam_frf", ("blade", "wheel"): "blade_wheel",
+    ("brb_flat", "patch"): "brb_patch", ("brb_flat", "part"): "brb_part", ("turbine", "frf"): "turbine_frf",
+    ("turbine", "patch"): "turbine_patch", ("turbine", "wheel"): "turbine_wheel",
+}  # fmt: skip
 
 KINDS = {
     "frf": "Response between its free and stuck references, and the path of the peak under wear.",
@@ -44,6 +48,8 @@ KINDS = {
     "status_maps": "Contact status over wear.",
     "part": "The part at its largest swing; the contact is outlined.",
     "contact": "Both faces of the contact, opened like a book.",
+    "contact_*": "The same of one contact among several.",
+    "exploded": "The bodies apart, their contacts in colour.",
     "wheel": "All blades at one instant.",
     "film_wear": "Depth, status and pressure over wear.",
     "film_cycle": "One cycle: the part in motion and the status of every pair.",
@@ -93,6 +99,8 @@ def main() -> None:
 def of_scene(name: str, folder: Path) -> Iterator[Path]:
     """Run a scene, and draw all that its result has."""
     result = td.run(name, folder, overrides=CHANGED.get(name, ()), resume=(folder / "result.h5").exists())
+    for old in PICTURES.glob(f"{name}_contact*.png"):
+        old.unlink()  # its contacts may have other names now
     with TemporaryDirectory() as place:
         start, spent = time.perf_counter(), time.process_time()
         written, missing = scenes.draw(result, Path(place), dpi=DPI)
@@ -194,9 +202,8 @@ def write_page() -> None:
     for name in td.scene_names():
         lines += [f"## {name.replace('_', ' ')}", ""]
         for kind, caption in KINDS.items():
-            for ending in (".png", ".gif"):
-                if (PICTURES / f"{name}_{kind}{ending}").exists():
-                    lines += [f"![{name}: {caption}](pictures/{name}_{kind}{ending})", "", caption, ""]
+            for path in sorted(PICTURES.glob(f"{name}_{kind}.*")):
+                lines += [f"![{name}: {caption}](pictures/{path.name})", "", caption, ""]
     PAGE.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
 
 

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import base64
-import os
 import re
-import shutil
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +13,7 @@ import numpy as np
 import pytest
 
 import tribodyn as td
+from tests.helpers.browser import DESK, PHONE, chromium, clicked_zoomed_and_turned, of_width, opened, until
 from tests.helpers.synthetic_result import result
 from tribodyn.workflows.pictures import plots
 from tribodyn.workflows.report import page
@@ -23,11 +21,7 @@ from tribodyn.workflows.report.solid import solid
 from tribodyn.workflows.result import faces
 
 selenium = pytest.importorskip("selenium.webdriver")
-Keys = pytest.importorskip("selenium.webdriver.common.keys").Keys
-Select = pytest.importorskip("selenium.webdriver.support.select").Select
-CHROMIUM = next(
-    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
-)
+__all__ = ["chromium"]
 
 
 @pytest.fixture(scope="module")
@@ -45,46 +39,12 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    """A headless Chromium, cut off from any network."""
-    if CHROMIUM is None:
-        if os.environ.get("TRIBODYN_BROWSER") == "required":
-            pytest.fail("no Chromium on this machine: apt-get install chromium chromium-driver")
-        pytest.skip("no Chromium on this machine")
-    options = selenium.ChromeOptions()
-    options.binary_location = CHROMIUM
-    for word in (
-        "--headless=new", "--no-sandbox", "--disable-dev-shm-usage",
-        "--enable-unsafe-swiftshader", "--use-angle=swiftshader",
-        "--window-size=1280,1000", "--host-resolver-rules=MAP * ~NOTFOUND", "--force-device-scale-factor=1",
-    ):  # fmt: skip
-        options.add_argument(word)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = selenium.Chrome(options=options, service=selenium.ChromeService(shutil.which("chromedriver")))
-    driver.set_script_timeout(120)
-    yield driver
-    driver.quit()
-
-
 @pytest.fixture
 def browser(chromium: Any, written: Path) -> Any:
     """The browser with the report of two results."""
     if chromium.current_url != written.as_uri():
         opened(chromium, written)
     return chromium
-
-
-def opened(driver: Any, path: Path) -> None:
-    driver.get(path.as_uri())
-    _until(driver, "return window.reportReady === true")
-
-
-def _until(driver: Any, script: str, seconds: float = 90.0) -> None:
-    end = time.monotonic() + seconds
-    while not driver.execute_script(script):
-        assert time.monotonic() < end, script
-        time.sleep(0.2)
 
 
 def test_the_page_needs_nothing_else(written: Path) -> None:
@@ -131,11 +91,11 @@ def test_a_curve_tells_its_values_and_zooms(browser: Any) -> None:
     selenium.ActionChains(browser).move_to_element_with_offset(
         plot, int(x - width / 2), int(y - height / 2)
     ).move_by_offset(1, 0).perform()
-    _until(browser, "return window.told !== null", 20)
+    until(browser, "return window.told !== null", 20)
     assert browser.execute_script("return window.told") == pytest.approx(given.preload[4], rel=1e-6)
     before = browser.execute_script("return arguments[0]._fullLayout.xaxis.range", chart)
     selenium.ActionChains(browser).move_to_element(plot).click_and_hold().move_by_offset(90, 40).release().perform()
-    _until(browser, "return true", 1)
+    until(browser, "return true", 1)
     after = browser.execute_script("return arguments[0]._fullLayout.xaxis.range", chart)
     assert after[1] - after[0] < 0.7 * (before[1] - before[0])
 
@@ -170,13 +130,10 @@ def test_the_slider_shows_the_depth_of_every_state(browser: Any) -> None:
     assert "slip-separation" in section.find_element("css selector", ".legend").text
 
 
-@pytest.mark.parametrize("width", [400, 1280])
+@pytest.mark.parametrize("width", [PHONE, DESK])
 def test_nothing_is_wider_than_the_window(width: int, browser: Any, tmp_path: Path) -> None:
-    """At the width of a phone and of a desk; set by the protocol, because windows have a least width."""
-    browser.execute_cdp_cmd(
-        "Emulation.setDeviceMetricsOverride",
-        {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600},
-    )
+    """At the width of a phone and of a desk."""
+    of_width(browser, width)
     time.sleep(0.5)
     assert browser.execute_script("return document.documentElement.scrollWidth") <= width
     smallest = browser.execute_script(
@@ -208,55 +165,9 @@ SMALL = {
 def test_the_report_of_each_case_is_clicked_zoomed_and_turned(
     name: str, chromium: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A small run of each scene that comes along, without its figures but one, which are looked at elsewhere."""
-    monkeypatch.setattr(page, "_renders", lambda found: {})
-    monkeypatch.setattr(plots, "figures", lambda found: {"frf": plots.frequency_response})
+    """A small run of each scene that comes along; those of the other cases are in their own tests."""
     result = td.run(name, overrides=(*SMALL[name], "verdict.enabled=false"))
-    path = page.write([(name, result, None)], tmp_path / f"{name}.html")
-    assert path.stat().st_size < page.LARGEST
-    opened(chromium, path)
-    charts = chromium.find_elements("css selector", ".chart")
-    assert len(charts) >= (1 if result.wear is None else 6)
-    for chart in charts:
-        chromium.execute_script("arguments[0].scrollIntoView({block: 'center'})", chart)
-        before = chromium.execute_script("return arguments[0]._fullLayout.xaxis.range.map(Number)", chart)
-        plot = chart.find_element("css selector", ".nsewdrag")
-        drag(chromium, plot, 80, 5)
-        after = chromium.execute_script("return arguments[0]._fullLayout.xaxis.range.map(Number)", chart)
-        assert after[1] - after[0] < 0.8 * (before[1] - before[0]), chart.get_attribute("data-chart")
-    entries = charts[0].find_elements("css selector", ".legendtoggle")
-    visible = "return arguments[0].data.map(t => String(t.visible))"
-    shown = chromium.execute_script(visible, charts[0])
-    entries[0].click()
-    time.sleep(0.5)  # a click waits for a second one
-    assert chromium.execute_script(visible, charts[0]) != shown
-    solid = chromium.find_element("css selector", "#part-0 .solid")
-    chromium.execute_script("arguments[0].scrollIntoView({block: 'center'})", solid)
-    eye = "return Object.values(arguments[0]._fullLayout.scene._scene.getCamera().eye)"
-    before = chromium.execute_script(eye, solid)
-    drag(chromium, solid, 120, 30)
-    assert np.linalg.norm(np.subtract(chromium.execute_script(eye, solid), before)) > 0.1
-    slider = chromium.find_element("css selector", "#part-0 .state")
-    label = chromium.find_element("css selector", "#part-0 .label")
-    first = label.text
-    slider.send_keys(Keys.HOME)
-    assert label.text != first
-    field = chromium.find_element("css selector", "#part-0 .field")
-    Select(field).select_by_visible_text("status")
-    _until(chromium, "return document.querySelector('#part-0 .legend').textContent !== ''", 20)
-    assert not [entry for entry in chromium.get_log("browser") if entry["level"] == "SEVERE"]
-    for width in (400, 1280):
-        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600}
-        chromium.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-        _until(chromium, f"return document.documentElement.scrollWidth <= {width}", 15)  # charts follow the width
-    chromium.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-
-
-def drag(driver: Any, element: Any, right: int, down: int) -> None:
-    selenium.ActionChains(driver).move_to_element(element).click_and_hold().move_by_offset(
-        right, down
-    ).release().perform()
-    time.sleep(0.4)
+    clicked_zoomed_and_turned(chromium, name, result, tmp_path, monkeypatch)
 
 
 def test_it_prints(browser: Any) -> None:

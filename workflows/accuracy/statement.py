@@ -80,9 +80,10 @@ def lines(verdict: Verdict) -> list[tuple[str, str]]:
             shown.append((label, f"{number}, {said.reason}"))
         else:
             by = f", most of it {said.dominated_by}" if said.dominated_by else ""
-            shown.append((label, f"{number}, error {_percent(said.error)}{by}"))
+            shown.append((label, f"{number}, error {percent(said.error)}{by}"))
     return shown
 
 
-def _percent(error: float) -> str:
+def percent(error: float) -> str:
+    """A relative error for people."""
     return f"{100 * error:.2g} %" if error >= 1e-4 else "below 0.01 %"

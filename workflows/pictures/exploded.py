@@ -23,6 +23,7 @@ ONE_WAY = 0.3  # of the area of touching faces: a smaller sum of their normals i
 TOUCH = 1e-3  # of the size of the smaller body: faces nearer than this touch
 SIZE = (1100, 760)  # pixels
 FLAT = 2.2  # width over height from which on two views stand one above the other
+RISE = 0.65  # slope that the bodies are looked at with, from above and from below
 LIFT = 4e-3  # of the size of a contact, by which its colours lie above the body
 
 
@@ -123,9 +124,11 @@ def exploded_picture(result: Result) -> Figure:
             layers += Field(values[one.pairs], limits, map_)(one.patch, there)
     towards, up = drawing.looking(result)
     axis = up / np.linalg.norm(up)
+    level = towards - (towards @ axis) * axis
+    level /= np.linalg.norm(level)
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         shots, cameras = [], []
-        for side in (towards + 0.3 * axis, towards - (2 * towards @ axis + 0.3) * axis):
+        for side in (level + RISE * axis, level - RISE * axis):
             cameras.append(frame(points, side, up, SIZE[0] / SIZE[1]))
             shots.append(shoot(View(layers), cameras[-1], SIZE))
         images, corner = triad.with_room(trimmed(shots))

@@ -65,6 +65,7 @@ def patch_maps(result: Result, rows: np.ndarray | None = None, scale: Literal["c
             axes.set_xlabel(f"{names[0]} / mm", fontsize=10)
         for axes in grid[:, 0]:
             axes.set_ylabel(f"{names[-1]} / mm", fontsize=10)
+        _name_contacts(grid[:, 0], result)
         if told:
             status_legend(figure, {int(b) for s in states if s.status is not None for b in s.status}, patch.components)
         heading(figure, result, "contact patch")
@@ -94,9 +95,23 @@ def status_maps(result: Result, count: int = 8) -> Figure:
             axes.tick_params(labelsize=9)
             axes.set(xlabel="t1 / mm", ylabel="t2 / mm")
             axes.label_outer(remove_inner_ticks=False)
+        _name_contacts(grid[:, 0], result)
         status_legend(figure, {int(bits) for row in rows for bits in wear.status[row]}, patch.components)
         heading(figure, result, "contact status over wear")
     return figure
+
+
+def _name_contacts(columns: np.ndarray, result: Result) -> None:
+    """Names of the contacts beside their faces, where several are drawn one above the other."""
+    patch, named = result.patch, result.facts.pairs_of_joints
+    assert patch is not None
+    if len(named) < 2 or patch.in_one_plane:
+        return
+    height = 1e3 * patch.flat[:, 1]
+    for axes in columns:
+        middles = [(height[pairs].min() + height[pairs].max()) / 2 for pairs in named.values()]
+        axes.set_yticks(middles, [name.replace("_", " ") for name in named])
+        axes.set_ylabel("")
 
 
 def _limits(values: list[np.ndarray]) -> tuple[float, float]:

@@ -62,8 +62,13 @@ def frequency_response(result: Result) -> Figure:
         unit, scale = length_unit(_largest_amplitude(result))
         if result.references is not None:
             hertz = result.references.omega / (2 * np.pi)
-            axes.plot(hertz, scale * result.references.free, "--", color=GREY, label="free (contact absent)")
-            axes.plot(hertz, scale * result.references.stuck, ":", color=INK, label="stuck (closed, no slip)")
+            both = (
+                (result.references.free, "--", GREY, "free (contact absent)"),
+                (result.references.stuck, ":", INK, "stuck (closed, no slip)"),
+            )
+            for height, style, color, label in both:
+                if np.isfinite(height).any():
+                    axes.plot(hertz, scale * height, style, color=color, label=label)
         if result.response is not None:
             good = result.response.converged
             amplitude = scale * result.response.amplitude(result.response.output_names[0])
@@ -328,12 +333,14 @@ def _ends(values: np.ndarray) -> tuple[float, float]:
 
 
 def _largest_amplitude(result: Result) -> float:
-    found = [0.0]
+    found = [np.zeros(1)]
     if result.references is not None:
-        found.append(float(result.references.free.max()))
-    if result.wear is not None and len(result.wear.amplitude):
-        found.append(float(result.wear.amplitude.max()))
-    return max(found)
+        found.append(result.references.free)
+    if result.response is not None:
+        found.append(result.response.amplitude(result.response.output_names[0]))
+    if result.wear is not None:
+        found.append(result.wear.amplitude)
+    return float(np.nanmax(np.concatenate(found)))
 
 
 def _cycles(largest: float) -> tuple[str, float]:

@@ -16,6 +16,7 @@ import matplotlib as mpl
 import numpy as np
 
 from tribodyn.version import __version__
+from tribodyn.workflows.accuracy import statement
 from tribodyn.workflows.pictures import plots, render
 from tribodyn.workflows.pictures.style import STYLE
 from tribodyn.workflows.report.charts import charts
@@ -135,13 +136,14 @@ def _verdict(result: Result) -> str:
     if isinstance(judged, Mapping):
         rows = []
         for name, item in judged.items():
-            error = item.get("error")
-            stated = "may be stated" if item.get("stated") else "may not be stated"
+            value, error = item.get("value"), item.get("error")
+            shown = "none" if value is None else f"{value:.5g} {statement.UNITS.get(name, '')}"
             rows.append((
-                name.replace("_", " "), _number(item.get("value")), "not known" if error is None else f"{error:.2g}",
-                str(item.get("dominated_by") or ""), stated, str(item.get("reason") or ""),
+                name.replace("_", " "), shown, "not known" if error is None else statement.percent(error),
+                str(item.get("dominated_by") or ""), "yes" if item.get("stated") else "no",
+                str(item.get("reason") or ""),
             ))  # fmt: skip
-        head = ("quantity", "value (SI)", "total relative error", "dominated by", "", "why")
+        head = ("quantity", "value", "total error", "most of it", "may be stated", "why")
         said += _table(rows, head)
     return said + _table(_not_told_elsewhere(summary.lines(result)))
 
@@ -195,6 +197,8 @@ def _inspection(result: Result) -> str:
         value = table.get(key)
         if value is not None:
             many = getattr(value, "ndim", 0) > 0
+            if many and not len(value):
+                continue
             text = ", ".join(_number(v) for v in np.asarray(value).tolist()[:6]) if many else _number(value)
             rows.append((label, text))
     if result.patch is not None:
@@ -247,6 +251,13 @@ def _viewer(number: int) -> str:
     )
 
 
+def _files(given: Mapping[str, str]) -> list[Path]:
+    """The files beside a scene that its text or its changes name, as far as they still are there."""
+    folder = Path(given.get("folder", "."))
+    named = re.findall(r'"([^"\n]+)"', f"{given['scene_text']}\n{given.get('overrides', '')}")
+    return [folder / name for name in sorted(set(named)) if "." in name and (folder / name).is_file()]
+
+
 def _provenance(result: Result, path: Path | None) -> str:
     given = result.provenance
     changes = "".join(f" --set {json.dumps(text)}" for text in given.get("overrides", "").split("\n") if text)
@@ -254,6 +265,7 @@ def _provenance(result: Result, path: Path | None) -> str:
     rows.append(("SHA-256 of the scene", hashlib.sha256(given["scene_text"].encode()).hexdigest()))
     if path is not None:
         rows.append((f"SHA-256 of {path.name}", hashlib.sha256(path.read_bytes()).hexdigest()))
+    rows += [(f"SHA-256 of {file.name}", hashlib.sha256(file.read_bytes()).hexdigest()) for file in _files(given)]
     rows += [
         (key, given[key]) for key in ("versions", "python", "platform", "seed", "threads", "started") if key in given
     ]

@@ -12,6 +12,7 @@ import pytest
 import scipy.linalg as sla
 
 import tribodyn as td
+from tests.helpers.browser import chromium, clicked_zoomed_and_turned
 from tests.helpers.command import leave
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, backbone
@@ -19,6 +20,8 @@ from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.scene import scene_file
+
+__all__ = ["chromium"]
 
 FORCE = 3 * 12249.0
 COARSE = [
@@ -113,3 +116,14 @@ def test_references_of_a_beam_that_hangs_free_are_those_of_its_dynamic_stiffness
             dynamic = stiffness - w**2 * system.mass + 1j * w * system.velocity_matrix
             wanted = abs(system.outputs["response"] @ np.linalg.solve(dynamic, force))
             assert height[at] == pytest.approx(wanted, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["brb", pytest.param("brb_flat", marks=pytest.mark.slow), pytest.param("brb_wavy", marks=pytest.mark.slow)],
+)
+def test_the_report_is_clicked_zoomed_and_turned(name, chromium, tmp_path: Path, monkeypatch):
+    monkeypatch.setattr(modelling, "build", lambda file, *_: built(name))
+    given = "response.frequency=['174 Hz', '178 Hz']"
+    result = td.run(name, overrides=(*COARSE, "response.points=2", given, "verdict.enabled=false"))
+    clicked_zoomed_and_turned(chromium, name, result, tmp_path, monkeypatch)

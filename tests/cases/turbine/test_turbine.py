@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
 import tribodyn as td
+from tests.helpers.browser import chromium, clicked_zoomed_and_turned
 from tribodyn.geometry import bladed_sector
 from tribodyn.workflows.result import summary
 
@@ -13,6 +17,7 @@ COARSE = (
     *("bodies.blade.n_span=2", "bodies.blade.n_along=3", "bodies.blade.n_up=2", "bodies.disk.n_axial=2"),
     *("bodies.damper.n_damper=1", "bodies.blade.hub_radius=200 mm"),
 )
+__all__ = ["chromium"]
 JOINTS = {"root_right", "root_left", "damper_right", "damper_left", "shroud"}
 
 
@@ -41,7 +46,9 @@ def test_centrifugal_load_of_the_damper_is_that_of_its_drawing(found: dict[str, 
     assert np.linalg.norm(found["damper"].load) == pytest.approx(expected, rel=2e-3)
 
 
-def test_every_contact_is_told_by_itself() -> None:
+@pytest.fixture(scope="module")
+def worn() -> td.Result:
+    """Two wear steps at a frequency, without a response curve."""
     changes = (
         "loads.harmonic.wave.value=1200 N",
         "wear.at=850 Hz",
@@ -52,7 +59,17 @@ def test_every_contact_is_told_by_itself() -> None:
     )
     file = td.read_scene("turbine", (*COARSE, *changes, 'contacts.damper_left.wear={coefficient = "1e4 um3/J"}'))
     model = td.build(file)
-    result = td.result_of(file, model.part, model.balance, td.wear(file, model.balance))
+    return td.result_of(file, model.part, model.balance, td.wear(file, model.balance))
+
+
+def test_the_report_is_clicked_zoomed_and_turned(
+    worn: td.Result, chromium: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clicked_zoomed_and_turned(chromium, "turbine", worn, tmp_path, monkeypatch)
+
+
+def test_every_contact_is_told_by_itself(worn: td.Result) -> None:
+    result = worn
     joints = summary.by_joint(result)
     assert set(joints) == JOINTS
     worn = {name: joint for name, joint in joints.items() if joint["energy_J"] > 0}
