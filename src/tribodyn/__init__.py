@@ -117,6 +117,7 @@ if TYPE_CHECKING:
         write_mistuned,
         write_whole,
     )
+    from tribodyn.workflows.api.surfaces import Asperities, HeightMap, asperities
     from tribodyn.workflows.api.whole_scenes import (
         benchmark,
         check_promise,
@@ -146,9 +147,11 @@ if TYPE_CHECKING:
 
 # name here -> module, and name there where it is another one
 _HOME: dict[str, tuple[str, ...]] = {
+    "Asperities": ("tribodyn.workflows.api.surfaces",),
     "Balance": ("tribodyn.workflows.api.own_matrices",),
     "Contact": ("tribodyn.workflows.api.own_matrices",),
     "Cycle": ("tribodyn.workflows.api.own_matrices",),
+    "HeightMap": ("tribodyn.workflows.api.surfaces",),
     "Lives": ("tribodyn.workflows.lives.lives",),
     "Matrices": ("tribodyn.reduction.foreign", "ForeignMatrices"),
     "Model": ("tribodyn.workflows.run.modelling",),
@@ -161,6 +164,7 @@ _HOME: dict[str, tuple[str, ...]] = {
     "Structure": ("tribodyn.workflows.api.own_matrices",),
     "StudyTable": ("tribodyn.workflows.designs.table",),
     "__version__": ("tribodyn.version",),
+    "asperities": ("tribodyn.workflows.api.surfaces",),
     "build": ("tribodyn.workflows.api.scenes",),
     "contact_laws": ("tribodyn.hbm.contact.law", "names"),
     "continuations": ("tribodyn.hbm.continuation", "names"),
@@ -298,6 +302,7 @@ __all__ = [
     "SEPARATES",
     "SLIPS",
     "STICKS",
+    "Asperities",
     "Balance",
     "Bench",
     "Branch",
@@ -310,6 +315,7 @@ __all__ = [
     "Exposure",
     "FoldInTime",
     "HarmonicBalance",
+    "HeightMap",
     "Identification",
     "IntegrationFailed",
     "JointSprings",
@@ -341,6 +347,7 @@ __all__ = [
     "WearHistory",
     "Wheel",
     "__version__",
+    "asperities",
     "benchmark",
     "body_forces",
     "build",

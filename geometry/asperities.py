@@ -1,0 +1,217 @@
+"""Asperities of a measured face: its summits, their curvature, density and heights; and what a random face would have.
+
+Two rough faces count as one: the sum of their heights against a plane, whose summits have the effective radius
+(Greenwood and Tripp 1970).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import RegularGridInterpolator
+from scipy.ndimage import maximum_filter
+
+from tribodyn.geometry.surface import HeightMap, check, fill_holes, level, prepare, remove_outliers, split
+from tribodyn.geometry.surface_pair import centred
+
+FEWEST = 30  # summits below which there are no statistics of them
+STEPS = 0.1  # points with a highest neighbour as high, over summits, beyond which the heights come in steps
+ROWS = 101  # of a table of gaps
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Spectral moments of a face, mean over x and y of their profiles.
+
+    m0 : variance of the heights [m2];  m2 : of the slopes [-];  m4 : of the curvatures [1/m2]
+    Source  McCool, Wear 107 (1986) 37; its summits where it is isotropic and Gaussian: Nayak, J. Lubr. Technol. 93
+        (1971) 398
+    """
+
+    m0: float
+    m2: float
+    m4: float
+
+    @property
+    def alpha(self) -> float:
+        """Nayak's bandwidth m0 m4 / m2^2, 1.5 or more."""
+        return self.m0 * self.m4 / self.m2**2
+
+    @property
+    def density(self) -> float:
+        """Summits per area of a Gaussian face [1/m2]: Nayak's m4 / (6 pi sqrt(3) m2)."""
+        return self.m4 / (6 * np.pi * np.sqrt(3) * self.m2)
+
+    @property
+    def radius(self) -> float:
+        """One over the mean curvature of its summits [m]: 3/8 sqrt(pi / m4)."""
+        return 3 / 8 * float(np.sqrt(np.pi / self.m4))
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of the heights of its summits [m]: sqrt((1 - 0.8968 / alpha) m0)."""
+        return float(np.sqrt((1 - 0.8968 / self.alpha) * self.m0))
+
+    @property
+    def mean(self) -> float:
+        """Mean height of its summits above the mean of the face [m]: 4 sqrt(m0 / (pi alpha))."""
+        return 4 * float(np.sqrt(self.m0 / (np.pi * self.alpha)))
+
+
+@dataclass(frozen=True)
+class Asperities:
+    """Summits of a face.
+
+    height : (n,) above the mean of the face [m];  curvature : (n,) mean of that along x and y, positive [1/m]
+    area : in which they were looked for [m2];  moments : of the same face
+    repairs : one sentence for each thing that was changed in a map
+    """
+
+    height: np.ndarray
+    curvature: np.ndarray
+    area: float
+    moments: Moments
+    repairs: tuple[str, ...] = ()
+
+    @property
+    def density(self) -> float:
+        """Summits per area [1/m2]."""
+        return len(self.height) / self.area
+
+    @property
+    def radius(self) -> float:
+        """One over their mean curvature [m] (McCool 1986)."""
+        return 1 / float(self.curvature.mean())
+
+    @property
+    def gap(self) -> np.ndarray:
+        """(n,) how far each is below the highest [m]."""
+        return self.height.max() - self.height
+
+    def table(self, rows: int = ROWS) -> np.ndarray:
+        """(rows, 2) gaps [m], equidistant from the highest to the lowest summit, and summits per m2 and m of gap.
+
+        The density is linear between the rows and keeps the number and the mean gap of the summits: each counts at
+        the rows on its two sides, more at the nearer one.
+        Raises  ValueError: fewer than two rows, or all summits at one height
+        """
+        if rows < 2:
+            raise ValueError(f"a table of {rows} rows holds no density of asperities: give 2 or more")
+        gap = self.gap
+        if not gap.max() > 0:
+            raise ValueError("all summits are at one height: they have no density of gaps")
+        at = gap / gap.max() * (rows - 1)
+        left = np.minimum(at.astype(int), rows - 2)
+        share = at - left
+        count = np.bincount(left, 1 - share, rows) + np.bincount(left + 1, share, rows)
+        width = np.full(rows, gap.max() / (rows - 1))
+        width[[0, -1]] /= 2
+        return np.column_stack([np.linspace(0, gap.max(), rows), count / (self.area * width)])
+
+
+def identify(
+    first: HeightMap, second: HeightMap | None = None, cutoff: float | None = None, shortest: float | None = None
+) -> Asperities:
+    """The asperities of one rough face against a plane, or of two faces against each other as they lie.
+
+    second : in the coordinates of the first, already mirrored; both are centred and the smaller extent counts
+    cutoff : wavelength [m] above which waves are no roughness and taken off; only the mean plane by default
+    shortest : wavelength [m] below which waves are noise of the instrument and taken off (S-filter of ISO 25178-2)
+    Raises  ValueError: what surface.prepare refuses, heights that come in steps, too few summits
+    """
+    faces: list[HeightMap] = []
+    repairs: list[str] = []
+    for face in (first, second):
+        if face is None:
+            continue
+        if shortest is None:
+            _refuse_steps(face)
+        if cutoff is None:
+            check(face)
+            without_spikes, spikes = remove_outliers(face)
+            whole, holes = fill_holes(without_spikes)
+            rough, said = level(whole), (*spikes, *holes)
+        else:
+            prepared = prepare(face, cutoff)
+            rough, said = prepared.roughness, prepared.repairs
+        faces.append(centred(split(rough, shortest)[0] if shortest is not None else rough))
+        repairs += said
+    both = faces[0] if len(faces) == 1 else _sum(*faces)
+    height, curvature = summits(both)
+    area = float(np.prod([step * (n - 2) for step, n in zip(both.spacing, both.z.shape, strict=True)]))
+    return Asperities(height, curvature, area, moments(both), tuple(repairs))
+
+
+def _sum(first: HeightMap, second: HeightMap) -> HeightMap:
+    """Sum of the heights of two centred maps, where both are known, on the grid of the finer one."""
+    if max(second.spacing) < max(first.spacing):
+        first, second = second, first
+    inside = [
+        (axis >= other[0] - 1e-9 * step) & (axis <= other[-1] + 1e-9 * step)
+        for axis, other, step in zip((first.x, first.y), (second.x, second.y), first.spacing, strict=True)
+    ]
+    x, y = first.x[inside[0]], first.y[inside[1]]
+    points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+    points = np.clip(points, (second.x[0], second.y[0]), (second.x[-1], second.y[-1]))
+    method = "cubic" if min(second.z.shape) >= 4 and second.spacing != first.spacing else "linear"
+    other = RegularGridInterpolator((second.x, second.y), second.z, method)(points)
+    return HeightMap(x, y, first.z[np.ix_(*inside)] + other, f"{first.name} and {second.name}")
+
+
+def summits(surface: HeightMap) -> tuple[np.ndarray, np.ndarray]:
+    """Heights above the mean of the face [m] and curvatures [1/m] of the points above all eight neighbours, (n,) each.
+
+    The curvature is the mean of the second differences along x and y. The rim holds no summit.
+    Raises  ValueError: holes, fewer than FEWEST summits
+    """
+    z = surface.z
+    if not np.isfinite(z).all():
+        raise ValueError(f"{surface.name}: it has points without height: fill the holes before summits are looked for")
+    inner = z[1:-1, 1:-1]
+    found = inner > _highest_neighbour(z)
+    count = int(found.sum())
+    if count < FEWEST:
+        raise ValueError(
+            f"{surface.name}: {count} summits are too few for statistics, {FEWEST} are wanted: measure a larger area"
+        )
+    bend_x, bend_y = _bends(surface)
+    return inner[found] - z.mean(), -0.5 * (bend_x + bend_y)[found]
+
+
+def _highest_neighbour(z: np.ndarray) -> np.ndarray:
+    """Largest of the eight heights around each inner point (nx - 2, ny - 2)."""
+    around = np.ones((3, 3), bool)
+    around[1, 1] = False
+    return np.asarray(maximum_filter(z, footprint=around)[1:-1, 1:-1])
+
+
+def _refuse_steps(surface: HeightMap) -> None:
+    """Raise ValueError where many summits are terraces, because an instrument gave its heights in steps.
+
+    To be asked before levelling, which tilts them. Plane land around a terrace is none.
+    """
+    z = np.where(np.isfinite(surface.z), surface.z, -np.inf)
+    inner, highest, lowest = z[1:-1, 1:-1], _highest_neighbour(z), -_highest_neighbour(-z)
+    single, shared = int((inner > highest).sum()), int(((inner == highest) & (inner > lowest)).sum())
+    if shared > STEPS * max(single, 1):
+        raise ValueError(
+            f"{surface.name}: {shared} points are as high as their highest neighbour and {single} above all of them, "
+            "so that its heights come in steps and summits cannot be told: give `shortest`, some steps of the grid"
+        )
+
+
+def moments(surface: HeightMap) -> Moments:
+    """Spectral moments of a face by differences of its grid."""
+    steps = surface.spacing
+    slope = [np.mean((np.diff(surface.z, axis=axis) / step) ** 2) for axis, step in enumerate(steps)]
+    bend = [np.mean(second**2) for second in _bends(surface)]
+    return Moments(float(surface.z.var()), float(np.mean(slope)), float(np.mean(bend)))
+
+
+def _bends(surface: HeightMap) -> tuple[np.ndarray, np.ndarray]:
+    """Second derivatives along x and y at the inner points (nx - 2, ny - 2) [1/m]."""
+    z, (dx, dy) = surface.z, surface.spacing
+    along = (z[2:, 1:-1] - 2 * z[1:-1, 1:-1] + z[:-2, 1:-1]) / dx**2
+    across = (z[1:-1, 2:] - 2 * z[1:-1, 1:-1] + z[1:-1, :-2]) / dy**2
+    return along, across

@@ -1,0 +1,142 @@
+"""Asperities of height maps: caps of known radius and heights, Nayak's random faces, the command, what is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tribodyn as td
+from tests.helpers.command import leave
+from tests.helpers.rough_faces import caps, gaussian
+from tribodyn.geometry.asperities import Moments, identify, moments, summits
+from tribodyn.geometry.surface import HeightMap
+
+RADIUS, APART, STEP = 200e-6, 41e-6, 1e-6
+
+
+def some_heights(n: int = 8) -> np.ndarray:
+    """Symmetric, so that levelling finds no tilt."""
+    quarter = np.random.default_rng(3).uniform(0.2e-6, 0.6e-6, (n // 2, n // 2))
+    half = np.concatenate([quarter, quarter[::-1]])
+    return np.concatenate([half, half[:, ::-1]], axis=1)
+
+
+def test_caps_give_their_radius_density_and_gaps():
+    heights = some_heights()
+    found = identify(caps(RADIUS, heights, APART, STEP))
+    assert len(found.height) == heights.size
+    assert found.radius == pytest.approx(RADIUS, rel=1e-4)
+    assert found.density == pytest.approx(1 / APART**2, rel=0.02)  # the rim is left out
+    np.testing.assert_allclose(np.sort(found.gap), np.sort(heights.max() - heights.ravel()), atol=1e-12)
+
+
+def test_two_faces_of_caps_that_meet_have_half_the_radius_and_both_heights():
+    first = caps(RADIUS, some_heights(), APART, STEP)
+    single, both = td.asperities(first), td.asperities(first, first)
+    assert both.radius == pytest.approx(RADIUS / 2, rel=1e-4)
+    np.testing.assert_allclose(np.sort(both.gap), 2 * np.sort(single.gap), atol=1e-12)
+    lower = first.with_heights(first.z * (1 - 0.4 * (first.x < first.x.mean()))[:, None])
+    turned = td.asperities(lower, lower, mirror="x")
+    assert turned.height.std() < 0.8 * td.asperities(lower, lower).height.std()
+
+
+def test_two_random_faces_of_different_grids_have_the_sum_of_their_moments():
+    """Greenwood and Tripp 1970."""
+    first, one = gaussian(400, 1e-6, 60e-6, 16e-6, 0.3e-6, 8)
+    second, other = gaussian(220, 2e-6, 60e-6, 20e-6, 0.5e-6, 9)
+    for found in (identify(first, second), identify(second, first)):
+        wanted = Moments(one.m0 + other.m0, one.m2 + other.m2, one.m4 + other.m4)
+        assert found.radius == pytest.approx(wanted.radius, rel=0.05)
+        assert found.density == pytest.approx(wanted.density, rel=0.08)
+        assert found.height.std() == pytest.approx(wanted.deviation, rel=0.08)
+
+
+@pytest.mark.parametrize("shortest", [12e-6, 16e-6])
+def test_a_random_face_has_the_summits_that_nayak_counts(shortest):
+    face, known = gaussian(512, 1e-6, 60e-6, shortest, 0.3e-6, 1)
+    found = identify(face)
+    assert found.density == pytest.approx(known.density, rel=0.05)
+    assert found.radius == pytest.approx(known.radius, rel=0.05)
+    assert found.height.std() == pytest.approx(known.deviation, rel=0.05)
+    assert found.height.mean() == pytest.approx(known.mean, rel=0.05)
+    own = moments(face)
+    np.testing.assert_allclose([own.m0, own.m2, own.m4], [known.m0, known.m2, known.m4], rtol=0.04)
+
+
+def test_cut_off_and_noise_filter_leave_the_roughness_between_them():
+    face, known = gaussian(400, 1e-6, 40e-6, 16e-6, 0.3e-6, 2)
+    form = 1e-6 * np.cos(2 * np.pi * face.x / 400e-6)[:, None] + 1e-2 * face.y
+    noise = 6e-9 * np.random.default_rng(4).standard_normal(face.z.shape)
+    measured = face.with_heights(face.z + form + noise)
+    assert identify(measured, cutoff=100e-6).density > 1.2 * known.density
+    assert identify(measured).height.std() > 2 * known.deviation
+    found = identify(measured, cutoff=100e-6, shortest=5e-6)
+    assert found.density == pytest.approx(known.density, rel=0.1)
+    assert found.radius == pytest.approx(known.radius, rel=0.1)
+    assert found.height.std() == pytest.approx(known.deviation, rel=0.1)
+
+
+@pytest.mark.parametrize("rows", [2, 11, 101])
+def test_a_table_keeps_the_number_of_summits_and_their_mean_gap(rows):
+    found = identify(gaussian(256, 1e-6, 60e-6, 12e-6, 0.3e-6, 5)[0])
+    gap, density = found.table(rows).T
+    width = np.full(rows, gap[1])
+    width[[0, -1]] /= 2
+    assert (width * density).sum() == pytest.approx(found.density, rel=1e-12)
+    assert (width * density * gap).sum() / found.density == pytest.approx(found.gap.mean(), rel=1e-12)
+    assert gap[-1] == found.gap.max()
+
+
+def stepped() -> HeightMap:
+    face = gaussian(200, 1e-6, 60e-6, 16e-6, 0.3e-6, 6)[0]
+    return face.with_heights(np.round(face.z / 30e-9) * 30e-9)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: identify(stepped()), "its heights come in steps .*: give `shortest`"),
+        (lambda: identify(caps(RADIUS, some_heights(4), APART, STEP)), "16 summits are too few"),
+        (lambda: identify(caps(RADIUS, np.full((8, 8), 5e-7), APART, STEP)).table(1), "a table of 1 rows"),
+        (lambda: summits(HeightMap(*2 * (np.arange(5.0),), np.full((5, 5), np.nan))), "without height"),
+        (lambda: td.asperities(stepped(), mirror="x"), "one face only"),
+    ],
+)
+def test_what_has_no_asperities_is_one_sentence(call, words):
+    with pytest.raises(ValueError, match=words):
+        call()
+
+
+def test_heights_in_steps_are_cured_by_the_filter_that_the_sentence_names():
+    known = gaussian(200, 1e-6, 60e-6, 16e-6, 0.3e-6, 6)[1]
+    assert identify(stepped(), shortest=8e-6).radius == pytest.approx(known.radius, rel=0.25)
+
+
+def test_the_command_writes_the_table_that_a_contact_takes(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    face, _ = gaussian(128, 1e-6, 40e-6, 12e-6, 0.3e-6, 7)
+    np.savetxt(tmp_path / "scan.txt", face.z.T * 1e6)
+    units = ["--spacing", "1um,1um", "--lateral-unit", "m", "--height-unit", "um"]
+    out = tmp_path / "asperities.csv"
+    code, said, err = leave(["asperities", str(tmp_path / "scan.txt"), *units, "--out", str(out), "--json"], capsys)
+    assert code == 0, err
+    record, found = json.loads(said), identify(face)
+    assert record["radius_m"] == pytest.approx(found.radius, rel=1e-6)
+    np.testing.assert_allclose(np.loadtxt(out, delimiter=","), found.table(), rtol=1e-6, atol=1e-3)
+    code, said, _ = leave(["asperities", str(tmp_path / "scan.txt"), *units, "--out", str(out)], capsys)
+    assert code == 0
+    assert 'law = "rough", table = "asperities.csv", radius = "' in said
+    contact = {
+        "law": "rough", "table": out.name, "radius": record["radius_m"], "young": "200 GPa", "poisson": 0.3,
+        "tangential_stiffness": None, "normal_stiffness": None,
+    }  # fmt: skip
+    beam = tmp_path / "beam.toml"
+    beam.write_text(td.read_scene("beam").text)
+    scene = td.read_scene(beam, {f"contact.{key}": value for key, value in contact.items()}).scene
+    assert len(scene.contact.table) == 101
+    for words, cure in ((["--spacing", "1um"], "give two steps"), (["--cutoff", "soon"], "--cutoff")):
+        code, _, err = leave(["asperities", str(tmp_path / "scan.txt"), *units[2:], *words], capsys)
+        assert code == 2
+        assert cure in err
