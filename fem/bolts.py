@@ -16,6 +16,9 @@ from scipy.sparse import csr_matrix
 
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.springs import shares
+from tribodyn.fem.surface import surface
+
+PULLS = 0.3  # cosine between a face's outward normal and the force on it, from which on the face is pulled
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,10 @@ class Bolt:
     stiffness: float = 0.0
 
     def elongation(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Row e (3 n_node,); raises ValueError for unknown faces, or where the bolt crosses nothing."""
+        """Row e (3 n_node,).
+
+        Raises  ValueError for unknown faces, where the bolt crosses nothing, or pulls at a face instead of pressing
+        """
         points = coordinates(mesh)
         row = np.zeros(points.shape)
         (head, share_1), (nut, share_2) = (shares(mesh, node_sets, name) for name in (self.head, self.nut))
@@ -42,6 +48,12 @@ class Bolt:
                 f"bolts.{self.name} crosses nothing: '{self.head}' and '{self.nut}' lie at one place; give the faces "
                 "under its head and under its nut"
             )
+        for name, towards in ((self.head, axis), (self.nut, -axis)):
+            if _outward(mesh, name) @ towards > PULLS * length:
+                raise ValueError(
+                    f"bolts.{self.name} would pull at '{name}' instead of pressing on it: give the faces under head "
+                    "and nut, which look away from each other"
+                )
         row[nut] += share_2[:, None] * axis / length
         row[head] -= share_1[:, None] * axis / length
         return row.ravel()
@@ -60,6 +72,15 @@ class Bolt:
         """Stiffness (3 n_node, 3 n_node) [N/m]."""
         row = csr_matrix(self.elongation(mesh, node_sets))
         return csr_matrix(self.stiffness * row.T @ row)
+
+
+def _outward(mesh: Any, name: str) -> np.ndarray:
+    """Mean outward normal (3,) of a face; zero of a node set that is none, small of a bore."""
+    faces = mesh.boundaries or {}
+    if name not in faces:
+        return np.zeros(3)
+    face = surface(mesh, faces[name])
+    return np.asarray(face.area @ face.normals / face.area.sum())
 
 
 @dataclass(frozen=True)

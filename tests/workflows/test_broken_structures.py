@@ -67,6 +67,7 @@ BROKEN: dict[str, tuple[str, tuple[Change, ...], str, str]] = {  # name : scene,
         STACK, (('second = "b.x_max"', 'second = "a.x_min"'),), "",
         "m8 crosses nothing: .*give",
     ),
+    "bolt that pulls": (STACK, (('first = "a.x_min"\nsecond', 'first = "a.x_max"\nsecond'),), "", "would pull at 'a"),
     "face of no rule": (BLOCKS, (("n_width = 1\n", "n_width = 1\nfaces = {a = {}}\n"),), "", "expected a rule: box"),
     "face where nothing is": (
         BLOCKS, (("n_width = 1\n", "n_width = 1\nfaces = {a = {box = [[1, 1, 1], [2, 2, 2]]}}\n"),), "",
