@@ -1,7 +1,8 @@
-"""The order of the tests: by room, as the imports of the product go, and what starts processes after what does not.
+"""The order of the tests: what takes minutes first, then by room, as the imports of the product go.
 
-What is wrong in a kernel is then told by its own test, not by a run of a scene minutes later. Modules stay whole, so
-that what a module sets up is set up once.
+Two processes share the tests by file, so that what a module sets up is set up once. A long file that began last would
+keep one of them busy while the other waits. Of the others, what is wrong in a kernel is told by its own test, not by a
+run of a scene minutes later; what starts processes comes last.
 """
 
 from __future__ import annotations
@@ -12,14 +13,21 @@ import pytest
 
 ROOMS = ("geometry", "fem", "reduction", "hbm", "workflows", "properties", "cases", "documentation")
 PROCESSES = ("subprocess", "multiprocessing")  # a test module that imports one of them starts processes
+LONG = (  # more than 40 s of processor each, the longest first
+    "test_pages", "test_rig", "test_folds_in_time", "test_run", "test_scene_leaf_seal", "test_accuracy",
+    "test_scene_blade", "test_wear_rules", "test_blade_study", "test_own_part", "test_study",
+    "test_only_what_is_needed",
+    "test_verification", "test_pictures",
+)  # fmt: skip
 TESTS = Path(__file__).parent
 
 
-def rank(item: pytest.Item) -> tuple[bool, int]:
-    """Whether the item's module starts processes, and its room."""
+def rank(item: pytest.Item) -> tuple[int, bool, int]:
+    """Place of the item's module among the long ones, whether it starts processes, and its room."""
     room = item.path.relative_to(TESTS).parts[0]
     starts = any(hasattr(getattr(item, "module", None), name) for name in PROCESSES)
-    return starts, ROOMS.index(room) if room in ROOMS else len(ROOMS)
+    long = LONG.index(item.path.stem) if item.path.stem in LONG else len(LONG)
+    return long, starts, ROOMS.index(room) if room in ROOMS else len(ROOMS)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
