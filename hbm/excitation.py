@@ -43,6 +43,14 @@ class Excitation:
             if value != 0 and h not in basis.harmonics:
                 raise ValueError(f"load '{name}' acts in harmonic {h}, which is not kept: keep it in {basis.harmonics}")
 
+    def static_force(self, vectors: Mapping[str, np.ndarray], n: int) -> np.ndarray:
+        """Sum of the static loads (n,) [N]; vectors : unit loads (n,) by name, those that are not there left out."""
+        force = np.zeros(n)
+        for (h, name), value in self.loads.items():
+            if h == 0 and name in vectors:
+                force += np.real(value) * vectors[name]
+        return force
+
     def scaled(self, factor: float, dynamic_only: bool = True) -> Excitation:
         """The same excitation with its harmonics >= 1 (or all) times a factor."""
         loads = {(h, n): v * factor if h or not dynamic_only else v for (h, n), v in self.loads.items()}

@@ -320,10 +320,7 @@ def preloaded(scene: Scene, reduced: ReducedModel, balance: HarmonicBalance) -> 
 
 def unbalanced_load(excitation: Excitation, part: Part, motions: np.ndarray) -> str:
     """What is wrong with static loads that push the rigid motions (n_free, r) of a structure, with their resultant."""
-    force = np.zeros(len(part.free))
-    for (harmonic, name), value in excitation.loads.items():
-        if harmonic == 0 and name in part.system.loads:
-            force += np.real(value) * part.system.loads[name]
+    force = excitation.static_force(part.system.loads, len(part.free))
     moved = np.linalg.norm(part.field(motions), axis=(1, 2))
     loose = moved > 1e-6 * moved.max()
     names = [""]

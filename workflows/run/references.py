@@ -115,10 +115,7 @@ def free_deflection(balance: HarmonicBalance) -> np.ndarray:
     if "n" not in interface.components or not balance.basis.has_static:
         return missing
     system, B = balance.model.at_harmonic(0)
-    force = np.zeros(system.n_dof)
-    for (harmonic, name), value in balance.excitation.loads.items():
-        if harmonic == 0:
-            force += np.real(value) * system.loads[name]
+    force = balance.excitation.static_force(system.loads, system.n_dof)
     factor = _factor(system.stiffness)
     if factor is None:
         return missing

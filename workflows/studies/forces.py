@@ -14,6 +14,7 @@ from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.part import Part
 from tribodyn.fem.prestress import spin_softening
 from tribodyn.hbm import newton
+from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.linear.recovery import full_displacement
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.run import modelling, part_reduction, settings
@@ -62,7 +63,7 @@ def study(file: SceneFile) -> list[BodyForces]:
             raise SolveFailed(f"the contact does not settle under the static loads: {solved.outcome}")
         force = solved.state.cycle.force
         q = full_displacement(balance, solved.state.flat, force.reshape(solved.state.flat.shape), omega)[:, 0]
-    load = _loads(scene, part, balance.excitation.loads, q)
+    load = _loads(scene, part, balance.excitation, q)
     contact = _contact_forces(scene, part, force[:, :, 0])
     bodies = [b.name for b in part.mesh.bodies if b.name] if isinstance(part.mesh, Assembly) else []
     sets = {name: named(part.node_sets, name) for name in bodies} or {"part": np.arange(len(part.points))}
@@ -78,14 +79,10 @@ def study(file: SceneFile) -> list[BodyForces]:
     return found
 
 
-def _loads(scene: MeshScene, part: Part, loads: Any, q: np.ndarray) -> np.ndarray:
+def _loads(scene: MeshScene, part: Part, excitation: Excitation, q: np.ndarray) -> np.ndarray:
     """Static loads at the nodes (n_node, 3) [N]; those of a turning frame grow with the static displacement q."""
-    total = np.zeros(len(part.free))
-    for (harmonic, name), value in loads.items():
-        if harmonic == 0 and name in part.system.loads:  # a prescribed displacement is none of the part's
-            total += np.real(value) * part.system.loads[name]
     full = np.zeros(3 * len(part.points))
-    full[part.free] = total
+    full[part.free] = excitation.static_force(part.system.loads, len(part.free))
     if scene.wheel is not None and scene.wheel.speed:
         mass, _ = assemble(part.mesh, part_reduction.material(scene, part.mesh))
         moved = part.field(q).ravel()
