@@ -116,6 +116,7 @@ class AtPeak:
     tolerance : relative, on the frequency of the peak
     highest : amplitude that no linear response inside the range passes, with the contact free or stuck, at load factor
         1 [m]: a tracked peak as high is not overtaken, and none is looked for
+    scanned : highest harmonic of the search for higher peaks
     """
 
     output: str
@@ -124,6 +125,7 @@ class AtPeak:
     n_scan: int = 60
     tolerance: float = 1e-5
     highest: float = np.inf
+    scanned: int = SCANNED
     newton: NewtonOptions = field(default_factory=NewtonOptions)
 
     def first(self, balance: HarmonicBalance) -> OperatingPoint:
@@ -164,7 +166,7 @@ class AtPeak:
         if OVERTAKES * point.amplitude >= self.highest * balance.load_factor:
             return None, 0
         needed = max((h for h, _ in balance.excitation.loads), default=0)
-        few = balance.with_harmonics(tuple(h for h in balance.basis.harmonics if h <= max(SCANNED, needed)))
+        few = balance.with_harmonics(tuple(h for h in balance.basis.harmonics if h <= max(self.scanned, needed)))
         try:
             scanned = self.first(few)
         except NoPeak:

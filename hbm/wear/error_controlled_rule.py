@@ -107,14 +107,19 @@ def evolve(
     return history(rows, end.kind.say(end.detail + _jumps(rows)))
 
 
+def jumps(rows: Sequence[WearRow]) -> list[int]:
+    """Rows of this rule after which wear went on at another peak: what follows a jump or a leap has no plan."""
+    pairs = enumerate(pairwise(rows))
+    return [i for i, (a, b) in pairs if a.plan.size and not a.plan.any() and abs(b.omega / a.omega - 1) > LARGEST_SHIFT]
+
+
 def _jumps(rows: Sequence[WearRow]) -> str:
     """What to say of frequencies that moved on to another peak between rows; empty where none did."""
-    said = [
-        f"; the response jumped from {a.omega / TURN:.5g} to {b.omega / TURN:.5g} Hz at {b.cycles:.3g} cycles"
-        for a, b in pairwise(rows)
-        if not a.plan.any() and abs(b.omega / a.omega - 1) > LARGEST_SHIFT  # what follows a jump or a leap has no plan
-    ]
-    return "".join(said)
+    return "".join(
+        f"; the response jumped from {rows[i].omega / TURN:.5g} to {rows[i + 1].omega / TURN:.5g} Hz "
+        f"at {rows[i + 1].cycles:.3g} cycles"
+        for i in jumps(rows)
+    )
 
 
 @dataclass(frozen=True)

@@ -14,17 +14,20 @@ import numpy as np
 
 from tribodyn.hbm.continuation.operating_point import NoPeak
 from tribodyn.hbm.outcome import SolveEnd
+from tribodyn.hbm.wear.error_controlled_rule import jumps
 from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload
-from tribodyn.workflows.accuracy import probes
+from tribodyn.workflows.accuracy import jump_probe, probes
 from tribodyn.workflows.accuracy.probes import Answers, InTime, State, relative
 from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution, Statement, Verdict
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 
 MOST = 0.8  # of the seconds, for more harmonics, which matter most
+FOR_JUMP = 0.5  # of the seconds, for the instant of a jump to another peak, where there is one
 HALF = 0.5  # of the seconds that are left, for one measurement of several
 CONTRADICTION = 3.0  # times the estimated error, from which on time integration contradicts the balance
 RESPONSE = ("amplitude", "energy", "preload")
@@ -51,6 +54,8 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spe
         return Verdict(_nothing(why), (), process_time() - clock)
     values = _values(result, seen)
     parts: list[Contribution] = list(_of_budget(result))
+    with progress.stage("verdict: jump"):
+        parts += _of_jump(file, model, result, values["life"], FOR_JUMP * left(), skipped)
     with progress.stage("verdict: harmonics"):
         finer = list(probes.each(seen, probes.with_more_harmonics, MOST * left()))
         lost = f"lost with more harmonics, or beyond the {allowed:.3g} s of verdict.seconds"
@@ -126,6 +131,25 @@ def _of_harmonics(
         yield Contribution("harmonics", "life", error, how if error is not None else lost)
     if result.wear is not None and result.wear_steps and len(seen) > 1:
         yield Contribution("harmonics", "depth", _depth_error(result, seen, finer), "preload with more harmonics")
+
+
+def _of_jump(
+    file: SceneFile, model: Model, result: Result, life: float | None, seconds: float, skipped: str
+) -> list[Contribution]:
+    """What more harmonics change in the instant at which the run goes on at another peak; nothing where it does not."""
+    wear, scene = result.wear, file.scene
+    if wear is None or life is None or scene.wear is None or not jumps(wear.rows()):
+        return []
+    duty = settings.mission(scene)[0]
+    try:
+        with processor_seconds(seconds):
+            error = jump_probe.life_moved(model.balance, wear, duty, life)
+    except TimeUp:
+        return [Contribution("instant of the jump", "life", None, skipped)]
+    except (ValueError, RuntimeError) as refusal:
+        return [Contribution("instant of the jump", "life", None, str(refusal))]
+    far = f"with more harmonics it moves by more than {jump_probe.SHARES[-1]:.0%} of the life"
+    return [Contribution("instant of the jump", "life", error, far if error is None else "more harmonics decide on it")]
 
 
 def _depth_error(result: Result, seen: Sequence[State], finer: Sequence[Answers | None]) -> float | None:

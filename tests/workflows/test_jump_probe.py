@@ -1,0 +1,61 @@
+"""How far more harmonics move the jump of a wear run to another peak."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.helpers.pressed_body import wear_problem
+from tribodyn.hbm.continuation.operating_point import AtPeak
+from tribodyn.hbm.wear.error_controlled_rule import jumps
+from tribodyn.hbm.wear.evolution import Duty
+from tribodyn.workflows.accuracy import jump_probe
+
+SITE = AtPeak("tip", 250.0, 1200.0)
+ROWS = [
+    SimpleNamespace(plan=np.ones(2), omega=900.0),
+    SimpleNamespace(plan=np.zeros(2), omega=880.0),  # the step behind it ended at another peak
+    SimpleNamespace(plan=np.ones(2), omega=450.0),
+    SimpleNamespace(plan=np.zeros(2), omega=449.0),  # a leap on the same branch
+    SimpleNamespace(plan=np.ones(2), omega=448.0),
+]
+
+
+def test_a_jump_is_a_step_without_a_plan_to_another_frequency() -> None:
+    rows: Any = ROWS
+    assert jumps(rows) == [1]
+    thesis: Any = [SimpleNamespace(plan=np.zeros(0), omega=omega) for omega in (900.0, 450.0)]
+    assert jumps(thesis) == []
+
+
+@pytest.mark.parametrize(
+    ("first_overtaken", "moved"), [(-0.04, 0.05 * 0.75), (-0.01, 0.025 * 0.75), (0.03, 0.05 * 0.75), (0.2, None)]
+)
+def test_the_change_of_life_is_bounded_from_the_side_on_which_the_answer_changes(
+    first_overtaken: float, moved: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The slower peak dissipates a quarter of the faster one: each cycle of delay costs three quarters of one."""
+    monkeypatch.setattr(jump_probe, "_sweep_with_more", lambda *given: lambda share: share >= first_overtaken)
+    wear: Any = SimpleNamespace(rows=lambda: ROWS, energy=np.array([[1.0], [1.0], [4.0], [4.0], [4.0]]))
+    nothing: Any = None
+    found = jump_probe.life_moved(nothing, wear, Duty(SITE), 1e6)
+    assert found == (None if moved is None else pytest.approx(moved))
+    wear.rows = lambda: ROWS[2:]
+    assert jump_probe.life_moved(nothing, wear, Duty(SITE), 1e6) == 0.0
+
+
+def test_the_sweep_with_more_harmonics_meets_the_higher_peak() -> None:
+    balance = wear_problem().balance
+    highest, lower = SITE.first(balance), AtPeak("tip", 500.0, 545.0).first(balance)
+    for point, overtaken in ((lower, True), (highest, False)):
+        flat = point.state.x.reshape(1, -1, balance.basis.n_coeff)
+        wear: Any = SimpleNamespace(
+            displacement=np.concatenate([flat, flat]),
+            cycles=np.array([0.0, 1.0]),
+            depth=np.zeros((2, balance.contact.n_pair)),
+            omega=np.full(2, point.state.omega),
+        )
+        assert jump_probe._sweep_with_more(balance, wear, Duty(SITE), 0, 1.0)(0.0) is overtaken

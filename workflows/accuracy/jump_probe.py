@@ -1,0 +1,80 @@
+"""How far more harmonics move the instant at which a wear run goes on at another peak.
+
+Energies at the states of a run say nothing about it: which peak wears is decided by a sweep. The sweep is repeated with
+more harmonics before and after the instant, until its answer changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation import harmonic_choice
+from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak, Site
+from tribodyn.hbm.wear.error_controlled_rule import jumps
+from tribodyn.hbm.wear.evolution import Duty
+from tribodyn.hbm.wear.history import WearHistory
+
+MORE = 2  # harmonics beyond the kept ones
+SHARES = (0.025, 0.05, 0.1)  # of the life, on the side of the instant where the answer is to change
+
+
+def life_moved(balance: HarmonicBalance, wear: WearHistory, duty: Duty, life: float) -> float | None:
+    """Relative change of a life [cycles] that the first jump of its run makes when more harmonics decide on it.
+
+    The instant moves by less than the share returned says; while it does, the contact wears at the slower peak instead
+    of the faster one. None where the peak is not found with more harmonics, or the instant moves by more than SHARES.
+    0 where the run has no jump
+    """
+    found = jumps(wear.rows())
+    if not found or isinstance(duty.site, AtFrequency):
+        return 0.0
+    overtaken = _sweep_with_more(balance, wear, duty, found[0], life)
+    at_once = overtaken(0.0)
+    if at_once is None:
+        return None
+    slow, fast = (float(wear.energy[row].sum()) for row in (found[0], found[0] + 1))
+    for share in SHARES:
+        if overtaken(-share if at_once else share) == (not at_once):
+            return share * abs(1 - slow / fast)
+    return None
+
+
+def _sweep_with_more(
+    balance: HarmonicBalance, wear: WearHistory, duty: Duty, row: int, life: float
+) -> Callable[[float], bool | None]:
+    """Whether a sweep with more harmonics meets a higher peak, some share of the life after the jump behind a row.
+
+    None where the tracked peak itself is not found
+    """
+    top = balance.basis.harmonics[-1] + MORE
+    wide = harmonic_choice.widened(balance, top)
+    wide = wide.with_harmonics(tuple(h for h in wide.basis.harmonics if h <= top)).with_load(duty.load)
+    kept = balance.basis.transfer(wear.displacement[row], wide.basis)
+    x = kept.reshape(balance.contact.n_pair, -1, wide.basis.n_coeff)
+    at, known = wear.cycles[: row + 2], wear.depth[: row + 2]
+    rate = (known[-1] - known[-2]) / (at[-1] - at[-2])
+    site = _searching(duty.site, top)
+
+    def overtaken(share: float) -> bool | None:
+        cycles = at[-1] + share * life
+        if share > 0:
+            depth = known[-1] + rate * share * life
+        else:
+            depth = np.array([np.interp(cycles, at, pair) for pair in known.T])
+        worn = wide.with_gap(balance.contact.gap + depth)
+        point = site.next(worn, float(wear.omega[row]), x)
+        return site.overtaken(worn, point)[0] is not None if point.solution.converged else None
+
+    return overtaken
+
+
+def _searching(site: Site, top: int) -> Site:
+    """A site that looks for higher peaks with all harmonics up to `top`."""
+    if isinstance(site, AtPeak):
+        return replace(site, scanned=top)
+    assert not isinstance(site, AtFrequency)
+    return replace(site, peak=replace(site.peak, scanned=top))
