@@ -468,3 +468,27 @@ def test_the_error_of_a_mesh_that_is_given_is_told_by_its_halved_elements(tmp_pa
     found = [probes.unworn(file, (0, 1))[0].hertz for file in files]
     error = probes.OF_HALVED * (found[0] / found[1] - 1)
     assert 0.3 * error < found[0] / 461.658 - 1 < error  # the peak with geometry.halved=2
+
+
+def test_a_bolt_presses_on_faces_of_a_cad_file(tmp_path: Path) -> None:
+    """Tetrahedra: the shank has its preload, and so has the joint, whose pairs stand at mid-side nodes."""
+    with session() as gmsh:
+        for z in (0, 10):
+            gmsh.model.occ.addBox(0, 0, z, 20, 10, 10)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(tmp_path / "stack.step"))
+    text = STACK[: STACK.index("[bodies.a]")]
+    for i, (name, held) in enumerate((("a", 'fixed = ["left"]\n'), ("b", "")), 1):
+        text += f'[bodies.{name}]\nmesh = "stack.step"\nvolume = "solid {i}"\nunit = "mm"\nsize = "9 mm"\n'
+        text += f'material = "plain"\n{held}[bodies.{name}.faces]\n'
+        text += 'left = { normal = "-x" }\ntop = { normal = "z" }\nfoot = { normal = "-z" }\n'
+    tail = STACK[STACK.index("[contacts.joint]") :].replace("a.x_max", "b.foot").replace('"b.x_min"', '"a.top"')
+    tail = tail.replace('"a.x_min"', '"b.top"').replace('second = "b.x_max"\npreload', 'second = "a.foot"\npreload')
+    balance = built(text + tail.replace("b.x_max", "b.top").replace('t1 = "y"', 't1 = "x"'), tmp_path).balance
+    balance = balance.with_load(0.0)
+    omega = 2 * np.pi * 1e3
+    found = newton.solve(balance, omega, balance.stuck(omega), newton.NewtonOptions(tolerance=1e-12))
+    assert found.converged
+    elongation = balance.outputs(found.state)[balance.compliance.output_names.index("bolts.m8"), 0]
+    assert balance.excitation.loads[0, "m8"].real + 90e6 * elongation == pytest.approx(5000.0, rel=1e-8)
+    assert balance.preload(found.state) == pytest.approx(5000.0, rel=1e-6)
