@@ -16,6 +16,8 @@ from tribodyn.workflows.pictures.style import PRESSURE_MAP, STATUS, STYLE, WEAR_
 from tribodyn.workflows.result.result import Patch, Result
 from tribodyn.workflows.result.states import shown_cycles, shown_states, state_of
 
+LEAST = 5.6  # inches of width: the legend of all states fits below
+
 
 def patch_maps(result: Result, rows: np.ndarray | None = None, scale: Literal["column", "shared"] = "column") -> Figure:
     """Depth, status over the cycle and mean pressure, one column for each state.
@@ -38,7 +40,7 @@ def patch_maps(result: Result, rows: np.ndarray | None = None, scale: Literal["c
     lines = list(fields)[:1] + ["status"] * told + list(fields)[1:]
     aspect = float(np.clip(np.ptp(patch.flat[:, 1]) / np.ptp(patch.flat[:, 0]), 0.25, 2.0))
     with mpl.rc_context({**STYLE, "axes.grid": False}):
-        size = (3.1 * len(states) + 0.4, len(lines) * (2.3 * aspect + 0.75) + 0.9)
+        size = (max(3.1 * len(states) + 0.4, LEAST), len(lines) * (2.3 * aspect + 0.75) + 0.9)
         figure = Figure(figsize=size, layout="constrained")
         grid = figure.subplots(len(lines), len(states), squeeze=False)
         for line, name in enumerate(lines):
@@ -83,7 +85,9 @@ def status_maps(result: Result, count: int = 8) -> Figure:
     lines = -(-len(rows) // columns)
     aspect = float(np.clip(np.ptp(patch.flat[:, 1]) / np.ptp(patch.flat[:, 0]), 0.25, 2.0))
     with mpl.rc_context({**STYLE, "axes.grid": False}):
-        figure = Figure(figsize=(2.5 * columns + 0.4, lines * (2.2 * aspect + 0.6) + 1.0), layout="constrained")
+        figure = Figure(
+            figsize=(max(2.5 * columns + 0.4, LEAST), lines * (2.2 * aspect + 0.6) + 1.0), layout="constrained"
+        )
         grid = figure.subplots(lines, columns, squeeze=False)
         for axes, row in zip(grid.ravel(), rows, strict=False):
             draw_status(axes, patch, wear.status[row])

@@ -15,6 +15,7 @@ from tribodyn.workflows.scene.schema import MeshScene, Scene
 POINTS = 401
 POINTS_BETWEEN = 41  # beside the resonances themselves
 MODES = 100
+RIGID = 1e-6  # of the square of the mean frequency: eigenvalues below are those of motions as a rigid body
 
 
 def linear_references(balance: HarmonicBalance, output: str, start: float, stop: float) -> References:
@@ -27,10 +28,11 @@ def linear_references(balance: HarmonicBalance, output: str, start: float, stop:
 def highest_linear(balance: HarmonicBalance, output: str, start: float, stop: float) -> float:
     """Largest amplitude of an output from one frequency to another [rad/s], free or stuck [m]; infinite where loose."""
     states = (None, balance.contact.stiffness)
-    at = [np.linspace(start, stop, POINTS_BETWEEN), *(_resonances(balance, springs) for springs in states)]
-    omega = np.unique(np.clip(np.concatenate(at), start, stop))
-    highest = float(max(_amplitudes(balance, springs, output, omega).max() for springs in states))
-    return np.inf if np.isnan(highest) else highest
+    found = np.concatenate([_resonances(balance, springs) for springs in states])
+    if (found < np.sqrt(RIGID) * (start + stop) / 2).any():
+        return np.inf  # between loose and stuck a part can have any resonance
+    omega = np.unique(np.clip(np.concatenate([np.linspace(start, stop, POINTS_BETWEEN), found]), start, stop))
+    return float(max(_amplitudes(balance, springs, output, omega).max() for springs in states))
 
 
 def delta_max(scene: Scene, approach: np.ndarray, area: np.ndarray) -> float:
@@ -79,11 +81,11 @@ def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: st
         if not force.any():
             continue
         stiffness = system.stiffness if springs is None else stuck_stiffness(system.stiffness, B, springs)
-        factor, shift = _factor(stiffness), 0.0
-        if factor is None:
-            shift = float((h * omega.mean()) ** 2)
-            factor = sla.cho_factor(stiffness + shift * system.mass)
         lam, phi = sla.eigh(stiffness, system.mass, subset_by_index=(0, min(MODES, system.n_dof) - 1))
+        shift = float((h * omega.mean()) ** 2)
+        if lam[0] > RIGID * shift:
+            shift = 0.0
+        factor = sla.cho_factor(stiffness + shift * system.mass if shift else stiffness)
         rate = system.velocity_matrix
         damping = np.zeros((len(lam),) * 2) if rate is None else phi.conj().T @ rate @ phi
         row = system.outputs[output]
@@ -93,15 +95,6 @@ def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: st
             dynamic = np.diag(lam + s**2) + s * damping
             amplitudes[i, position] = remainder + (row @ phi) @ np.linalg.solve(dynamic, modal)
     return amplitude(basis.to_real(amplitudes))
-
-
-def _factor(stiffness: np.ndarray) -> tuple[np.ndarray, bool] | None:
-    """The Cholesky factor of a stiffness, None where its part can move rigidly, even if rounding lets one pass."""
-    try:
-        factor: tuple[np.ndarray, bool] = sla.cho_factor(stiffness)
-    except np.linalg.LinAlgError:
-        return None
-    return factor if softest_residual(stiffness, lambda b: sla.cho_solve(factor, b)) <= SINGULAR else None
 
 
 def free_deflection(balance: HarmonicBalance) -> np.ndarray:
@@ -116,8 +109,11 @@ def free_deflection(balance: HarmonicBalance) -> np.ndarray:
         return missing
     system, B = balance.model.at_harmonic(0)
     force = balance.excitation.static_force(system.loads, system.n_dof)
-    factor = _factor(system.stiffness)
-    if factor is None:
+    try:
+        factor = sla.cho_factor(system.stiffness)
+    except np.linalg.LinAlgError:
         return missing
+    if softest_residual(system.stiffness, lambda b: sla.cho_solve(factor, b)) > SINGULAR:
+        return missing  # it can move rigidly, but rounding let the factorisation pass
     q = sla.cho_solve(factor, force)
     return np.asarray((B @ q)[interface.components.index("n") :: len(interface.components)])
