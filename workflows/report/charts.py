@@ -35,7 +35,7 @@ def _chart(data: list[Chart], x: str, y: str, log: bool = False) -> Chart:
     axis = {"showline": True, "linecolor": INK, "gridcolor": "#dfe2e6", "zeroline": False, "automargin": True}
     layout = {
         "xaxis": {**axis, "title": {"text": x}},
-        "yaxis": {**axis, "title": {"text": y}, "type": "log" if log else "linear", "tickformat": "~g" if log else ""},
+        "yaxis": {**axis, "title": {"text": y}, "type": "log" if log else "linear"},
         "margin": {"l": 60, "r": 12, "t": 10, "b": 45},
         "paper_bgcolor": "white",
         "plot_bgcolor": "white",
