@@ -1,7 +1,8 @@
 """Nasty values for every key of a scene: each run ends well, is refused, or fails with a sentence, and in time.
 
 Every run is the command `tribodyn run` in a process of its own, forked from one that has loaded everything. A limit of
-its processor seconds kills what does not end.
+its processor seconds kills what does not end. A value that reading the scene refuses needs no run, and of several that
+make the same scene (`1`, `true` for a switch, a value that is the key's default) one is run.
 """
 
 from __future__ import annotations
@@ -10,9 +11,10 @@ import os
 import resource
 import sys
 import time
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from multiprocessing import connection, get_context
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -22,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from tribodyn.fem import factor
+from tribodyn.workflows.accuracy.time_limit import processor_seconds
 from tribodyn.workflows.command.exits import BAD_INPUT, FAILED_SOLVE
 from tribodyn.workflows.result import store
 from tribodyn.workflows.run import pipeline  # noqa: F401  # loaded once, before the processes are forked
@@ -36,7 +39,7 @@ NASTY = (
 
 ENDS = {0: "success", BAD_INPUT: "refused", FAILED_SOLVE: "failed"}
 GOOD = (*ENDS.values(),)
-LATE = 10.0  # times the limit of processor seconds, of the clock, after which a process that sleeps is killed
+LATE = 10.0  # times the limit, of the clock, after which a process that sleeps is killed; what compiling may take
 
 Active = dict[BaseProcess, tuple[str, str, str, Path, float]]
 
@@ -46,7 +49,7 @@ class Tried:
     """One value of one key.
 
     end : success, refused or failed (with one sentence), else what is wrong with it; said : the sentence, or what was
-    printed; seconds : of the processor
+    printed; seconds : of the processor; like : another key=value that makes the same scene and was run, empty for a run
     """
 
     scene: str
@@ -55,6 +58,7 @@ class Tried:
     end: str
     said: str
     seconds: float
+    like: str = ""
 
     @property
     def good(self) -> bool:
@@ -113,8 +117,25 @@ def fuzz(
     todo = cases(scene, overrides, runs, seed)
     fork, found = get_context("fork"), []
     active: Active = {}
+    with TemporaryDirectory() as folder:  # the scene as it is: compiles what is not compiled yet, which takes its time
+        unchanged = fork.Process(target=_run, args=(command, scene, tuple(overrides), Path(folder), LATE * seconds))
+        unchanged.start()
+        unchanged.join(LATE * seconds)
+        unchanged.kill()
+    first: dict[str, tuple[str, str]] = {}  # by the scene that is meant: who runs it
+    same: list[tuple[str, str, tuple[str, str]]] = []
     with TemporaryDirectory() as folder:
         for number, (key, value) in enumerate(todo):
+            if number % 1000 == 999:
+                wrong = sum(not one.good for one in found)
+                say(f"{scene}: {number + 1} of {len(todo)} values, {len(first)} runs, {wrong} wrong ends")
+            meant = _read(scene, (*overrides, f"{key}={value}"), seconds)
+            if meant.refusal:
+                found.append(Tried(scene, key, value, ENDS[BAD_INPUT], f"tribodyn: {meant.refusal}", meant.seconds))
+                continue
+            if meant.text and first.setdefault(meant.text, (key, value)) != (key, value):
+                same.append((key, value, first[meant.text]))
+                continue
             while len(active) >= workers:
                 found += _ended(active, seconds)
             place = Path(folder) / str(number)
@@ -123,11 +144,37 @@ def fuzz(
             process: BaseProcess = fork.Process(target=_run, args=(command, scene, changed, place, seconds))
             process.start()
             active[process] = (scene, key, value, place, time.monotonic())
-            if number % 100 == 99:
-                say(f"{scene}: {number + 1} of {len(todo)} values, {sum(not one.good for one in found)} wrong ends")
         while active:
             found += _ended(active, seconds)
+    run = {(one.key, one.value): one for one in found}
+    found += [replace(run[who], key=key, value=value, like="=".join(who)) for key, value, who in same]
     return sorted(found, key=lambda one: (one.key, NASTY.index(one.value)))
+
+
+@dataclass(frozen=True)
+class _Meant:
+    """What a scene file with a value means: the scene as text, or the sentence that refuses it; both empty if neither.
+
+    seconds : of the processor
+    """
+
+    text: str
+    refusal: str
+    seconds: float
+
+
+def _read(scene: str, overrides: tuple[str, ...], seconds: float) -> _Meant:
+    """Read a scene; what is no refusal in one line is left for the command to meet again."""
+    clock = time.process_time()
+    try:
+        with warnings.catch_warnings(), processor_seconds(seconds):
+            warnings.simplefilter("error")
+            text, refusal = scene_file.read(scene, overrides).scene.model_dump_json(), ""
+    except scene_file.SceneError as error:
+        text, refusal = "", str(error)
+    except Exception:  # a traceback of the command tells more
+        text = refusal = ""
+    return _Meant(text, "" if "\n" in refusal else refusal, time.process_time() - clock)
 
 
 def _ended(active: Active, seconds: float) -> list[Tried]:
