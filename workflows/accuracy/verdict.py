@@ -52,7 +52,7 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spe
     except (NoPeak, TimeUp) as missing:
         why = skipped if isinstance(missing, TimeUp) else str(missing)
         return Verdict(_nothing(why), (), process_time() - clock)
-    values = _values(result, seen)
+    values = values_of(result, seen)
     parts: list[Contribution] = list(_of_budget(result))
     with progress.stage("verdict: jump"):
         parts += _of_jump(file, model, result, values["life"], FOR_JUMP * left(), skipped)
@@ -81,7 +81,7 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spe
     return Verdict(statements, tuple(parts), process_time() - clock)
 
 
-def _values(result: Result, seen: Sequence[State]) -> dict[str, float | None]:
+def values_of(result: Result, seen: Sequence[State]) -> dict[str, float | None]:
     """The quantities of a result: of its first state, and of its whole wear."""
     values: dict[str, float | None] = dict.fromkeys(QUANTITIES)
     if seen:

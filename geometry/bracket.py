@@ -1,0 +1,89 @@
+"""Angle bracket with bolt holes, in tetrahedra: a leg that is clamped at its back, and one whose end rests on a pad."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tribodyn.geometry import checks
+from tribodyn.geometry.gmsh_session import save, session
+
+MESH = ("n_length",)  # numbers of elements
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """The clamped leg stands along z, its back on x = 0; the other lies along x, its lower face on z = 0.
+
+    length, height : of the lying and of the standing leg, outside [m]; width : along y; thickness : of both legs
+    hole, holes : diameter of the holes through the standing leg, in a row up the middle, and their number
+    pad_length : of the pad below the end of the lying leg
+    n_length : elements along the lying leg, which sets the size of all of them
+    """
+
+    length: float = 0.1
+    height: float = 0.06
+    width: float = 0.03
+    thickness: float = 0.008
+    hole: float = 0.008
+    holes: int = 2
+    pad_length: float = 0.02
+    n_length: int = 10
+
+    def __post_init__(self) -> None:
+        checks.positive(self, "length", "height", "width", "thickness", "hole", "pad_length")
+        checks.whole(self, "holes", least=0)
+        checks.whole(self, "n_length", least=3)
+        if self.thickness >= self.height or self.thickness + self.pad_length >= self.length:
+            raise ValueError(
+                f"geometry.thickness is {self.thickness}: keep it below height, and with pad_length below length"
+            )
+        if self.holes and self.hole >= min(self.width, (self.height - self.thickness) / self.holes):
+            raise ValueError(f"geometry.hole is {self.hole}: keep it below width, and all holes within the height")
+
+
+def build(parameters: Parameters, path: str | Path) -> None:
+    """Write the mesh.
+
+    Groups: volume "bracket"; surfaces "back" (x = 0), "pad" (below the end), "top" (above the pad), "end" (x = length),
+    "side" (of the end, y = width)
+    """
+    p = parameters
+    start = p.length - p.pad_length
+    with session() as gmsh:
+        occ = gmsh.model.occ
+        standing = occ.addBox(0, 0, 0, p.thickness, p.width, p.height)
+        for number in range(p.holes):
+            z = p.thickness + (p.height - p.thickness) * (number + 0.5) / p.holes
+            bore = occ.addCylinder(0, p.width / 2, z, p.thickness, 0, 0, p.hole / 2)
+            occ.cut([(3, standing)], [(3, bore)])
+        boxes = [(3, occ.addBox(p.thickness, 0, 0, start - p.thickness, p.width, p.thickness))]
+        boxes.append((3, occ.addBox(start, 0, 0, p.pad_length, p.width, p.thickness)))
+        occ.fragment([(3, standing)], boxes)
+        occ.synchronize()
+        volumes = [tag for _, tag in gmsh.model.getEntities(3)]
+        gmsh.model.addPhysicalGroup(3, volumes, name="bracket")
+        for name, low, high in (
+            ("back", (0, 0, 0), (0, p.width, p.height)),
+            ("pad", (start, 0, 0), (p.length, p.width, 0)),
+            ("top", (start, 0, p.thickness), (p.length, p.width, p.thickness)),
+            ("end", (p.length, 0, 0), (p.length, p.width, p.thickness)),
+            ("side", (start, p.width, 0), (p.length, p.width, p.thickness)),
+        ):
+            gmsh.model.addPhysicalGroup(2, _within(gmsh, low, high), name=name)
+        size = p.length / p.n_length
+        gmsh.option.setNumber("Mesh.MeshSizeMin", size)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.setOrder(2)
+        save(gmsh, path)
+
+
+def _within(gmsh: Any, low: tuple[float, ...], high: tuple[float, ...]) -> list[int]:
+    """Tags of the faces in a box."""
+    slack = 1e-4 * np.ptp([low, high])  # Open CASCADE widens its boxes
+    a, b = np.array(low) - slack, np.array(high) + slack
+    return [tag for _, tag in gmsh.model.getEntitiesInBoundingBox(*a, *b, 2)]

@@ -1,0 +1,256 @@
+"""Verdicts and promises on scenes that nobody has tuned, held against a reference that is finer in every knob.
+
+Scenes are drawn by `scoreboard_scenes`. Each is run and judged as a user gets it; then it is run with more elements,
+modes, harmonics, samples, points and wear steps. A row is kept as soon as its scene is done.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from tribodyn.geometry import parts
+from tribodyn.hbm.continuation.operating_point import NoPeak
+from tribodyn.workflows.accuracy import probes, refinement, verdict
+from tribodyn.workflows.accuracy.statement import QUANTITIES
+from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
+from tribodyn.workflows.benchmarks.scoreboard_scenes import draw
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.run import modelling, pipeline
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.scene_file import SceneFile, parse
+from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.scene.structure import StructureScene
+
+ROWS = "rows.jsonl"
+ELEMENTS = 1.75  # of the reference along every edge, over those of the scene
+MODES, CUTOFF = 3, 2  # times those of the scene
+HARMONICS, LOWEST = 4, 6  # more than the scene's; the highest at the least
+STEPS = 3  # wear steps in each of the scene
+ROUNDING = 1e-8  # relative difference that says nothing
+PROMISED = 5  # every so many scenes a promise is asked for too
+WANTED = "10 % of peak frequency, amplitude, energy, preload"
+
+Values = dict[str, float | None]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One quantity of one scene: what the verdict says, and what the reference says.
+
+    error, true : relative; stated : whether the verdict states the value
+    """
+
+    quantity: str
+    value: float | None
+    error: float | None
+    dominated_by: str | None
+    stated: bool
+    reference: float | None
+    true: float | None
+    reason: str
+
+    @property
+    def promised(self) -> bool:
+        """Whether there is a stated error and a reference to hold it against."""
+        return self.stated and self.error is not None and self.true is not None
+
+    @property
+    def broken(self) -> bool:
+        """Whether the true error is above the stated one."""
+        return self.promised and (self.true or 0.0) > (self.error or 0.0) + ROUNDING
+
+
+@dataclass(frozen=True)
+class Row:
+    """One scene. outcome : "measured", or what ended it; seconds : of the processor, of run, verdict and reference."""
+
+    number: int
+    seed: int
+    family: str
+    outcome: str
+    n_pair: int
+    harmonics: int
+    judged: tuple[Judged, ...]
+    promise: tuple[Judged, ...]
+    contributions: tuple[dict[str, Any], ...]
+    seconds: tuple[float, float, float]
+
+    def record(self) -> str:
+        """One line of JSON."""
+        return json.dumps(asdict(self))
+
+
+def row_of(line: str) -> Row:
+    """A row from its line of JSON."""
+    data = json.loads(line)
+    for name in ("judged", "promise"):
+        data[name] = tuple(Judged(**one) for one in data[name])
+    data["contributions"], data["seconds"] = tuple(data["contributions"]), tuple(data["seconds"])
+    return Row(**data)
+
+
+def rows_in(folder: Path) -> list[Row]:
+    """The rows that are kept in a folder, as many as were written whole."""
+    path = folder / ROWS
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    return [row_of(line) for line in lines if line.endswith("}")]
+
+
+def run(scenes: int, seed: int, folder: Path, seconds: float, say: Callable[[str], None]) -> list[Row]:
+    """Draw, run, judge and check scenes, those that `folder` holds of this seed left out; all rows of the seed.
+
+    seconds : of the processor, that the run of a scene may take, and its reference again
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    kept = [row for row in rows_in(folder) if row.seed == seed]
+    done = {row.number for row in kept}
+    for number in (n for n in range(scenes) if n not in done):
+        row = measured(number, seed, seconds)
+        with (folder / ROWS).open("a", encoding="utf-8") as file:
+            file.write(row.record() + "\n")
+        kept.append(row)
+        broken = ", ".join(one.quantity for one in (*row.judged, *row.promise) if one.broken)
+        spent = "/".join(f"{one:.0f}" for one in row.seconds)
+        say(f"{row.family} {number}: {row.outcome}, {spent} s{f'; BROKEN: {broken}' if broken else ''}")
+    return sorted((row for row in kept if row.number < scenes), key=lambda row: row.number)
+
+
+def measured(number: int, seed: int, seconds: float) -> Row:
+    """The row of one scene."""
+    none = (number, seed, "", "", 0, 0, (), (), ())
+    with TemporaryDirectory() as place:
+        folder = Path(place)
+        try:
+            drawn = draw(number, seed, folder)
+        except (ValueError, RuntimeError, np.linalg.LinAlgError) as refusal:
+            return Row(*none[:3], f"not drawn: {refusal}", *none[4:], (0.0, 0.0, 0.0))
+        none = (number, seed, drawn.family, *none[3:])
+        file, clock = drawn.file(folder), process_time()
+        try:
+            with processor_seconds(seconds):
+                result, model = solved(file)
+        except TimeUp:
+            return Row(*none[:3], f"its run takes above {seconds:g} s", *none[4:], (seconds, 0.0, 0.0))
+        except (ValueError, RuntimeError) as refusal:
+            return Row(*none[:3], f"refused: {refusal}", *none[4:], (process_time() - clock, 0.0, 0.0))
+        ran = process_time() - clock
+        said = verdict.judge(file, model, result, Progress(), ran)
+        clock = process_time()
+        truth, outcome = reference(file, seconds)
+        referred = process_time() - clock
+        judged = tuple(_judged(name, said, truth) for name in QUANTITIES)
+        promise = _promise(file, seconds) if number % PROMISED == 0 else ()
+        about = (outcome, model.balance.contact.n_pair, max(result.harmonics))
+        parts_of = tuple(asdict(part) for part in said.contributions)
+        return Row(*none[:3], *about, judged, promise, parts_of, (ran, said.seconds, referred))
+
+
+def solved(file: SceneFile) -> tuple[Result, modelling.Model]:
+    """The result of a scene that is not judged, and its model."""
+    models: list[modelling.Model] = []
+
+    def build(one: SceneFile) -> modelling.Model:
+        models.append(modelling.build(one, None, Progress()))
+        return models[-1]
+
+    return pipeline.run(with_overrides(file, "verdict.enabled=false"), None, Progress(), build=build), models[-1]
+
+
+def with_overrides(file: SceneFile, *more: str) -> SceneFile:
+    """The scene with further overrides."""
+    return parse(file.text, f"{file.name}.toml", (*file.overrides, *more), file.folder)
+
+
+def reference(file: SceneFile, seconds: float) -> tuple[Values, str]:
+    """What the scene says with all knobs finer, and "measured" or why there is nothing to say.
+
+    Without wear first; then with wear in what is left of the seconds
+    """
+    fine = tuple(finer(file))
+    values: Values = dict.fromkeys(QUANTITIES)
+    clock, outcome = process_time(), "measured"
+    for more in (("wear=",), ()):
+        if not more and not file.scene.wears:
+            break
+        try:
+            with processor_seconds(seconds - (process_time() - clock)):
+                one = with_overrides(file, *fine, *more)
+                result, model = solved(one)
+                found = verdict.values_of(result, probes.states(one, model.balance, result))
+        except TimeUp:
+            outcome = "measured, the reference of its wear is too dear" if not more else "its reference is too dear"
+            break
+        except (NoPeak, ValueError, RuntimeError) as refusal:
+            outcome = f"its reference {'of wear ' if not more else ''}is refused: {refusal}"
+            break
+        values |= {name: value for name, value in found.items() if values[name] is None}
+    return values, outcome
+
+
+def finer(file: SceneFile) -> Iterator[str]:
+    """Overrides that make every knob of a scene finer."""
+    scene = file.scene
+    tables = {}
+    if isinstance(scene, PartScene | StructureScene) and scene.geometry is not None:
+        tables["geometry"] = scene.geometry
+    elif isinstance(scene, StructureScene):
+        tables = {f"bodies.{name}": body for name, body in scene.bodies.items()}
+    for key, table in tables.items():
+        part = parts.load(str(table.part_name))
+        more = parts.rescaled(part, part.Parameters(**table.parameters), ELEMENTS)
+        yield from (f"{key}.{name}={count}" for name, count in more.items())
+    reduction = getattr(scene, "reduction", None)
+    if reduction is not None and reduction.modes is not None:
+        yield f"reduction.modes={MODES * reduction.modes}"
+    if reduction is not None and reduction.cutoff is not None:
+        yield f"reduction.cutoff={CUTOFF * reduction.cutoff!r}"
+    top = max(max(scene.harmonics.kept) + HARMONICS, LOWEST)
+    yield f"harmonics.kept={list(range(top + 1))}"
+    yield f"harmonics.samples={max(2 * scene.harmonics.samples, 16 * top)}"
+    yield f"response.points={2 * scene.response.points}"
+    yield f"solver.tolerance={0.1 * scene.solver.tolerance!r}"
+    wear = scene.wear
+    if wear is not None:
+        yield f"wear.max_steps={4 * STEPS * wear.max_steps}"
+        if wear.rule == "error_controlled" and wear.tolerance is not None:
+            yield f"wear.tolerance={wear.tolerance / STEPS!r}"
+        elif wear.step is not None and wear.step.share is not None:
+            yield f"wear.step={wear.step.share / STEPS!r}"
+
+
+def _judged(name: str, said: verdict.Verdict, truth: Values) -> Judged:
+    one, right = said.statements[name], truth[name]
+    true = None if one.value is None or right is None else probes.relative(one.value, right)
+    return Judged(name, one.value, one.error, one.dominated_by, one.stated, right, true, one.reason)
+
+
+def _promise(file: SceneFile, seconds: float) -> tuple[Judged, ...]:
+    """What `run --accuracy` promises of the unworn response, against a reference that is finer than its last round."""
+    last: list[SceneFile] = []
+
+    def round_of(one: SceneFile, number: int) -> Result:
+        last.append(one)
+        result, model = solved(one)
+        clock = process_time()
+        said = verdict.judge(one, model, result, Progress(), process_time() - clock)
+        return replace(result, verdict=said.dumped())
+
+    try:
+        result, promise = refinement.to_accuracy(file, WANTED, round_of, lambda sentence: None)
+    except (ValueError, RuntimeError):
+        return ()
+    truth, _ = reference(last[-1], 2 * seconds)
+    found = []
+    for name, why in promise.reasons.items():
+        value, right = refinement.loaded(result.verdict).statements[name].value, truth[name]
+        true = None if value is None or right is None else probes.relative(value, right)
+        found.append(Judged(name, value, promise.wanted, None, not why, right, true, why))
+    return tuple(found)
