@@ -115,7 +115,8 @@ def fuzz(
         raise ValueError("this system cannot fork processes, as fuzz does")
     factor.pardiso_available()  # loads it
     todo = cases(scene, overrides, runs, seed)
-    fork, found = get_context("fork"), []
+    fork = get_context("fork")
+    found: list[Tried] = []
     active: Active = {}
     with TemporaryDirectory() as folder:  # the scene as it is: compiles what is not compiled yet, which takes its time
         unchanged = fork.Process(target=_run, args=(command, scene, tuple(overrides), Path(folder), LATE * seconds))

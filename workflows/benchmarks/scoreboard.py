@@ -25,9 +25,10 @@ from tribodyn.workflows.benchmarks.scoreboard_scenes import draw
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.body import Geometry
 from tribodyn.workflows.scene.scene_file import SceneFile, parse
 from tribodyn.workflows.scene.schema import PartScene
-from tribodyn.workflows.scene.structure import StructureScene
+from tribodyn.workflows.scene.structure import Body, StructureScene
 
 ROWS = "rows.jsonl"
 ELEMENTS = 1.75  # of the reference along every edge, over those of the scene
@@ -125,32 +126,37 @@ def run(scenes: int, seed: int, folder: Path, seconds: float, say: Callable[[str
 
 def measured(number: int, seed: int, seconds: float) -> Row:
     """The row of one scene."""
-    none = (number, seed, "", "", 0, 0, (), (), ())
+    row = Row(number, seed, "", "", 0, 0, (), (), (), (0.0, 0.0, 0.0))
     with TemporaryDirectory() as place:
         folder = Path(place)
         try:
             drawn = draw(number, seed, folder)
         except (ValueError, RuntimeError, np.linalg.LinAlgError) as refusal:
-            return Row(*none[:3], f"not drawn: {refusal}", *none[4:], (0.0, 0.0, 0.0))
-        none = (number, seed, drawn.family, *none[3:])
+            return replace(row, outcome=f"not drawn: {refusal}")
+        row = replace(row, family=drawn.family)
         file, clock = drawn.file(folder), process_time()
         try:
             with processor_seconds(seconds):
                 result, model = solved(file)
         except TimeUp:
-            return Row(*none[:3], f"its run takes above {seconds:g} s", *none[4:], (seconds, 0.0, 0.0))
+            return replace(row, outcome=f"its run takes above {seconds:g} s", seconds=(seconds, 0.0, 0.0))
         except (ValueError, RuntimeError) as refusal:
-            return Row(*none[:3], f"refused: {refusal}", *none[4:], (process_time() - clock, 0.0, 0.0))
+            return replace(row, outcome=f"refused: {refusal}", seconds=(process_time() - clock, 0.0, 0.0))
         ran = process_time() - clock
         said = verdict.judge(file, model, result, Progress(), ran)
         clock = process_time()
         truth, outcome = reference(file, seconds)
         referred = process_time() - clock
-        judged = tuple(_judged(name, said, truth) for name in QUANTITIES)
-        promise = _promise(file, seconds) if number % PROMISED == 0 else ()
-        about = (outcome, model.balance.contact.n_pair, max(result.harmonics))
-        parts_of = tuple(asdict(part) for part in said.contributions)
-        return Row(*none[:3], *about, judged, promise, parts_of, (ran, said.seconds, referred))
+        return replace(
+            row,
+            outcome=outcome,
+            n_pair=model.balance.contact.n_pair,
+            harmonics=max(result.harmonics),
+            judged=tuple(_judged(name, said, truth) for name in QUANTITIES),
+            promise=_promise(file, seconds) if number % PROMISED == 0 else (),
+            contributions=tuple(asdict(part) for part in said.contributions),
+            seconds=(ran, said.seconds, referred),
+        )
 
 
 def solved(file: SceneFile) -> tuple[Result, modelling.Model]:
@@ -198,7 +204,7 @@ def reference(file: SceneFile, seconds: float) -> tuple[Values, str]:
 def finer(file: SceneFile) -> Iterator[str]:
     """Overrides that make every knob of a scene finer."""
     scene = file.scene
-    tables = {}
+    tables: dict[str, Geometry | Body] = {}
     if isinstance(scene, PartScene | StructureScene) and scene.geometry is not None:
         tables["geometry"] = scene.geometry
     elif isinstance(scene, StructureScene):

@@ -47,11 +47,11 @@ def draw(number: int, seed: int, folder: Path) -> Drawn:
     rng = np.random.default_rng([seed, number])
     family = tuple(FAMILIES)[number % len(FAMILIES)]
     tables = FAMILIES[family](rng)
-    table = {"scene": {"title": f"{family} {number} of seed {seed}"}} | tables | _common(rng)
+    table: Table = {"scene": {"title": f"{family} {number} of seed {seed}"}} | tables | _common(rng)
     table |= {"materials": {"steel": STEEL}} if "bodies" in table else {"material": STEEL}
     if "wheel" not in table:
         table["reduction"] = {"modes": int(rng.integers(5, 16))}
-    guess = {"frequency": [1.0, 1e5], "points": 10}
+    guess: Table = {"frequency": [1.0, 1e5], "points": 10}
     text = as_toml(table | {"response": table["response"] | guess})
     balance = modelling.build(parse(text, "drawn.toml", (), folder), None, Progress()).balance
     low, high, force = _placed(balance, float(10 ** rng.uniform(-0.2, 0.8)))
