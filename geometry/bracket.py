@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ from tribodyn.geometry import checks
 from tribodyn.geometry.gmsh_session import save, session
 
 MESH = ("n_length",)  # numbers of elements
+SIDES = 8  # of a hole, straight, so that no element bends
 
 
 @dataclass(frozen=True)
@@ -19,9 +22,9 @@ class Parameters:
     """The clamped leg stands along z, its back on x = 0; the other lies along x, its lower face on z = 0.
 
     length, height : of the lying and of the standing leg, outside [m]; width : along y; thickness : of both legs
-    hole, holes : diameter of the holes through the standing leg, in a row up the middle, and their number
+    hole, holes : diameter of the octagonal holes through the standing leg, in a row up the middle, and their number
     pad_length : of the pad below the end of the lying leg
-    n_length : elements along the lying leg, which sets the size of all of them
+    n_length : elements along the lying leg, which sets the size of all
     """
 
     length: float = 0.1
@@ -31,7 +34,7 @@ class Parameters:
     hole: float = 0.008
     holes: int = 2
     pad_length: float = 0.02
-    n_length: int = 10
+    n_length: int = 14
 
     def __post_init__(self) -> None:
         checks.positive(self, "length", "height", "width", "thickness", "hole", "pad_length")
@@ -58,8 +61,12 @@ def build(parameters: Parameters, path: str | Path) -> None:
         standing = occ.addBox(0, 0, 0, p.thickness, p.width, p.height)
         for number in range(p.holes):
             z = p.thickness + (p.height - p.thickness) * (number + 0.5) / p.holes
-            bore = occ.addCylinder(0, p.width / 2, z, p.thickness, 0, 0, p.hole / 2)
-            occ.cut([(3, standing)], [(3, bore)])
+            turn = np.pi / SIDES * (2 * np.arange(SIDES) + 1)
+            corners = [occ.addPoint(0, p.width / 2 + p.hole / 2 * c, z + p.hole / 2 * s) for c, s in _circle(turn)]
+            sides = [occ.addLine(a, b) for a, b in pairwise([*corners, corners[0]])]
+            face = occ.addPlaneSurface([occ.addCurveLoop(sides)])
+            bore = [one for one in occ.extrude([(2, face)], p.thickness, 0, 0) if one[0] == 3]
+            occ.cut([(3, standing)], bore)
         boxes = [(3, occ.addBox(p.thickness, 0, 0, start - p.thickness, p.width, p.thickness))]
         boxes.append((3, occ.addBox(start, 0, 0, p.pad_length, p.width, p.thickness)))
         occ.fragment([(3, standing)], boxes)
@@ -78,6 +85,7 @@ def build(parameters: Parameters, path: str | Path) -> None:
         gmsh.option.setNumber("Mesh.MeshSizeMin", size)
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
         gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.optimize("Netgen")
         gmsh.model.mesh.setOrder(2)
         save(gmsh, path)
 
@@ -87,3 +95,8 @@ def _within(gmsh: Any, low: tuple[float, ...], high: tuple[float, ...]) -> list[
     slack = 1e-4 * np.ptp([low, high])  # Open CASCADE widens its boxes
     a, b = np.array(low) - slack, np.array(high) + slack
     return [tag for _, tag in gmsh.model.getEntitiesInBoundingBox(*a, *b, 2)]
+
+
+def _circle(angle: np.ndarray) -> Iterator[tuple[float, float]]:
+    """Cosine and sine of angles."""
+    return zip(np.cos(angle).tolist(), np.sin(angle).tolist(), strict=True)
