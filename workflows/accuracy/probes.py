@@ -6,7 +6,7 @@ tells how far off it is; energy per cycle is carried to life, because wear is in
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import process_time
@@ -37,8 +37,9 @@ from tribodyn.workflows.scene.structure import Body, StructureScene
 
 CLIMB = (3, 5, 7, 9)  # highest harmonics that the estimate climbs through: each start is near enough for Newton
 FURTHER = 6  # harmonics beyond the kept ones that it looks at, where more than CLIMB are kept
-COARSER = 2 / 3  # of the elements along every edge of a part
+COARSER = (2 / 3, 1 / 2)  # of the elements along every edge of a part
 OF_HALVED = 2.0  # times the difference to elements of half the size bounds the error of a mesh from first order on
+OF_MODES = 4 / 3  # times the difference to twice as many modes, whose error falls with their number squared
 MOST_HALVED = 200_000  # DOFs of a mesh of halved elements that a verdict solves
 # shares of the life at which states are looked at: more of the late ones, where the peak moves fast
 STATES = (0.0, 0.25, 0.5, 0.65, 0.8, 0.9)
@@ -180,24 +181,60 @@ class Given(ValueError):
     """A mesh that cannot be made again."""
 
 
-def on_another_mesh(file: SceneFile, n_dof: int) -> tuple[SceneFile, float, str]:
-    """The scene on a coarser mesh, or with elements of half the size where its mesh is given.
+@dataclass(frozen=True)
+class Other:
+    """The scene with another mesh or reduction, and what differences to it are multiplied by to bound the error.
 
+    how : what it is; along : what of the discretisation it changes: errors of one kind are the same error seen twice
+    """
+
+    file: SceneFile
+    factor: float
+    how: str
+    along: str
+
+
+def on_other_meshes(file: SceneFile, n_dof: int) -> list[Other]:
+    """The scene on coarser meshes, or with elements of half the size where its mesh is given.
+
+    A difference can vanish by chance where an answer does not settle from one side: two coarser meshes tell. Edges of a
+    part with a single element, which no mesh has fewer of, get more of them. The factors are those of first order:
+    corners and the borders of contacts leave no better one to elements of any order.
     n_dof : of the scene's own mesh
-    Returns the scene, what the difference to it is multiplied by, and what it is
     Raises  ValueError where there is no other mesh, or halved elements are too many for a verdict
     """
+    tables, found = _meshed(file), dict[tuple[str, ...], Other]()
     try:
-        return coarser(file), 1.0, "a coarser mesh"
+        for share in COARSER:
+            fewer = [_fewer_elements(key, table, file.folder, share) for key, table in tables.items()]
+            ratio = float(np.mean([ratio for _, ratio in fewer]))
+            texts = tuple(text for more, _ in fewer for text in more)
+            found[texts] = Other(_with(file, texts), 1 / (ratio - 1), "a coarser mesh", "most edges")
     except Given:
         if 8 * n_dof > MOST_HALVED:
             raise ValueError(
                 f"the mesh is given, and its elements halved would have some {8 * n_dof:.2g} DOFs, beyond the "
                 f"{MOST_HALVED:.2g} that a verdict solves: compare with a run on another mesh"
             ) from None
-    texts = [f"{key}.halved={table.halved + 1}" for key, table in _meshed(file).items()]
-    finer = parse(file.text, f"{file.name}.toml", (*file.overrides, *texts), file.folder)
-    return finer, OF_HALVED, "halved elements"
+        texts = tuple(f"{key}.halved={table.halved + 1}" for key, table in tables.items())
+        return [Other(_with(file, texts), OF_HALVED, "halved elements", "most edges")]
+    single = tuple(text for key, table in tables.items() for text in _more_of_single_ones(key, table))
+    if single:
+        found[single] = Other(_with(file, single), OF_HALVED, "more elements along short edges", "short edges")
+    return list(found.values())
+
+
+def with_more_modes(file: SceneFile) -> Other | None:
+    """The scene with twice as many modes retained, None where it has no such number."""
+    reduction = getattr(file.scene, "reduction", None)
+    if reduction is None or not (reduction.modes or reduction.cutoff):
+        return None
+    key, value = ("modes", reduction.modes) if reduction.modes else ("cutoff", reduction.cutoff)
+    return Other(_with(file, [f"reduction.{key}={2 * value!r}"]), OF_MODES, "twice as many modes", "modes")
+
+
+def _with(file: SceneFile, texts: Sequence[str]) -> SceneFile:
+    return parse(file.text, f"{file.name}.toml", (*file.overrides, *texts), file.folder)
 
 
 def _meshed(file: SceneFile) -> dict[str, Geometry | Body | Deck]:
@@ -211,28 +248,34 @@ def _meshed(file: SceneFile) -> dict[str, Geometry | Body | Deck]:
     return tables | {f"decks.{name}": deck for name, deck in scene.decks.items()}
 
 
-def coarser(file: SceneFile) -> SceneFile:
-    """The scene on a mesh with fewer elements along every edge of every body.
+def _fewer_elements(key: str, table: Geometry | Body | Deck, folder: Path, share: float) -> tuple[list[str], float]:
+    """Overrides that give a body a share of its elements along every edge, and by how much fewer they are.
 
-    Raises  Given where the mesh of a body cannot be made again, ValueError where there is no mesh
+    Raises  Given where there are none
     """
-    texts = [text for key, table in _meshed(file).items() for text in _fewer_elements(key, table, file.folder)]
-    return parse(file.text, f"{file.name}.toml", (*file.overrides, *texts), file.folder)
-
-
-def _fewer_elements(key: str, table: Geometry | Body | Deck, folder: Path) -> list[str]:
-    """Overrides that give a body fewer elements; raises Given where there are none."""
     if not isinstance(table, Deck) and table.part_name is not None:
         part = parts.load(table.part_name)
-        fewer = parts.rescaled(part, part.Parameters(**table.parameters), COARSER)
+        own = part.Parameters(**table.parameters)
+        fewer = parts.rescaled(part, own, share)
         if not fewer:
             raise Given(f"the part of [{key}] lists no counts of elements in MESH")
-        return [f"{key}.{name}={count}" for name, count in fewer.items()]
+        ratio = float(np.mean([getattr(own, name) / count for name, count in fewer.items()]))
+        return [f"{key}.{name}={count}" for name, count in fewer.items()], ratio
     if not isinstance(table, Body) or Path(str(table.mesh)).suffix.lower() not in cad.ENDINGS:
         raise Given(f"the mesh of [{key}] is given")
     size = table.size or table.unit * cad.default_size(folder / str(table.mesh))
-    faces = ", ".join(f'"{name}" = {face / COARSER:.6g}' for name, face in table.face_sizes.items())
-    return [f"{key}.size={size / COARSER:.6g}", *([f"{key}.face_sizes={{{faces}}}"] if faces else [])]
+    faces = ", ".join(f'"{name}" = {face / share:.6g}' for name, face in table.face_sizes.items())
+    return [f"{key}.size={size / share:.6g}", *([f"{key}.face_sizes={{{faces}}}"] if faces else [])], 1 / share
+
+
+def _more_of_single_ones(key: str, table: Geometry | Body | Deck) -> list[str]:
+    """Overrides that give a part more elements where no mesh of it has fewer."""
+    if isinstance(table, Deck) or table.part_name is None:
+        return []
+    part = parts.load(table.part_name)
+    own = part.Parameters(**table.parameters)
+    fewer, more = parts.rescaled(part, own, COARSER[0]), parts.rescaled(part, own, 1 / COARSER[0])
+    return [f"{key}.{name}={count}" for name, count in more.items() if name not in fewer]
 
 
 def unworn(other: SceneFile, harmonics: tuple[int, ...]) -> tuple[Answers, float]:

@@ -7,7 +7,8 @@ time integration contradicts, is not stated.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from time import process_time
 
 import numpy as np
@@ -17,7 +18,7 @@ from tribodyn.hbm.outcome import SolveEnd
 from tribodyn.hbm.wear.error_controlled_rule import jumps
 from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload
 from tribodyn.workflows.accuracy import jump_probe, probes
-from tribodyn.workflows.accuracy.probes import Answers, InTime, State, relative
+from tribodyn.workflows.accuracy.probes import Answers, InTime, Other, State, relative
 from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution, Statement, Verdict
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.result.result import Result
@@ -29,6 +30,7 @@ from tribodyn.workflows.scene.scene_file import SceneFile
 MOST = 0.8  # of the seconds, for more harmonics, which matter most
 FOR_JUMP = 0.5  # of the seconds, for the instant of a jump to another peak, where there is one
 HALF = 0.5  # of the seconds that are left, for one measurement of several
+MESH = "mesh and contact grid"
 CONTRADICTION = 3.0  # times the estimated error, from which on time integration contradicts the balance
 RESPONSE = ("amplitude", "energy", "preload")
 
@@ -60,11 +62,16 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spe
         finer = list(probes.each(seen, probes.with_more_harmonics, MOST * left()))
         lost = f"lost with more harmonics, or beyond the {allowed:.3g} s of verdict.seconds"
         parts += _of_harmonics(result, seen, finer, values["life"], lost)
+    more_modes = probes.with_more_modes(file)
+    if more_modes is not None:
+        with progress.stage("verdict: modes"):
+            parts += _of_others("modes", lambda: [more_modes], result, seen, HALF * left(), skipped)
     with progress.stage("verdict: mesh"):
+        meshes = partial(probes.on_other_meshes, file, result.facts.full_dofs)
         parts += (
-            list(_of_mesh(file, result, seen, HALF * left() if wanted.in_time else left(), skipped))
+            list(_of_others(MESH, meshes, result, seen, HALF * left() if wanted.in_time else left(), skipped))
             if wanted.mesh
-            else _unknown("mesh and contact grid", "verdict.mesh is false")
+            else _unknown(MESH, "verdict.mesh is false")
         )
     checks: list[tuple[State, InTime]] = []
     refusal = "" if wanted.in_time else "verdict.in_time is false"
@@ -95,20 +102,16 @@ def values_of(result: Result, seen: Sequence[State]) -> dict[str, float | None]:
 
 
 def _of_budget(result: Result) -> Iterator[Contribution]:
-    """What the error budget has estimated: modes, Newton, samples, wear steps."""
+    """What the error budget has estimated: Newton, samples, wear steps; the peak is refined, whatever the points."""
     for entry in result.budget:
         source, error, how = entry.source, entry.error, entry.by
         if error is None or not how.startswith("estimate") or source == "harmonics":
             continue
-        if entry.quantity == "free frequencies":
-            yield Contribution(source, "peak_frequency", error, how)
-        elif entry.quantity == "response at the peak":
+        if entry.quantity == "response at the peak":
             for quantity in (*RESPONSE, "life"):
                 yield Contribution(source, quantity, error, how)
         elif entry.quantity in ("life", "depth"):
             yield Contribution(source, entry.quantity, error, how)
-        elif source == "points" and not result.wear_steps:
-            yield Contribution(source, "amplitude", error, how)
 
 
 def _of_harmonics(
@@ -166,37 +169,63 @@ def _depth_error(result: Result, seen: Sequence[State], finer: Sequence[Answers 
     return change / fall * deepened / float(result.depth_after(-1).max())
 
 
-def _of_mesh(
-    file: SceneFile, result: Result, seen: Sequence[State], seconds: float, skipped: str
+def _of_others(
+    source: str,
+    others: Callable[[], Sequence[Other]],
+    result: Result,
+    seen: Sequence[State],
+    seconds: float,
+    skipped: str,
 ) -> Iterator[Contribution]:
-    """The first state on another mesh, see `probes.on_another_mesh`."""
-    source = "mesh and contact grid"
+    """The first state with other meshes, or another reduction: the largest of those that change the same, all summed.
+
+    Of several meshes that change the same one is enough where the others have no solution or the seconds are used up
+    """
     if not seen:
         yield from _unknown(source, "no state was solved")
         return
+    errors: dict[str, dict[str, float]] = {}  # by what is changed, by quantity
+    refused: dict[str, str] = {}  # by what is changed
+    ours, said, end = Answers.of(seen[0].balance, seen[0].here), list[str](), process_time() + seconds
     try:
-        with processor_seconds(seconds):
-            other, factor, how = probes.on_another_mesh(file, result.facts.full_dofs)
-            there, deepest = probes.unworn(other, result.harmonics)
-    except TimeUp:
-        yield from _unknown(source, skipped)
-        return
+        wanted = others()
     except (ValueError, RuntimeError) as refusal:
-        yield from _unknown(source, f"no other mesh: {refusal}")
+        yield from _unknown(source, str(refusal))
         return
-    ours = Answers.of(seen[0].balance, seen[0].here)
+    for other in wanted:
+        try:
+            with processor_seconds(end - process_time()):
+                there, deepest = probes.unworn(other.file, result.harmonics)
+        except (TimeUp, ValueError, RuntimeError) as refusal:
+            refused[other.along] = skipped if isinstance(refusal, TimeUp) else f"{other.how}: {refusal}"
+            continue
+        said.append(other.how)
+        largest = errors.setdefault(other.along, {})
+        for quantity, error in _differences(there, deepest, ours, result):
+            largest[quantity] = float(np.maximum(largest.get(quantity, 0.0), other.factor * error))
+    lacking = [why for along, why in refused.items() if along not in errors]
+    if lacking:
+        yield from _unknown(source, lacking[0])
+        return
+    how = ", ".join(dict.fromkeys(said))
+    for quantity in dict.fromkeys(name for largest in errors.values() for name in largest):
+        error = sum(largest[quantity] for largest in errors.values())
+        if np.isfinite(error):
+            yield Contribution(source, quantity, error, how)
+        else:
+            why = "the free body does not say how deep the contact can wear"
+            yield Contribution(source, quantity, None, why)
+
+
+def _differences(there: Answers, deepest: float, ours: Answers, result: Result) -> Iterator[tuple[str, float]]:
+    """Relative differences of all quantities; those of depth and life nan where the free body does not tell them."""
     for quantity, a, b in _pairs(there, ours):
-        yield Contribution(source, quantity, factor * relative(a, b), how)
-    reach = result.facts.delta_max_m
-    if not result.wear_steps:
-        return
-    if not reach or not np.isfinite([reach, deepest]).all():
-        for quantity in ("depth", "life"):
-            yield Contribution(source, quantity, None, "the free body does not say how deep the contact can wear")
-        return
-    depth = factor * relative(deepest, reach)
-    yield Contribution(source, "depth", depth, how)
-    yield Contribution(source, "life", depth + factor * relative(there.energy, ours.energy), how)
+        yield quantity, relative(a, b)
+    if result.wear_steps:
+        reach = result.facts.delta_max_m
+        depth = relative(deepest, reach) if reach and np.isfinite([reach, deepest]).all() else float("nan")
+        yield "depth", depth
+        yield "life", depth + relative(there.energy, ours.energy)
 
 
 def _pairs(a: Answers, b: Answers) -> Iterator[tuple[str, float, float]]:

@@ -36,7 +36,7 @@ MODES, CUTOFF = 3, 2  # times those of the scene
 HARMONICS, LOWEST = 4, 6  # more than the scene's; the highest at the least
 STEPS = 3  # wear steps in each of the scene
 ROUNDING = 1e-8  # relative difference that says nothing
-PROMISED = 5  # every so many scenes a promise is asked for too
+PROMISED = 11  # every so many scenes a promise is asked for too
 WANTED = "10 % of peak frequency, amplitude, energy, preload"
 
 Values = dict[str, float | None]
