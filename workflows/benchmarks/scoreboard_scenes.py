@@ -25,7 +25,7 @@ Table = dict[str, Any]
 WIDEST = 4.0  # highest over lowest frequency of a response
 STEEL = {"young": "210 GPa", "density": "7860 kg/m3", "poisson": 0.3}
 MODES = 6  # stuck modes that the resonance is looked for in
-WORN = 0.4  # share of the scenes that are worn
+WORN = 0.25  # share of the scenes that are worn
 
 
 @dataclass(frozen=True)
