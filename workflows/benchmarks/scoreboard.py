@@ -105,6 +105,12 @@ def rows_in(folder: Path) -> list[Row]:
     return [row_of(line) for line in lines if line.endswith("}")]
 
 
+def _torn(folder: Path) -> bool:
+    """Whether the last row was not written whole."""
+    text = (folder / ROWS).read_text(encoding="utf-8")
+    return bool(text) and not text.endswith("\n")
+
+
 def run(scenes: int, seed: int, folder: Path, seconds: float, say: Callable[[str], None]) -> list[Row]:
     """Draw, run, judge and check scenes, those that `folder` holds of this seed left out; all rows of the seed.
 
@@ -116,7 +122,7 @@ def run(scenes: int, seed: int, folder: Path, seconds: float, say: Callable[[str
     for number in (n for n in range(scenes) if n not in done):
         row = measured(number, seed, seconds)
         with (folder / ROWS).open("a", encoding="utf-8") as file:
-            file.write(row.record() + "\n")
+            file.write("\n" * _torn(folder) + row.record() + "\n")
         kept.append(row)
         broken = ", ".join(one.quantity for one in (*row.judged, *row.promise) if one.broken)
         spent = "/".join(f"{one:.0f}" for one in row.seconds)

@@ -1,0 +1,77 @@
+"""The scoreboard on scenes of two families, its table, and that a broken promise is seen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tribodyn.workflows.benchmarks import scoreboard, scoreboard_scenes, scoreboard_table
+from tribodyn.workflows.benchmarks.scoreboard import Judged, Row
+
+SEED = 2
+SCENES = (6, 7)  # a beam and a plate that take a second each
+
+
+@pytest.fixture(scope="module")
+def rows() -> list[Row]:
+    return [scoreboard.measured(number, SEED, 60.0) for number in SCENES]
+
+
+def test_what_is_stated_of_untuned_scenes_holds(rows: list[Row]) -> None:
+    for row in rows:
+        assert row.outcome == "measured"
+        assert {one.quantity for one in row.judged if one.promised} >= {"peak_frequency", "preload"}
+        assert [one.quantity for one in row.judged if one.broken] == []
+        assert {part["source"] for part in row.contributions} >= {"harmonics", "mesh and contact grid", "modes"}
+
+
+def test_the_reference_is_finer_in_every_knob(tmp_path: Path) -> None:
+    drawn = scoreboard_scenes.draw(SCENES[0], SEED, tmp_path)
+    assert drawn.text == scoreboard_scenes.draw(SCENES[0], SEED, tmp_path).text
+    assert drawn.text != scoreboard_scenes.draw(SCENES[0], SEED + 1, tmp_path).text
+    ours = drawn.file(tmp_path)
+    fine = scoreboard.with_overrides(ours, *scoreboard.finer(ours)).part_scene
+    scene = ours.part_scene
+    for name in ("n_patch", "n_length", "n_height"):
+        assert fine.geometry.parameters[name] > scene.geometry.parameters[name]
+    assert fine.reduction.modes is not None
+    assert scene.reduction.modes is not None
+    assert fine.reduction.modes > 2 * scene.reduction.modes
+    assert max(fine.harmonics.kept) >= max(scene.harmonics.kept) + 4
+    assert fine.harmonics.samples > scene.harmonics.samples
+    assert fine.response.points > scene.response.points
+    assert fine.solver.tolerance < scene.solver.tolerance
+
+
+def test_rows_are_kept_and_taken_up_again(rows: list[Row], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[int] = []
+
+    def measured(number: int, seed: int, seconds: float) -> Row:
+        calls.append(number)
+        return replace(rows[0], number=number, seed=seed)
+
+    monkeypatch.setattr(scoreboard, "measured", measured)
+    scoreboard.run(2, SEED, tmp_path, 1.0, lambda sentence: None)
+    with (tmp_path / scoreboard.ROWS).open("a") as file:
+        file.write('{"number": 7, "se')  # killed while it wrote
+    again = scoreboard.run(3, SEED, tmp_path, 1.0, lambda sentence: None)
+    assert calls == [0, 1, 2]
+    assert again[0] == replace(rows[0], number=0)
+
+
+def test_a_broken_promise_is_told(rows: list[Row], tmp_path: Path) -> None:
+    off = Judged("energy", 1.0, 0.01, "modes", True, 1.1, 0.09, "")
+    bad = [replace(rows[0], judged=(off,)), *rows[1:]]
+    assert off.broken
+    assert not replace(off, error=0.1).broken
+    assert not replace(off, stated=False).broken
+    assert "energy: stated 0.01, true 0.09" in scoreboard_table.summary(bad)
+    assert "broken:" not in scoreboard_table.summary(rows)
+    assert np.isclose(scoreboard_table.overestimates(bad, "energy")[0], 0.01 / 0.09)
+    scoreboard_table.write(bad, tmp_path)
+    table = (tmp_path / "scoreboard.csv").read_text().splitlines()
+    assert table[1].split(",")[4:8] == ["energy", "1.0", "0.01", "0.09"]
+    assert (tmp_path / "scoreboard.png").stat().st_size > 10_000
