@@ -36,7 +36,7 @@ MODES, CUTOFF = 3, 2  # times those of the scene
 HARMONICS, LOWEST = 4, 6  # more than the scene's; the highest at the least
 STEPS = 3  # wear steps in each of the scene
 ROUNDING = 1e-8  # relative difference that says nothing
-PROMISED = 11  # every so many scenes a promise is asked for too
+PROMISED = 10  # every so many scenes a promise is asked for too
 WANTED = "10 % of peak frequency, amplitude, energy, preload"
 
 Values = dict[str, float | None]
@@ -247,11 +247,14 @@ def _judged(name: str, said: verdict.Verdict, truth: Values) -> Judged:
 def _promise(file: SceneFile, seconds: float) -> tuple[Judged, ...]:
     """What `run --accuracy` promises of the unworn response, against a reference that is finer than its last round."""
     last: list[SceneFile] = []
+    start = process_time()
 
     def round_of(one: SceneFile, number: int) -> Result:
+        if process_time() - start > seconds:
+            raise RuntimeError(f"the promise takes above {seconds:g} s")
         last.append(one)
-        result, model = solved(one)
         clock = process_time()
+        result, model = solved(one)
         said = verdict.judge(one, model, result, Progress(), process_time() - clock)
         return replace(result, verdict=said.dumped())
 

@@ -225,6 +225,7 @@ def _sentence(problem: Any, kind_of_file: type[BaseModel]) -> str:
         "dict_type": "a table",
         "tuple_type": "a list",
         "too_long": "a shorter list",
+        "too_short": "a longer list",
     }.get(kind)
     return f"{key}: {f'expected {what}' if what else problem['msg'].lower()}, got {given!r}"
 

@@ -47,7 +47,7 @@ class Response(Table):
     """Range of the response, [low, high]."""
     references: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]] | None = None
     """Range in which the linear references are drawn; the same as `frequency` by default."""
-    points: Annotated[StrictInt, Field(ge=2)] = 60
+    points: Annotated[StrictInt, Field(ge=2, le=20_000)] = 60
     """Number of frequency steps of the continuation."""
     method: str = "natural"
     """Continuation method: natural, arc_length or adaptive."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import ModuleType
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
@@ -40,6 +40,12 @@ class Place(Table):
     """Frequency."""
     peak: Annotated[float, Field(gt=0)] | None = None
     """Ratio to the frequency of the resonance peak."""
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Self:
+        if (self.frequency is None) == (self.peak is None):
+            raise ValueError("expected either frequency or peak, and not both")
+        return self
 
 
 def _place(value: object) -> object:
