@@ -133,13 +133,10 @@ def test_every_scene_reads_and_survives_json(name: str) -> None:
     [
         ("beam", "wear.at={}", "wear.at: expected either frequency or peak"),
         ("blade", "contact.group=[]", "contact.group: expected a longer list"),
-        ("beam", "material.young=1e-300", "material.young: expected a value at least 0.001"),
-        ("beam", "material.density=1e-300", "material.density: expected a value at least 1e-06"),
         ("beam", "response.points=1000000", "response.points: expected a value at most 20000"),
-        ("beam", "contact.normal_stiffness=1e-300", "contact.normal_stiffness: expected a value at least 1e-09"),
     ],
 )
 def test_what_fuzz_has_found_is_refused(scene: str, override: str, sentence: str) -> None:
-    with pytest.raises(scene_file.SceneError) as caught:
+    with pytest.raises(SceneError) as caught:
         scene_file.read(scene, [override])
     assert sentence in str(caught.value)

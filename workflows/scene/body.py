@@ -95,9 +95,9 @@ def part_parameters(part: str, given: dict[str, Any], folder: Path | None = None
 class Material(Table):
     """Linear isotropic elasticity and density."""
 
-    young: Annotated[float, quantity("Pa"), Field(ge=1e-3)]
+    young: Annotated[float, quantity("Pa"), Field(gt=0)]
     """Young's modulus."""
-    density: Annotated[float, quantity("kg/m3"), Field(ge=1e-6)]
+    density: Annotated[float, quantity("kg/m3"), Field(gt=0)]
     """Density."""
     poisson: Annotated[Number, Field(gt=-1, lt=0.5)]
     """Poisson's ratio."""

@@ -35,9 +35,9 @@ class Contact(LawTable):
     law: str = "jenkins"
     """Name of a contact law, or a file my_law.py beside the scene; its own numbers, such as friction, are further keys
     of this table."""
-    tangential_stiffness: Annotated[Stiffness, Field(ge=1e-9, le=1e16)] | None = None
+    tangential_stiffness: Annotated[Stiffness, Field(gt=0, le=1e16)] | None = None
     """Tangential stiffness of all pairs together."""
-    normal_stiffness: Annotated[Stiffness, Field(ge=1e-9, le=1e16)] | None = None
+    normal_stiffness: Annotated[Stiffness, Field(gt=0, le=1e16)] | None = None
     """Normal stiffness of all pairs together."""
     table: tuple[tuple[float, ...], ...] | None = None
     """File of the law's own table beside the scene, comma-separated numbers, or its rows; where the law takes one."""

@@ -110,7 +110,7 @@ class Body(Table):
         return (self.material,) if isinstance(self.material, str) else tuple(self.material.values())
 
 
-Modulus = Annotated[float, quantity("Pa"), Field(ge=1e-3)]
+Modulus = Annotated[float, quantity("Pa"), Field(gt=0)]
 Expansion = Annotated[float, quantity("1/K")]
 
 
@@ -124,7 +124,7 @@ class SolidMaterial(Table):
     along the first."""
     shear: tuple[Modulus, Modulus, Modulus] | None = None
     """Shear moduli G12, G13, G23 of an orthotropic material."""
-    density: Annotated[float, quantity("kg/m3"), Field(ge=1e-6)]
+    density: Annotated[float, quantity("kg/m3"), Field(gt=0)]
     """Density."""
     axes: tuple[Direction, Direction] | None = None
     """First and second axis of an orthotropic material; x and y by default."""
