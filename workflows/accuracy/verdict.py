@@ -62,7 +62,7 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spe
         finer = list(probes.each(seen, probes.with_more_harmonics, MOST * left()))
         lost = f"lost with more harmonics, or beyond the {allowed:.3g} s of verdict.seconds"
         parts += _of_harmonics(result, seen, finer, values["life"], lost)
-    more_modes = probes.with_more_modes(file)
+    more_modes = probes.with_more_modes(file) if wanted.mesh else None  # another model, too
     if more_modes is not None:
         with progress.stage("verdict: modes"):
             parts += _of_others("modes", lambda: [more_modes], result, seen, HALF * left(), skipped)

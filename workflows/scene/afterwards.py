@@ -40,7 +40,7 @@ class VerdictOptions(Table):
     """Processor seconds that the measurements may take together; what they do not reach is not known. By default as
     long as the run itself took, but 10 s at least and 60 s at most."""
     mesh: StrictBool = True
-    """Solve the unworn contact on a coarser mesh."""
+    """Solve the unworn contact on other meshes, and with more modes."""
     in_time: StrictBool = False
     """Integrate the unworn, the middle and the late state in time, which takes longest."""
 
