@@ -11,9 +11,11 @@ import pytest
 
 from tests.helpers.command import leave
 from tribodyn.reduction.linear import linear_modes
+from tribodyn.workflows.pictures import backbone_maps
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import read
+from tribodyn.workflows.studies import modes
 
 SMALL = [
     "harmonics.kept=[0, 1]",
@@ -42,11 +44,28 @@ def test_the_backbone_goes_from_the_stuck_to_the_free_mode(capsys: pytest.Captur
         rows = list(csv.DictReader(stream))
     assert np.array([float(row["frequency_hz"]) for row in rows]) == pytest.approx(np.array(found["frequency_hz"]))
     assert (tmp_path / "backbone.png").is_file()
+    assert (tmp_path / "backbone_maps.png").stat().st_size > 10_000
     code, out, _ = leave(
         ["backbone", "beam", *SET, "--from", "1um", "--to", "4um", "--points", "5", "--out", str(tmp_path)], capsys
     )
     assert code == 0
     assert "at rest" in out
+
+
+def test_maps_along_the_backbone_hold_its_friction_work_and_its_motion() -> None:
+    balance, found = modes.follow_with_contact(read("beam", SMALL), modes.Way(1e-7, 2e-4, points=6), Progress())
+    slides = []
+    for at in range(len(found.omega)):
+        slide, gap, work = backbone_maps.fields(balance, found, at)
+        assert work @ balance.model.interface.area == pytest.approx(found.energy[at], rel=1e-12)
+        x = found.contact[at].reshape(len(gap), 3, -1)
+        phase = np.linspace(0, 2 * np.pi, 721)
+        moved = x[:, :, 1, None] * np.cos(phase) + x[:, :, 2, None] * np.sin(phase)  # harmonics 0 and 1
+        np.testing.assert_allclose(slide, np.hypot(moved[:, 0], moved[:, 1]).max(axis=1), rtol=5e-3)
+        widest = balance.contact.gap - x[:, 2, 0] - moved[:, 2].min(axis=1)
+        np.testing.assert_allclose(gap, widest, atol=5e-3 * np.abs(moved).max())
+        slides.append(slide.max())
+    assert slides[-1] > 100 * slides[0]
 
 
 @pytest.mark.parametrize(

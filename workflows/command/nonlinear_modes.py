@@ -45,17 +45,23 @@ def backbone(
     points
         Points on an easy way; there are more where the backbone bends. 40 or those of [backbone] by default.
     out
-        Folder of backbone.csv and backbone.png; results/NAME by default.
+        Folder of backbone.csv, backbone.png and, where faces rub, backbone_maps.png; results/NAME by default.
     as_json
         Print JSON for machines.
     """
+    from tribodyn.workflows.pictures import backbone_maps
     from tribodyn.workflows.run.progress import Progress, console_progress
     from tribodyn.workflows.studies import modes
 
     file, asked, folder = _asked(scene, overrides, start, stop, mode, points, out)
-    found = modes.follow(file, asked, Progress() if as_json else console_progress())
-    modes.write(found, folder / "backbone.csv")
-    modes.picture(found, file.name).savefig(folder / "backbone.png")
+    balance, found = modes.follow_with_contact(file, asked, Progress() if as_json else console_progress())
+    written = [folder / "backbone.csv", folder / "backbone.png"]
+    modes.write(found, written[0])
+    modes.picture(found, file.name).savefig(written[1])
+    maps = backbone_maps.picture(balance, found, file.name)
+    if maps is not None:
+        written.append(folder / "backbone_maps.png")
+        maps.savefig(written[-1])
     if as_json:
         print(json.dumps(modes.record(found), indent=2))
     else:
@@ -68,7 +74,7 @@ def backbone(
                 ("end", str(found.end)),
             ]
         )
-        print(folder / "backbone.csv", folder / "backbone.png", sep="\n")
+        print(*written, sep="\n")
 
 
 def ring_down(

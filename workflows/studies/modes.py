@@ -56,11 +56,17 @@ def follow(file: SceneFile, asked: Way, progress: Progress) -> Backbone:
 
     Raises  ValueError for what cannot be; SolveFailed where not even the first point is found
     """
+    return follow_with_contact(file, asked, progress)[1]
+
+
+def follow_with_contact(file: SceneFile, asked: Way, progress: Progress) -> tuple[HarmonicBalance, Backbone]:
+    """The same with the balance that it was followed in, for what the contact does."""
     with limited(file.scene.solver.threads):
-        found = along(file, modelling.build(file, None, progress).balance, asked, progress)
+        balance = modelling.build(file, None, progress).balance
+        found = along(file, balance, asked, progress)
     if not found.converged.any():
         raise SolveFailed(f"the backbone {found.end}")
-    return found
+    return balance, found
 
 
 def along(file: SceneFile, balance: HarmonicBalance, asked: Way, progress: Progress) -> Backbone:

@@ -16,7 +16,7 @@ from tests.helpers.browser import chromium, clicked_zoomed_and_turned
 from tests.helpers.command import leave
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, backbone
-from tribodyn.workflows.run import modelling
+from tribodyn.workflows.run import modelling, tightening
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.scene import scene_file
@@ -36,8 +36,8 @@ COARSE = [
 @cache
 def built(name: str) -> modelling.Model:
     """The model of a scene; the part and its reduction are those of the plain one."""
-    if name == "brb":
-        return modelling.build(scene_file.read("brb", COARSE), None, Progress())
+    if name in ("brb", "brb_locked"):
+        return modelling.build(scene_file.read(name, COARSE), None, Progress())
     file, plain = scene_file.read(name, COARSE), built("brb")
     part, _ = modelling.with_surfaces(file.mesh_scene, plain.part, file.folder)
     reduced = replace(
@@ -74,6 +74,26 @@ def test_pressed_together_the_lap_carries_the_bolts_and_six_motions_are_left(nam
         turned = points * [-1, 1, 1]
         partner = np.linalg.norm(points[:, None] - turned[None], axis=2).argmin(axis=1)
         assert np.abs(force - force[partner]).max() < 2e-3 * force.max()
+
+
+def locked_at_rest(worn: float = 0.0) -> tuple[float, np.ndarray]:
+    """Force of the lap [N] without vibration after a depth worn everywhere [m], and the elongations of its rods."""
+    balance = built("brb_locked").balance.with_load(0.0)
+    balance = balance.with_gap(balance.contact.gap + worn)
+    solved = newton.solve(balance, balance.omega_max, balance.stuck(balance.omega_max))
+    assert solved.converged
+    names = balance.compliance.output_names
+    rods = [names.index(tightening.output(f"rod_{i}")) for i in (1, 2, 3)]
+    return solved.state.cycle.force[:, 2, 0].sum(), balance.outputs(solved.state)[rods, 0]
+
+
+def test_locked_bolts_lose_force_with_what_is_worn():
+    """N = P + k e of rods in series with what they clamp."""
+    worn, k = 20e-9, 200e9 * np.pi / 4 * 7.9375e-3**2 / 28.575e-3
+    (new, before), (old, after) = locked_at_rest(), locked_at_rest(worn)
+    assert new == pytest.approx(FORCE, rel=1e-6)
+    assert old - new == pytest.approx(k * (after - before).sum(), rel=1e-3)
+    assert 0.3 * 3 * k * worn < new - old < 3 * k * worn
 
 
 @pytest.mark.parametrize("name", ["brb_flat", "brb_wavy"])
