@@ -96,6 +96,17 @@ def test_locked_bolts_lose_force_with_what_is_worn():
     assert 0.3 * 3 * k * worn < new - old < 3 * k * worn
 
 
+def test_the_lap_wears_where_it_slides():
+    file = scene_file.read("brb_locked", [*COARSE, "wear.max_steps=2", "wear.at=168 Hz"])
+    history = td.wear(file, built("brb_locked").balance)
+    depth = history.depth[-1]
+    assert history.cycles[-1] > 1e5
+    assert depth.max() == pytest.approx(20e-9, rel=0.05)
+    assert history.preload[-1] == pytest.approx(history.preload[0], rel=1e-5)  # at the ends there is little to lose
+    points = built("brb_locked").balance.model.interface.points
+    assert np.abs(points[depth.argmax(), 0]) > 40e-3  # towards the ends of the lap, beyond the pads of the bolts
+
+
 @pytest.mark.parametrize("name", ["brb_flat", "brb_wavy"])
 def test_rough_faces_soften_and_damp_along_the_backbone(name):
     balance = built(name).balance
