@@ -37,9 +37,9 @@ from tribodyn.workflows.scene.structure import Body, StructureScene
 
 CLIMB = (3, 5, 7, 9)  # highest harmonics that the estimate climbs through: each start is near enough for Newton
 FURTHER = 6  # harmonics beyond the kept ones that it looks at, where more than CLIMB are kept
-# elements along every edge of a part, and the order that the error is taken to fall with: the second mesh is there in
-# case the difference to the first vanishes by chance
-COARSER = ((2 / 3, 1), (1 / 2, 2))
+# elements along every edge of a part; the error is taken to fall in proportion to their size, as at corners and at the
+# borders of contacts, and the second mesh is there in case the difference to the first vanishes by chance
+COARSER = (2 / 3, 1 / 2)
 OF_HALVED = 2.0  # times the difference to elements of half the size bounds the error of a mesh from first order on
 OF_MODES = 4 / 3  # times the difference to twice as many modes, whose error falls with their number squared
 MOST_HALVED = 200_000  # DOFs of a mesh of halved elements that a verdict solves
@@ -207,11 +207,11 @@ def on_other_meshes(file: SceneFile, n_dof: int) -> list[Other]:
     """
     tables, found = _meshed(file), dict[tuple[str, ...], Other]()
     try:
-        for share, order in COARSER:
+        for share in COARSER:
             fewer = [_fewer_elements(key, table, file.folder, share) for key, table in tables.items()]
             ratio = float(np.mean([ratio for _, ratio in fewer]))
             texts = tuple(text for more, _ in fewer for text in more)
-            found[texts] = Other(_with(file, texts), 1 / (ratio**order - 1), "a coarser mesh", "most edges")
+            found[texts] = Other(_with(file, texts), 1 / (ratio - 1), "a coarser mesh", "most edges")
     except Given:
         if 8 * n_dof > MOST_HALVED:
             raise ValueError(
@@ -276,7 +276,7 @@ def _more_of_single_ones(key: str, table: Geometry | Body | Deck) -> list[str]:
         return []
     part = parts.load(table.part_name)
     own = part.Parameters(**table.parameters)
-    fewer, more = (parts.rescaled(part, own, share) for share in (COARSER[0][0], 1 / COARSER[0][0]))
+    fewer, more = (parts.rescaled(part, own, share) for share in (COARSER[0], 1 / COARSER[0]))
     return [f"{key}.{name}={count}" for name, count in more.items() if name not in fewer]
 
 
