@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.workflows.test_structure import BLOCKS, FREE, STACK, built
+from tests.helpers.structures import BLOCKS, FREE, STACK, built
 
 PART = 'part = "block"\nlength = "40 mm"\nwidth = "14 mm"\nn_length = 3\nn_width = 1\n'
 UPPER, LOWER = 'group = "upper.z_max"\npressure', 'group = "lower.x_max"\ndirection = "x"\n'
