@@ -33,15 +33,6 @@ def test_the_example_runs_from_its_drawing_to_its_worn_surface(folder: Path) -> 
     assert (folder / "results/arm/pictures/part.png").stat().st_size > 10_000
 
 
-def test_the_error_without_vertices_only_names_the_cure(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    mesh_drawing(folder / "arm.geo", folder / "arm.msh", {"size": 0.02})
-    words = ["run", str(folder / "arm.toml"), "--set", "contact.vertices_only=false", "--out", str(folder / "out")]
-    with pytest.raises(SystemExit) as left:
-        cli.main(words)
-    assert left.value.code == 2
-    assert "contact.vertices_only = true" in capsys.readouterr().err
-
-
 GRIDS = """
 [converge.mesh]
 sizes = [1, 1.33, 2]
