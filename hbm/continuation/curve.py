@@ -80,7 +80,7 @@ class Segment:
         """Where the tangents of the ends come closest: ahead of the start, before the end, and how far apart."""
         cosine = np.cos(self.angle)
         ahead, behind = self.metric.dot(self.chord, self.start.tangent), self.metric.dot(self.chord, self.end.tangent)
-        sine2 = max(1.0 - cosine**2, 1e-300)
+        sine2 = max(1.0 - cosine**2, 1e-30)  # parallel tangents meet far away, not beyond all numbers
         a, b = (ahead - cosine * behind) / sine2, (behind - cosine * ahead) / sine2
         miss = self.chord - self.start.tangent * a - self.end.tangent * b
         return a, b, self.metric.norm(miss)

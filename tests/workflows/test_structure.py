@@ -56,7 +56,10 @@ DRIVEN = 'group = "upper.x_max"\ndirection = "y"\nvalue = "{} N"'
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (("lower.z_max", "lower.top"), "the mesh has no face 'lower.top'; it has lower.x_max"),
+        (
+            ("lower.z_max", "lower.top"),
+            r"the mesh has no face 'lower.top' \(did you mean 'lower.z_min'\?\); it has lower.x_max",
+        ),
         (('material = "aluminium"', 'material = "gold"'), "bodies.upper: unknown key materials.gold"),
         (('translation = ["55 mm", "3 mm", "10 mm"]', 'translation = ["55 mm", "3 mm", "60 mm"]'), "do not meet"),
         (('first = "upper.z_min"', 'firts = "upper.z_min"'), "first is missing"),

@@ -6,6 +6,7 @@ import json
 import signal
 from time import process_time
 
+import numba
 import numpy as np
 import pytest
 
@@ -91,6 +92,20 @@ def test_the_verdict_is_kept(small: td.Result, tmp_path) -> None:
 def _spin() -> None:
     while True:
         sum(range(1000))
+
+
+def test_a_compiler_is_not_interrupted() -> None:
+    @numba.njit  # type: ignore[untyped-decorator]
+    def cube(x: float) -> float:
+        return x**3
+
+    def compile_and_spin() -> None:
+        assert cube(2.0) == 8.0  # compiled for longer than the limit
+        _spin()
+
+    with pytest.raises(TimeUp), processor_seconds(0.02):
+        compile_and_spin()
+    assert cube(3.0) == 27.0
 
 
 def test_work_beyond_its_seconds_is_stopped() -> None:

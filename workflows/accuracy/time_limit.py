@@ -8,6 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+COMPILERS = ("numba", "llvmlite")
+AGAIN = 0.2  # processor seconds after which to look again, where the time was up in a compiler
+
 
 class TimeUp(Exception):
     """The processor seconds are used up; no RuntimeError, which a solver may answer by trying another way."""
@@ -18,6 +21,7 @@ def processor_seconds(limit: float) -> Iterator[None]:
     """Raise TimeUp in the body once this process has spent `limit` seconds of the processor in it.
 
     The timer of a process belongs to its main thread: in another one, and on systems without it, nothing is limited.
+    A compiler is not interrupted: a function that is compiled by half could not be called in this process any more.
     Raises  TimeUp, also at once where `limit` is not above 0
     """
     if limit <= 0:
@@ -27,7 +31,10 @@ def processor_seconds(limit: float) -> Iterator[None]:
         return
 
     def up(number: int, frame: FrameType | None) -> None:
-        raise TimeUp(f"{limit:g} s are used up")
+        if _compiles(frame):
+            signal.setitimer(signal.ITIMER_PROF, AGAIN)
+        else:
+            raise TimeUp(f"{limit:g} s are used up")
 
     before = signal.signal(signal.SIGPROF, up)
     signal.setitimer(signal.ITIMER_PROF, limit)
@@ -36,3 +43,12 @@ def processor_seconds(limit: float) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
         signal.signal(signal.SIGPROF, before)
+
+
+def _compiles(frame: FrameType | None) -> bool:
+    """Whether a compiler is at work in a frame or in one that has called it."""
+    while frame is not None:
+        if str(frame.f_globals.get("__name__", "")).partition(".")[0] in COMPILERS:
+            return True
+        frame = frame.f_back
+    return False
