@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import tribodyn as td
+from tribodyn.workflows.accuracy.verification import rebuilt
 from tribodyn.workflows.command import main as cli
 
 SMALL = {
@@ -146,3 +147,12 @@ def test_every_plot_is_a_figure(worn: td.Result, tmp_path: Path) -> None:
     for draw in (unworn.plot_wear, unworn.plot_patch):
         with pytest.raises(ValueError, match="the result holds no"):
             draw()
+
+
+def test_a_list_among_changes_stays_on_one_line_of_the_result() -> None:
+    """A result keeps a change in each line, and is built again from these."""
+    changes = {**SMALL, "response.frequency": ["500 Hz", "520 Hz"], "response.points": 2, "wear": None}
+    result = td.run("beam", overrides={**changes, "verdict.enabled": False})
+    lines = result.provenance["overrides"].split("\n")
+    assert len(lines) == len(changes) + 1
+    assert rebuilt(result).scene.response.frequency == (500.0, 520.0)

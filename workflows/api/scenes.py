@@ -197,9 +197,14 @@ def override_texts(overrides: Overrides) -> tuple[str, ...]:
     if not isinstance(overrides, Mapping):
         return tuple(overrides)
     return tuple(
-        f"{key}=" if value is None else f"{key}={tomli_w.dumps({'v': _plain(value)}).partition('=')[2].strip()}"
+        f"{key}=" if value is None else f"{key}={_on_one_line(tomli_w.dumps({'v': _plain(value)}).partition('=')[2])}"
         for key, value in overrides.items()
     )
+
+
+def _on_one_line(toml: str) -> str:
+    """An array over several lines as one: results keep a change in each line."""
+    return " ".join(line.strip() for line in toml.strip().splitlines())
 
 
 def _plain(value: Any) -> Any:
