@@ -323,7 +323,7 @@ def test_what_a_bolt_clamps_carries_its_force_on_small_faces_too(tmp_path: Path)
 def test_every_body_of_a_scene_is_made_coarser_or_the_elements_of_all_are_halved(tmp_path: Path) -> None:
     """Parts by their counts, CAD files by their sizes; a mesh file cannot be made again, but its elements cut."""
     file = scene_file.parse(BLOCKS, "blocks.toml", folder=tmp_path)
-    coarse = probes.coarser(file).scene
+    coarse = probes.on_other_meshes(file, 20_000)[0].file.scene
     assert (coarse.bodies["lower"].parameters["n_length"], coarse.bodies["upper"].parameters["n_length"]) == (3, 2)
     with session() as gmsh:
         gmsh.model.occ.addBox(0, 0, 0, 40, 10, 10)
@@ -338,17 +338,17 @@ def test_every_body_of_a_scene_is_made_coarser_or_the_elements_of_all_are_halved
         .replace("upper.z_min", "upper.face 5")
         .replace("upper.z_max", "upper.face 6")
     )
-    coarse = probes.coarser(scene_file.parse(own + tail, "drawn.toml", folder=tmp_path)).scene
+    drawn_file = scene_file.parse(own + tail, "drawn.toml", folder=tmp_path)
+    coarse = probes.on_other_meshes(drawn_file, 20_000)[0].file.scene
     assert coarse.bodies["upper"].size == pytest.approx(6e-3)  # a tenth of 40 mm, and half as much again
     assert coarse.bodies["upper"].face_sizes == {"face 2": pytest.approx(4.5e-3)}
     given = (own + tail).replace("box.step", "box.msh").replace('face_sizes = { "face 2" = "3 mm" }\n', "")
     file = scene_file.parse(given, "given.toml", folder=tmp_path)
-    finer, factor, how = probes.on_another_mesh(file, 20_000)
-    assert [finer.scene.bodies[name].halved for name in ("lower", "upper")] == [1, 1]
-    assert (factor, how) == (probes.OF_HALVED, "halved elements")
-    assert probes.on_another_mesh(scene_file.parse(BLOCKS, "blocks.toml", folder=tmp_path), 20_000)[1] == 1.0
+    (finer,) = probes.on_other_meshes(file, 20_000)
+    assert [finer.file.scene.bodies[name].halved for name in ("lower", "upper")] == [1, 1]
+    assert (finer.factor, finer.how) == (probes.OF_HALVED, "halved elements")
     with pytest.raises(ValueError, match=r"its elements halved would have some 8e\+05 DOFs"):
-        probes.on_another_mesh(file, 100_000)
+        probes.on_other_meshes(file, 100_000)
 
 
 def test_the_error_of_a_mesh_that_is_given_is_told_by_its_halved_elements(tmp_path: Path) -> None:

@@ -201,7 +201,7 @@ def on_other_meshes(file: SceneFile, n_dof: int) -> list[Other]:
 
     A difference can vanish by chance where an answer does not settle from one side: two coarser meshes tell. Edges of a
     part with a single element, which no mesh has fewer of, get more of them. The factors are those of first order, as
-    corners and the borders of contacts leave no better one to elements of any order; of the second mesh of second.
+    corners and the borders of contacts leave no better one to elements of any order.
     n_dof : of the scene's own mesh
     Raises  ValueError where there is no other mesh, or halved elements are too many for a verdict
     """
