@@ -33,7 +33,7 @@ def test_the_reference_is_finer_in_every_knob(tmp_path: Path) -> None:
     assert drawn.text == scoreboard_scenes.draw(SCENES[0], SEED, tmp_path).text
     assert drawn.text != scoreboard_scenes.draw(SCENES[0], SEED + 1, tmp_path).text
     ours = drawn.file(tmp_path)
-    fine = scoreboard.with_overrides(ours, *scoreboard.finer(ours)).part_scene
+    fine = ours.changed(*scoreboard.finer(ours)).part_scene
     scene = ours.part_scene
     for name in ("n_patch", "n_length", "n_height"):
         assert fine.geometry.parameters[name] > scene.geometry.parameters[name]

@@ -16,7 +16,7 @@ from tribodyn.workflows.accuracy import accuracy
 from tribodyn.workflows.accuracy.trade_table import NAMES, QUANTITIES, Trade
 from tribodyn.workflows.result.facts import BudgetEntry
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.scene.scene_file import SceneError, SceneFile, read
+from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 
 # knobs that an estimator covers; Newton's is of the residual, whatever Krylov left of it
 ESTIMATED = ("modes", "harmonics", "samples", "newton", "krylov", "points", "wear")
@@ -163,7 +163,7 @@ def _compared(file: SceneFile, overrides: tuple[str, ...]) -> str | None:
     None where it is finer, where it sets what is not counted, or where the scene cannot be set so
     """
     try:
-        other = read(str(file.folder / f"{file.name}.toml"), (*file.overrides, *overrides)).scene
+        other = file.changed(*overrides).scene
     except SceneError:
         return None
     ours, theirs = file.scene.model_dump(), other.model_dump()

@@ -6,7 +6,7 @@ tells how far off it is; energy per cycle is carried to life, because wear is in
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from time import process_time
@@ -31,7 +31,7 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import delta_max, free_deflection
 from tribodyn.workflows.scene.body import Geometry
 from tribodyn.workflows.scene.decks import Deck
-from tribodyn.workflows.scene.scene_file import SceneFile, parse
+from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import PartScene
 from tribodyn.workflows.scene.structure import Body, StructureScene
 
@@ -211,7 +211,7 @@ def on_other_meshes(file: SceneFile, n_dof: int) -> list[Other]:
             fewer = [_fewer_elements(key, table, file.folder, share) for key, table in tables.items()]
             ratio = float(np.mean([ratio for _, ratio in fewer]))
             texts = tuple(text for more, _ in fewer for text in more)
-            found[texts] = Other(_with(file, texts), 1 / (ratio - 1), "a coarser mesh", "most edges")
+            found[texts] = Other(file.changed(*texts), 1 / (ratio - 1), "a coarser mesh", "most edges")
     except Given:
         if 8 * n_dof > MOST_HALVED:
             raise ValueError(
@@ -219,10 +219,10 @@ def on_other_meshes(file: SceneFile, n_dof: int) -> list[Other]:
                 f"{MOST_HALVED:.2g} that a verdict solves: compare with a run on another mesh"
             ) from None
         texts = tuple(f"{key}.halved={table.halved + 1}" for key, table in tables.items())
-        return [Other(_with(file, texts), OF_HALVED, "halved elements", "most edges")]
+        return [Other(file.changed(*texts), OF_HALVED, "halved elements", "most edges")]
     single = tuple(text for key, table in tables.items() for text in _more_of_single_ones(key, table))
     if single:
-        found[single] = Other(_with(file, single), OF_HALVED, "more elements along short edges", "short edges")
+        found[single] = Other(file.changed(*single), OF_HALVED, "more elements along short edges", "short edges")
     return list(found.values())
 
 
@@ -232,11 +232,7 @@ def with_more_modes(file: SceneFile) -> Other | None:
     if reduction is None or not (reduction.modes or reduction.cutoff):
         return None
     key, value = ("modes", reduction.modes) if reduction.modes else ("cutoff", reduction.cutoff)
-    return Other(_with(file, [f"reduction.{key}={2 * value!r}"]), OF_MODES, "twice as many modes", "modes")
-
-
-def _with(file: SceneFile, texts: Sequence[str]) -> SceneFile:
-    return parse(file.text, f"{file.name}.toml", (*file.overrides, *texts), file.folder)
+    return Other(file.changed(f"reduction.{key}={2 * value!r}"), OF_MODES, "twice as many modes", "modes")
 
 
 def _meshed(file: SceneFile) -> dict[str, Geometry | Body | Deck]:

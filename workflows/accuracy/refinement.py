@@ -17,7 +17,7 @@ from tribodyn.workflows.accuracy.statement import NAMES, QUANTITIES, Contributio
 from tribodyn.workflows.accuracy.trade_table import QUANTITIES as TRADED
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.scene.afterwards import VERDICT_SECONDS
-from tribodyn.workflows.scene.scene_file import SceneFile, parse
+from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import PartScene
 
 ROUNDS = 8
@@ -87,7 +87,7 @@ def to_accuracy(file: SceneFile, accuracy: str, run: Runner, say: Callable[[str]
     added: dict[str, str] = {}
     for number in range(1, ROUNDS + 1):
         more = (f"{key}={value}" for key, value in (always | added).items())
-        current = parse(file.text, f"{file.name}.toml", (*file.overrides, *more), file.folder)
+        current = file.changed(*more)
         result = run(current, number)
         found = loaded(result.verdict)
         of = asked or tuple(name for name, said in found.statements.items() if said.value is not None)

@@ -26,7 +26,7 @@ from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.body import Geometry
-from tribodyn.workflows.scene.scene_file import SceneFile, parse
+from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import PartScene
 from tribodyn.workflows.scene.structure import Body, StructureScene
 
@@ -173,12 +173,7 @@ def solved(file: SceneFile) -> tuple[Result, modelling.Model]:
         models.append(modelling.build(one, None, Progress()))
         return models[-1]
 
-    return pipeline.run(with_overrides(file, "verdict.enabled=false"), None, Progress(), build=build), models[-1]
-
-
-def with_overrides(file: SceneFile, *more: str) -> SceneFile:
-    """The scene with further overrides."""
-    return parse(file.text, f"{file.name}.toml", (*file.overrides, *more), file.folder)
+    return pipeline.run(file.changed("verdict.enabled=false"), None, Progress(), build=build), models[-1]
 
 
 def reference(file: SceneFile, seconds: float) -> tuple[Values, str]:
@@ -194,7 +189,7 @@ def reference(file: SceneFile, seconds: float) -> tuple[Values, str]:
             break
         try:
             with processor_seconds(seconds - (process_time() - clock)):
-                one = with_overrides(file, *fine, *more)
+                one = file.changed(*fine, *more)
                 result, model = solved(one)
                 found = verdict.values_of(result, probes.states(one, model.balance, result))
         except TimeUp:

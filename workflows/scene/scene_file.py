@@ -52,6 +52,10 @@ class SceneFile:
         """Whether it is a scene that comes with the program."""
         return self.folder.resolve().parent == CASES.resolve()
 
+    def changed(self, *overrides: str) -> SceneFile:
+        """The same with further overrides; raises SceneError."""
+        return parse(self.text, f"{self.name}.toml", (*self.overrides, *overrides), self.folder)
+
     @property
     def part_scene(self) -> PartScene:
         """The scene, for what needs a mesh; raises SceneError where it is one of matrices."""
