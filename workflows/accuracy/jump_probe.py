@@ -25,9 +25,9 @@ SHARES = (0.025, 0.05, 0.1)  # of the life, on the side of the instant where the
 def life_moved(balance: HarmonicBalance, wear: WearHistory, duty: Duty, life: float) -> float | None:
     """Relative change of a life [cycles] that the first jump of its run makes when more harmonics decide on it.
 
-    The instant moves by less than the share returned says; while it does, the contact wears at the slower peak instead
-    of the faster one. None where the peak is not found with more harmonics, or the instant moves by more than SHARES.
-    0 where the run has no jump
+    By how much of the life the instant moves is bounded by the first of SHARES at which the answer changes. In between
+    the contact wears at the slower peak instead of the faster one, which costs that share times 1 - slow / fast.
+    None where the peak is not found with more harmonics, or the instant moves further; 0 where the run has no jump
     """
     found = jumps(wear.rows())
     if not found or isinstance(duty.site, AtFrequency):

@@ -5,12 +5,11 @@ from __future__ import annotations
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone
 from tribodyn.workflows.pictures.figures import length_unit, named
-from tribodyn.workflows.pictures.maps import draw_field
+from tribodyn.workflows.pictures.maps import colour_bar, draw_field, label_axes
 from tribodyn.workflows.pictures.style import MOTION_MAP, PRESSURE_MAP, STYLE, WEAR_MAP
 from tribodyn.workflows.result.result import Patch
 
@@ -72,15 +71,7 @@ def picture(balance: HarmonicBalance, found: Backbone, scene: str = "") -> Figur
                 _map(figure, axes, patch, values[line], name, colors)
         for axes, at in zip(grid[0], chosen, strict=True):
             axes.set_title(f"{factor * found.amplitude[at]:.3g} {unit}, {found.frequency[at]:.4g} Hz", fontsize=11)
-        names = [name for name in ("t1", "t2") if name in patch.components]
-        for axes in grid.ravel():
-            axes.locator_params(nbins=5)
-            axes.tick_params(labelsize=9)
-            axes.label_outer(remove_inner_ticks=False)
-        for axes in grid[-1]:
-            axes.set_xlabel(f"{names[0]} / mm", fontsize=10)
-        for axes in grid[:, 0]:
-            axes.set_ylabel(f"{names[-1]} / mm", fontsize=10)
+        label_axes(grid, patch)
         figure.suptitle(named(scene, "contact along the backbone"), x=0.01, ha="left", fontsize=12)
     return figure
 
@@ -92,9 +83,5 @@ def _map(figure: Figure, axes: mpl.axes.Axes, patch: Patch, values: np.ndarray, 
     else:
         unit, factor = length_unit(float(np.abs(values).max()))
     shown = factor * values
-    field = draw_field(axes, patch, shown, colors, float(shown.max()), float(shown.min()))
-    bar = figure.colorbar(field, ax=axes, location="bottom", shrink=0.85, aspect=26)
-    bar.set_label(f"{name} / {unit}", fontsize=10)
-    bar.ax.tick_params(labelsize=9)
-    bar.locator = MaxNLocator(4)
-    bar.update_ticks()
+    high, low = float(shown.max()), float(shown.min())
+    colour_bar(figure, axes, draw_field(axes, patch, shown, colors, high, low), f"{name} / {unit}", high, low)

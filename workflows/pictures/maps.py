@@ -51,22 +51,10 @@ def patch_maps(result: Result, rows: np.ndarray | None = None, scale: Literal["c
                 colors, values = fields[name]
                 low, high = _limits(values if scale == "shared" else [values[column]])
                 shown = draw_field(axes, patch, values[column], colors, high, low)
-                bar = figure.colorbar(shown, ax=axes, location="bottom", shrink=0.85, aspect=26)
-                bar.set_label(name if high > low else f"{name}: {low:.3g} everywhere", fontsize=10)
-                bar.ax.tick_params(labelsize=9)
-                bar.locator = MaxNLocator(4) if high > low else mpl.ticker.NullLocator()
-                bar.update_ticks()
+                colour_bar(figure, axes, shown, name, high, low)
         for axes, state in zip(grid[0], states, strict=True):
             axes.set_title(state.label, fontsize=11)
-        names = [name for name in ("t1", "t2") if name in patch.components] or ["t1", "t2"]
-        for axes in grid.ravel():
-            axes.locator_params(nbins=5)
-            axes.tick_params(labelsize=9)
-            axes.label_outer(remove_inner_ticks=False)
-        for axes in grid[-1]:
-            axes.set_xlabel(f"{names[0]} / mm", fontsize=10)
-        for axes in grid[:, 0]:
-            axes.set_ylabel(f"{names[-1]} / mm", fontsize=10)
+        label_axes(grid, patch)
         _name_contacts(grid[:, 0], result)
         if told:
             status_legend(figure, {int(b) for s in states if s.status is not None for b in s.status}, patch.components)
@@ -103,6 +91,28 @@ def status_maps(result: Result, count: int = 8) -> Figure:
         status_legend(figure, {int(bits) for row in rows for bits in wear.status[row]}, patch.components)
         heading(figure, result, "contact status over wear")
     return figure
+
+
+def label_axes(grid: np.ndarray, patch: Patch) -> None:
+    """Ticks and labels of the axes (n_row, n_column) of maps of one face."""
+    names = [name for name in ("t1", "t2") if name in patch.components] or ["t1", "t2"]
+    for axes in grid.ravel():
+        axes.locator_params(nbins=5)
+        axes.tick_params(labelsize=9)
+        axes.label_outer(remove_inner_ticks=False)
+    for axes in grid[-1]:
+        axes.set_xlabel(f"{names[0]} / mm", fontsize=10)
+    for axes in grid[:, 0]:
+        axes.set_ylabel(f"{names[-1]} / mm", fontsize=10)
+
+
+def colour_bar(figure: Figure, axes: mpl.axes.Axes, shown: Any, name: str, high: float, low: float) -> None:
+    """The scale below a map from `draw_field`; one value alone is told in words."""
+    bar = figure.colorbar(shown, ax=axes, location="bottom", shrink=0.85, aspect=26)
+    bar.set_label(name if high > low else f"{name}: {low:.3g} everywhere", fontsize=10)
+    bar.ax.tick_params(labelsize=9)
+    bar.locator = MaxNLocator(4) if high > low else mpl.ticker.NullLocator()
+    bar.update_ticks()
 
 
 def _name_contacts(columns: np.ndarray, result: Result) -> None:
