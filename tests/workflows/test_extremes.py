@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.wear.step_error import step_error
-from tribodyn.workflows.benchmarks import extremes, extremes_wear
+from tribodyn.workflows.benchmarks import extremes, extremes_march, extremes_wear
 from tribodyn.workflows.benchmarks.extremes_judge import judged, sampled_honestly, tried
-from tribodyn.workflows.benchmarks.extremes_march import force_error
+from tribodyn.workflows.benchmarks.extremes_march import held
 from tribodyn.workflows.benchmarks.extremes_models import lattice, rigid
 from tribodyn.workflows.command import main as cli
 
@@ -37,23 +38,57 @@ def test_a_solution_that_is_slightly_off_is_seen(transitions: str) -> None:
     balance = body.balance(replace(body.ordinary, transitions=transitions))
     verdict, solution = tried(balance, body.ordinary.omega)
     assert verdict.outcome == "converged"
-    assert "forces of a plain march, equilibrium of every coordinate" in verdict.reason
+    assert "friction of a plain march, normal of a plain march, work of a plain march, equilibrium" in verdict.reason
     x = solution.state.x.copy()
     x[0, 0, 1] *= 1 + 1e-6
     assert judged(balance, balance.evaluate(body.ordinary.omega, x)).outcome == "wrong"
 
 
-@pytest.mark.parametrize(("transitions", "share"), [("located", 2e-2), ("sampled", 1e-9)])
-def test_a_contact_force_that_is_slightly_off_is_seen(transitions: str, share: float) -> None:
+@pytest.mark.parametrize(
+    ("transitions", "changes"), [("located", {}), ("located", {"tangential": 1e9}), ("sampled", {"preload": 0.0})]
+)
+def test_a_contact_force_or_an_energy_off_by_a_thousandth_is_seen(transitions: str, changes: dict[str, float]) -> None:
     """The march shares nothing with the solver's law, which all other checks believe."""
     body = lattice(2, 2)
+    balance = body.balance(replace(body.ordinary, transitions=transitions, **changes))
+    state = tried(balance, body.ordinary.omega)[1].state
+
+    def told(found: State) -> set[str]:
+        return {one.name for one in held(balance, found) if one.off > one.allowed}
+
+    assert not told(state)
+    for part, name in ((np.s_[:, :-1], "friction"), (np.s_[:, -1:], "normal")):
+        force = state.cycle.force.copy()
+        force[part] *= 1.001
+        assert name in told(replace(state, cycle=replace(state.cycle, force=force)))
+
+
+@pytest.mark.parametrize("transitions", ["located", "sampled"])
+def test_a_friction_work_off_by_a_thousandth_is_seen(transitions: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    body = lattice(3, 3)
     balance = body.balance(replace(body.ordinary, transitions=transitions))
     state = tried(balance, body.ordinary.omega)[1].state
-    off, allowed = force_error(balance, state)
-    assert off <= allowed
-    wrong = replace(state, cycle=replace(state.cycle, force=(1 + share) * state.cycle.force))
-    off, allowed = force_error(balance, wrong)
-    assert off > allowed
+    energy = HarmonicBalance.energy
+    monkeypatch.setattr(HarmonicBalance, "energy", lambda self, state: 1.001 * energy(self, state))
+    assert [one.name for one in held(balance, state) if one.off > one.allowed] == ["work"]
+
+
+def test_the_march_finds_the_loop_of_a_jenkins_element() -> None:
+    """Masing's loop under constant pressure: work 4 mu N (u - mu N / k), force mu N where it ends."""
+    body = rigid(1)
+    balance = body.balance(replace(body.ordinary, harmonics=(0, 1)))
+    k, pressed, u = balance.contact.stiffness[0, 0], 100.0, 3e-4
+    x = np.zeros((1, 2, 3))
+    x[0, 0, 1], x[0, 1, 0] = u, pressed / balance.contact.stiffness[0, 1]
+    force, _, work, doubt = extremes_march._marched(balance, balance.evaluate(1100.0, x), 1024)
+    limit = 0.4 * pressed
+    expected = 4 * limit * (u - limit / k)
+    assert work[0] == pytest.approx(expected, rel=1e-5)
+    assert abs(work[0] - expected) < doubt[0]
+    turned = np.arccos(1 - 2 * limit / (k * u))  # the angle through which it sticks after each end
+    sine = -expected / (np.pi * u)
+    cosine = (k * u * (2 * turned - np.sin(2 * turned))) / (2 * np.pi)
+    assert force[0, 0, 1:] == pytest.approx([cosine, sine], rel=3e-5)
 
 
 def test_what_nobody_declared_is_wrong_and_what_is_declared_is_refused() -> None:

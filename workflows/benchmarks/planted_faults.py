@@ -1,8 +1,8 @@
 """Faults planted in a copy of the sources, one at a time: which tests see them, what extremes sees, what they change.
 
-The list is planted_faults.toml beside this file. The tests are those of the fault's room, until the first fails or
-their processor seconds are spent; the judge is that of `extremes` on every so many of its quick cells. Of a fault that
-neither sees, a few small scenes tell how much it changes.
+The list is planted_faults.toml beside this file. The tests are those of the fault's room, those named after its file
+first, until the first fails or their processor seconds are spent. Where none fails, the judge of `extremes` is asked on
+every so many of its quick cells. Where that sees nothing either, a few small scenes tell how much the fault changes.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import sys
 import tomllib
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 LIST = Path(__file__).with_suffix(".toml")
@@ -25,6 +25,7 @@ ROWS = "rows.jsonl"
 COPIED = ("fem", "geometry", "hbm", "reduction", "workflows", "src", "tests", "pyproject.toml", "README.md")
 JUDGED = 30  # every so many of the quick cells of extremes
 SECONDS = 25.0  # of the processor, for the tests of one fault, and again for the judge
+COMPILING = 40.0  # seconds more where the file is compiled: what calls it is compiled anew
 SOLVED = ("hbm/", "reduction/")  # what extremes looks at; it takes the matrices as they are
 PROBED = 6  # times the seconds, for the small scenes
 LARGE = 1e-3  # relative change of a result from which on a fault must be seen
@@ -55,7 +56,8 @@ class Fault:
 
 @dataclass(frozen=True)
 class Seen:
-    """tests : the first test that fails, "" where none does; extremes : a cell that is wrong, "" where none is.
+    """tests : the first test that fails, "" where none does; extremes : a cell that is wrong, "" where none is or none
+    was asked, because a test fails already.
 
     change : largest relative one of the results of PROBES, where neither sees it and it can be told
     """
@@ -78,44 +80,64 @@ def faults() -> tuple[list[Fault], dict[str, list[str]]]:
     return [Fault(**({"room": one["file"].partition("/")[0]} | one)) for one in data["fault"]], data["tests"]
 
 
-def run(tree: Path, folder: Path, say: Callable[[str], None], seconds: float = SECONDS) -> list[Seen]:
+def run(
+    tree: Path, folder: Path, say: Callable[[str], None], seconds: float = SECONDS, again: bool = False
+) -> list[Seen]:
     """Plant every fault in a copy of a tree; those that `folder` holds already are left out.
 
     tree : root of a clone; folder : of the copy and of the rows; seconds : of the processor for the tests of a fault
+    again : plant those once more that nothing has seen, in a new copy of the tree
     Raises  ValueError where the tree is no clone, or a text does not stand once in its file
     """
     listed, tests = faults()
     if not (tree / "tests").is_dir():
         raise ValueError(f"{tree} holds no tests: plant faults from a clone of the repository")
     copy = folder / "tree"
+    if again:
+        shutil.rmtree(copy, ignore_errors=True)
     if not copy.exists():
         copied(tree, copy)
-    done = {(row.file, row.does): row for row in rows_in(folder)}
+    for fault in listed:  # a run that was killed leaves its fault
+        if (copy / fault.file).read_text(encoding="utf-8") != (original := (tree / fault.file).read_text("utf-8")):
+            _replace(copy, fault.file, original)
+    done = {(row.file, row.does): row for row in rows_in(folder) if row.caught or not again}
     base: dict[str, float] = {}  # of the copy without a fault, once it is needed
     for number, fault in enumerate(listed, start=1):
         if (fault.file, fault.does) in done:
             continue
         planted(copy, fault, tree)
         try:
-            by_tests = failing(copy, tests[fault.room], seconds)
-            by_extremes = wrong_cell(copy, seconds) if fault.file.startswith(SOLVED) else ""
-            now = {} if by_tests or by_extremes else probed(copy, PROBED * seconds)
+            row, now = _seen(copy, fault, tests[fault.room], seconds)
         finally:
             _replace(copy, fault.file, (tree / fault.file).read_text(encoding="utf-8"))
-        base = base or (probed(copy, PROBED * seconds) if now else {})
-        change = _change(base, now) if now else None
-        row = Seen(fault.file, fault.does, by_tests, by_extremes, change)
+        if now:
+            base = base or probed(copy, PROBED * seconds)
+            row = replace(row, change=_change(base, now))
         with (folder / ROWS).open("a", encoding="utf-8") as file:
             file.write(json.dumps(asdict(row)) + "\n")
         done[(fault.file, fault.does)] = row
-        say(f"{number} of {len(listed)}: {row.file}, {row.does}: {row.tests or row.extremes or f'unseen, {change}'}")
+        told = row.tests or row.extremes or f"unseen, {row.change}"
+        say(f"{number} of {len(listed)}: {row.file}, {row.does}: {told}")
     return [done[(fault.file, fault.does)] for fault in listed]
 
 
+def _seen(copy: Path, fault: Fault, tests: Sequence[str], seconds: float) -> tuple[Seen, dict[str, float]]:
+    """What sees a planted fault, and the results of PROBES with it where nothing does."""
+    if "numba" in (copy / fault.file).read_text(encoding="utf-8"):
+        seconds += COMPILING
+    name = Path(fault.file).stem
+    by_tests = failing(copy, sorted(tests, key=lambda test: name not in test), seconds)
+    asked = not by_tests and fault.file.startswith(SOLVED)
+    by_extremes = wrong_cell(copy, seconds) if asked else ""
+    now = {} if by_tests or by_extremes else probed(copy, PROBED * seconds)
+    return Seen(fault.file, fault.does, by_tests, by_extremes), now
+
+
 def rows_in(folder: Path) -> list[Seen]:
-    """The rows that a folder holds."""
+    """The rows that a folder holds, the last one of each fault."""
     path = folder / ROWS
-    return [Seen(**json.loads(line)) for line in path.read_text().splitlines()] if path.exists() else []
+    rows = [Seen(**json.loads(line)) for line in path.read_text().splitlines()] if path.exists() else []
+    return list({(row.file, row.does): row for row in rows}.values())
 
 
 def copied(tree: Path, copy: Path) -> None:
@@ -138,10 +160,10 @@ def planted(copy: Path, fault: Fault, tree: Path) -> None:
 
 
 def _replace(copy: Path, file: str, text: str) -> None:
-    """Write a file of the copy, and forget what was compiled of its folder: callers hold compiled callees."""
+    """Write a file of the copy, and forget what holds it compiled: its callers hold the compiled callee."""
+    if "numba" in text:
+        shutil.rmtree(copy.parent / "compiled", ignore_errors=True)
     (copy / file).write_text(text, encoding="utf-8")
-    for compiled in (copy.parent / "compiled").glob(f"{Path(file).parent.name}_*"):
-        shutil.rmtree(compiled)
 
 
 def failing(copy: Path, tests: Sequence[str], seconds: float) -> str:
