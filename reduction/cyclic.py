@@ -104,7 +104,7 @@ def travelling_wave(reduced: ReducedSector, engine_order: int, cutoff: float | N
     except StaticDivergence:  # rotation carries away what only the contact holds
         pass
     interface = replace(reduced.sector.interface, B=B)
-    return ReducedModel(system, interface, None, info, wave.model, wave.basis)
+    return ReducedModel(system, interface, None, info, wave.model, wave.basis, wave.at_index)
 
 
 def wheel_model(reduced: ReducedSector, stiffness: Sequence[float] | None = None) -> ReducedModel:
@@ -161,14 +161,15 @@ class _Wave:
 
     def model(self, h: int) -> tuple[SecondOrderSystem, np.ndarray]:
         """Small system and contact map of harmonic h."""
-        return self._index(h)[:2]
+        return self.at_index(h * self.engine_order)
+
+    def at_index(self, index: int) -> tuple[SecondOrderSystem, np.ndarray]:
+        """Small system and contact map of any wave of the wheel."""
+        return self.index_of(index % self.reduced.sector.n_sectors)[:2]
 
     def basis(self, h: int) -> np.ndarray:
         """From the small coordinates of harmonic h to the full ones."""
-        return self.reduced.basis @ self._index(h)[2]
-
-    def _index(self, h: int) -> tuple[SecondOrderSystem, np.ndarray, np.ndarray]:
-        return self.index_of(h * self.engine_order % self.reduced.sector.n_sectors)
+        return self.reduced.basis @ self.index_of(h * self.engine_order % self.reduced.sector.n_sectors)[2]
 
 
 def distinct(sector: Sector) -> tuple[Sector, np.ndarray]:

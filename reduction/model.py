@@ -65,6 +65,8 @@ class ReducedModel:
     per_harmonic : harmonic -> (system, B) where a harmonic sees another system than `system`
         (cyclic harmonic index, displacement prescribed in harmonic 0); complex Hermitian where cyclic
     harmonic_basis : harmonic -> (n_full, n) basis where the coordinates of a harmonic are its own
+    per_index : of a travelling wave, index -> (system, B) of any wave of the wheel, real for 0 and N/2; matrices of
+        index -j are the conjugates of those of j
     """
 
     system: SecondOrderSystem
@@ -73,6 +75,7 @@ class ReducedModel:
     info: ModelInfo = field(default_factory=ModelInfo)
     per_harmonic: Callable[[int], tuple[SecondOrderSystem, np.ndarray]] | None = None
     harmonic_basis: Callable[[int], np.ndarray] | None = None
+    per_index: Callable[[int], tuple[SecondOrderSystem, np.ndarray]] | None = None
 
     def at_harmonic(self, h: int) -> tuple[SecondOrderSystem, np.ndarray]:
         """System and contact map (n_pair * n_component, n) that harmonic h sees."""
@@ -107,7 +110,14 @@ class ReducedModel:
             system, B = seen(h)
             return damped(system, B), B
 
-        return replace(self, system=first, per_harmonic=per_harmonic)
+        if (any_wave := self.per_index) is None:
+            return replace(self, system=first, per_harmonic=per_harmonic)
+
+        def per_index(index: int) -> tuple[SecondOrderSystem, np.ndarray]:
+            system, B = any_wave(index)
+            return damped(system, B), B
+
+        return replace(self, system=first, per_harmonic=per_harmonic, per_index=per_index)
 
 
 @dataclass(frozen=True)

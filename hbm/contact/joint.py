@@ -118,6 +118,27 @@ class Contact:
             raise ValueError(f"{needed_by} serves one joint that covers the whole contact: this one has several laws")
         return self._alone
 
+    def merged(self, needed_by: str) -> Joint:
+        """One joint that covers all pairs in their order, where every joint has the same law and all components.
+
+        Raises  ValueError where they differ
+        """
+        if self._alone is not None:
+            return self._alone
+        first = self.joints[0]
+        alike = all(
+            joint.law == first.law
+            and joint.parameters.components == self.components
+            and joint.parameters.tail is None
+            and tuple(joint.parameters.numbers) == tuple(first.parameters.numbers)
+            for joint in self.joints
+        )
+        if not alike:
+            return self.only(needed_by)
+        numbers = {name: self.number(name) for name in first.parameters.numbers}
+        whole = replace(first.parameters, stiffness=self.stiffness, gap=self.gap, numbers=numbers)
+        return replace(first, name=needed_by, parameters=whole, pairs=np.arange(self.n_pair))
+
     def columns(self, joint: Joint) -> np.ndarray:
         """Positions of a joint's components among those of the interface."""
         return np.array([self.components.index(c) for c in joint.parameters.components])

@@ -31,11 +31,11 @@ def left_face(basis: HarmonicBasis, coefficients: np.ndarray, engine_order: int,
     return at_sector(basis, coefficients, engine_order, n_sectors, 1)
 
 
-def on_wheel(excitation: Excitation, engine_order: int, n_sectors: int) -> Excitation:
-    """The excitation of one sector as loads "<name>@<sector>" of all sectors of a wheel."""
+def on_wheel(excitation: Excitation, engine_order: int, n_sectors: int, shown: int | None = None) -> Excitation:
+    """The excitation of one sector as loads "<name>@<sector>" of all sectors of a wheel, or of the first `shown`."""
     loads = {
         (h, f"{name}@{n}"): value * np.exp(-2j * np.pi * (h * engine_order * n % n_sectors) / n_sectors)
         for (h, name), value in excitation.loads.items()
-        for n in range(n_sectors)
+        for n in range(shown or n_sectors)
     }
     return replace(excitation, loads=loads)

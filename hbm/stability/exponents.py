@@ -17,20 +17,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.contact.law import STICKS
 from tribodyn.hbm.continuation import parameter
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.stability import floquet
+from tribodyn.hbm.stability import floquet, wave_exponents
+from tribodyn.hbm.stability.wave_exponents import WaveModes
 from tribodyn.hbm.threads import single
 
 NEUTRAL_GROWTH = 1e-6  # over omega: real parts up to it count as zero, for the solution is no better than that
 FEWEST_MODES, MOST_MODES = 20, 30  # friction makes modes far above the excitation flutter, too
+_WAVES: WeakKeyDictionary[ContactCompliance, WaveModes] = WeakKeyDictionary()  # for all solutions of one wheel
 COPY_DISTANCE = 0.02  # over omega: how far truncation may drive copies of one exponent apart
 
 
@@ -41,11 +46,14 @@ class Stability:
     omega : [rad/s]
     exponents : (n,) complex, growth rates lambda [1/s], largest real part first; imaginary parts within (-w/2, w/2]
     method : "hill" or "floquet"
+    diameters : (n,) of a travelling wave, index of each perturbation's wave beside that of the solution, 0 where it
+        repeats itself from sector to sector as the solution does; None of a motion that is no wave
     """
 
     omega: float
     exponents: np.ndarray
     method: str
+    diameters: np.ndarray | None = None
 
     @property
     def multipliers(self) -> np.ndarray:
@@ -112,18 +120,21 @@ def stability(
     n_modes : modes that move dynamically in Hill's method, by default those below three times the highest harmonic,
         at least FEWEST_MODES and at most MOST_MODES of them
     top : highest harmonic of the perturbation in Hill's method, by default that of the balance
-    Raises  ValueError for unknown methods and for models whose harmonics see different systems
+    Raises  ValueError for unknown methods and for models whose harmonics see different systems, but for travelling
+        waves by Hill's method
     """
-    if balance.model.per_harmonic is not None:
-        raise ValueError(
-            "stability needs one system for all harmonics: perturbations of a cyclic part, or with a displacement "
-            "prescribed in harmonic 0 alone, see other systems than the solution does"
-        )
-    if method == "floquet":
-        return Stability(state.omega, _sorted(floquet.exponents(balance, state), state.omega), method)
-    if method != "hill":
+    if method not in ("hill", "floquet"):
         raise ValueError(f"no stability method '{method}': there are hill, floquet")
-    return Stability(state.omega, _sorted(_hill(balance, state, n_modes, top), state.omega), method)
+    model = balance.model
+    if method == "hill" and model.per_index is not None:
+        return _of_wave(balance, state, n_modes, top)
+    if model.per_harmonic is not None:
+        raise ValueError(
+            "stability needs one system for all harmonics: perturbations of a stored cyclic part, or with a "
+            "displacement prescribed in harmonic 0 alone, see other systems than the solution does"
+        )
+    found = floquet.exponents(balance, state) if method == "floquet" else _hill(balance, state, n_modes, top)
+    return Stability(state.omega, _sorted(found, state.omega)[0], method)
 
 
 @single
@@ -166,22 +177,43 @@ def _locate(i: int, before: Stability, after: Stability, first: float, second: f
     return Bifurcation(i + share, first + share * (second - first), crossing.crossing)
 
 
-def _sorted(exponents: np.ndarray, omega: float) -> np.ndarray:
-    """Imaginary parts brought into (-w/2, w/2], largest real part first."""
+def _sorted(exponents: np.ndarray, omega: float) -> tuple[np.ndarray, np.ndarray]:
+    """Imaginary parts brought into (-w/2, w/2], largest real part first; and the order that makes it so."""
     turns = np.ceil(exponents.imag / omega - 0.5)
     exponents = exponents - 1j * omega * turns
-    return exponents[np.lexsort((exponents.imag, -exponents.real))]
+    order = np.lexsort((exponents.imag, -exponents.real))
+    return exponents[order], order
+
+
+def _perturbed(balance: HarmonicBalance, top: int | None) -> HarmonicBasis:
+    """All harmonics of a perturbation up to the highest, by default that of the balance."""
+    top = balance.basis.harmonics[-1] if top is None else top
+    return HarmonicBasis(tuple(range(top + 1)), max(balance.basis.n_samples, 4 * top + 1), balance.basis.transitions)
+
+
+def _moving(balance: HarmonicBalance, state: State, n_modes: int | None, top: int) -> int:
+    """How many modes move dynamically."""
+    frequencies = np.sqrt(balance.compliance.groups[-1][0].lam)
+    if n_modes is None:
+        n_modes = int(np.clip(np.sum(frequencies < 3 * (top + 1) * state.omega), FEWEST_MODES, MOST_MODES))
+    return min(n_modes, len(balance.model.system.mass))
+
+
+def _of_wave(balance: HarmonicBalance, state: State, n_modes: int | None, top: int | None) -> Stability:
+    basis, linear = _perturbed(balance, top), balance.compliance
+    wanted = _moving(balance, state, n_modes, basis.harmonics[-1])
+    modes = _WAVES.get(linear)
+    if modes is None or modes.m != wanted:
+        modes = _WAVES[linear] = WaveModes(balance.model, linear.k, wanted)
+    found, diameters = wave_exponents.exponents(balance, modes, state.omega, _departure_slope(balance, state, basis))
+    exponents, order = _sorted(found, state.omega)
+    return Stability(state.omega, exponents, "hill", diameters[order])
 
 
 def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int | None) -> np.ndarray:
-    top = balance.basis.harmonics[-1] if top is None else top
-    n_samples = max(balance.basis.n_samples, 4 * top + 1)
-    basis = HarmonicBasis(tuple(range(top + 1)), n_samples, balance.basis.transitions)
+    basis = _perturbed(balance, top)
     expansion = balance.compliance.groups[0][0]
-    frequencies = np.sqrt(expansion.lam)
-    if n_modes is None:
-        n_modes = int(np.clip(np.sum(frequencies < 3 * (top + 1) * state.omega), FEWEST_MODES, MOST_MODES))
-    m = min(n_modes, len(frequencies))
+    m = min(_moving(balance, state, n_modes, basis.harmonics[-1]), len(expansion.lam))
     n_contact = balance.compliance.n_contact
     phi, rest = expansion.b[:n_contact, :m], expansion.b[:n_contact, m:]
     static = expansion.w0[:n_contact, :n_contact] + (rest / expansion.lam[m:]) @ rest.T
@@ -206,13 +238,15 @@ def _departure_slope(balance: HarmonicBalance, state: State, basis: HarmonicBasi
         if h <= basis.harmonics[-1]:
             x[:, :, 0 if h == 0 else 2 * h - 1 + seen.get(h, 0)] = state.x[:, :, i]
             seen[h] = 1
-    jac = balance.contact.cycle(x, basis, balance.memory).jacobian
+    cycle = balance.contact.cycle(x, basis, balance.memory)
+    jac = cycle.jacobian
     assert jac is not None
     slope = -jac.reshape(n_pair, c, basis.n_coeff, c, basis.n_coeff)
     k = balance.compliance.k.reshape(n_pair, c)
     for j in range(c):
         for a in range(basis.n_coeff):
             slope[:, j, a, j, a] += k[:, j]
+    slope[cycle.status == STICKS] = 0.0  # where the slider stood still it does so in a small perturbation, too
     return slope
 
 

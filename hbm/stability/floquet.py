@@ -33,7 +33,7 @@ def exponents(balance: HarmonicBalance, state: State, options: Options | None = 
 def monodromy(stepper: TimeStepper, motion: PeriodicMotion) -> np.ndarray:
     """Derivative of the state (z, f, x, memory that moves) after a period with respect to the one before."""
     assert motion.slopes is not None
-    linear, A, c = stepper.linear, stepper.contact.A, stepper.c
+    linear, A, c = stepper.linear, stepper.contact.A.T, stepper.c
     n, n_contact, n_memory = len(linear.E), len(A), stepper.balance.memory.size
     n_state = motion.slopes.shape[2] - c
     z, f, x, s = np.split(np.eye(n + 2 * n_contact + n_memory), np.cumsum([n, n_contact, n_contact]))

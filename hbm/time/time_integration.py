@@ -22,7 +22,7 @@ from tribodyn.hbm.contact import compiled_law
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
-from tribodyn.hbm.time import time_step
+from tribodyn.hbm.time import time_step, wave_in_time
 from tribodyn.hbm.time.period_search import Period, PeriodSearch
 from tribodyn.hbm.time.time_step import Moving, Record
 
@@ -138,8 +138,6 @@ class TimeStepper:
             )
         self.balance, self.omega, self.options = balance, omega, options
         system = model.system
-        if system.gyroscopic is not None:
-            raise ValueError("time integration knows no Coriolis forces: leave them out, wheel.coriolis = false")
         lam, phi = _free_modes(system)
         self.h = 2 * np.pi / omega / options.steps
         m = self.n_dynamic = max(1, int(np.sum(lam < (RESOLVED / self.h) ** 2)))
@@ -148,7 +146,8 @@ class TimeStepper:
         B = np.asarray(model.interface.B)
         U, follows = np.ascontiguousarray(B @ moving), B @ rest
         self.static = follows @ follows.T
-        full = np.zeros((m, m)) if system.damping is None else moving.T @ np.asarray(system.damping) @ moving
+        rate = system.velocity_matrix
+        full = np.zeros((m, m)) if rate is None else moving.T @ np.asarray(rate) @ moving
         self.damping = full
         own = np.abs(np.diag(full))
         off = np.abs(full - np.diag(np.diag(full)))
@@ -170,10 +169,11 @@ class TimeStepper:
             np.ascontiguousarray(samples @ self.rest.T), np.ascontiguousarray(samples @ output_rest.T),
         )  # fmt: skip
         compliance = 0.5 * U @ (Q[:m] @ U.T) + self.static
-        joint = balance.contact.only("time integration")
+        joint = balance.contact.merged("time integration")
         components = joint.parameters.components
         normal = components.index("n") if "n" in components else -1
-        compliance = np.ascontiguousarray(0.5 * (compliance + compliance.T))
+        compliance = 0.5 * (compliance + compliance.T) if system.gyroscopic is None else compliance.T
+        compliance = np.ascontiguousarray(compliance)
         self.contact = time_step.Contact(joint.parameters.packed(), joint.parameters.gap, normal, compliance)
         self.law = compiled_law.pointer(joint.module.step)
 
@@ -261,6 +261,12 @@ class TimeStepper:
 
 
 def _free_modes(system: SecondOrderSystem) -> tuple[np.ndarray, np.ndarray]:
+    matrices = [np.asarray(matrix) for matrix in (system.stiffness, system.mass)]
+    if all(np.count_nonzero(matrix) == np.count_nonzero(np.diag(matrix)) for matrix in matrices):
+        k, m = (np.diag(matrix) for matrix in matrices)
+        if (m > 0).all():
+            order = np.argsort(k / m, kind="stable")
+            return (k / m)[order], np.diag(1 / np.sqrt(m))[:, order]
     try:
         lam, phi = sla.eigh(np.asarray(system.stiffness), np.asarray(system.mass))
     except np.linalg.LinAlgError:
@@ -317,13 +323,16 @@ def integrate(
 
     omega : [rad/s]; start : balance state to start from, or None for rest: the balance's static equilibrium
     with_slopes : record the derivatives of the law along the last period
+    Of a travelling wave all sectors are marched until it repeats itself, and the first of them is shown; its slopes
+    are of all of them
     Returns the last period, also where it is not periodic within max_periods, as its outcome then says
     Raises  ValueError for models with no equation of motion in time; IntegrationFailed
     """
     options = options or Options()
-    stepper = TimeStepper(balance, omega, options)
-    motion = stepper.start_from(start) if start is not None else _rest(stepper)
-    return _to_periodic(stepper, motion, options, with_slopes)
+    whole, begin = _in_time(balance, omega, start, options)
+    stepper = TimeStepper(whole, omega, options)
+    motion = stepper.start_from(begin) if begin is not None else _rest(stepper)
+    return _of_sector(balance, _to_periodic(stepper, motion, options, with_slopes))
 
 
 @single
@@ -337,16 +346,18 @@ def leave_alone(
     Raises  ValueError for models with no equation of motion in time; IntegrationFailed
     """
     options = replace(options or Options(), accelerate=False)
-    stepper = TimeStepper(balance, omega, options)
+    whole, begin = _in_time(balance, omega, start, options)
+    assert begin is not None
+    stepper = TimeStepper(whole, omega, options)
     search = PeriodSearch(stepper, replace(options, max_periods=periods, patience=periods), False)
     energy, amplitude = [], []
-    motion = stepper.start_from(start)
+    motion = stepper.start_from(begin)
     for _ in range(periods):
         found = search.step(motion)
         motion = found.end
-        whole = _result(stepper, found, search.periods, CONVERGED)
-        energy.append(float(whole.energy.sum()))
-        amplitude.append(np.sqrt(2 * whole.outputs.var(axis=1)))
+        seen = _of_sector(balance, _result(stepper, found, search.periods, CONVERGED))
+        energy.append(float(seen.energy.sum()))
+        amplitude.append(np.sqrt(2 * seen.outputs.var(axis=1)))
     late, swing = np.array(energy[periods // 2 :]), np.array(amplitude[periods // 2 :])
     return LeftAlone(
         energy=float(late.mean()),
@@ -355,6 +366,34 @@ def leave_alone(
         amplitude_spread=swing.std(axis=0),
         drift=found.drift,
         periods=periods,
+    )
+
+
+def _in_time(
+    balance: HarmonicBalance, omega: float, start: State | None, options: Options
+) -> tuple[HarmonicBalance, State | None]:
+    """The problem that has an equation of motion in time, and the start: a wave as the sectors until it repeats."""
+    if not wave_in_time.is_wave(balance):
+        return balance, start
+    whole = wave_in_time.unroll(balance, RESOLVED * options.steps * omega / (2 * np.pi))
+    return whole, None if start is None else wave_in_time.state_of(balance, whole, start)
+
+
+def _of_sector(balance: HarmonicBalance, motion: PeriodicMotion) -> PeriodicMotion:
+    """The motion of the first sector of a wave; any other motion is left as it is."""
+    if not wave_in_time.is_wave(balance):
+        return motion
+    pairs, components = slice(0, balance.contact.n_pair), balance.contact.components
+    force = motion.force[pairs]
+    normal = force[:, components.index("n")].mean(axis=1).sum() if "n" in components else 0.0
+    return replace(
+        motion,
+        x=motion.x[pairs],
+        force=force,
+        outputs=motion.outputs[: len(balance.compliance.output_names)],
+        energy=motion.energy[pairs],
+        preload=float(normal),
+        status=motion.status[pairs],
     )
 
 

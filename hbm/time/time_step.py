@@ -34,7 +34,8 @@ class Contact(NamedTuple):
     """The contact that a step meets.
 
     p : (n_pair, ...) packed parameters; gap : (n_pair,) [m]; normal : position of the component n, -1 without one
-    A : (n_pair * c, n_pair * c) symmetric compliance of a step
+    A : (n_pair * c, n_pair * c) compliance of a step, row i the displacement of all under a unit force i; symmetric
+        but for Coriolis forces
     """
 
     p: np.ndarray
@@ -226,7 +227,7 @@ def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, near, backward,
     for turn in range(n_pair):
         i = n_pair - 1 - turn if backward else turn
         o = i * c
-        own = A[o : o + c, o : o + c]
+        own = A[o : o + c, o : o + c].T
         off = 0.0
         for a in range(c):
             b[a] = x_free[o + a] - y[o + a]
@@ -286,7 +287,7 @@ def solve_contact(step, contact, x_free, x0, was_open, s, x, f, scale):
 
 @numba.njit(cache=True)
 def times(A, f):
-    """A f (n,) for the symmetric A and forces f (n_pair, c), of which many vanish."""
+    """Displacement (n,) under forces f (n_pair, c), of which many vanish; A as in `Contact`."""
     y = np.zeros(A.shape[0])
     c = f.shape[1]
     for i in range(f.shape[0]):
@@ -326,7 +327,7 @@ def newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits):
             full = np.eye(n_pair * c)
             for i in range(n_pair):
                 o = i * c
-                full[:, o : o + c] += np.dot(np.ascontiguousarray(A[:, o : o + c]), np.ascontiguousarray(J[i]))
+                full[:, o : o + c] += np.dot(np.ascontiguousarray(A[o : o + c].T), np.ascontiguousarray(J[i]))
             direction = np.linalg.solve(full, r)
         x[:] = x_best - length * direction.reshape(x.shape)
     return bits, -1, scale

@@ -22,7 +22,6 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import expansion
 from tribodyn.hbm.linear import travelling_wave as waves
 from tribodyn.hbm.reference import DenseBalance
-from tribodyn.hbm.time.time_integration import integrate
 from tribodyn.reduction import linear
 from tribodyn.reduction.cyclic import reduce_sector, travelling_wave
 from tribodyn.reduction.damping import modal_damping
@@ -140,9 +139,5 @@ def test_unequal_blades_with_coriolis_forces_solve_the_equations_of_the_whole_wh
 
 def test_what_knows_no_coriolis_forces_says_so(turning):
     _, wheel = small.wave_and_wheel(turning, 1, harmonics=(0, 1))
-    omega = 2 * np.pi * 250
-    state = wheel.evaluate(omega, wheel.stuck(omega))
-    with pytest.raises(ValueError, match=r"leave them out, wheel.coriolis = false"):
-        integrate(wheel, omega, state)
     with pytest.raises(ValueError, match=r"leave them out, wheel.coriolis = false"):
         FreeVibration(wheel, 0, None)

@@ -133,7 +133,6 @@ class MeshScene(Scene):
             ("reduction.relative", self.reduction.relative),
             ("reduction.solver", self.reduction.solver != "direct"),
             ("reduction.interface_modes", self.reduction.interface_modes is not None),
-            ("response.stability", self.response.stability),  # perturbations see other waves than the solution does
         ):
             if has:
                 raise ValueError(f"{key} has no meaning for a sector of a wheel: leave it out")

@@ -1,0 +1,171 @@
+"""Hill's method for a travelling wave: perturbations of every nodal diameter, which one sector does not show.
+
+A motion that repeats itself from sector to sector, x_n(t) = x_0(t - n phi / w), is perturbed by
+
+    d x_n(t) = exp(lambda t) sum_k X_k exp(i k (w t - n phi)) exp(-i 2 pi d n / N),    phi = 2 pi EO / N,
+
+which solves the linearised equations of the whole wheel for d = 0 .. N - 1 (Floquet in time, Bloch round the wheel):
+its harmonic k sees the wave of index k EO + d. With the modes Phi, L of the stuck wheel at that index,
+
+    (lambda + i k w)^2 eta_k + C_k (lambda + i k w) eta_k + L_k eta_k = Phi_k^H dg_k,
+    X_k = Phi_k eta_k + W_k dg_k,    dg = (dg/dx) X,
+
+one quadratic eigenproblem for each d; that of N - d is its conjugate. The assumptions are those of `exponents`.
+Source  Floquet-Bloch perturbations of a periodic solution with space-time symmetry: Krack and Gross 2019, section 3.7,
+for one sector; the extension to all nodal diameters and the elimination of the contact are ours
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as sla
+
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.linear.expansion import stuck_modes
+from tribodyn.reduction.model import ReducedModel
+
+COPY_DISTANCE, SAME_CENTRE = 0.02, 0.25  # over omega, and of harmonic numbers: how far truncation drives copies apart
+
+
+class WaveModes:
+    """Stuck modes and contact flexibility of the wheel by index, each made once.
+
+    n_modes : of each index that move dynamically; the others follow statically
+    """
+
+    def __init__(self, model: ReducedModel, stiffness: np.ndarray, n_modes: int):
+        assert model.per_index is not None
+        assert model.info.n_sectors is not None
+        self.n_sectors = model.info.n_sectors
+        self._per_index, self._k, self.m = model.per_index, np.asarray(stiffness, float).ravel(), n_modes
+        self._made: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = {}
+
+    def __call__(self, index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Squared frequencies (m,), damping (m, m), contact shapes (n_contact, m), W of the rest (n_contact, ...)."""
+        index = index % self.n_sectors
+        mirror = 2 * index > self.n_sectors
+        key = self.n_sectors - index if mirror else index
+        if key not in self._made:
+            self._made[key] = self._make(key)
+        lam, c, phi, static = self._made[key]
+        return (lam, c.conj(), phi.conj(), static.conj()) if mirror else (lam, c, phi, static)
+
+    def _make(self, index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        system, b = self._per_index(index)
+        b, mass = np.asarray(b), np.asarray(system.mass)
+        stuck = np.asarray(system.stiffness) + b.conj().T @ (self._k[:, None] * b)
+        m = min(self.m, len(mass))
+        lam, shapes = (part[..., :m] for part in stuck_modes(stuck, mass)[:2]) if m == len(mass) else sla.eigh(
+            stuck, mass, subset_by_index=(0, m - 1)
+        )  # fmt: skip
+        rate = system.velocity_matrix
+        c = np.zeros((m, m)) if rate is None else shapes.conj().T @ np.asarray(rate) @ shapes
+        phi = b @ shapes
+        static = np.zeros((len(b), len(b)), phi.dtype)
+        if m < len(mass):
+            static = b @ sla.solve(stuck, b.conj().T, assume_a="pos") - (phi / lam) @ phi.conj().T
+        return lam, c, phi, static
+
+
+def exponents(
+    balance: HarmonicBalance, modes: WaveModes, omega: float, slope: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Floquet exponents of a travelling wave against perturbations of every nodal diameter.
+
+    slope : (n_pair, c, n_coeff, c, n_coeff) dg/dx with coefficients [x_0, a_1, b_1, ...] up to the highest harmonic of
+        the perturbation
+    Returns exponents (n,) [1/s] and the index d (n,) of each perturbation, from -N/2 + 1 to N/2
+    """
+    order, n = balance.model.info.engine_order, modes.n_sectors
+    assert order is not None
+    active = np.flatnonzero(np.abs(slope).max(axis=(1, 2, 3, 4)) > 0)
+    blocks = of_exponentials(slope[active])
+    c = slope.shape[1]
+    rows = (active[:, None] * c + np.arange(c)).ravel()
+    values, centres, diameters = [], [], []
+    for d in range(n // 2 + 1):
+        found, centre = _of_index(modes, order, d, omega, blocks, rows)
+        for sign in (1, -1) if 0 < 2 * d < n else (1,):
+            values.append(found if sign > 0 else found.conj())
+            centres.append(sign * centre)
+            diameters.append(np.full(len(found), sign * d))
+    every = np.concatenate(values), np.concatenate(centres), np.concatenate(diameters)
+    chosen = _once(*every, order, n, sum(2 * len(modes(d)[0]) for d in range(n)))
+    return every[0][chosen] * omega, every[2][chosen]
+
+
+def _once(
+    values: np.ndarray, centre: np.ndarray, diameters: np.ndarray, order: int, n_sectors: int, wanted: int
+) -> np.ndarray:
+    """The `wanted` exponents, in units of omega, with the most central perturbations, none of them twice.
+
+    (lambda - i s, d - s EO) with harmonics renumbered by s is the same perturbation as (lambda, d), for whole s
+    """
+    chosen: list[int] = []
+    for i in np.argsort(np.abs(centre), kind="stable"):
+        shift = np.round((values[chosen] - values[i]).imag)
+        same = np.abs(values[chosen] - values[i] - 1j * shift) < COPY_DISTANCE
+        same &= (shift != 0) & ((diameters[chosen] - diameters[i] - shift * order) % n_sectors == 0)
+        if not np.any(same & (np.abs(centre[i] - centre[chosen] - shift) < SAME_CENTRE)):
+            chosen.append(int(i))
+        if len(chosen) == wanted:
+            break
+    return np.array(chosen)
+
+
+def of_exponentials(slope: np.ndarray) -> np.ndarray:
+    """The derivative (..., n_coeff, c, n_coeff) of cosines and sines on the amplitudes of exp(i k w t), k = -H .. H."""
+    nc = slope.shape[-1]
+    top = nc // 2
+    to_real = np.zeros((nc, nc), complex)  # [x_0, a_1, b_1, ...] of [X_-H, ..., X_H]
+    to_real[0, top] = 1.0
+    for h in range(1, top + 1):
+        to_real[2 * h - 1, [top - h, top + h]] = 1.0
+        to_real[2 * h, [top - h, top + h]] = -1j, 1j
+    return np.einsum("ka,pcadb,bl->pckdl", np.linalg.inv(to_real), slope, to_real, optimize=True)
+
+
+def _of_index(
+    modes: WaveModes, order: int, d: int, omega: float, blocks: np.ndarray, rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Exponents of perturbations of index d, in units of omega, and the mean k of each; those with it within 1."""
+    nc = blocks.shape[-1]
+    numbers = np.arange(nc) - nc // 2
+    seen = [modes(int(k) * order + d) for k in numbers]
+    m = len(seen[0][0])
+    coupling = _contact_in_modes(blocks, rows, seen)
+    rate = np.repeat(1j * numbers, m)
+    damping = sla.block_diag(*(c / omega for _, c, _, _ in seen))
+    spring = np.diag(np.concatenate([lam for lam, *_ in seen])) - coupling
+    constant = np.diag(rate**2) + damping * rate + spring / omega**2
+    n = len(rate)
+    companion = np.block([[np.zeros((n, n)), np.eye(n)], [-constant, -np.diag(2 * rate) - damping]])
+    values, vectors = np.linalg.eig(companion)
+    weight = (np.abs(vectors[:n].reshape(nc, m, -1)) ** 2).sum(axis=1)
+    centre = numbers @ weight / weight.sum(axis=0)
+    near = np.abs(centre) < 1.0
+    return values[near], centre[near]
+
+
+def _contact_in_modes(
+    blocks: np.ndarray, rows: np.ndarray, seen: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
+) -> np.ndarray:
+    """Phi^H dg of modal displacements, the flexibility W of what follows in series: (nc m, nc m), harmonic by harmonic.
+
+    blocks : (n_active, c, nc, c, nc)
+    """
+    n_active, c, nc = blocks.shape[:3]
+    m, n = len(seen[0][0]), len(rows)
+    if n == 0:
+        return np.zeros((nc * m, nc * m))
+    phi = [shapes[rows] for _, _, shapes, _ in seen]
+    driven = np.empty((n, nc, nc, m), complex)  # (dg/dx) Phi
+    series = np.empty((n, nc, n, nc), complex)  # (dg/dx) W
+    for k, (_, _, _, static) in enumerate(seen):
+        slope = blocks[..., k]  # (n_active, c, nc, c)
+        driven[:, :, k] = np.einsum("pahb,pbm->pahm", slope, phi[k].reshape(n_active, c, m)).reshape(n, nc, m)
+        flexible = static[np.ix_(rows, rows)].reshape(n_active, c, n)
+        series[..., k] = np.einsum("pahb,pbr->pahr", slope, flexible).reshape(n, nc, n)
+    dg = np.linalg.solve(np.eye(n * nc) - series.reshape(n * nc, n * nc), driven.reshape(n * nc, nc * m))
+    dg = dg.reshape(n, nc, nc * m)
+    return np.concatenate([shape.conj().T @ dg[:, k] for k, shape in enumerate(phi)])

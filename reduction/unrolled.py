@@ -1,0 +1,118 @@
+"""The sectors of a wheel until a wave repeats itself, as one real model: what a travelling wave is in time.
+
+A wave of engine order EO repeats itself after n = N / gcd(N, EO) sectors. These close to a ring in which only the
+indices 0, g, 2 g, ... live, g = gcd(N, EO). Its coordinates are the free modes of these indices, cosine and sine of the
+complex ones, so that nothing of the size of the wheel is ever decomposed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import gcd
+
+import numpy as np
+import scipy.linalg as sla
+
+from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.fem.wheel import of_sector
+from tribodyn.reduction.model import ReducedModel
+
+STATIC = 100.0  # frequency over `highest` that is given to shapes which stand for all static ones
+NEGLIGIBLE = 1e-14  # of the largest compliance of these shapes
+
+
+def period(n_sectors: int, engine_order: int) -> int:
+    """Number of sectors after which a wave repeats itself."""
+    return n_sectors // gcd(n_sectors, engine_order)
+
+
+def unrolled(model: ReducedModel, highest: float) -> ReducedModel:
+    """The sectors of a travelling wave until it repeats itself, in modal coordinates: unit mass, diagonal stiffness.
+
+    model : of a wave, see `cyclic.travelling_wave`, damped or not
+    highest : angular frequency [rad/s] up to which modes of the wheel without contact keep their inertia; of an index
+        with many more modes than contacts, loads and outputs the others are replaced by as many shapes of the same
+        compliance there
+    Returns the model; contact rows sector by sector, loads and outputs "<name>@<sector>"
+    Raises  ValueError for a model that is no travelling wave
+    """
+    if model.per_index is None or model.info.n_sectors is None or model.info.engine_order is None:
+        raise ValueError("only a travelling wave of a wheel can be unrolled")
+    N, order = model.info.n_sectors, model.info.engine_order
+    step = gcd(N, order)
+    n = N // step
+    lam, ports, damping, gyroscopic = [], [], [], []
+    for index in range(0, N // 2 + 1, step):
+        squares, rows, c, g = _modes(*model.per_index(index), highest)
+        pair = 0 < 2 * index < N
+        lam.append(np.tile(squares, 1 + pair))
+        turned = [rows * np.exp(-2j * np.pi * (index * k % N) / N) for k in range(n)]
+        ports.append(np.stack([_real_row(row, pair) for row in turned]) / np.sqrt(n))
+        damping.append(_real_matrix(c, pair))
+        gyroscopic.append(_real_matrix(g, pair))
+    squares, rows = np.concatenate(lam), np.concatenate(ports, axis=2)  # (n_mode,), (n, n_port, n_mode)
+    system, _ = model.per_index(0)
+    n_contact, loads, outputs = model.interface.B.shape[0], list(system.loads), list(system.outputs)
+    at = n_contact + len(loads)
+    named = {
+        kind: {of_sector(name, k): rows[k, first + i] for k in range(n) for i, name in enumerate(names)}
+        for kind, first, names in (("loads", n_contact, loads), ("outputs", at, outputs))
+    }
+    whole = SecondOrderSystem(
+        np.eye(len(squares)),
+        np.diag(squares),
+        sla.block_diag(*damping) if system.damping is not None else None,
+        named["loads"],
+        named["outputs"],
+        sla.block_diag(*gyroscopic) if system.gyroscopic is not None else None,
+    )
+    one = model.interface
+    interface = replace(
+        one,
+        points=np.tile(one.points, (n, 1)),
+        frames=np.tile(one.frames, (n, 1, 1)),
+        area=np.tile(one.area, n),
+        gap=np.tile(one.gap, n),
+        B=rows[:, :n_contact].reshape(n * n_contact, -1),
+        faces=np.concatenate([one.faces + k * one.n_pair for k in range(n)]),
+    )
+    return ReducedModel(whole, interface, None, replace(model.info, joints={}))
+
+
+def _modes(
+    system: SecondOrderSystem, B: np.ndarray, highest: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Squared frequencies (m,), ports (n_port, m), damping and Coriolis matrix (m, m) of the free modes of an index."""
+    lam, phi = sla.eigh(np.asarray(system.stiffness), np.asarray(system.mass))
+    loads = [np.conj(load)[None] for load in system.loads.values()]
+    outputs = [np.asarray(row)[None] for row in system.outputs.values()]
+    rows = np.concatenate([np.asarray(B), *loads, *outputs]) @ phi
+    moving = int(np.sum(lam < highest**2))
+    if len(lam) - moving > len(rows):
+        rest = rows[:, moving:] / np.sqrt(lam[moving:])
+        size, shapes = sla.eigh(rest @ rest.conj().T)
+        kept = size > NEGLIGIBLE * size[-1]
+        still = STATIC * highest
+        rows = np.concatenate([rows[:, :moving], still * np.sqrt(size[kept]) * shapes[:, kept]], axis=1)
+        lam = np.concatenate([lam[:moving], np.full(int(kept.sum()), still**2)])
+        phi = phi[:, :moving]
+
+    def modal(matrix: np.ndarray | None) -> np.ndarray:
+        full = np.zeros((len(lam), len(lam)), rows.dtype)
+        if matrix is not None:
+            full[: phi.shape[1], : phi.shape[1]] = phi.conj().T @ np.asarray(matrix) @ phi
+        return full
+
+    return lam, rows, modal(system.damping), modal(system.gyroscopic)
+
+
+def _real_row(row: np.ndarray, pair: bool) -> np.ndarray:
+    """What a row (..., m) sees of amplitudes (u + i v) / sqrt(2) of an index and of their conjugates of its mirror."""
+    return np.sqrt(2) * np.concatenate([row.real, -row.imag], axis=-1) if pair else row.real
+
+
+def _real_matrix(matrix: np.ndarray, pair: bool) -> np.ndarray:
+    """A matrix on complex amplitudes u + i v as one on (u, v)."""
+    if not pair:
+        return matrix.real
+    return np.block([[matrix.real, -matrix.imag], [matrix.imag, matrix.real]])

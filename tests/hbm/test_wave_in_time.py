@@ -1,0 +1,66 @@
+"""Travelling waves in time, on as many sectors as they need, against the whole wheel and against the balance."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.helpers import tiny_wheel as tiny
+from tribodyn.hbm import newton
+from tribodyn.hbm.contact.law import SLIPS
+from tribodyn.hbm.time.time_integration import Options, integrate, leave_alone
+from tribodyn.hbm.time.verify import verify
+from tribodyn.reduction.cyclic import travelling_wave
+from tribodyn.reduction.unrolled import period, unrolled
+
+OMEGA = 120.0
+
+
+@pytest.mark.parametrize(("order", "sectors"), [(2, 3), (-1, 6), (3, 2), (0, 1)])
+def test_a_wave_in_time_is_the_whole_wheel_in_time(order, sectors):
+    """Slipping, with Coriolis forces, on a wheel of six: the ring that the wave needs and all sectors agree."""
+    one, wheel = tiny.wave_and_wheel(
+        tiny.sector(("t1", "n"), 12.0, 6), "jenkins", order, (0, 1, 2, 3), 160.0, friction=0.4
+    )
+    assert period(6, order) == sectors
+    found = newton.solve_from_rest(one, OMEGA)
+    assert found.converged
+    options = Options(steps=120, tolerance=1e-9)  # a whole number of them from sector to sector
+    here = integrate(one, OMEGA, found.state, options)
+    everywhere = newton.solve(wheel, OMEGA, np.concatenate(tiny.spread(one, found.state.x, order, 6)))
+    there = integrate(wheel, OMEGA, everywhere.state, options)
+    assert here.outcome == there.outcome
+    assert here.status[0] & SLIPS or order == 0
+    names = wheel.compliance.output_names
+    first = [names.index(f"{name}@0") for name in one.compliance.output_names]
+    np.testing.assert_allclose(here.outputs, there.outputs[first], atol=1e-7 * np.abs(there.outputs).max())
+    np.testing.assert_allclose(here.x, there.x[:1], atol=1e-7 * np.abs(there.x).max())
+    assert here.energy.sum() == pytest.approx(there.energy.sum() / 6, rel=1e-6, abs=1e-9)
+    assert here.preload == pytest.approx(there.preload / 6, rel=1e-6)
+
+
+def test_a_wave_is_verified_and_left_alone_like_any_motion():
+    one, _ = tiny.wave_and_wheel(tiny.sector(("t1", "n"), 12.0), "jenkins", 2, tuple(range(8)), 160.0, friction=0.4)
+    found = newton.solve_from_rest(one, OMEGA)
+    seen = verify(one, found.state, Options(steps=256))
+    assert seen.largest < 5e-3
+    assert seen.step_error < 5e-3
+    assert list(seen.amplitude) == ["tip", "side"]
+    alone = leave_alone(one, OMEGA, found.state, 20, Options(steps=256))
+    assert alone.energy == pytest.approx(one.energy(found.state).sum(), rel=1e-2)
+
+
+def test_static_shapes_stand_for_modes_above_the_highest():
+    """Compliance at contact, loads and outputs is kept when modes give way to static shapes."""
+    reduced = tiny.sector(("n",))
+    bare = replace(reduced, sector=replace(reduced.sector, system=replace(reduced.sector.system, outputs={})))
+    wave = travelling_wave(bare, 2)
+    whole, every = unrolled(wave, 0.1), unrolled(wave, 1e6)
+    assert whole.system.n_dof < every.system.n_dof
+    compliance = []
+    for model in (every, whole):
+        rows = np.concatenate([model.interface.B, np.array(list(model.system.loads.values()))])
+        compliance.append(rows @ np.linalg.solve(model.system.stiffness, rows.T))
+    np.testing.assert_allclose(compliance[1], compliance[0], rtol=1e-9, atol=1e-12 * compliance[0].max())

@@ -1,0 +1,74 @@
+"""Stability of travelling waves against every perturbation wave, held against the whole wheel."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.helpers import tiny_wheel as tiny
+from tribodyn.hbm import newton
+from tribodyn.hbm.contact.law import SEPARATES, SLIPS
+from tribodyn.hbm.stability.exponents import stability
+
+EXACT = newton.NewtonOptions(tolerance=1e-12)
+
+
+def solved(one, wheel, omega, order):
+    """The states of a wave and of the whole wheel that it is."""
+    found = newton.solve_from_rest(one, omega, EXACT)
+    assert found.converged
+    x = np.concatenate(tiny.spread(one, found.state.x, order))
+    everywhere = newton.solve(wheel, omega, x, EXACT)
+    assert everywhere.converged
+    assert np.abs(everywhere.state.x - x).max() < 1e-8 * np.abs(x).max()
+    return found.state, everywhere.state
+
+
+def matched(ours, theirs):
+    """Largest distance of an exponent to the nearest one of the others."""
+    return np.abs(ours[:, None] - theirs[None, :]).min(axis=1).max()
+
+
+@pytest.mark.parametrize("turning", [0.0, 12.0])
+def test_exponents_of_a_lifting_wave_are_those_of_the_monodromy_matrix_of_the_whole_wheel(turning):
+    """A law without memory: Hill's method makes no assumption but the highest harmonic of the perturbation."""
+    one, wheel = tiny.wave_and_wheel(tiny.sector(("n",), turning), "unilateral", 2, tuple(range(10)), 120.0)
+    here, there = solved(one, wheel, 120.0, 2)
+    assert (here.cycle.status & SEPARATES).all()
+    found = stability(one, here)
+    assert len(found.exponents) == len(found.diameters) == 2 * 4 * tiny.N
+    reference = stability(wheel, there, "floquet")
+    unit = 2 * np.pi / found.omega
+    assert matched(np.exp(found.exponents * unit), reference.multipliers) < 4e-4
+    assert matched(reference.multipliers, np.exp(found.exponents * unit)) < 4e-4
+
+
+def test_exponents_of_a_slipping_wave_are_those_of_the_whole_wheel_by_the_same_method():
+    one, wheel = tiny.wave_and_wheel(tiny.sector(("t1", "n"), 12.0), "jenkins", 2, (0, 1, 2, 3), 120.0, friction=0.4)
+    here, there = solved(one, wheel, 120.0, 2)
+    assert (here.cycle.status & SLIPS).all()
+    found, reference = stability(one, here, top=6), stability(wheel, there, top=6)
+    lead = found.exponents[:8]
+    assert matched(lead, reference.exponents) < 1e-10 * np.abs(lead).max()
+    assert matched(reference.exponents[:8], found.exponents) < 1e-10 * np.abs(lead).max()
+
+
+def test_a_wave_whose_contacts_stick_is_as_stable_as_the_stuck_wheel():
+    """Sliders that the static load has dragged stand still in a perturbation: frequency and decay of the stuck modes."""
+    one, _ = tiny.wave_and_wheel(tiny.sector(("t1", "n")), "jenkins", 2, (0, 1), 0.5, friction=0.4)
+    found = newton.solve_from_rest(one, 120.0, EXACT)
+    assert (found.state.cycle.status == 1).all()
+    memory = np.full_like(one.memory, 1e-3)  # far beyond what friction holds
+    dragged = one.with_memory(memory)
+    state = newton.solve(dragged, 120.0, found.state.x, EXACT).state
+    assert (state.cycle.status == 1).all()
+    exponents = stability(dragged, state).exponents
+    assert exponents.real.max() < 0
+    for index in range(tiny.N):
+        system, b = one.model.per_index(index)
+        k = one.compliance.k
+        stuck = system.stiffness + b.conj().T @ (k[:, None] * b)
+        n = len(stuck)
+        first = np.block([[np.zeros((n, n)), np.eye(n)], [-stuck, -system.damping]])
+        wanted = np.exp(np.linalg.eigvals(first) * 2 * np.pi / 120.0)
+        assert matched(wanted, np.exp(exponents * 2 * np.pi / 120.0)) < 1e-9
