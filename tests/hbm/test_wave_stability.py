@@ -54,7 +54,7 @@ def test_exponents_of_a_slipping_wave_are_those_of_the_whole_wheel_by_the_same_m
 
 
 def test_a_wave_whose_contacts_stick_is_as_stable_as_the_stuck_wheel():
-    """Sliders that the static load has dragged stand still in a perturbation: frequency and decay of the stuck modes."""
+    """Sliders that were dragged once stand still in a perturbation: frequency and decay of the stuck modes."""
     one, _ = tiny.wave_and_wheel(tiny.sector(("t1", "n")), "jenkins", 2, (0, 1), 0.5, friction=0.4)
     found = newton.solve_from_rest(one, 120.0, EXACT)
     assert (found.state.cycle.status == 1).all()
