@@ -15,6 +15,7 @@ from tribodyn.hbm.threads import single
 ZERO_SIZE = 1e-6  # size of x, relative to the start, below which a solution counts as zero
 UNRESISTED = 1e-9  # singular value over the largest of a Jacobian whose motion counts as not resisted
 MOST_DENSE = 3000  # unknowns up to which the dense Jacobian serves where Krylov steps fail at rest
+RAMP_SLOWEST = 0.9  # residual over that of two steps before, likewise: most steps that fail stand still
 RAMP_STEPS = 12  # Newton steps in one step of the load ramp; beyond it a shorter step costs less
 FORCE_ACCURACY = 1e-4  # of the contact forces, wanted where these stretch their springs far less than x is large
 CURES = "more damping, a softer contact, fewer harmonics or a larger static load make it easier"
@@ -253,12 +254,13 @@ def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptio
     if not last.converged and balance.n_unknown <= MOST_DENSE:
         thorough = replace(options, least_motion=True, max_steps=2 * options.max_steps)
         last = solve(balance.with_load(0.0), omega, start, thorough)
-    for patience in (min(options.max_steps, RAMP_STEPS), options.max_steps):
+    hasty = replace(options, max_steps=min(options.max_steps, RAMP_STEPS), slowest=min(options.slowest, RAMP_SLOWEST))
+    for patience in (hasty, options):
         stride = 0.25
         while last.converged and stride > 1e-3:
             target = min(1.0, factor + stride)
             loaded = balance.with_load(target * balance.load_factor)
-            trial = solve(loaded, omega, last.state.x, replace(options, max_steps=patience))
+            trial = solve(loaded, omega, last.state.x, patience)
             steps, products = steps + trial.steps, products + trial.products
             if trial.converged:
                 factor, last, stride = target, trial, 1.5 * stride

@@ -18,6 +18,7 @@ from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED, SolveEnd
 
 SCAN_TOLERANCE = 0.03  # of the response between the points of the first search
+SCAN_MISSES = 0.15  # of a peak's height, at most, between two points of the first search: five times their tolerance
 COARSEST = 0.05  # longest step of the first search, share of its range
 # highest harmonic of the search for higher peaks: contacts that lift bend a curve of many harmonics so much that a scan
 # of it takes longer than a wear step, and a peak that is found is solved with all of them
@@ -133,6 +134,10 @@ class AtPeak:
 
         Raises  NoPeak where no maximum lies inside the range: an end of it is no resonance
         """
+        branch = self._scan(balance)
+        return self._highest(balance, branch, self._maxima(branch))
+
+    def _scan(self, balance: HarmonicBalance) -> Branch:
         step = min(1 / self.n_scan, COARSEST)
         scan = adaptive.Options(
             tolerance=SCAN_TOLERANCE,
@@ -141,9 +146,12 @@ class AtPeak:
             min_step=1e-3 * step,
             newton=self.newton,
         )
-        branch = adaptive.follow(balance, self.start, self.stop, scan)
+        return adaptive.follow(balance, self.start, self.stop, scan)
+
+    def _highest(self, balance: HarmonicBalance, branch: Branch, maxima: np.ndarray) -> OperatingPoint:
+        """The first of a branch's maxima that can be refined; its solves count those of the branch."""
         solves = len(branch.omega)
-        for best in self._maxima(branch)[:TRIED]:
+        for best in maxima[:TRIED]:
             contact = branch.contact[best]
             x = contact.reshape(balance.contact.n_pair, len(balance.contact.components), balance.basis.n_coeff)
             width = float(np.ptp(branch.omega[best - 1 : best + 2])) / 2
@@ -167,10 +175,15 @@ class AtPeak:
             return None, 0
         needed = max((h for h, _ in balance.excitation.loads), default=0)
         few = balance.with_harmonics(tuple(h for h in balance.basis.harmonics if h <= max(self.scanned, needed)))
+        branch = self._scan(few)
         try:
-            scanned = self.first(few)
+            maxima = self._maxima(branch)
         except NoPeak:
-            return None, 0
+            return None, len(branch.omega)
+        might = branch.amplitude(self.output)[maxima] > (1 - SCAN_MISSES) * OVERTAKES * point.amplitude
+        if not might.any():
+            return None, len(branch.omega)
+        scanned = self._highest(few, branch, maxima[might])
         if not self._is_higher(scanned, point):
             return None, scanned.solves
         x = few.basis.transfer(scanned.state.flat, balance.basis).reshape(point.state.x.shape)
