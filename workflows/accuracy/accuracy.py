@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tribodyn.workflows.accuracy.trade_table import ANSWERED, NAMES, QUANTITIES, Trade, TradeRow, key_of, load
+from tribodyn.workflows.accuracy.trade_table import ANSWERED, NAMES, QUANTITIES, Trade, TradeRow, load
 from tribodyn.workflows.scene.scene_file import SceneFile, read
 from tribodyn.workflows.scene.units import to_si
 
@@ -248,17 +248,19 @@ def beside(file: SceneFile) -> Path:
 def table_of(file: SceneFile, path: Path | None = None) -> Trade:
     """The trade of a scene: of `path`, or results/NAME/trade.json, or the one beside the scene.
 
-    Raises  ValueError where there is none, or where it was measured on another scene
+    Raises  ValueError where there is none, or where the scene, a file that it names or the program was another one
     """
     here = Path("results") / file.name / "trade.json"
     places = [path] if path is not None else [p for p in (here, beside(file)) if p.is_file()]
+    changed: list[str] = []
     for place in places:
         trade = load(place)
-        if trade.key == key_of(file):
+        changed.append(trade.changed(file, shipped=file.comes_along and place.resolve() == beside(file).resolve()))
+        if not changed[-1]:
             return trade
     if places:
         raise ValueError(
-            f"the trade in {places[0]} was measured on another scene than this {file.name}: measure it again with "
+            f"the trade in {places[0]} was measured {changed[0]}: measure it again with "
             f"tribodyn trade {file.word} and the same --set"
         )
     raise ValueError(f"no trade was measured for {file.name}: measure it with tribodyn trade {file.word}")

@@ -15,7 +15,6 @@ from tribodyn.workflows.accuracy.trade_table import (
     QUANTITIES,
     Trade,
     TradeRow,
-    key_of,
     known_of,
     plain,
 )
@@ -49,8 +48,8 @@ def run(
     meter = Meter()
     response, once = meter.of(file, wears=False), meter.of(file)
     say(f"{BASE}: {once.seconds:.1f} s, {once.outcome}")
-    found = Trade(file.name, key_of(plain), base, once.seconds, ())
-    if earlier is not None and (earlier.key, earlier.base) == (found.key, found.base):
+    found = Trade.begun(plain, base, once.seconds)
+    if earlier is not None and not earlier.changed(plain) and earlier.base == found.base:
         measured = {knob.name for knob in knobs}
         found = replace(found, rows=tuple(row for row in earlier.rows if row.knob not in measured))
     for knob in knobs:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,8 @@ import numpy as np
 from tribodyn.workflows.accuracy.knobs import study_of
 from tribodyn.workflows.accuracy.limit import limit_of
 from tribodyn.workflows.result.whole_file import replacing
-from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.content import code, digests
+from tribodyn.workflows.scene.scene_file import SceneFile, first_difference
 
 FORMAT = "tribodyn trade 2"
 KEY_VERSION = 2  # of the defaults and meanings of the schema that keys of tables rest on
@@ -60,6 +61,7 @@ class Trade:
 
     scene : name; key : of the scene and its study, so that a table of another scene is told; base : overrides under
     which all was measured; base_seconds : of the scene with them
+    says : what the key is made of; files : digests of the files that the scene names; code : digest of what computes
     """
 
     scene: str
@@ -67,6 +69,31 @@ class Trade:
     base: tuple[str, ...]
     base_seconds: float
     rows: tuple[TradeRow, ...]
+    says: dict[str, Any] = field(default_factory=dict)
+    files: dict[str, str] = field(default_factory=dict)
+    code: str = ""
+
+    @classmethod
+    def begun(cls, file: SceneFile, base: tuple[str, ...], base_seconds: float) -> Trade:
+        """The table of a scene before anything is measured."""
+        files = digests(file.scene.model_dump(mode="json"), file.folder)
+        return cls(file.name, key_of(file), base, base_seconds, (), said_by(file), files, code())
+
+    def changed(self, file: SceneFile, shipped: bool = False) -> str:
+        """What is not as it was when the table was measured: of the scene, its files or the program; "" where all is.
+
+        shipped : with the program, whose tests measure some of its rows anew: the code is not compared
+        """
+        if self.key != key_of(file):
+            what = first_difference(self.says, said_by(file)) if self.says else ""
+            return f"on another scene than this {file.name}" + (f", {what} differs" if what else "")
+        now = digests(file.scene.model_dump(mode="json"), file.folder)
+        for name in sorted(self.files.keys() | now.keys()):
+            if self.files.get(name) != now.get(name):
+                return f"with another content of {name}"
+        if not shipped and self.code != code():
+            return "by another version of the program"
+        return ""
 
     @property
     def knobs(self) -> tuple[str, ...]:
@@ -92,12 +119,18 @@ def known_of(rows: Iterable[TradeRow], quantity: str) -> list[tuple[float, float
 
 
 def key_of(file: SceneFile) -> str:
-    """A short name of everything in a scene that its trade depends on; the knobs themselves are not among it.
+    """A short name of everything in a scene that its trade depends on; the knobs themselves are not among it."""
+    told = json.dumps(said_by(file), sort_keys=True)
+    return f"{KEY_VERSION}-{hashlib.sha256(told.encode()).hexdigest()[:16]}"
 
-    It is made of what the scene says other than by default, so that a key of the schema that comes later leaves the
-    names of older scenes as they are. Where a default changes its value or a key its meaning, KEY_VERSION goes up.
+
+def said_by(file: SceneFile) -> dict[str, Any]:
+    """What a scene says other than by default, but for the knobs.
+
+    A key of the schema that comes later leaves the keys of older tables as they are. Where a default changes its value
+    or a key its meaning, KEY_VERSION goes up.
     """
-    said = file.scene.model_dump(
+    said: dict[str, Any] = file.scene.model_dump(
         mode="json", exclude_defaults=True, exclude={"scene": True, "pictures": True, "solver": True}
     )
     own = {text.partition("=")[0] for k in study_of(file).knobs for s in k.settings for text in s.overrides}
@@ -109,7 +142,7 @@ def key_of(file: SceneFile) -> str:
         for place in (table, table.get("parameters")):
             if isinstance(place, dict):
                 place.pop(last, None)
-    return f"{KEY_VERSION}-{hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()[:16]}"
+    return said
 
 
 # set by knobs that any scene may have, so that they do not make another scene
@@ -144,7 +177,8 @@ def load(path: Path) -> Trade:
         )
         for row in said["rows"]
     ]
-    return Trade(said["scene"], said["key"], tuple(said["base"]), said["base_seconds"], tuple(rows))
+    since = {name: said[name] for name in ("says", "files", "code") if name in said}
+    return Trade(said["scene"], said["key"], tuple(said["base"]), said["base_seconds"], tuple(rows), **since)
 
 
 def _size(row: dict[str, Any]) -> float:

@@ -6,9 +6,7 @@ import hashlib
 import threading
 import time
 import tomllib
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
-from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Literal
@@ -22,6 +20,7 @@ from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.content import digests
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import PartScene
 
@@ -59,8 +58,8 @@ class Task:
 
     def _content(self, *told: object) -> str:
         content = hashlib.sha256(repr((__version__, *told)).encode())
-        for path in sorted(set(_files(self.text, self.overrides, self.folder))):
-            content.update(_digest(path, path.stat().st_mtime_ns))
+        said = [tomllib.loads(self.text), *(one.partition("=")[2].strip(" \"'") for one in self.overrides)]
+        content.update(repr(digests(said, self.folder)).encode())
         return content.hexdigest()
 
     def scene(self) -> SceneFile:
@@ -146,26 +145,3 @@ def numbers_of(result: Result) -> dict[str, float]:
         said = summary["verdict"][name]
         numbers |= {f"{name}_error": said["error"], f"{name}_stated": said["stated"]}
     return {name: float(value) for name, value in numbers.items() if value is not None}
-
-
-def _files(text: str, overrides: tuple[str, ...], folder: Path) -> Iterator[Path]:
-    """Files that a scene and its overrides name."""
-    for value in _texts([tomllib.loads(text), *(one.partition("=")[2].strip(" \"'") for one in overrides)]):
-        if len(value) < 256 and "\n" not in value and "\0" not in value and (folder / value).is_file():
-            yield folder / value
-
-
-def _texts(value: Any) -> Iterator[str]:
-    if isinstance(value, str):
-        yield value
-        yield f"{value}.py"  # a law or part of one's own
-    elif isinstance(value, dict):
-        yield from _texts(list(value.values()))
-    elif isinstance(value, list):
-        for item in value:
-            yield from _texts(item)
-
-
-@cache
-def _digest(path: Path, changed: int) -> bytes:
-    return hashlib.sha256(path.read_bytes()).digest()

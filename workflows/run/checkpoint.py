@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,7 +16,8 @@ from tribodyn.hbm.outcome import WearEnd
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.content import digests
+from tribodyn.workflows.scene.scene_file import SceneFile, first_difference
 from tribodyn.workflows.scene.schema import Scene
 
 
@@ -76,6 +78,10 @@ def earlier(path: Path, file: SceneFile) -> Result | None:
     key = same_problem(scene_file.from_json(result.provenance["scene"]), file.scene)
     if key:
         raise ValueError(f"{path} is the result of another scene, {key} differs: run its scene, or without --resume")
+    before = json.loads(result.provenance.get("files", "{}"))
+    for name, found in digests(file.scene.model_dump(mode="json"), file.folder).items():
+        if before.get(name, found) != found:
+            raise ValueError(f"{path} was computed with another content of {name}: run the scene without --resume")
     return result
 
 
@@ -95,14 +101,4 @@ def same_problem(first: Scene, second: Scene) -> str:
     """
     ignored: dict[str, Any] = {"scene": True, "pictures": True, "solver": {"threads"}}
     ignored["wear"] = {"max_steps", "responses", "split"}
-    return _difference(first.model_dump(exclude=ignored), second.model_dump(exclude=ignored))
-
-
-def _difference(first: Any, second: Any) -> str:
-    if isinstance(first, dict) and isinstance(second, dict):
-        for key in [*first, *(k for k in second if k not in first)]:
-            below = _difference(first.get(key), second.get(key))
-            if below:
-                return f"{key}.{below}".rstrip(".")
-        return ""
-    return "" if first == second else "."
+    return first_difference(first.model_dump(exclude=ignored), second.model_dump(exclude=ignored))

@@ -20,6 +20,7 @@ from tribodyn.version import package_version
 from tribodyn.workflows.result.facts import Around, Facts, Stage
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
 from tribodyn.workflows.run.references import delta_max, free_deflection
+from tribodyn.workflows.scene.content import digests
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene
 from tribodyn.workflows.scene.structure import StructureScene
@@ -81,6 +82,7 @@ def provenance(file: SceneFile) -> dict[str, str]:
         "overrides": "\n".join(file.overrides),
         "folder": str(file.folder),
         "scene": file.scene.model_dump_json(),
+        "files": json.dumps(digests(file.scene.model_dump(mode="json"), file.folder)),
         "versions": ", ".join(f"{name} {package_version(name)}" for name in PACKAGES),
         "python": platform.python_version(),
         "platform": platform.platform(),

@@ -269,3 +269,14 @@ def _table(annotation: Any) -> Any:
 
 def _is_mapping(annotation: Any) -> bool:
     return getattr(annotation, "__origin__", None) is dict
+
+
+def first_difference(first: Any, second: Any) -> str:
+    """The first key "section.key" in which two scenes as plain tables differ, "." where they are no tables, else ""."""
+    if isinstance(first, dict) and isinstance(second, dict):
+        for key in [*first, *(k for k in second if k not in first)]:
+            below = first_difference(first.get(key), second.get(key))
+            if below:
+                return f"{key}.{below}".rstrip(".")
+        return ""
+    return "" if first == second else "."
