@@ -76,6 +76,12 @@ class Segment:
         return self.metric.unit(self.start.tangent + self.end.tangent)
 
     @cached_property
+    def slant(self) -> float:
+        """Angle between the chord and `along` [rad]: zero on a circle, at most half of the turn round a kink."""
+        advance = self.metric.dot(self.chord, self.along)
+        return float(np.arctan2(np.sqrt(max(self.length**2 - advance**2, 0.0)), advance))
+
+    @cached_property
     def corner(self) -> tuple[float, float, float]:
         """Where the tangents of the ends come closest: ahead of the start, before the end, and how far apart."""
         cosine = np.cos(self.angle)

@@ -21,6 +21,10 @@ LEAST_LENGTH_RATIO = 0.8  # the characteristic length falls to this share per po
 LARGEST_MISS = 0.35
 CORNER_STEP = 0.1  # longest step in which a corner is looked for
 TANGENT_ACCURACY = 1e-6  # relative; a tangent here only predicts, and the prediction is off by far more
+# Slant of a step, the angle between its chord and the mean of its tangents, up to which it needs no check [rad]: the
+# slant of a smooth curve falls with the square of the step, and few steps have more.
+LARGEST_SLANT = 0.03
+MAX_HALVINGS = 6  # of a step that is checked: a jump of LARGEST_SLANT has shown itself after four
 CAP_GROWTH = 1.1  # growth per step of the cap on steps after a rewind; slow, so that the wrong turn is passed first
 
 
@@ -119,7 +123,10 @@ class Stepper:
         """Whether a step is short for the curve, or turns at a corner whose legs are straight and meet."""
         stray = self._metric.norm(trial.end.place - self._ahead(step))
         if trial.angle <= KINK_ANGLE and stray <= LARGEST_MISS * step:
-            return True
+            if self._same_branch(trial):
+                return True
+            self.trouble = f"the curve jumps to another branch at every step down to {step:.1e}"
+            return False
         self.trouble = f"the curve turns sharply, or jumps, at every step down to {step:.1e}"
         if trial.angle < LARGEST_MISS:
             return False
@@ -127,6 +134,35 @@ class Stepper:
         if min(first, second) < -0.02 * step or first + second > 2 * step or miss > 0.05 * trial.length:
             return False
         return self._is_straight(trial.start, 0.95 * first) and self._is_straight(trial.end, -0.95 * second)
+
+    def _same_branch(self, trial: Segment) -> bool:
+        """Whether both ends of a step lie on one branch, not on two that run side by side.
+
+        Where the chord is not along the tangents the step is halved, again and again in the half that is worse. On a
+        smooth curve the slant falls with the square of the length. At a kink it stays below half of the turn. Across
+        the gap between two branches it grows as the length falls.
+        """
+        for _ in range(MAX_HALVINGS):
+            if trial.slant <= LARGEST_SLANT:
+                return True
+            if trial.slant > 0.5 * KINK_ANGLE:
+                return False
+            solution, value = bordered.correct(self._path, trial.at(0.5), trial.along, trial.metric, self._newton)
+            tangent = self._tangent(value, solution, trial.along) if solution.converged else None
+            if tangent is None:
+                return False
+            middle = CurvePoint.of(value, solution, tangent)
+            halves = Segment(trial.start, middle, trial.metric), Segment(middle, trial.end, trial.metric)
+            trial = max(halves, key=lambda half: half.slant)
+        return True
+
+    def arrives(self, part: Segment, value: float, solution: Solution) -> bool:
+        """Whether a solution at a value within a part of the walk belongs to its branch."""
+        tangent = self._tangent(value, solution, part.end.tangent)
+        if tangent is None:
+            return True
+        way = Segment(part.start, CurvePoint.of(value, solution, tangent), part.metric)
+        return way.length < self._options.min_step or way.angle > KINK_ANGLE or self._same_branch(way)
 
     def _is_straight(self, point: CurvePoint, step: float) -> bool:
         """Whether the curve keeps the tangent of a point over a step, as a leg of a corner does."""

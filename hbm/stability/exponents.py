@@ -24,15 +24,17 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import STICKS
 from tribodyn.hbm.continuation import parameter
+from tribodyn.hbm.continuation.bordered import Direction
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.stability import floquet, wave_exponents
+from tribodyn.hbm.stability import crossing, floquet, wave_exponents
 from tribodyn.hbm.stability.wave_exponents import WaveModes
 from tribodyn.hbm.threads import single
 
+FOLD = "fold"
 NEUTRAL_GROWTH = 1e-6  # over omega: real parts up to it count as zero, for the solution is no better than that
 FEWEST_MODES, MOST_MODES = 20, 30  # friction makes modes far above the excitation flutter, too
 _WAVES: WeakKeyDictionary[ContactCompliance, WaveModes] = WeakKeyDictionary()  # for all solutions of one wheel
@@ -74,7 +76,7 @@ class Stability:
     def crossing(self) -> str:
         """What the leading exponent does when its real part passes zero: "fold", "flip" or "Neimark-Sacker"."""
         share = abs(self.exponents[0].imag) / self.omega
-        return "fold" if share < 1e-3 else "flip" if share > 0.5 - 1e-3 else "Neimark-Sacker"
+        return FOLD if share < 1e-3 else "flip" if share > 0.5 - 1e-3 else "Neimark-Sacker"
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,8 @@ class Bifurcation:
     """A change of stability between two points of a branch.
 
     position : between the points, counted from 0: 3.4 is 40 % of the way from point 3 to point 4
-    value : of the parameter there, by linear interpolation: [rad/s] where the branch was followed in frequency
+    value : of the parameter there: [rad/s] where the branch was followed in frequency; solved for where the kind is not
+        a fold, else interpolated: the branch lists its folds
     kind : "fold" (multiplier +1), "flip" (-1) or "Neimark-Sacker" (a complex pair)
     """
 
@@ -159,7 +162,8 @@ def mark(
     changes = []
     for i, (before, after) in enumerate(pairwise(found)):
         if before is not None and after is not None and before.n_unstable != after.n_unstable:
-            changes.append(_locate(i, before, after, float(branch.parameter[i]), float(branch.parameter[i + 1])))
+            ends = (Direction(branch.contact[j], float(branch.parameter[j])) for j in (i, i + 1))
+            changes.append(_locate(path, i, (before, after), tuple(ends), method, n_modes))
     return BranchStability(
         stable=np.array([s is not None and s.stable for s in found]),
         leading=np.array([np.nan if s is None else s.exponents[0] for s in found], complex),
@@ -167,14 +171,32 @@ def mark(
     )
 
 
-def _locate(i: int, before: Stability, after: Stability, first: float, second: float) -> Bifurcation:
-    """Where the exponents that change sides have, on average, a real part of zero."""
+def _locate(
+    path: Parameter,
+    i: int,
+    sides: tuple[Stability, Stability],
+    ends: tuple[Direction, ...],
+    method: str,
+    n_modes: int | None,
+) -> Bifurcation:
+    """Where the exponents that change sides have, on average, a real part of zero.
+
+    A flip or Neimark-Sacker bifurcation is solved for; a fold, which the curve itself locates, is interpolated.
+    """
+    before, after = sides
     low, high = sorted((before.n_unstable, after.n_unstable))
-    r0, r1 = (s.exponents.real[low:high].mean() for s in (before, after))
+    r0, r1 = (float(s.exponents.real[low:high].mean()) for s in sides)
     share = float(np.clip(r0 / (r0 - r1), 0.0, 1.0)) if r0 != r1 else 0.5
     unstable = before if before.n_unstable > after.n_unstable else after
-    crossing = replace(unstable, exponents=unstable.exponents[low:])
-    return Bifurcation(i + share, first + share * (second - first), crossing.crossing)
+    kind = replace(unstable, exponents=unstable.exponents[low:]).crossing
+    value = ends[0].p + share * (ends[1].p - ends[0].p)
+    if kind != FOLD and r0 * r1 < 0:
+
+        def growth(balance: HarmonicBalance, state: State) -> float:
+            return float(stability(balance, state, method, n_modes).exponents.real[low:high].mean())
+
+        share, value = crossing.locate(path, *ends, growth, (r0, r1)) or (share, value)
+    return Bifurcation(i + share, value, kind)
 
 
 def _sorted(exponents: np.ndarray, omega: float) -> tuple[np.ndarray, np.ndarray]:

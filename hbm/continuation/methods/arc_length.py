@@ -3,9 +3,10 @@
 One step: predict along the tangent (bent by the last change of the tangent), correct in the hyperplane normal to it.
 The step grows and shrinks with the Newton steps and the turn of the tangent. Kinks, as contact laws make them, are
 crossed where their two legs are straight and meet; behind one that turns by more than a right angle the curve is looked
-for in the directions that the derivative there offers. A walk that comes back onto its own way took a wrong turn: it is
-rewound and resumes in shorter steps. Where all that fails, as where pairs hammer and the curve has gaps, the parameter
-alone takes a short step over the place, and the branch says where.
+for in the directions that the derivative there offers. A step whose chord is not along its tangents is halved until it
+shows whether it stays on its branch, and none is taken to a neighbouring one. A walk that comes back onto its own way
+took a wrong turn: it is rewound and resumes in shorter steps. Where all that fails, as where pairs hammer and the curve
+has gaps, the parameter alone takes a short step over the place, and the branch says where.
 Source  Keller 1977 (pseudo arc length); step control and kinks ours.
 """
 
@@ -201,13 +202,19 @@ class _Walk:
                 return True
         return False
 
-    def _land(self, part: Segment, bound: float) -> Outcome[BranchEnd]:
-        """Solve at the bound that the curve crosses."""
+    def _land(self, part: Segment, bound: float) -> Outcome[BranchEnd] | None:
+        """Solve at the bound that the curve crosses; None where that leads elsewhere, and shorter steps are to come."""
         balance, omega = self._path.place(bound)
         flat = part.guess_at(bound)
         guess = flat.reshape(balance.contact.n_pair, -1, flat.shape[-1])
         last = newton.solve(balance, omega, guess, self._options.newton)
+        astray = last.converged and not self._stepper.arrives(part, bound, last)
+        if astray and part.length > self._options.min_step:
+            self._rewind(len(self._stepper.segments) - 1)
+            return None
         self._builder.add(bound, last)
+        if astray:
+            return BranchEnd.ENDED.say(f" {self._path.say(bound)}: the curve jumps to another branch there")
         if not last.converged:
             return BranchEnd.ENDED.say(f" {self._path.say(bound)}: {last.outcome}")
         end = BranchEnd.TURNED_BACK if bound == self._start else BranchEnd.REACHED
@@ -241,8 +248,12 @@ class _Walk:
                     return BranchEnd.ENDED.say(f" {here}: the curve came back onto itself")
                 self._rewinds += 1
                 index = index if sense < 0 else max(index - 2, 0)
-                self._stepper.rewind(index)
-                self._builder.truncate(self._rows[index])
-                del self._rows[index + 1 :]
+                self._rewind(index)
                 return None
         return None
+
+    def _rewind(self, index: int) -> None:
+        """Back to the start of an earlier segment."""
+        self._stepper.rewind(index)
+        self._builder.truncate(self._rows[index])
+        del self._rows[index + 1 :]
