@@ -162,8 +162,8 @@ def mark(
     changes = []
     for i, (before, after) in enumerate(pairwise(found)):
         if before is not None and after is not None and before.n_unstable != after.n_unstable:
-            ends = (Direction(branch.contact[j], float(branch.parameter[j])) for j in (i, i + 1))
-            changes.append(_locate(path, i, (before, after), tuple(ends), method, n_modes))
+            ends = [Direction(branch.contact[j], float(branch.parameter[j])) for j in (i, i + 1)]
+            changes.append(_locate(path, i, (before, after), (ends[0], ends[1]), method, n_modes))
     return BranchStability(
         stable=np.array([s is not None and s.stable for s in found]),
         leading=np.array([np.nan if s is None else s.exponents[0] for s in found], complex),
@@ -175,7 +175,7 @@ def _locate(
     path: Parameter,
     i: int,
     sides: tuple[Stability, Stability],
-    ends: tuple[Direction, ...],
+    ends: tuple[Direction, Direction],
     method: str,
     n_modes: int | None,
 ) -> Bifurcation:
