@@ -19,15 +19,23 @@ def exponents(balance: HarmonicBalance, state: State, options: Options | None = 
     """
     options = options or Options()
     stepper = TimeStepper(balance, state.omega, options)
-    size = 2 * len(stepper.lam) + balance.memory.size + 2 * len(stepper.static)
-    if size > MAX_STATES:
-        raise ValueError(f"{size} state variables are too many for Floquet multipliers: use the method hill")
+    if _size(stepper) > MAX_STATES:
+        raise ValueError(f"{_size(stepper)} state variables are too many for Floquet multipliers: use the method hill")
     motion = integrate(balance, state.omega, state, options, with_slopes=True)
     if not motion.periodic:
         raise ValueError(f"no periodic motion near this state: {motion.outcome}")
     multipliers = np.linalg.eigvals(monodromy(stepper, motion))
     multipliers = multipliers[np.abs(multipliers) > LEAST_MULTIPLIER]
     return np.log(multipliers.astype(complex)) * state.omega / (2 * np.pi)
+
+
+def size(balance: HarmonicBalance, omega: float, options: Options | None = None) -> int:
+    """Number of state variables that the multipliers at a frequency [rad/s] are those of."""
+    return _size(TimeStepper(balance, omega, options or Options()))
+
+
+def _size(stepper: TimeStepper) -> int:
+    return 2 * len(stepper.lam) + stepper.balance.memory.size + 2 * len(stepper.static)
 
 
 def monodromy(stepper: TimeStepper, motion: PeriodicMotion) -> np.ndarray:

@@ -12,7 +12,7 @@ import pytest
 
 import tribodyn as td
 from tribodyn.hbm.continuation.operating_point import NoPeak
-from tribodyn.workflows.accuracy import statement, verdict
+from tribodyn.workflows.accuracy import statement, time_probe, verdict
 from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 
@@ -67,7 +67,7 @@ def test_the_coarser_mesh_tells_the_error_of_this_one(small: td.Result) -> None:
 
 def test_a_part_that_nobody_measured_leaves_the_error_unknown() -> None:
     parts = [Contribution("modes", "energy", 0.01, "estimate"), Contribution("mesh", "energy", None, "no mesh")]
-    said = verdict._statement("energy", 1.0, parts, (), "", td.Result({}, {}, ""))
+    said = verdict._statement("energy", 1.0, parts, time_probe.Checked((), 0, ""), td.Result({}, {}, ""))
     assert said.error is None
     assert said.stated
     assert "mesh: no mesh" in said.reason

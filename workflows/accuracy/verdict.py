@@ -7,8 +7,7 @@ time integration contradicts, is not stated.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
 from time import process_time
 
 import numpy as np
@@ -17,10 +16,13 @@ from tribodyn.hbm.continuation.operating_point import NoPeak
 from tribodyn.hbm.outcome import SolveEnd
 from tribodyn.hbm.wear.error_controlled_rule import jumps
 from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload
-from tribodyn.workflows.accuracy import jump_probe, probes
-from tribodyn.workflows.accuracy.probes import Answers, InTime, Other, State, relative
+from tribodyn.workflows.accuracy import jump_probe, mesh_probe, probes, time_probe
+from tribodyn.workflows.accuracy.mesh_probe import MESH, Probe
+from tribodyn.workflows.accuracy.other_meshes import with_more_modes
+from tribodyn.workflows.accuracy.probes import Answers, State, relative
 from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution, Statement, Verdict
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
+from tribodyn.workflows.accuracy.time_probe import MULTIPLIERS, Checked, InTime
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.modelling import Model
@@ -30,8 +32,10 @@ from tribodyn.workflows.scene.scene_file import SceneFile
 MOST = 0.8  # of the seconds, for more harmonics, which matter most
 FOR_JUMP = 0.5  # of the seconds, for the instant of a jump to another peak, where there is one
 HALF = 0.5  # of the seconds that are left, for one measurement of several
-MESH = "mesh and contact grid"
+FOR_MESH = 0.75  # of the seconds that are left then
 CONTRADICTION = 3.0  # times the estimated error, from which on time integration contradicts the balance
+LEAST_OWN_ERROR = 1e-3  # of a time integration: how far it is from periodic adds to what its steps make
+AT_A_GIVEN_FREQUENCY = ("peak_frequency", "depth")  # a motion at a given frequency tells nothing about these
 RESPONSE = ("amplitude", "energy", "preload")
 
 
@@ -62,29 +66,20 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spe
         finer = list(probes.each(seen, probes.with_more_harmonics, MOST * left()))
         lost = f"lost with more harmonics, or beyond the {allowed:.3g} s of verdict.seconds"
         parts += _of_harmonics(result, seen, finer, values["life"], lost)
-    more_modes = probes.with_more_modes(file) if wanted.mesh else None  # another model, too
+    more_modes = with_more_modes(file) if wanted.mesh and seen else None  # another model, too
     if more_modes is not None:
         with progress.stage("verdict: modes"):
-            parts += _of_others("modes", lambda: [more_modes], result, seen, HALF * left(), skipped)
+            parts += Probe(result, seen[0], HALF * left(), skipped).of_modes(more_modes)
     with progress.stage("verdict: mesh"):
-        meshes = partial(probes.on_other_meshes, file, result.facts.full_dofs)
-        parts += (
-            list(_of_others(MESH, meshes, result, seen, HALF * left() if wanted.in_time else left(), skipped))
-            if wanted.mesh
-            else _unknown(MESH, "verdict.mesh is false")
-        )
-    checks: list[tuple[State, InTime]] = []
-    refusal = "" if wanted.in_time else "verdict.in_time is false"
-    if wanted.in_time:
-        with progress.stage("verdict: time integration"):
-            for state in [seen[i] for i in sorted({0, len(seen) // 2, len(seen) - 1})] if seen else []:
-                try:
-                    with processor_seconds(left()):
-                        checks.append((state, probes.in_time(state)))
-                except (ValueError, TimeUp) as reason:
-                    refusal = skipped if isinstance(reason, TimeUp) else str(reason)
-                    break
-    statements = {name: _statement(name, values[name], parts, checks, refusal, result) for name in QUANTITIES}
+        if not wanted.mesh:
+            parts += mesh_probe.unknown(MESH, "verdict.mesh is false")
+        elif not seen:
+            parts += mesh_probe.unknown(MESH, "no state was solved")
+        else:
+            parts += Probe(result, seen[0], FOR_MESH * left(), skipped).of_mesh(file)
+    with progress.stage("verdict: time integration"):
+        checked = time_probe.check(seen, wanted.in_time, left(), skipped)
+    statements = {name: _statement(name, values[name], parts, checked, result) for name in QUANTITIES}
     return Verdict(statements, tuple(parts), process_time() - clock)
 
 
@@ -119,15 +114,15 @@ def _of_harmonics(
 ) -> Iterator[Contribution]:
     """The first state, and energies of all states carried to life, with more harmonics."""
     if not seen:
-        yield from _unknown("harmonics", "no state was solved")
+        yield from mesh_probe.unknown("harmonics", "no state was solved")
         return
     first = finer[0]
     if first is None:
-        yield from _unknown("harmonics", lost)
+        yield from mesh_probe.unknown("harmonics", lost)
         return
     ours = Answers.of(seen[0].balance, seen[0].here)
     how = "more harmonics at the same states"
-    for quantity, a, b in _pairs(ours, first):
+    for quantity, a, b in mesh_probe.compared(ours, first):
         yield Contribution("harmonics", quantity, relative(a, b), how)
     if life is not None:
         error = probes.carried_to_life(list(seen), list(finer), life)
@@ -169,88 +164,12 @@ def _depth_error(result: Result, seen: Sequence[State], finer: Sequence[Answers 
     return change / fall * deepened / float(result.depth_after(-1).max())
 
 
-def _of_others(
-    source: str,
-    others: Callable[[], Sequence[Other]],
-    result: Result,
-    seen: Sequence[State],
-    seconds: float,
-    skipped: str,
-) -> Iterator[Contribution]:
-    """The first state with other meshes, or another reduction: the largest of those that change the same, all summed.
-
-    Of several meshes that change the same one is enough where the others have no solution or the seconds are used up
-    """
-    if not seen:
-        yield from _unknown(source, "no state was solved")
-        return
-    errors: dict[str, dict[str, float]] = {}  # by what is changed, by quantity
-    refused: dict[str, str] = {}  # by what is changed
-    ours, said, end = Answers.of(seen[0].balance, seen[0].here), list[str](), process_time() + seconds
-    try:
-        wanted = others()
-    except (ValueError, RuntimeError) as refusal:
-        yield from _unknown(source, str(refusal))
-        return
-    for other in wanted:
-        try:
-            with processor_seconds(end - process_time()):
-                there, deepest = probes.unworn(other.file, result.harmonics)
-        except (TimeUp, ValueError, RuntimeError) as refusal:
-            refused[other.along] = skipped if isinstance(refusal, TimeUp) else f"{other.how}: {refusal}"
-            continue
-        said.append(other.how)
-        largest = errors.setdefault(other.along, {})
-        for quantity, error in _differences(there, deepest, ours, result):
-            largest[quantity] = float(np.maximum(largest.get(quantity, 0.0), other.factor * error))
-    lacking = [why for along, why in refused.items() if along not in errors]
-    if lacking:
-        yield from _unknown(source, lacking[0])
-        return
-    how = ", ".join(dict.fromkeys(said))
-    for quantity in dict.fromkeys(name for largest in errors.values() for name in largest):
-        error = sum(largest[quantity] for largest in errors.values())
-        if np.isfinite(error):
-            yield Contribution(source, quantity, error, how)
-        else:
-            why = "the free body does not say how deep the contact can wear"
-            yield Contribution(source, quantity, None, why)
-
-
-def _differences(there: Answers, deepest: float, ours: Answers, result: Result) -> Iterator[tuple[str, float]]:
-    """Relative differences of all quantities; those of depth and life nan where the free body does not tell them."""
-    for quantity, a, b in _pairs(there, ours):
-        yield quantity, relative(a, b)
-    if result.wear_steps:
-        reach = result.facts.delta_max_m
-        depth = relative(deepest, reach) if reach and np.isfinite([reach, deepest]).all() else float("nan")
-        yield "depth", depth
-        yield "life", depth + relative(there.energy, ours.energy)
-
-
-def _pairs(a: Answers, b: Answers) -> Iterator[tuple[str, float, float]]:
-    yield from (
-        ("peak_frequency", a.hertz, b.hertz), ("amplitude", a.amplitude, b.amplitude), ("energy", a.energy, b.energy),
-        ("preload", a.preload, b.preload),
-    )  # fmt: skip
-
-
-def _unknown(source: str, why: str) -> Iterator[Contribution]:
-    for quantity in QUANTITIES:
-        yield Contribution(source, quantity, None, why)
-
-
 def _nothing(why: str) -> dict[str, Statement]:
     return {name: Statement(None, None, None, False, why) for name in QUANTITIES}
 
 
 def _statement(
-    name: str,
-    value: float | None,
-    parts: Sequence[Contribution],
-    checks: Sequence[tuple[State, InTime]],
-    refusal: str,
-    result: Result,
+    name: str, value: float | None, parts: Sequence[Contribution], checked: Checked, result: Result
 ) -> Statement:
     """One quantity, from what contributes to its error and from time integration of the states it belongs to."""
     if value is None:
@@ -258,39 +177,53 @@ def _statement(
     own = [part for part in parts if part.quantity == name]
     known = [part for part in own if part.error is not None and np.isfinite(part.error)]
     lacking = [part for part in own if part.error is None or not np.isfinite(part.error)]
-    total: float | None = float(sum(part.error or 0.0 for part in known)) if not lacking else None
+    sum_of_known = float(sum(part.error or 0.0 for part in known))
     largest = max(known, key=lambda part: part.error or 0.0, default=None)
     dominated = largest.source if largest is not None else None
-    if name in ("peak_frequency", "depth"):
-        concerned: Sequence[tuple[State, InTime]] = ()  # a motion at a given frequency tells nothing about these
-    else:
-        concerned = checks if name == "life" else checks[:1]
-    trouble = ""
-    for state, check in concerned:
-        where = "of the unworn contact" if not state.row else f"after {state.cycles:.3g} cycles"
-        if check.outcome.kind is not SolveEnd.CONVERGED:
-            trouble = f"time integration finds no periodic motion {where}: {check.outcome}"
-            break
-        miss = abs({"amplitude": check.amplitude, "preload": check.preload}.get(name, check.energy))
-        if not check.stable and miss > CONTRADICTION * max(check.own_error, 1e-3):
-            trouble = f"the balance solution {where} is unstable, and time integration leaves it by {miss:.1%}"
-            break
-        if total is not None and miss > total:
-            if miss > CONTRADICTION * (total + check.own_error):
-                dominated = "harmonics, by time integration"
-            total = miss + check.own_error
+    concerned = () if name in AT_A_GIVEN_FREQUENCY else checked.found if name == "life" else checked.found[:1]
+    wanted = 0 if name in AT_A_GIVEN_FREQUENCY else checked.wanted if name == "life" else min(checked.wanted, 1)
+    miss, trouble = _in_time(name, concerned, sum_of_known)
+    total = None if lacking else max(sum_of_known, miss)
+    if miss > sum_of_known:
+        dominated = "harmonics, by time integration"
     if trouble:
         return Statement(value, total, dominated, False, trouble)
     if total is None:
         missing = "; ".join(sorted({f"{part.source}: {part.how}" for part in lacking}))
-        at_least = sum(part.error or 0.0 for part in known)
-        large = at_least > LARGEST
-        reason = f"total error not known ({missing}); the known parts sum to {at_least:.2g}"
+        large = sum_of_known > LARGEST
+        reason = f"total error not known ({missing}); the known parts sum to {sum_of_known:.2g}"
         return Statement(value, None, dominated, not large, reason)
     if total > LARGEST:
         return Statement(value, total, dominated, False, f"its error is above {LARGEST:.0%}")
-    checked = "" if concerned else f"; not held against time integration: {refusal}" if refusal else ""
-    return Statement(value, total, dominated, True, f"all contributions measured on this scene{checked}")
+    reason = "all contributions measured on this scene"
+    if wanted and len(concerned) == wanted:
+        reason += ", held against time integration"
+    elif wanted:
+        at = f" at all but {len(concerned)} of {wanted} states" if concerned else ""
+        reason += f"; not held against time integration{at}: {checked.refusal}"
+    return Statement(value, total, dominated, True, reason)
+
+
+def _in_time(name: str, concerned: Sequence[tuple[State, InTime]], error: float) -> tuple[float, str]:
+    """Largest difference to time integration with its own error, and why the motion cannot be trusted, if it cannot.
+
+    error : that the contributions sum to
+    """
+    most = 0.0
+    for state, check in concerned:
+        where = "of the unworn contact" if not state.row else f"after {state.cycles:.3g} cycles"
+        miss = abs({"amplitude": check.amplitude, "preload": check.preload}.get(name, check.energy))
+        own_error = np.fmax(check.own_error, LEAST_OWN_ERROR)
+        if check.outcome.kind is not SolveEnd.CONVERGED and not miss <= CONTRADICTION * (error + own_error):
+            return most, f"time integration finds no periodic motion {where}: {check.outcome}"
+        if not check.stable and (miss > CONTRADICTION * own_error or check.how == MULTIPLIERS):
+            leaves = f"time integration leaves it by {miss:.1%}" if miss > own_error else "no machine shows it"
+            return most, f"the motion {where} is unstable by {check.how}: {leaves}"
+        if miss > CONTRADICTION * (error + own_error):
+            return miss + own_error, f"time integration contradicts the motion {where} by {miss:.1%}"
+        if miss > error:
+            most = max(most, miss + own_error)
+    return most, ""
 
 
 def _absent(name: str, result: Result) -> str:

@@ -41,8 +41,9 @@ class VerdictOptions(Table):
     long as the run itself took, but 10 s at least and 60 s at most."""
     mesh: StrictBool = True
     """Solve the unworn contact on other meshes, and with more modes."""
-    in_time: StrictBool = False
-    """Integrate the unworn, the middle and the late state in time, which takes longest."""
+    in_time: StrictBool | None = None
+    """Integrate the unworn, the middle and the late state in time; by default where the contact has at most 60
+    components and the seconds last."""
 
     def limit(self, spent: float) -> float:
         """Processor seconds that the measurements may take after a run that took `spent` [s]."""

@@ -1,0 +1,118 @@
+"""Contributions of mesh, contact grid and modes to the errors of a result, from the unworn contact on other ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from time import process_time
+
+import numpy as np
+
+from tribodyn.workflows.accuracy import convergence, other_meshes, probes
+from tribodyn.workflows.accuracy.convergence import Difference
+from tribodyn.workflows.accuracy.other_meshes import Other
+from tribodyn.workflows.accuracy.probes import Answers, State
+from tribodyn.workflows.accuracy.statement import QUANTITIES, Contribution
+from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.scene.scene_file import SceneFile
+
+MESH = "mesh and contact grid"
+ANSWERS = ("peak_frequency", "amplitude", "energy", "preload")
+
+
+@dataclass
+class Seen:
+    """What other meshes have answered: differences by what is changed and by quantity, refusals by what is changed."""
+
+    differences: dict[str, dict[str, list[Difference]]] = field(default_factory=dict)
+    refused: dict[str, str] = field(default_factory=dict)
+    said: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Probe:
+    """The unworn state that other meshes are compared with.
+
+    seconds : of the processor, for all of a source; skipped : the sentence where they are used up
+    """
+
+    result: Result
+    first: State
+    seconds: float
+    skipped: str
+
+    def of_mesh(self, file: SceneFile) -> Iterator[Contribution]:
+        """On a coarser and a finer mesh; where the finer one is too large or fails, on coarser ones."""
+        facts, end, seen = self.result.facts, process_time() + self.seconds, Seen()
+        both = other_meshes.around(file, facts.full_dofs, facts.unknowns)
+        self._solve(both, seen, end)
+        if "a finer mesh" not in seen.said:
+            try:
+                more = other_meshes.coarser(file, facts.full_dofs)
+            except ValueError as refusal:
+                return unknown(MESH, str(refusal))
+            seen.refused.clear()
+            self._solve([other for other in more if not (both and other.file == both[0].file)], seen, end)
+        return self._contributions(MESH, seen)
+
+    def of_modes(self, other: Other) -> Iterator[Contribution]:
+        """With more modes."""
+        seen = Seen()
+        self._solve([other], seen, process_time() + self.seconds)
+        return self._contributions("modes", seen)
+
+    def _solve(self, others: Sequence[Other], seen: Seen, end: float) -> None:
+        ours = Answers.of(self.first.balance, self.first.here)
+        for other in others:
+            try:
+                with processor_seconds(end - process_time()):
+                    there, deepest = probes.unworn(other.file, self.result.harmonics)
+            except (TimeUp, ValueError, RuntimeError) as refusal:
+                why = self.skipped if isinstance(refusal, TimeUp) else f"{other.how}: {refusal}"
+                seen.refused[other.along] = why
+                continue
+            seen.said.append(other.how)
+            of = seen.differences.setdefault(other.along, {})
+            pairs = {name: (a, b) for name, a, b in compared(there, ours)}
+            if self.result.wear_steps:
+                reach = self.result.facts.delta_max_m
+                pairs["depth"] = (deepest, np.nan if reach is None else reach)
+            for name, (a, b) in pairs.items():
+                of.setdefault(name, []).append(convergence.difference(other.size, a, b))
+
+    def _contributions(self, source: str, seen: Seen) -> Iterator[Contribution]:
+        """Errors of different kinds are added: they are of different directions, and their signs are not known.
+
+        One mesh of several that change the same is enough where the others have no solution or the seconds are used up
+        """
+        lacking = [why for along, why in seen.refused.items() if along not in seen.differences]
+        if lacking:
+            yield from unknown(source, lacking[0])
+            return
+        how, errors = ", ".join(dict.fromkeys(seen.said)), dict[str, float]()
+        for of in seen.differences.values():
+            settled = convergence.has_settled([one for name in ANSWERS for one in of[name]])
+            for name, differences in of.items():
+                errors[name] = errors.get(name, 0.0) + convergence.bound(differences, settled)
+        if "depth" in errors:  # wear passes a depth in cycles that are inverse to the energy
+            errors["life"] = errors["depth"] + errors["energy"]
+        for name, error in errors.items():
+            if np.isfinite(error):
+                yield Contribution(source, name, error, how)
+            else:
+                yield Contribution(source, name, None, "the free body does not say how deep the contact can wear")
+
+
+def compared(a: Answers, b: Answers) -> Iterator[tuple[str, float, float]]:
+    """Two answers side by side, by quantity."""
+    yield from (
+        ("peak_frequency", a.hertz, b.hertz), ("amplitude", a.amplitude, b.amplitude), ("energy", a.energy, b.energy),
+        ("preload", a.preload, b.preload),
+    )  # fmt: skip
+
+
+def unknown(source: str, why: str) -> Iterator[Contribution]:
+    """A source whose contribution to no quantity is known."""
+    for quantity in QUANTITIES:
+        yield Contribution(source, quantity, None, why)
