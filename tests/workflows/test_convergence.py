@@ -18,9 +18,12 @@ def seen(answer: Callable[[float], float], sizes: tuple[float, ...] = SIZES) -> 
 
 
 @given(
-    st.floats(1.0, 2.0), st.floats(-0.2, 0.2).filter(lambda c: abs(c) > 1e-6), st.floats(1.2, 2.2), st.floats(0.5, 0.85)
+    st.floats(0.75, 2.0),
+    st.floats(-0.2, 0.2).filter(lambda c: abs(c) > 1e-6),
+    st.floats(1.2, 2.2),
+    st.floats(0.5, 0.85),
 )
-def test_an_order_between_one_and_two_is_observed(order: float, error: float, coarse: float, fine: float) -> None:
+def test_an_order_in_the_range_is_observed(order: float, error: float, coarse: float, fine: float) -> None:
     """1 + c h^p, whose limit is 1: the error is bounded, and by not much more than the safety of three meshes."""
     differences = seen(lambda h: 1 + error * h**order, (coarse, fine))
     found, scale = bound(differences), 1 + abs(error)  # differences are relative to answers, not to the limit
@@ -28,9 +31,9 @@ def test_an_order_between_one_and_two_is_observed(order: float, error: float, co
     assert found < max(OBSERVED * abs(error) * scale**2, abs(differences[0].change)) * 1.01
 
 
-@pytest.mark.parametrize(("order", "least", "most"), [(4.0, 1.0, 5.0), (0.5, 0.6, 1.0)])
+@pytest.mark.parametrize(("order", "least", "most"), [(4.0, 1.0, 5.0), (0.5, 0.75, 1.0)])
 def test_other_orders_are_not_believed(order: float, least: float, most: float) -> None:
-    """Fast convergence may be chance and is not counted; slow one is taken as first order with its safety."""
+    """Fast convergence may be chance and is not counted; slow one is taken as the lowest order, with its safety."""
     assert least < bound(seen(lambda h: 1 + 0.01 * h**order)) / 0.01 < most
 
 
@@ -38,7 +41,7 @@ def test_a_difference_that_vanishes_by_chance_deceives_nobody() -> None:
     scattered = {1.5: 0.6, 1.0: 1.0, 2 / 3: 1.001}
     assert bound(seen(scattered.__getitem__)) == pytest.approx(0.4)
     up_and_down = {1.5: 1.01, 1.0: 1.0, 2 / 3: 1.02}
-    assert bound(seen(up_and_down.__getitem__)) == pytest.approx(3 * 0.02 / 1.02)
+    assert bound(seen(up_and_down.__getitem__)) == pytest.approx(OBSERVED * 3 * 0.02 / 1.02)
 
 
 def test_meshes_too_coarse_for_an_order_count_three_times() -> None:

@@ -11,10 +11,15 @@ import numpy as np
 import pytest
 
 import tribodyn as td
-from tribodyn.hbm.continuation.operating_point import NoPeak
-from tribodyn.workflows.accuracy import statement, time_probe, verdict
+from tribodyn.hbm.continuation.operating_point import AtFrequency, NoPeak
+from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
+from tribodyn.workflows.accuracy import probes, statement, time_probe, verdict
 from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
+from tribodyn.workflows.accuracy.time_probe import InTime
+from tribodyn.workflows.run import modelling, settings
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene import scene_file
 
 SMALL = (
     "harmonics.kept=[0, 1]",
@@ -71,6 +76,59 @@ def test_a_part_that_nobody_measured_leaves_the_error_unknown() -> None:
     assert said.error is None
     assert said.stated
     assert "mesh: no mesh" in said.reason
+
+
+def _life(checks: list[InTime], error: float = 0.05) -> statement.Statement:
+    """What is stated of a life whose states were integrated in time; the first is the unworn one."""
+    seen = tuple((probes.State(row, 1e6 * row, *(None,) * 4), check) for row, check in enumerate(checks))  # type: ignore[arg-type]
+    parts = [Contribution("harmonics", "life", error, "estimate")]
+    return verdict._statement("life", 1e7, parts, time_probe.Checked(seen, 3, "no seconds"), td.Result({}, {}, ""))
+
+
+def _in_time(
+    energy: float, stable: bool = True, how: str = time_probe.MULTIPLIERS, outcome: Outcome[SolveEnd] = CONVERGED
+) -> InTime:
+    return InTime(0.0, energy, 0.0, 1e-4, stable, how, outcome)
+
+
+def test_a_life_is_not_stated_where_time_integration_contradicts_its_motion() -> None:
+    held = _life([_in_time(0.01)] * 3)
+    assert (held.stated, held.error) == (True, 0.05)
+    assert held.reason.endswith("held against time integration")
+    off = _life([_in_time(0.01), _in_time(0.08), _in_time(0.01)])
+    assert off.stated
+    assert off.error == pytest.approx(0.081)
+    assert off.dominated_by == "harmonics, by time integration"
+    assert "at all but 1 of 3 states: no seconds" in _life([_in_time(0.01)]).reason
+    for late, why in (
+        (_in_time(0.2), "time integration contradicts the motion after 1e+06 cycles by 20.0%"),
+        (_in_time(0.0, stable=False), "is unstable by its Floquet multipliers in time"),
+        (_in_time(0.2, outcome=SolveEnd.NOT_PERIODIC.say(" 60 periods")), "time integration finds no periodic motion"),
+    ):
+        contradicted = _life([_in_time(0.01), late])
+        assert not contradicted.stated
+        assert why in contradicted.reason
+    # Hill's method alone is no proof: friction makes modes far above the excitation flutter in it
+    assert _life([_in_time(0.0, stable=False, how="Hill's method")] * 3).stated
+
+
+def test_small_contacts_are_integrated_in_time_by_default(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two ways to solve one reduced model, which share the contact law alone, and the multipliers of its motion."""
+    mesh = [text for text in SMALL if text.startswith(("geometry.n_l", "geometry.n_h", "reduction"))]
+    file = scene_file.read("beam", (*mesh, "geometry.n_patch=3", "loads.harmonic.shake.value=2 kN", "wear="))
+    balance = modelling.build(file, None, Progress(), (0, 1, 2, 3, 4, 5)).balance
+    site = AtFrequency(settings.OUTPUT, 2 * np.pi * 700)
+    here = site.first(balance)
+    assert balance.energy(here.state).sum() > 0
+    seen = [probes.State(None, 0.0, np.zeros(9), balance, site, here)]
+    checked = time_probe.check(seen, None, 60.0, "late")
+    ((_, found),) = checked.found
+    assert (checked.wanted, checked.refusal, found.stable, found.how) == (1, "", True, time_probe.MULTIPLIERS)
+    assert max(abs(found.amplitude), abs(found.energy), abs(found.preload)) < 0.02
+    assert time_probe.check(seen, None, 0.0, "late").refusal == "late"
+    assert "false" in time_probe.check(seen, False, 60.0, "").refusal
+    monkeypatch.setattr(time_probe, "MOST", 26)
+    assert "27 components, above the 26" in time_probe.check(seen, None, 60.0, "").refusal
 
 
 def test_an_end_of_the_range_is_no_peak() -> None:

@@ -13,7 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-ORDERS = (1.0, 2.0)  # first, as corners and borders of contacts leave it, to that of linear elements
+ORDERS = (
+    0.75,
+    2.0,
+)  # re-entrant corners and borders of contacts leave less than first order; linear elements reach second
 OBSERVED, GUESSED = 1.25, 3.0  # safety where the order is observed, and where the meshes are too coarse to have one
 SETTLED = 0.5  # relative difference to a finer mesh above which a quantity has not begun to settle
 
@@ -51,8 +54,8 @@ def bound(seen: Sequence[Difference], settled: bool = True) -> float:
     change, coarse = abs(fine.change), min(coarser, key=lambda one: one.size)
     if not settled:
         error = GUESSED * change / (1 - fine.size ** ORDERS[1])
-    elif fine.change * coarse.change >= 0:  # answers go up and down: the limit lies in between
-        error = change / (1 - fine.size)
+    elif fine.change * coarse.change >= 0:  # answers go up and down: no order is observed
+        error = OBSERVED * change / (1 - fine.size)
     else:
         error = OBSERVED * change / (1 - fine.size ** _order(fine, coarse))
     return max(error, abs(coarse.change))

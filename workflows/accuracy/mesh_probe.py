@@ -19,6 +19,9 @@ from tribodyn.workflows.scene.scene_file import SceneFile
 
 MESH = "mesh and contact grid"
 ANSWERS = ("peak_frequency", "amplitude", "energy", "preload")
+# no better known than the frequency of the peak they belong to: its stiffness limits the motion, too, as in
+# F / (2 zeta m omega^2); differences that cancel between two meshes say nothing of a third
+AT_A_PEAK = ("amplitude", "energy")
 
 
 @dataclass
@@ -95,6 +98,8 @@ class Probe:
             settled = convergence.has_settled([one for name in ANSWERS for one in of[name]])
             for name, differences in of.items():
                 errors[name] = errors.get(name, 0.0) + convergence.bound(differences, settled)
+        for name in AT_A_PEAK:
+            errors[name] = max(errors[name], errors["peak_frequency"])
         if "depth" in errors:  # wear passes a depth in cycles that are inverse to the energy
             errors["life"] = errors["depth"] + errors["energy"]
         for name, error in errors.items():

@@ -17,7 +17,7 @@ from tribodyn.workflows.accuracy.probes import State
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 
 MOST = 60  # components of a contact that a verdict integrates in time without being asked
-MOST_MULTIPLIERS = 150  # state variables up to which the multipliers of the integrated motion are formed
+MOST_MULTIPLIERS = 200  # state variables up to which the multipliers of the integrated motion are formed
 STEPS, STEPS_PER_HARMONIC = 256, 32  # time steps per period; per period of the highest harmonic kept
 PERIODS = 60
 MULTIPLIERS = "its Floquet multipliers in time"

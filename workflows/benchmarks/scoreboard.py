@@ -40,7 +40,7 @@ MODES, CUTOFF = 3, 2  # times those of the scene
 HARMONICS, LOWEST = 3, 5  # more than the scene's; the highest at the least
 STEPS = 3  # wear steps in each of the scene
 ROUNDING = 1e-8  # relative difference that says nothing
-PROMISED = 4  # every so many scenes a promise is asked for too
+PROMISED = 7  # every so many scenes a promise is asked for too
 WANTED = "20 % of peak frequency, amplitude, energy, preload"
 
 Values = dict[str, float | None]

@@ -26,7 +26,11 @@ Table = dict[str, Any]
 WIDEST = 4.0  # highest over lowest frequency of a response
 STEEL = {"young": "210 GPa", "density": "7860 kg/m3", "poisson": 0.3}
 MODES = 6  # stuck modes that the resonance is looked for in
-WORN = 0.5  # share of the scenes that are worn
+WORN = 0.4  # share of the scenes that are worn
+# logarithm of the tangential force of the stuck contact over what friction can carry; with little of it wear fades
+# out before the contact is lost
+DRIVE, WEARING = (-0.2, 0.8), (0.3, 0.9)
+BESIDE = ((0.85, 0.95), (1.05, 1.15))  # frequencies at which they wear, over the resonance of the free part
 
 
 @dataclass(frozen=True)
@@ -55,13 +59,14 @@ def draw(number: int, seed: int, folder: Path) -> Drawn:
     guess: Table = {"frequency": [1.0, 1e5], "points": 10}
     text = as_toml(table | {"response": table["response"] | guess})
     balance = modelling.build(parse(text, "drawn.toml", (), folder), None, Progress()).balance
-    low, high, force = _placed(balance, float(10 ** rng.uniform(-0.2, 0.8)))
+    worn, at = bool(rng.uniform() < WORN), float(rng.uniform(*BESIDE[int(rng.integers(2))]))
+    drive = float(10 ** rng.uniform(*(WEARING if worn else DRIVE)))
+    low, high, place, force = _placed(balance, drive, at if worn else None)
     table["response"] |= {"frequency": [low, high], "points": int(rng.choice([30, 50]))}
     table["loads"]["harmonic"]["shake"]["value"] = force
-    if rng.uniform() < WORN:
-        table["wear"] = {"coefficient": "1e4 um3/J", "at": "peak", "max_steps": 80, "lost_below": LIFE_SHARE} | _rule(
-            rng
-        )
+    if worn:
+        table["wear"] = {"coefficient": "1e4 um3/J", "max_steps": 80, "lost_below": LIFE_SHARE} | _rule(rng)
+        table["wear"] |= {"at": {"frequency": place}}
     return Drawn(number, seed, family, as_toml(table))
 
 
@@ -215,10 +220,11 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Table]] = {
 }  # fmt: skip
 
 
-def _placed(balance: HarmonicBalance, drive: float) -> tuple[float, float, float]:
-    """Range of the response [Hz] about the highest resonance of the stuck and of the free part, and the force [N].
+def _placed(balance: HarmonicBalance, drive: float, at: float | None) -> tuple[float, float, float, float]:
+    """Range of the response [Hz], its lower and upper end, a frequency in it [Hz], and the force [N].
 
-    drive : tangential force of the stuck resonance over what friction can carry
+    drive : tangential force of the stuck contact over what friction can carry, at that frequency
+    at : the frequency over the resonance of the free part; None: the highest resonance of the stuck one
     """
     system, b = balance.model.at_harmonic(1)
     free, held = (
@@ -229,7 +235,8 @@ def _placed(balance: HarmonicBalance, drive: float) -> tuple[float, float, float
     stuck = float(curves.omega[int(np.argmax(curves.stuck))])
     below = free[free < stuck]
     loose = float(below[-1]) if len(below) and below[-1] > stuck / WIDEST else stuck / 1.5
-    at_rest, moving = balance.x_lin(stuck), balance.contact.stiffness.ravel()
+    place = stuck if at is None else at * loose
+    at_rest, moving = balance.x_lin(place), balance.contact.stiffness.ravel()
     x = np.abs(at_rest.reshape(len(moving), -1))
     normal = np.zeros(len(moving), bool)
     normal[2::3] = True
@@ -239,7 +246,8 @@ def _placed(balance: HarmonicBalance, drive: float) -> tuple[float, float, float
     if not load.sum() > 0 or not shaken.sum() > 0:
         raise ValueError("the static load opens the contact, or the vibration does not reach it")
     force = drive * float(carried.sum()) / float(np.hypot(shaken[::2], shaken[1::2]).sum())
-    return 0.6 * loose / (2 * np.pi), 1.2 * stuck / (2 * np.pi), force
+    turn = 2 * np.pi
+    return 0.6 * loose / turn, 1.2 * stuck / turn, place / turn, force
 
 
 def as_toml(table: Table) -> str:
