@@ -1,0 +1,178 @@
+"""What solver and statements say of a state, each number found by a second way: sums over time, differences, ratios."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tribodyn.fem.interface import ContactInterface
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.continuation.methods import arc_length
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.linear import recovery
+from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.wear.history import cycles_to_share
+from tribodyn.reduction.damping import rayleigh, rayleigh_of_ratios
+from tribodyn.workflows.accuracy import probes, verdict
+from tribodyn.workflows.accuracy.limit import limit_of
+from tribodyn.workflows.accuracy.statement import Contribution
+from tribodyn.workflows.benchmarks.extremes_march import held
+from tribodyn.workflows.benchmarks.extremes_models import lattice
+from tribodyn.workflows.run import modelling
+from tribodyn.workflows.run.references import delta_max
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.loads import StaticLoad
+
+BASIS = HarmonicBasis((0, 1, 2, 3), 64)
+
+
+@pytest.fixture(scope="module", params=["located", "sampled"])
+def solved(request: pytest.FixtureRequest) -> tuple[HarmonicBalance, State]:
+    """Pairs that stick, slip and lift."""
+    body = lattice(3, 3)
+    balance = body.balance(replace(body.ordinary, harmonics=(0, 1, 2, 3), transitions=request.param))
+    solution = arc_length.solve_along_load(balance, body.ordinary.omega)
+    assert solution.converged
+    return balance, solution.state
+
+
+def test_transforms_are_each_others_inverse_and_the_rate_is_the_derivative() -> None:
+    c = np.random.default_rng(0).normal(size=(5, BASIS.n_coeff))
+    np.testing.assert_allclose(BASIS.from_time(BASIS.to_time(c)), c, atol=1e-13)
+    step = 1e-6
+    ahead, behind = (BASIS.functions(BASIS.angle + way * step) for way in (1, -1))
+    np.testing.assert_allclose(BASIS.to_time(c @ BASIS.rate), c @ (ahead - behind).T / (2 * step), atol=1e-8)
+
+
+def test_work_is_force_times_velocity_over_the_cycle() -> None:
+    force, x = np.random.default_rng(1).normal(size=(2, 5, BASIS.n_coeff))
+    fine = HarmonicBasis(BASIS.harmonics, 512)
+    step = 1e-5
+    speed = x @ (fine.functions(fine.angle + step) - fine.functions(fine.angle - step)).T / (2 * step)
+    expected = (fine.to_time(force) * speed).sum(axis=1) * 2 * np.pi / fine.n_samples
+    np.testing.assert_allclose(BASIS.work_per_cycle(force, x), expected, rtol=1e-8)
+
+
+def test_forces_and_friction_work_are_those_of_a_plain_march(solved: tuple[HarmonicBalance, State]) -> None:
+    assert [one.name for one in held(*solved) if one.off > one.allowed] == []
+
+
+def test_outputs_and_preload_follow_from_the_coordinates(solved: tuple[HarmonicBalance, State]) -> None:
+    """Coordinates from M, C, K and the contact forces; what is pressed on is carried by contact and supports."""
+    balance, state = solved
+    shape = (-1, balance.basis.n_coeff)
+    q = recovery.coordinates(balance, state.x.reshape(shape), state.cycle.force.reshape(shape), state.omega)
+    row = balance.model.system.outputs["edge"]
+    edge = balance.basis.to_real(np.array([[row @ one for one in q]]))
+    place = balance.compliance.output_names.index("edge")
+    np.testing.assert_allclose(balance.outputs(state)[place], edge[0], rtol=1e-6, atol=1e-9 * np.abs(edge).max())
+    weight = np.zeros(len(q[0]))
+    weight[len(weight) // 2 + 2 :: 3] = 1.0  # the upper layer moves up
+    springs = weight @ np.asarray(balance.model.system.stiffness) @ q[0].real
+    pressed = abs(np.real(balance.excitation.loads[0, "press"]))
+    lower = np.zeros(len(q[0]))
+    lower[2 : len(lower) // 2 : 3] = 1.0
+    springs += lower @ np.asarray(balance.model.system.stiffness) @ q[0].real
+    assert balance.preload(state) == pytest.approx(pressed + springs, rel=1e-6)
+
+
+def test_the_slope_over_frequency_is_the_difference(solved: tuple[HarmonicBalance, State]) -> None:
+    balance, state = solved
+    found, outputs = balance.frequency_slope(state)
+    step = 1e-5 * state.omega
+    ends = [balance.evaluate(state.omega + way * step, state.x) for way in (1, -1)]
+    residual = (ends[0].residual - ends[1].residual) / (2 * step)
+    np.testing.assert_allclose(found, residual, atol=1e-5 * np.abs(residual).max())
+    moved = (balance.outputs(ends[0]) - balance.outputs(ends[1])) / (2 * step)
+    np.testing.assert_allclose(outputs, moved, atol=1e-5 * np.abs(moved).max())
+
+
+def test_a_converged_state_leaves_what_the_tolerance_says(solved: tuple[HarmonicBalance, State]) -> None:
+    _, state = solved
+    assert np.linalg.norm(state.residual) < 2 * NewtonOptions().tolerance * np.linalg.norm(state.x)
+
+
+def test_the_load_factor_scales_vibration_alone(solved: tuple[HarmonicBalance, State]) -> None:
+    balance, state = solved
+    whole, half = balance.x_lin(state.omega), balance.with_load(0.5).x_lin(state.omega)
+    np.testing.assert_allclose(half, whole * np.where(balance.basis.order > 0, 0.5, 1.0), rtol=1e-12)
+    assert np.abs(whole[:, balance.basis.order == 1]).max() > 0
+
+
+def test_static_loads_add_up() -> None:
+    loads = Excitation({(0, "a"): 2.0, (0, "b"): -3.0, (1, "a"): 5.0})
+    found = loads.static_force({"a": np.array([1.0, 0.0]), "b": np.array([0.0, 1.0])}, 2)
+    np.testing.assert_allclose(found, [2.0, -3.0])
+
+
+def test_rayleigh_gives_two_modes_their_ratios() -> None:
+    system = lattice(2, 2).model.system
+    alpha, beta = rayleigh_of_ratios(system, (1, 4), (0.01, 0.03))
+    C = rayleigh(system, alpha, beta)
+    values, phi = np.linalg.eigh(system.stiffness / system.mass[0, 0])
+    phi = phi / np.sqrt(system.mass[0, 0])
+    for mode, ratio in ((1, 0.01), (4, 0.03)):
+        assert phi[:, mode] @ C @ phi[:, mode] == pytest.approx(2 * ratio * np.sqrt(values[mode]), rel=1e-9)
+
+
+def test_the_cycles_to_a_share_lie_between_its_rows() -> None:
+    assert cycles_to_share(np.array([0.0, 10.0, 20.0]), np.array([1.0, 0.1, 0.001]), 0.01) == pytest.approx(15.0)
+
+
+def test_delta_max_of_a_wheel_is_half_the_mean_approach() -> None:
+    approach, area = np.array([1.0, 4.0]), np.array([3.0, 1.0])
+    assert delta_max(scene_file.read("blade").scene, approach, area) == pytest.approx(0.5 * 7 / 4)
+    assert delta_max(scene_file.read("beam").scene, approach, area) == 4.0
+
+
+def test_gravity_acts_along_its_direction_and_an_accelerated_ground_against_it() -> None:
+    for key, sign in (("acceleration", 1.0), ("base_acceleration", -1.0)):
+        load = StaticLoad(**{key: 9.81}, direction=(0.0, 0.0, 1.0))
+        found = modelling.make_load(load, None, None, None)
+        np.testing.assert_allclose(found.direction, [0, 0, sign])
+
+
+def test_the_ground_moves_ahead_by_its_phase() -> None:
+    """cos(w t + phase): a = cos(phase), b = -sin(phase)."""
+    frames, none = np.eye(3)[None], np.zeros((1, 3))
+    interface = ContactInterface(
+        ("t1", "t2", "n"), none, frames, np.ones(1), np.zeros(1), np.zeros((3, 3)), np.zeros((0, 4), int)
+    )
+    moves = SimpleNamespace(static=0.0, harmonic=2.0, phase=0.3, direction=(1.0, 0.0, 0.0))
+    scene = SimpleNamespace(motion={"foot": moves})
+    part = SimpleNamespace(interface=interface, pairs={"foot": slice(0, 1)})
+    found = modelling.ground_motion(scene, part, HarmonicBasis((0, 1)))
+    np.testing.assert_allclose(found[0], [0.0, 2 * np.cos(0.3), -2 * np.sin(0.3)], atol=1e-15)
+
+
+def test_the_total_error_is_the_sum_of_its_parts() -> None:
+    parts = [Contribution("mesh", "preload", 0.1, ""), Contribution("modes", "preload", 0.02, "")]
+    result = SimpleNamespace(wear_steps=0, facts=SimpleNamespace())
+    said = verdict._statement("preload", 100.0, parts, [], "", result)
+    assert said.error == pytest.approx(0.12)
+    assert said.dominated_by == "mesh"
+
+
+def test_life_is_off_by_depth_and_energy_together() -> None:
+    ours, there = probes.Answers(100.0, 1.0, 2.0, 5.0), probes.Answers(100.0, 1.0, 2.2, 5.0)
+    result = SimpleNamespace(wear_steps=3, facts=SimpleNamespace(delta_max_m=1.0))
+    found = dict(verdict._differences(there, 1.05, ours, result))
+    assert found["depth"] == pytest.approx(0.05)
+    assert found["life"] == pytest.approx(0.05 + 0.2 / 2)
+
+
+def test_twice_the_energy_is_half_the_life() -> None:
+    here = SimpleNamespace(state=None)
+    balance = SimpleNamespace(energy=lambda state: np.array([1.0]))
+    seen = [SimpleNamespace(cycles=c, balance=balance, here=here) for c in (0.0, 50.0)]
+    finer = [probes.Answers(1.0, 1.0, 2.0, 1.0)] * 2
+    assert probes.carried_to_life(seen, finer, 100.0) == pytest.approx(1.0)
+
+
+def test_a_sequence_of_known_order_is_extrapolated_to_its_limit() -> None:
+    found = limit_of([1, 2, 4], [1 + 1.0, 1 + 0.25, 1 + 0.0625])
+    assert (found.value, found.order) == (pytest.approx(1.0), pytest.approx(2.0))
