@@ -486,9 +486,7 @@ def test_a_table_is_told_what_has_changed(tmp_path: Path, monkeypatch: pytest.Mo
     path, word = tmp_path / "own.trade.json", str(tmp_path / "own.toml")
     trade_table.save(trade_table.Trade.begun(scene_file.read(word), (), 1.0), path)
     assert list(accuracy.table_of(scene_file.read(word), path).files) == ["heights.csv"]
-    with pytest.raises(
-        ValueError, match=r"another scene than this own, contact\.friction differs: measure it again"
-    ):
+    with pytest.raises(ValueError, match=r"another scene than this own, contact\.friction differs: measure it again"):
         accuracy.table_of(scene_file.read(word, ["contact.friction=0.7"]), path)
     with monkeypatch.context() as patch:
         patch.setattr(trade_table, "code", lambda: "other")
