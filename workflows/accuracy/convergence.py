@@ -41,8 +41,9 @@ def bound(seen: Sequence[Difference], settled: bool = True) -> float:
     """Relative error of the scene's own answer, from its differences to others that change the same.
 
     seen : at least one; settled : whether the meshes are fine enough for an order
-    A finer and a coarser mesh tell the order, which is kept within ORDERS; the bound is at least the difference to the
-    coarser one, so that a difference that vanishes by chance deceives nobody. Otherwise the error is of first order.
+    A finer and a coarser mesh tell the order, which is kept within ORDERS. The bound is never below the difference to
+    the coarser one, with the same safety: a difference that vanishes by chance deceives nobody. Otherwise the error is
+    of first order.
     """
     finer = [one for one in seen if one.size < 1]
     coarser = [one for one in seen if one.size > 1]
@@ -58,7 +59,7 @@ def bound(seen: Sequence[Difference], settled: bool = True) -> float:
         error = OBSERVED * change / (1 - fine.size)
     else:
         error = OBSERVED * change / (1 - fine.size ** _order(fine, coarse))
-    return max(error, abs(coarse.change))
+    return max(error, OBSERVED * abs(coarse.change))
 
 
 def has_settled(differences: Sequence[Difference]) -> bool:

@@ -102,8 +102,14 @@ class Probe:
             errors[name] = max(errors[name], errors["peak_frequency"])
         if "depth" in errors:  # wear passes a depth in cycles that are inverse to the energy
             errors["life"] = errors["depth"] + errors["energy"]
+        worn = self.result.wear
+        survives = worn is not None and worn.ended.survived
         for name, error in errors.items():
-            if np.isfinite(error):
+            if name == "depth" and survives:  # it ends where slip ends, not where the static deflection is worn off
+                yield Contribution(
+                    source, name, None, "the depth of a contact that survives is measured on no other mesh"
+                )
+            elif np.isfinite(error):
                 yield Contribution(source, name, error, how)
             else:
                 yield Contribution(source, name, None, "the free body does not say how deep the contact can wear")

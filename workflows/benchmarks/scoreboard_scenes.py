@@ -26,7 +26,7 @@ Table = dict[str, Any]
 WIDEST = 4.0  # highest over lowest frequency of a response
 STEEL = {"young": "210 GPa", "density": "7860 kg/m3", "poisson": 0.3}
 MODES = 6  # stuck modes that the resonance is looked for in
-WORN = 0.4  # share of the scenes that are worn
+WORN = 0.2  # share of the scenes that are worn
 # logarithm of the tangential force of the stuck contact over what friction can carry; with little of it wear fades
 # out before the contact is lost
 DRIVE, WEARING = (-0.2, 0.8), (0.3, 0.9)
