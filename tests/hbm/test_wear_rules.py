@@ -32,7 +32,7 @@ def problem() -> WearProblem:
 
 @pytest.fixture(scope="module")
 def fine(problem: WearProblem) -> WearHistory:
-    return thesis_rule.evolve(problem, 5e-8)
+    return thesis_rule.evolve(problem, 2e-7)
 
 
 def test_thesis_rule_wears_what_it_dissipates(problem: WearProblem) -> None:
@@ -86,7 +86,7 @@ def test_error_controlled_rule_converges_with_its_tolerance(problem: WearProblem
         assert np.all(np.diff(worn.depth, axis=0) >= 0)
     assert errors[0] < 0.05
     assert errors[1] < 0.005
-    assert worn.solves.sum() < fine.solves.sum() / 10
+    assert worn.solves.sum() < fine.solves.sum() / 3
 
 
 @pytest.mark.parametrize("kind", ["thesis", "error_controlled"])
@@ -139,17 +139,17 @@ def test_archard_and_energy_law_agree_up_to_the_uncoupled_directions(problem: We
 def test_error_controlled_missions_equal_the_finest_thesis_run(problem: WearProblem) -> None:
     mission = (Duty(AtFrequency("tip", 420.0), 0.4), Duty(AtPeak("tip", 250.0, 1200.0), 0.6, load=0.7))
     mixed = wear_problem(mission=mission, lost_below=0.02)
-    fine = thesis_rule.evolve(mixed, 5e-7)
+    fine = thesis_rule.evolve(mixed, 1.5e-6)
     worn = error_controlled_rule.evolve(mixed, error_controlled_rule.Tolerance(0.02, 2e-4))
     assert str(worn.end).startswith("preload fell")
     assert life(worn) == pytest.approx(life(fine), rel=0.01)
-    assert len(worn.cycles) < len(fine.cycles) / 10  # on four pairs a search for a higher peak outweighs twenty steps
+    assert len(worn.cycles) < len(fine.cycles) / 3  # on four pairs a search for a higher peak outweighs twenty steps
 
 
 @pytest.mark.parametrize("law", ["archard"])
 def test_error_controlled_rule_takes_laws_whose_depth_per_work_changes(law: str) -> None:
     other = wear_problem(wear=JointWear.of(law, coefficient=4e-10))
-    fine = thesis_rule.evolve(other, 5e-7)
+    fine = thesis_rule.evolve(other, 1.5e-6)
     worn = error_controlled_rule.evolve(other, error_controlled_rule.Tolerance(0.02, 2e-4))
     assert life(worn) == pytest.approx(life(fine), rel=0.01)
 
@@ -157,7 +157,7 @@ def test_error_controlled_rule_takes_laws_whose_depth_per_work_changes(law: str)
 def test_a_law_file_of_ones_own_is_taken_by_both_rules() -> None:
     law = str(scene_file.CASES / "beam" / "running_in.py")
     own = wear_problem(wear=JointWear.of(law, coefficient=4e-10))
-    fine = thesis_rule.evolve(own, 5e-7)
+    fine = thesis_rule.evolve(own, 1.5e-6)
     worn = error_controlled_rule.evolve(own, error_controlled_rule.Tolerance(0.02, 2e-4))
     assert life(worn) == pytest.approx(life(fine), rel=0.015)
     plain_problem = wear_problem(wear=JointWear.of("energy", coefficient=4e-10))
@@ -288,12 +288,12 @@ def test_where_no_branch_goes_on_the_rule_takes_explicit_steps_to_the_end(proble
         def correct(self, balance: HarmonicBalance, state: State) -> Correction:
             return Correction(state.omega, np.zeros_like(state.x), 0)
 
-    tolerance = error_controlled_rule.Tolerance(0.05, 2e-4)
+    tolerance = error_controlled_rule.Tolerance(0.1, 2e-4)
     worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Never("tip", 420.0)),)), tolerance)
-    explicit = thesis_rule.evolve(problem, error_controlled_rule.EXPLICIT_STEPS[-1] * 0.05 * 2e-4)
+    explicit = thesis_rule.evolve(problem, error_controlled_rule.EXPLICIT_STEPS[-1] * 0.1 * 2e-4)
     assert worn.end == explicit.end
     assert np.all(worn.step_error[:-1] == 1.0)
-    assert worn.worn.max() <= 1e-5
+    assert worn.worn.max() <= 2e-5
     assert life(worn) == pytest.approx(life(explicit), rel=0.05)  # the first steps are shorter
 
 

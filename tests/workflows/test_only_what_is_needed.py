@@ -78,7 +78,7 @@ def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
     overrides, expected = RUNS[request.param]
     name = request.param.split(",")[0]
     arguments = on_a_mesh_file(name, overrides, tmp_path_factory.mktemp(name))
-    command = [sys.executable, "-m", "tests.helpers.run_probe", name, *arguments, "verdict.mesh=false"]
+    command = [sys.executable, "-m", "tests.helpers.run_probe", name, *arguments, "verdict.enabled=false"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout.splitlines()[-1]), expected

@@ -138,7 +138,7 @@ def test_every_blade_has_its_phase(finished):
 
 
 def test_pictures(finished, tmp_path):
-    written = render.draw(finished, tmp_path)
+    written = render.draw(finished, tmp_path, dpi=60)
     assert {path.stem for path in written} == {"part", "contact", "wheel"}
     for path in written:
         assert_not_blank(path)

@@ -18,6 +18,7 @@ from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.workflows.cases.rig import fit as rig_fit
 from tribodyn.workflows.cases.rig import published
 from tribodyn.workflows.cases.rig import table as rig_table
+from tribodyn.workflows.cases.rig import time as rig_time
 from tribodyn.workflows.cases.rig.cases import apart
 from tribodyn.workflows.cases.rig.joints import Modes, joints_of
 from tribodyn.workflows.cases.rig.model import Rig
@@ -174,7 +175,9 @@ def test_both_wear_rules_use_up_the_preload_alike():
 # ---- the study ----
 
 
-def test_the_study_compares_every_number_and_draws(tmp_path, capsys):
+def test_the_study_compares_every_number_and_draws(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(rig_time, "STEPS", 128)
+    monkeypatch.setattr(rig_time, "PERIODS", 40)
     words = ["rig", "study", "--json", "--out", str(tmp_path)]
     for override in QUICK:
         words += ["--set", override]
