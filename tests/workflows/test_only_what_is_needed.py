@@ -52,7 +52,7 @@ RUNS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
         # harmonic 0 has the platform's height prescribed, the others do not
         {"pairs": 55, "components": 3, "coefficients": 7, "systems": 2, "groups": ALWAYS | DRAWN},
     ),
-    "blade": (
+    "blade_thesis": (
         ("response.points=4", "wear.max_steps=1"),
         # every harmonic of a travelling wave sees its own nodal diameter
         {"pairs": 20, "components": 3, "coefficients": 3, "systems": 2, "groups": ALWAYS | WEAR},

@@ -27,7 +27,7 @@ FEWER = (*FEW_SECTORS, "geometry.n_span=3", "harmonics.samples=32", "response.po
 
 @pytest.fixture(scope="module")
 def blade():
-    return build_wheel(scene_file.read("blade", COARSE))
+    return build_wheel(scene_file.read("blade_thesis", COARSE))
 
 
 def rows_of(path):
@@ -37,7 +37,7 @@ def rows_of(path):
 
 def test_study_writes_its_tables_and_pictures(tmp_path):
     said = []
-    paths = blade_study.run("blade", COARSE, tmp_path, 150.0, said.append, SHORT)
+    paths = blade_study.run("blade_thesis", COARSE, tmp_path, 150.0, said.append, SHORT)
     pictures = [path for path in paths if path.suffix == ".png"]
     assert {path.stem for path in pictures} == {
         "diagram", "campbell", "orders", "forces", "maps", "backbone", "cycles", "peaks",
@@ -95,7 +95,7 @@ def test_references_carry_the_load_of_their_curve(blade):
 
 def test_blades_alike_are_a_travelling_wave():
     """The wheel that the mistuned example solves, with no deviation, is the sector: same parts, same answer."""
-    blade = build_wheel(scene_file.read("blade", FEWER))
+    blade = build_wheel(scene_file.read("blade_thesis", FEWER))
     one, wheel = blade.wave(), blade.whole()
     exact = newton.NewtonOptions(tolerance=1e-11)
     mine, theirs = (newton.solve_from_rest(balance, 2 * np.pi * 1000, exact) for balance in (one, wheel))

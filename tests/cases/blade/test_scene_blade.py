@@ -26,7 +26,7 @@ from tribodyn.workflows.scene import scene_file
 
 
 def built(folder, *overrides):
-    return modelling.build(scene_file.read("blade", (*COARSE, *overrides)), folder, Progress())
+    return modelling.build(scene_file.read("blade_thesis", (*COARSE, *overrides)), folder, Progress())
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def finished(folder):
-    return pipeline.run(scene_file.read("blade", COARSE), folder, Progress())
+    return pipeline.run(scene_file.read("blade_thesis", COARSE), folder, Progress())
 
 
 def test_wear_goes_on_until_the_blades_are_free(finished):
@@ -125,7 +125,7 @@ def test_forces_on_both_faces_balance_in_the_full_sector(finished, folder):
 
 
 def model_scene():
-    return scene_file.read("blade", COARSE).part_scene
+    return scene_file.read("blade_thesis", COARSE).part_scene
 
 
 def test_every_blade_has_its_phase(finished):
@@ -176,7 +176,7 @@ def test_a_couple_is_two_opposite_forces(folder):
     system, loads = two.reduced.system, two.balance.excitation.loads
     expected = sum(value * system.loads[name] for (h, name), value in loads.items() if h == 0)
     assert one.balance.excitation.loads[0, "untwist"] * one.reduced.system.loads["untwist"] == pytest.approx(expected)
-    again = scene_file.from_json(scene_file.read("blade", (couple,)).scene.model_dump_json())
+    again = scene_file.from_json(scene_file.read("blade_thesis", (couple,)).scene.model_dump_json())
     assert again.loads.static["untwist"].opposite == "couple_trailing"
 
 
@@ -192,20 +192,20 @@ def test_spinning_wheel_is_stiffer_and_presses_harder(folder):
 def test_flexible_disk_couples_through_its_seam(folder):
     """With a disk sector under the root the free frequencies depend on the nodal diameter."""
     disk = ("geometry.disk_radius=0.15", 'wheel.seam=["cyclic_right", "cyclic_left"]')
-    scene = scene_file.read("blade", (*COARSE, *disk))
+    scene = scene_file.read("blade_thesis", (*COARSE, *disk))
     mesh, nodes = modelling.make_mesh(scene, folder)
     assert len(named(nodes, "cyclic_left")) > 0
     part = modelling.make_part(scene.part_scene, mesh, nodes)
     reduced = sector.reduced(scene.part_scene, sector.sector(scene.part_scene, part))
     free = nodal_diameters(reduced.sector, (0, 5, 10), 1)[:, 0]
     assert np.ptp(free) > 0.1
-    spinning = scene_file.read("blade", (*COARSE, *disk, "wheel.speed=6000 rpm")).part_scene
+    spinning = scene_file.read("blade_thesis", (*COARSE, *disk, "wheel.speed=6000 rpm")).part_scene
     spun = sector.reduced(spinning, sector.sector(spinning, modelling.make_part(spinning, mesh, nodes)))
     assert (nodal_diameters(spun.sector, (0, 5, 10), 1)[:, 0] > free).all()
 
 
 def test_plan_of_a_wheel():
-    plan = planning.plan(scene_file.read("blade", COARSE))
+    plan = planning.plan(scene_file.read("blade_thesis", COARSE))
     assert plan.contact_pairs == 20
     assert plan.unknowns == 180
 

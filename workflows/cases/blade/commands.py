@@ -10,7 +10,7 @@ from tribodyn.command_words import Overrides, aside, make_room, quantity
 
 def blade(
     work: Literal["study", "mistuned"],
-    scene: str = "blade",
+    scene: str = "blade_thesis",
     *,
     overrides: Overrides = (),
     speed: str | None = None,
