@@ -119,7 +119,9 @@ def test_a_joint_makes_another_reduction_and_a_cycle_is_that_of_the_run(monkeypa
 def test_a_wheel_has_the_frequencies_of_its_wave():
     known = {"first": Known(of="stuck frequency", mode=1, value=341.0)}
     bench = Bench()
-    one, two = (predict(bench, scene_file.read("blade_thesis", (*BLADE, f"wheel.engine_order={o}")), known) for o in (1, 2))
+    one, two = (
+        predict(bench, scene_file.read("blade_thesis", (*BLADE, f"wheel.engine_order={o}")), known) for o in (1, 2)
+    )
     assert 300 < one[0] < 400 < two[0] < 550
 
 
