@@ -68,6 +68,7 @@ def test_a_motion_that_hill_finds_unstable_is_said_to_be_and_time_leaves_it(
     assert abs(found[640]["outputs"]["response"]["difference"]) < 0.1
 
 
+@pytest.mark.slow
 def test_more_harmonics_come_closer(folder: Path) -> None:
     """The differences fall with the harmonics kept: this beam lifts and slides, its third harmonic is near a mode.
 

@@ -25,15 +25,15 @@ SMALL = (
 def table() -> wear_steps.WearStepTable:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(wear_steps, "THESIS_STEPS", (0.5, 0.25))
-        patch.setattr(wear_steps, "FINER_STEPS", (0.1,))
-        patch.setattr(wear_steps, "REFERENCE_TOLERANCES", (0.15, 0.05))
-        patch.setattr(wear_steps, "TOLERANCES", (0.3,))
+        patch.setattr(wear_steps, "FINER_STEPS", (0.15,))
+        patch.setattr(wear_steps, "REFERENCE_TOLERANCES", (0.3, 0.2))
+        patch.setattr(wear_steps, "TOLERANCES", (0.5,))
         return wear_steps.compare("beam", lambda _: None, SMALL)
 
 
 def test_errors_fall_with_the_step(table: wear_steps.WearStepTable) -> None:
     thesis = [row for row in table.rows if row.rule == "thesis"]
-    assert [row.step for row in thesis] == [0.5, 0.25, 0.1]
+    assert [row.step for row in thesis] == [0.5, 0.25, 0.15]
     errors = [abs(row.life_error or 0.0) for row in thesis]
     assert errors[-1] < errors[0]
     assert all(row.life_cycles > 0 and 0 < row.depth_m < 0.02 for row in table.rows)
