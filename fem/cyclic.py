@@ -192,12 +192,18 @@ def projected(system: SecondOrderSystem, T: Any) -> SecondOrderSystem:
         small = T.conj().T @ (matrix @ T)
         return (small + small.conj().T) / 2
 
-    turning = None if system.gyroscopic is None else T.conj().T @ (system.gyroscopic @ T)
+    def swirling(matrix: Any) -> Any:
+        if matrix is None:
+            return None
+        small = T.conj().T @ (matrix @ T)
+        return (small - small.conj().T) / 2
+
     return SecondOrderSystem(
         congruent(system.mass),
         congruent(system.stiffness),
         None if system.damping is None else congruent(system.damping),
         {name: T.conj().T @ load for name, load in system.loads.items()},
         {name: T.T @ row for name, row in system.outputs.items()},
-        None if turning is None else (turning - turning.conj().T) / 2,
+        swirling(system.gyroscopic),
+        swirling(system.circulatory),
     )

@@ -18,6 +18,8 @@ class SecondOrderSystem:
     loads : name -> (n,) force per unit of the named load [N/N]
     outputs : name -> (n,) row that observes a displacement, output = row . q [m/m]
     gyroscopic : (n, n) antisymmetric (anti-Hermitian), the Coriolis matrix G of a turning frame, or None [N s/m]
+    circulatory : (n, n) antisymmetric (anti-Hermitian) forces by displacement, of a flow, that stiffness cannot hold, or
+        None [N/m]
     """
 
     mass: Any
@@ -26,6 +28,7 @@ class SecondOrderSystem:
     loads: Mapping[str, np.ndarray] = field(default_factory=dict)
     outputs: Mapping[str, np.ndarray] = field(default_factory=dict)
     gyroscopic: Any = None
+    circulatory: Any = None
 
     @property
     def n_dof(self) -> int:

@@ -55,6 +55,7 @@ def assemble(sector: Sector, stiffness: Sequence[float] | None = None) -> tuple[
         {of_sector(name, k): P.T @ load for name, load in system.loads.items() for k, P in enumerate(maps)},
         {of_sector(name, k): P.T @ row for name, row in system.outputs.items() for k, P in enumerate(maps)},
         None if system.gyroscopic is None else summed(system.gyroscopic, ones),
+        None if system.circulatory is None else summed(system.circulatory, ones),
     )
     B = [half.B @ P - sector.left @ maps[k - 1] for k, P in enumerate(maps)]
     turns = [np.linalg.matrix_power(sector.turn, k) for k in range(n_sectors)]

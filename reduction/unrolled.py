@@ -41,15 +41,16 @@ def unrolled(model: ReducedModel, highest: float) -> ReducedModel:
     N, order = model.info.n_sectors, model.info.engine_order
     step = gcd(N, order)
     n = N // step
-    lam, ports, damping, gyroscopic = [], [], [], []
+    lam, ports, damping, gyroscopic, circulatory = [], [], [], [], []
     for index in range(0, N // 2 + 1, step):
-        squares, rows, c, g = _modes(*model.per_index(index), highest)
+        squares, rows, c, g, flow = _modes(*model.per_index(index), highest)
         pair = 0 < 2 * index < N
         lam.append(np.tile(squares, 1 + pair))
         turned = [rows * np.exp(-2j * np.pi * (index * k % N) / N) for k in range(n)]
         ports.append(np.stack([_real_row(row, pair) for row in turned]) / np.sqrt(n))
         damping.append(_real_matrix(c, pair))
         gyroscopic.append(_real_matrix(g, pair))
+        circulatory.append(_real_matrix(flow, pair))
     squares, rows = np.concatenate(lam), np.concatenate(ports, axis=2)  # (n_mode,), (n, n_port, n_mode)
     system, _ = model.per_index(0)
     n_contact, loads, outputs = model.interface.B.shape[0], list(system.loads), list(system.outputs)
@@ -64,7 +65,8 @@ def unrolled(model: ReducedModel, highest: float) -> ReducedModel:
         sla.block_diag(*damping) if system.damping is not None else None,
         named["loads"],
         named["outputs"],
-        sla.block_diag(*gyroscopic) if system.gyroscopic is not None else None,
+        _together(gyroscopic),
+        _together(circulatory),
     )
     one = model.interface
     interface = replace(
@@ -81,8 +83,8 @@ def unrolled(model: ReducedModel, highest: float) -> ReducedModel:
 
 def _modes(
     system: SecondOrderSystem, B: np.ndarray, highest: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Squared frequencies (m,), ports (n_port, m), damping and Coriolis matrix (m, m) of the free modes of an index."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Squared frequencies (m,), ports (n_port, m), and (m, m) each damping, Coriolis forces and flow of an index."""
     lam, phi = sla.eigh(np.asarray(system.stiffness), np.asarray(system.mass))
     loads = [np.conj(load)[None] for load in system.loads.values()]
     outputs = [np.asarray(row)[None] for row in system.outputs.values()]
@@ -103,7 +105,12 @@ def _modes(
             full[: phi.shape[1], : phi.shape[1]] = phi.conj().T @ np.asarray(matrix) @ phi
         return full
 
-    return lam, rows, modal(system.damping), modal(system.gyroscopic)
+    return lam, rows, modal(system.damping), modal(system.gyroscopic), modal(system.circulatory)
+
+
+def _together(blocks: list[np.ndarray]) -> np.ndarray | None:
+    """Blocks of all indices as one matrix, None where all vanish."""
+    return sla.block_diag(*blocks) if any(block.any() for block in blocks) else None
 
 
 def _real_row(row: np.ndarray, pair: bool) -> np.ndarray:

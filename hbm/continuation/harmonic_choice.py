@@ -12,12 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.methods import arc_length
+from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.threads import single
 
@@ -26,6 +28,7 @@ LINEAR_ACCURACY = 1e-3  # of the linear solves behind the estimate, which is of 
 LEAST_VIBRATION_SHARE = 1e-2
 # useful harmonics in a row, the smallest first, after which no more are tried for dropping
 USEFUL_IN_A_ROW = 3
+_WIDE: WeakKeyDictionary[ContactCompliance, ContactCompliance] = WeakKeyDictionary()
 ALLOWED_SHARE = 0.5  # of the tolerance, that the harmonics left out may use: the estimate sees each on its own
 
 
@@ -134,21 +137,20 @@ def choose(balance: HarmonicBalance, omega: Sequence[float], options: ChoiceOpti
 
 
 def widened(balance: HarmonicBalance, highest: int) -> HarmonicBalance:
-    """The problem with all harmonics to half as many again as `highest`, for estimates; raises ValueError."""
+    """The problem with all harmonics to half as many again as `highest`, for estimates; raises ValueError.
+
+    The linear side is kept as long as that of the balance: problems that differ in contact, wear or load share it
+    """
     top = highest + (highest + 1) // 2
     basis = replace(balance.basis, harmonics=tuple(range(top + 1)))
     excitation = balance.excitation
     if excitation.base is not None:
         excitation = replace(excitation, base=balance.basis.transfer(excitation.base, basis))
-    wide = HarmonicBalance.of(
-        balance.model,
-        balance.contact.joints,
-        basis,
-        excitation,
-        balance.omega_max,
-        balance.memory,
-    )
-    return wide.with_load(balance.load_factor)
+    own, springs = balance.compliance, balance.contact.stiffness.ravel()
+    known = _WIDE.get(own)
+    if known is None or known.basis.harmonics[-1] < top or not np.array_equal(known.k, springs):
+        known = _WIDE[own] = ContactCompliance(balance.model, springs, basis, excitation, balance.omega_max)
+    return replace(balance, basis=basis, excitation=excitation, compliance=known.restricted(basis), at_rest=None)
 
 
 def estimate(wide: HarmonicBalance, kept: tuple[int, ...], omega: float, x: np.ndarray, split: bool = True) -> Estimate:

@@ -46,19 +46,17 @@ class ContactCompliance:
                 self._load[load_names.index(name), basis.harmonics.index(h)] = value
         self.base = excitation.base
         self.groups: list[tuple[Expansion, list[int]]] = []
-        seen = [model.at_harmonic(h) for h in basis.harmonics]
-        sharing: dict[int, list[int]] = {}
-        for position, (system, _) in enumerate(seen):
-            sharing.setdefault(id(system), []).append(position)
-        for positions in sharing.values():
-            system, b = seen[positions[0]]
+        for positions, mirrored in _sharing(model, basis.harmonics):
+            system, b = model.at_harmonic(basis.harmonics[positions[0]])
             loads = [np.conj(system.loads[name])[None] for name in load_names]
             outputs = [system.outputs[name][None] for name in self.output_names]
             ports = np.concatenate([np.asarray(rows) for rows in (b, *loads, *outputs)])
-            s_max = basis.harmonics[positions[-1]] * omega_max
+            s_max = basis.harmonics[max([*positions, *mirrored])] * omega_max
             self.groups.append((Expansion(system, np.asarray(b), self.k, ports, s_max), positions))
+            if mirrored:
+                self.groups.append((self.groups[-1][0].mirrored(), mirrored))
             if basis.has_static and 0 in positions:
-                self._check_balance(self.groups[-1][0])
+                self._check_balance(self.groups[-1 - bool(mirrored)][0])
         self.error = max(e.error for e, _ in self.groups)
         self.shared_real = self._one_real()
         self.coarse = self._coarse_modes()
@@ -132,6 +130,22 @@ class ContactCompliance:
             base = np.zeros((self.n_contact, self.basis.n_coeff)) if self.base is None else self.base
             contact, load = self.basis.to_complex(self.k[:, None] * base), self._load
         return np.concatenate([contact, load, np.zeros((len(self.output_names), load.shape[1]))])
+
+
+def _sharing(model: ReducedModel, harmonics: tuple[int, ...]) -> list[tuple[list[int], list[int]]]:
+    """Positions of the harmonics that share a system, and of those that see its conjugate: a wave of index -j."""
+    sharing: dict[int, tuple[list[int], list[int]]] = {}
+    order, n = model.info.engine_order, model.info.n_sectors
+    if model.per_index is None or order is None or n is None:
+        for position, h in enumerate(harmonics):
+            sharing.setdefault(id(model.at_harmonic(h)[0]), ([], []))[0].append(position)
+        return list(sharing.values())
+    first: dict[int, int] = {}
+    for position, h in enumerate(harmonics):
+        index = h * order % n
+        key = min(index, n - index)
+        sharing.setdefault(key, ([], []))[first.setdefault(key, index) != index].append(position)
+    return list(sharing.values())
 
 
 class CompliancePoint:

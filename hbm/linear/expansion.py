@@ -92,7 +92,7 @@ class Expansion:
             "or raise the contact stiffness"
         )
         count = n if n < ALL_MODES_BELOW else TRUNCATIONS[-1][0]
-        self.hermitian = system.gyroscopic is None
+        self.hermitian = system.gyroscopic is None and system.circulatory is None
         self.rigid = np.zeros((n, 0))
         # a rigid mode comes out of the eigenvalue problem as rounding of the stiffest ones, of either sign
         rounding = n * np.finfo(float).eps * np.max(np.diag(stuck).real / np.diag(mass).real)
@@ -122,6 +122,9 @@ class Expansion:
         probe = np.random.default_rng(0).normal(size=(self.n_port, N_PROBE))
         force = ports.conj().T @ probe
         free = stuck + s * damping + s * s * mass
+        self._flow = None if system.circulatory is None else np.asarray(system.circulatory)
+        if self._flow is not None:
+            free = free + self._flow
         if self.rigid.shape[1]:
             free = free - shift * held @ held.conj().T
         exact = ports @ np.linalg.solve(free, force)
@@ -140,7 +143,7 @@ class Expansion:
             m, order = len(lam), 1 if len(lam) == n else 8
         self._build(lam[:m], phi[:, :m], factor, order, ports)
         self.error = float(np.abs(self.at(s).apply(probe) - exact).max() / np.abs(exact).max())
-        del self._system
+        del self._system, self._flow
 
     def _build(
         self, lam: np.ndarray, phi: np.ndarray, factor: tuple[np.ndarray, bool], order: int, ports: np.ndarray
@@ -186,15 +189,32 @@ class Expansion:
         self.lam = np.concatenate([np.zeros(r), lam[r:]])
         self.static_lam = np.concatenate([np.full(r, np.inf), lam[r:]])  # rigid motions stand still
         self.c = phi.conj().T @ cphi
+        self.flow = None if self._flow is None else phi.conj().T @ self._flow @ phi
         n = self._n_contact
         self.w0_single, self.b_single = (a.astype(self.single.dtype) for a in (self.w0[:n, :n], self.b[:n]))
+
+    def mirrored(self) -> Expansion:
+        """That of the conjugate system, as the wave of the opposite index of a wheel has it."""
+        other = object.__new__(Expansion)
+        other.__dict__.update(self.__dict__)
+        p, m = self.n_port, self.n_mode
+        for name in ("columns", "single", "t", "left", "c", "w0_single", "b_single", "rigid", "flow"):
+            value = getattr(self, name)
+            setattr(other, name, None if value is None else np.conj(value))
+        other.w0, other.b = other.columns[:, :p], other.columns[:, p : p + m]
+        other.e = [other.columns[:, p + m * (k + 1) : p + m * (k + 2)] for k in range(len(self.e))]
+        other.higher = [other.single[:, p * k : p * (k + 1)] for k in range(len(self.higher))]
+        other.e_in = other.e if self.e_in is self.e else [np.conj(e) for e in self.e_in]
+        return other
 
     def at(self, s: complex) -> PortCompliance:
         """The compliance at s = i h w."""
         core = s * self.c
         for k, t in enumerate(self.t):
             core = core - s ** (k + 2) * t
-        core = core + np.diag(self.lam + s * s)
+        core = core + np.diag((self.lam if s != 0 or self.flow is None else self.static_lam) + s * s)
+        if self.flow is not None:
+            core = core + self.flow
         factor, pivots, _ = sla.lapack.zgetrf(core)
         if s != 0 and np.abs(np.diag(factor)).min() < RESONANCE_DISTANCE * abs(s) ** 2:
             raise UndampedResonance(
@@ -280,7 +300,7 @@ class PortCompliance:
 
     def through_core(self, z: np.ndarray) -> np.ndarray:
         """S(s)^-1 z for modal forces z (n_mode, ...)."""
-        if self.s == 0:
+        if self.s == 0 and self.expansion.flow is None:
             return (z.T / self.expansion.static_lam).T
         solution: np.ndarray = sla.lapack.zgetrs(self.factor, self.pivots, z)[0]
         return solution.reshape(z.shape)

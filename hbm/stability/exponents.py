@@ -245,6 +245,8 @@ def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int 
     turn = np.kron(np.eye(m), basis.rate.T)  # d / d(w t)
     damping = np.kron(expansion.c[:m, :m] / state.omega, unit)
     spring = np.kron(np.diag(expansion.lam[:m]), unit) - coupling
+    if expansion.flow is not None:
+        spring = spring + np.kron(expansion.flow[:m, :m], unit)
     constant = turn @ turn + damping @ turn + spring / state.omega**2
     companion = np.block([[np.zeros_like(turn), np.eye(len(turn))], [-constant, -2 * turn - damping]])
     values, vectors = np.linalg.eig(companion)

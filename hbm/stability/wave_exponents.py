@@ -27,6 +27,9 @@ from tribodyn.reduction.model import ReducedModel
 COPY_DISTANCE, SAME_CENTRE = 0.02, 0.25  # over omega, and of harmonic numbers: how far truncation drives copies apart
 
 
+_Index = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
 class WaveModes:
     """Stuck modes and contact flexibility of the wheel by index, each made once.
 
@@ -38,19 +41,20 @@ class WaveModes:
         assert model.info.n_sectors is not None
         self.n_sectors = model.info.n_sectors
         self._per_index, self._k, self.m = model.per_index, np.asarray(stiffness, float).ravel(), n_modes
-        self._made: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = {}
+        self._made: dict[int, _Index] = {}
 
-    def __call__(self, index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Squared frequencies (m,), damping (m, m), contact shapes (n_contact, m), W of the rest (n_contact, ...)."""
+    def __call__(self, index: int) -> _Index:
+        """Squared frequencies (m,), damping and flow (m, m), contact shapes (n_contact, m), W of the rest."""
         index = index % self.n_sectors
         mirror = 2 * index > self.n_sectors
         key = self.n_sectors - index if mirror else index
         if key not in self._made:
             self._made[key] = self._make(key)
-        lam, c, phi, static = self._made[key]
-        return (lam, c.conj(), phi.conj(), static.conj()) if mirror else (lam, c, phi, static)
+        lam, *others = self._made[key]
+        c, flow, phi, static = (part.conj() for part in others) if mirror else others
+        return lam, c, flow, phi, static
 
-    def _make(self, index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def _make(self, index: int) -> _Index:
         system, b = self._per_index(index)
         b, mass = np.asarray(b), np.asarray(system.mass)
         stuck = np.asarray(system.stiffness) + b.conj().T @ (self._k[:, None] * b)
@@ -60,11 +64,14 @@ class WaveModes:
         )  # fmt: skip
         rate = system.velocity_matrix
         c = np.zeros((m, m)) if rate is None else shapes.conj().T @ np.asarray(rate) @ shapes
+        flow = np.zeros((m, m))
+        if system.circulatory is not None:
+            flow = shapes.conj().T @ np.asarray(system.circulatory) @ shapes
         phi = b @ shapes
         static = np.zeros((len(b), len(b)), phi.dtype)
         if m < len(mass):
             static = b @ sla.solve(stuck, b.conj().T, assume_a="pos") - (phi / lam) @ phi.conj().T
-        return lam, c, phi, static
+        return lam, c, flow, phi, static
 
 
 def exponents(
@@ -135,8 +142,9 @@ def _of_index(
     m = len(seen[0][0])
     coupling = _contact_in_modes(blocks, rows, seen)
     rate = np.repeat(1j * numbers, m)
-    damping = sla.block_diag(*(c / omega for _, c, _, _ in seen))
+    damping = sla.block_diag(*(c / omega for _, c, *_ in seen))
     spring = np.diag(np.concatenate([lam for lam, *_ in seen])) - coupling
+    spring = spring + sla.block_diag(*(flow for _, _, flow, _, _ in seen))
     constant = np.diag(rate**2) + damping * rate + spring / omega**2
     n = len(rate)
     companion = np.block([[np.zeros((n, n)), np.eye(n)], [-constant, -np.diag(2 * rate) - damping]])
@@ -147,9 +155,7 @@ def _of_index(
     return values[near], centre[near]
 
 
-def _contact_in_modes(
-    blocks: np.ndarray, rows: np.ndarray, seen: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
-) -> np.ndarray:
+def _contact_in_modes(blocks: np.ndarray, rows: np.ndarray, seen: list[_Index]) -> np.ndarray:
     """Phi^H dg of modal displacements, the flexibility W of what follows in series: (nc m, nc m), harmonic by harmonic.
 
     blocks : (n_active, c, nc, c, nc)
@@ -158,10 +164,10 @@ def _contact_in_modes(
     m, n = len(seen[0][0]), len(rows)
     if n == 0:
         return np.zeros((nc * m, nc * m))
-    phi = [shapes[rows] for _, _, shapes, _ in seen]
+    phi = [shapes[rows] for *_, shapes, _ in seen]
     driven = np.empty((n, nc, nc, m), complex)  # (dg/dx) Phi
     series = np.empty((n, nc, n, nc), complex)  # (dg/dx) W
-    for k, (_, _, _, static) in enumerate(seen):
+    for k, (*_, static) in enumerate(seen):
         slope = blocks[..., k]  # (n_active, c, nc, c)
         driven[:, :, k] = np.einsum("pahb,pbm->pahm", slope, phi[k].reshape(n_active, c, m)).reshape(n, nc, m)
         flexible = static[np.ix_(rows, rows)].reshape(n_active, c, n)

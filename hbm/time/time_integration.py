@@ -149,9 +149,11 @@ class TimeStepper:
         rate = system.velocity_matrix
         full = np.zeros((m, m)) if rate is None else moving.T @ np.asarray(rate) @ moving
         self.damping = full
+        self.flow = np.zeros((m, m)) if system.circulatory is None else moving.T @ system.circulatory @ moving
+        flow = None if system.circulatory is None else self.flow
         own = np.abs(np.diag(full))
         off = np.abs(full - np.diag(np.diag(full)))
-        diagonal = bool(np.all(off <= 1e-9 * np.sqrt(np.outer(own, own)) + 1e-13 * own.max()))
+        diagonal = flow is None and bool(np.all(off <= 1e-9 * np.sqrt(np.outer(own, own)) + 1e-13 * own.max()))
         names = balance.compliance.output_names
         rows = np.array([system.outputs[name] for name in names]).reshape(len(names), len(phi))
         basis = balance.basis
@@ -160,7 +162,7 @@ class TimeStepper:
         samples = basis.functions(2 * np.pi * np.arange(1, options.steps + 1) / options.steps)
         base = balance.excitation.base
         self._base = np.zeros((len(B), basis.n_coeff)) if base is None else balance.loaded(base)
-        E, Q, kick = _exact_step(self.lam, full, diagonal, self.h, self._modal_load, basis, omega)
+        E, Q, kick = _exact_step(self.lam, full, flow, diagonal, self.h, self._modal_load, basis, omega)
         outputs = np.concatenate([rows @ moving, np.zeros((len(rows), m)), -(rows @ rest) @ follows.T], axis=1)
         self.rest = follows @ (rest.T @ force) - self._base  # (n_contact, n_coeff)
         output_rest = (rows @ rest) @ (rest.T @ force)
@@ -172,7 +174,8 @@ class TimeStepper:
         joint = balance.contact.merged("time integration")
         components = joint.parameters.components
         normal = components.index("n") if "n" in components else -1
-        compliance = 0.5 * (compliance + compliance.T) if system.gyroscopic is None else compliance.T
+        symmetric = system.gyroscopic is None and system.circulatory is None
+        compliance = 0.5 * (compliance + compliance.T) if symmetric else compliance.T
         compliance = np.ascontiguousarray(compliance)
         self.contact = time_step.Contact(joint.parameters.packed(), joint.parameters.gap, normal, compliance)
         self.law = compiled_law.pointer(joint.module.step)
@@ -202,7 +205,7 @@ class TimeStepper:
             elif not at_rest:
                 s = 1j * h * self.omega
                 amplitude = np.linalg.solve(
-                    np.diag(self.lam + s * s - 2 * added * self.omega * s) + s * self.damping, force[:, i]
+                    np.diag(self.lam + s * s - 2 * added * self.omega * s) + s * self.damping + self.flow, force[:, i]
                 )
                 eta += amplitude.real
                 v += (s * amplitude).real
@@ -217,7 +220,7 @@ class TimeStepper:
         pull = k * (state.flat[:, 0] - self.rest[:, 0]) - state.cycle.force.reshape(len(k), -1)[:, 0]
         pull += k * (self.static @ state.cycle.force.reshape(len(k), -1)[:, 0])
         found: np.ndarray = np.linalg.solve(
-            np.diag(self.lam) + U.T @ (k[:, None] * U), self._modal_load[:, 0] + U.T @ pull
+            np.diag(self.lam) + self.flow + U.T @ (k[:, None] * U), self._modal_load[:, 0] + U.T @ pull
         )
         return found
 
@@ -279,6 +282,7 @@ def _free_modes(system: SecondOrderSystem) -> tuple[np.ndarray, np.ndarray]:
 def _exact_step(
     lam: np.ndarray,
     damping: np.ndarray,
+    flow: np.ndarray | None,
     diagonal: bool,
     h: float,
     load: np.ndarray,
@@ -300,6 +304,8 @@ def _exact_step(
         rate[:n, n : 2 * n] = np.eye(n)
         rate[n : 2 * n, :n] = -(h**2) * np.diag(lam[g])
         rate[n : 2 * n, n : 2 * n] = -h * damping[np.ix_(g, g)]
+        if flow is not None:
+            rate[n : 2 * n, :n] -= h**2 * flow[np.ix_(g, g)]
         rate[n : 2 * n, 2 * n : 3 * n] = np.eye(n)
         scale = float(np.abs(load[g]).max()) or 1.0
         rate[n : 2 * n, 3 * n :] = load[g] / scale

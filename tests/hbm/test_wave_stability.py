@@ -29,6 +29,21 @@ def matched(ours, theirs):
     return np.abs(ours[:, None] - theirs[None, :]).min(axis=1).max()
 
 
+def test_a_harmonic_of_the_opposite_index_sees_the_conjugate_system():
+    """Harmonics 2 and 3 of engine order 2 on five sectors are waves of index 4 and 1; each against a direct solve."""
+    one, _ = tiny.wave_and_wheel(tiny.sector(("t1", "n"), 12.0), "jenkins", 2, (0, 1, 2, 3, 4), 160.0, friction=0.4)
+    assert [positions for _, positions in one.compliance.groups] == [[0], [1], [4], [2], [3]]
+    force = np.random.default_rng(1).normal(size=(2, one.basis.n_coeff))
+    moved = one.basis.to_complex(one.at(120.0).apply(force))
+    for h in one.basis.harmonics:
+        system, b = one.model.at_harmonic(h)
+        s = 120j * h
+        stiffness = system.stiffness + b.conj().T @ (one.compliance.k[:, None] * b)
+        dynamic = stiffness + s * system.velocity_matrix + s * s * system.mass
+        wanted = b @ np.linalg.solve(dynamic, b.conj().T @ one.basis.to_complex(force)[:, h])
+        np.testing.assert_allclose(moved[:, h], wanted, rtol=1e-9)
+
+
 @pytest.mark.parametrize("turning", [0.0, 12.0])
 def test_exponents_of_a_lifting_wave_are_those_of_the_monodromy_matrix_of_the_whole_wheel(turning):
     """A law without memory: Hill's method makes no assumption but the highest harmonic of the perturbation."""

@@ -15,7 +15,7 @@ import numpy as np
 from tribodyn.hbm.continuation.operating_point import NoPeak
 from tribodyn.hbm.outcome import SolveEnd
 from tribodyn.hbm.wear.error_controlled_rule import jumps
-from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload
+from tribodyn.hbm.wear.history import LIFE_SHARE
 from tribodyn.workflows.accuracy import jump_probe, mesh_probe, probes, time_probe
 from tribodyn.workflows.accuracy.mesh_probe import MESH, Probe
 from tribodyn.workflows.accuracy.other_meshes import with_more_modes
@@ -23,6 +23,7 @@ from tribodyn.workflows.accuracy.probes import Answers, State, relative
 from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution, Statement, Verdict
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.accuracy.time_probe import MULTIPLIERS, Checked, InTime
+from tribodyn.workflows.result import summary
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.modelling import Model
@@ -92,7 +93,7 @@ def values_of(result: Result, seen: Sequence[State]) -> dict[str, float | None]:
         values["preload"] = first.preload
     if result.wear is not None and result.wear_steps:
         values["depth"] = float(result.depth_after(-1).max())
-        values["life"] = cycles_to_preload(result.wear)
+        values["life"] = summary.life(result)
     return values
 
 

@@ -74,10 +74,24 @@ def by_joint(result: Result) -> dict[str, dict[str, Any]]:
     return found
 
 
+def life(result: Result) -> float | None:
+    """Cycles until the preload had fallen to LIFE_SHARE; with `wear.lost_of` "any" that of the first joint."""
+    if result.wear is None:
+        return None
+    if _told_of_wear(result).get("lost_of") != "any":
+        return cycles_to_preload(result.wear)
+    lives = [joint.get("life_cycles") for joint in by_joint(result).values()]
+    return min((one for one in lives if one is not None), default=None)
+
+
+def _told_of_wear(result: Result) -> dict[str, Any]:
+    told = json.loads(result.provenance.get("scene", "{}")).get("wear") or {}
+    return dict(told)
+
+
 def _life_share(result: Result) -> float:
     """Share of the first preload where the life of a joint ends: the scene's `wear.lost_below`, else LIFE_SHARE."""
-    told = json.loads(result.provenance.get("scene", "{}")).get("wear") or {}
-    return float(told.get("lost_below") or LIFE_SHARE)
+    return float(_told_of_wear(result).get("lost_below") or LIFE_SHARE)
 
 
 def _wear(result: Result) -> dict[str, Any]:
