@@ -18,7 +18,7 @@ class SecondOrderSystem:
     loads : name -> (n,) force per unit of the named load [N/N]
     outputs : name -> (n,) row that observes a displacement, output = row . q [m/m]
     gyroscopic : (n, n) antisymmetric (anti-Hermitian), the Coriolis matrix G of a turning frame, or None [N s/m]
-    circulatory : (n, n) antisymmetric (anti-Hermitian) forces by displacement, of a flow, that stiffness cannot hold, or
+    circulatory : (n, n) antisymmetric (anti-Hermitian) forces of a flow, by displacement, beside the stiffness, or
         None [N/m]
     """
 
