@@ -1,6 +1,6 @@
 """Free vibration with friction: the balance without a force, in frequency and damping, bordered by a reference mode.
 
-    M q'' + (C - 2 zeta w M) q' + K q + B^T f_c(x) = F_0,    phi^T M q_1 = a
+    M q'' + (C - 2 zeta w M) q' + K q + B^T f_c(x) = F_0,    phi^H M q_1 = a
 
 The linear side is solved directly in all modes of the stuck structure, since the added term changes it at every point;
 the border, the reference mode phi, keeps it regular in resonance, and what it needs to hold phi at the amplitude a is
@@ -17,12 +17,14 @@ from typing import Protocol
 import numpy as np
 import scipy.linalg as sla
 
+from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.law import SEPARATES, ContactCycle
 from tribodyn.hbm.krylov import gmres
 from tribodyn.hbm.linear.expansion import stuck_modes
 
+FEW = 120  # lowest modes among which the reference mode of a turning or a flown-about structure is looked for
 PROPORTIONAL = 1e-6  # of the damping of two modes: less between them is rounding
 
 
@@ -47,7 +49,7 @@ class Point:
 
 
 class Bordered(Protocol):
-    """[D, r; r^T, 0] of one harmonic, or [D, 0; 0, 1] where nothing borders it; solves for rhs (n + 1,)."""
+    """[D, r; r^H, 0] of one harmonic, or [D, 0; 0, 1] where nothing borders it; solves for rhs (n + 1,)."""
 
     def solve(self, rhs: np.ndarray) -> np.ndarray: ...
 
@@ -56,7 +58,7 @@ class DenseBordered:
     """With a full D (n, n); border : (n,)."""
 
     def __init__(self, d: np.ndarray, border: np.ndarray, corner: float):
-        self._factor = sla.lu_factor(np.block([[d, border[:, None]], [border[None], np.array([[corner]])]]))
+        self._factor = sla.lu_factor(np.block([[d, border[:, None]], [border.conj()[None], np.array([[corner]])]]))
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """Solution (n + 1,)."""
@@ -67,14 +69,14 @@ class DiagonalBordered:
     """With a diagonal D (n,), as proportional damping has it; one of its entries may vanish where r is largest."""
 
     def __init__(self, d: np.ndarray, border: np.ndarray, corner: float):
-        self._d, self._r, self._corner = d, border, corner
+        self._d, self._r, self._left, self._corner = d, border, border.conj(), corner
         self._pivot = int(np.abs(border).argmax())
         with np.errstate(divide="ignore", invalid="ignore"):
             self._inverse = 1.0 / d
         if not corner:
             self._inverse[self._pivot] = 0.0
-            ratio = d[self._pivot] / border[self._pivot]
-            self._scale = border[self._pivot] + ratio * (border**2 * self._inverse).sum()
+            ratio = d[self._pivot] / self._left[self._pivot]
+            self._scale = border[self._pivot] + ratio * (np.abs(border) ** 2 * self._inverse).sum()
             self._ratio = ratio
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
@@ -84,73 +86,115 @@ class DiagonalBordered:
         if self._corner:
             out[:-1], out[-1] = force * self._inverse, wanted / self._corner
             return out
-        k, r = self._pivot, self._r
+        k, r, left = self._pivot, self._r, self._left
         others = force * self._inverse
-        missing = (force[k] - self._ratio * (wanted - r @ others)) / self._scale
+        missing = (force[k] - self._ratio * (wanted - left @ others)) / self._scale
         out[:-1] = others - r * self._inverse * missing
-        out[k] = (wanted - r @ out[:-1] + r[k] * out[k]) / r[k]
+        out[k] = (wanted - left @ out[:-1] + left[k] * out[k]) / left[k]
         out[-1] = missing
         return out
+
+
+class Modes:
+    """All modes of the stuck structure that a harmonic sees.
+
+    lam : (n,) squared frequencies; held : the same for static loads; U, O : (n_contact, n), (n_output, n) shapes
+    damping, flow : (n, n) what multiplies the velocity, and circulatory forces or None
+    proportional : whether nothing couples the modes
+    """
+
+    def __init__(self, system: SecondOrderSystem, b: np.ndarray, k: np.ndarray, outputs: tuple[str, ...]):
+        mass = np.asarray(system.mass)
+        stuck = np.asarray(system.stiffness) + b.conj().T @ (k[:, None] * b)
+        self.lam, self.shapes, free = stuck_modes(stuck, mass)
+        self.held = np.where(free, np.inf, self.lam)  # static loads in equilibrium do not move what nothing holds
+        self.U = b @ self.shapes
+        self.UH = self.U.conj().T
+        self.O = np.array([system.outputs[name] @ self.shapes for name in outputs])
+        rate, flow = system.velocity_matrix, system.circulatory
+        left = self.shapes.conj().T
+        self.damping = np.zeros_like(mass) if rate is None else left @ np.asarray(rate) @ self.shapes
+        self.flow = None if flow is None else left @ np.asarray(flow) @ self.shapes
+        size = np.abs(np.diag(self.damping))
+        apart = np.abs(self.damping - np.diag(np.diag(self.damping)))
+        small = PROPORTIONAL * np.sqrt(np.outer(size, size)) + PROPORTIONAL * 1e-6 * size.max(initial=0.0)
+        self.proportional = flow is None and bool((apart <= small).all())
 
 
 class FreeVibration:
     """The problem of one reference mode.
 
-    balance : its vibration load plays no part; mode : number of the reference mode, from 0, of the structure stuck
-        where the static load keeps it closed; output : whose motion in the reference mode measures the amplitude
-    reference_omega : [rad/s]; per_amplitude : motion of the output per modal amplitude a
+    balance : of one structure or of a travelling wave of a wheel; its vibration load plays no part
+    mode : number of the reference mode, from 0, of the structure stuck where the static load keeps it closed; None for
+        the one with the least damping
+    output : whose motion in the reference mode measures the amplitude
+    reference_omega : [rad/s]; reference_damping : ratio of the mode with Coriolis forces, damping and flow
+    per_amplitude : motion of the output per modal amplitude a
     Raises  ValueError for what has no such mode
     """
 
-    def __init__(self, balance: HarmonicBalance, mode: int, output: str | None):
+    def __init__(self, balance: HarmonicBalance, mode: int | None, output: str | None):
         model, self.balance, self.basis = balance.model, balance, balance.basis
-        if model.per_harmonic is not None:
+        if model.per_harmonic is not None and model.per_index is None:
             raise ValueError(
                 "nonlinear modes need one system for all harmonics: this model has one of its own per harmonic"
             )
         if 1 not in self.basis.harmonics:
             raise ValueError("nonlinear modes need harmonic 1 among the harmonics")
-        system, b = model.system, np.asarray(model.interface.B)
-        if system.gyroscopic is not None:
-            raise ValueError("nonlinear modes know no Coriolis forces: leave them out, wheel.coriolis = false")
         names = balance.compliance.output_names
         if not names or (output is not None and output not in names):
             raise ValueError(
                 f"no output '{output}' to measure the amplitude: the model has {', '.join(names) or 'none'}"
             )
         self.k = balance.compliance.k
-        mass = np.asarray(system.mass)
-        self.lam, phi, free = stuck_modes(np.asarray(system.stiffness) + b.T @ (self.k[:, None] * b), mass)
-        self.n = len(self.lam)
-        self.held = np.where(free, np.inf, self.lam)  # static loads in equilibrium do not move what nothing holds
-        self.U = b @ phi
-        self.O = np.array([system.outputs[name] @ phi for name in names])
-        self.damping = np.zeros_like(mass) if system.damping is None else phi.T @ np.asarray(system.damping) @ phi
-        size = np.abs(np.diag(self.damping))
-        apart_from_it = np.abs(self.damping - np.diag(np.diag(self.damping)))
-        self.proportional = bool(
-            (
-                apart_from_it
-                <= PROPORTIONAL * np.sqrt(np.outer(size, size)) + PROPORTIONAL * 1e-6 * size.max(initial=0.0)
-            ).all()
-        )
-        static = sum(
-            (v * system.loads[name] for (h, name), v in balance.excitation.loads.items() if h == 0), np.zeros(self.n)
+        made: dict[int, Modes] = {}
+        self.modes: list[Modes] = []
+        for h in self.basis.harmonics:
+            system, b = model.at_harmonic(h)
+            if id(system) not in made:
+                made[id(system)] = Modes(system, np.asarray(b), self.k, names)
+            self.modes.append(made[id(system)])
+        self.first = self.basis.harmonics.index(1)
+        self.n = len(self.modes[self.first].lam)
+        static, b = model.at_harmonic(self.basis.harmonics[0])
+        load = sum(
+            (v * static.loads[name] for (h, name), v in balance.excitation.loads.items() if h == 0),
+            np.zeros(static.n_dof),
         )
         base = balance.excitation.base
         self.base = np.zeros(len(b)) if base is None or not self.basis.has_static else base[:, 0]
-        self.static_load = phi.T @ np.real(static) + self.U.T @ (self.k * self.base)
+        still = self.modes[0]
+        self.static_load = np.real(still.shapes.conj().T @ load + still.UH @ (self.k * self.base))
         self.rest, apart = self._static_state()
-        squares, shapes = np.linalg.eigh(np.diag(self.lam) - self.U[apart].T @ (self.k[apart, None] * self.U[apart]))
-        if not 0 <= mode < self.n:
-            raise ValueError(f"there is no mode {mode}: the model has modes 0 to {self.n - 1}")
-        if squares[mode] <= 1e-13 * squares[-1]:
-            raise ValueError(f"mode {mode} is a rigid-body motion at rest: choose one that vibrates")
-        self.reference, self.reference_omega = shapes[:, mode], float(np.sqrt(squares[mode]))
+        self.reference, self.reference_omega, self.reference_damping = self._reference(mode, apart)
         self.output = output or names[0]
-        self.per_amplitude = float(abs((self.O @ self.reference)[names.index(self.output)]))
-        if self.per_amplitude <= 1e-9 * np.abs(self.O).max():
+        moved = self.modes[self.first].O @ self.reference
+        self.per_amplitude = float(abs(moved[names.index(self.output)]))
+        if self.per_amplitude <= 1e-9 * np.abs(self.modes[self.first].O).max():
             raise ValueError(f"output '{self.output}' does not move in mode {mode}: choose another output")
+
+    def _reference(self, mode: int | None, apart: np.ndarray) -> tuple[np.ndarray, float, float]:
+        """Modal shape (n,) of unit mass, frequency [rad/s] and damping ratio of the reference mode."""
+        m = self.modes[self.first]
+        open_springs = m.UH[:, apart] @ (self.k[apart, None] * m.U[apart])
+        squares, shapes = np.linalg.eigh(np.diag(m.lam) - open_springs)
+        if mode is not None and not 0 <= mode < self.n:
+            raise ValueError(f"there is no mode {mode}: the model has modes 0 to {self.n - 1}")
+        system, _ = self.balance.model.at_harmonic(1)
+        if mode is not None and system.gyroscopic is None and system.circulatory is None:
+            if squares[mode] <= 1e-13 * squares[-1]:
+                raise ValueError(f"mode {mode} is a rigid-body motion at rest: choose one that vibrates")
+            shape, omega = shapes[:, mode], float(np.sqrt(squares[mode]))
+            return shape, omega, float(np.real(shape.conj() @ m.damping @ shape)) / (2 * omega)
+        few = shapes[:, : min(self.n, FEW)]  # what turns and what flows couples the lowest ones
+        stiffness = np.diag(squares[: few.shape[1]]) + (0.0 if m.flow is None else few.conj().T @ m.flow @ few)
+        rate = few.conj().T @ m.damping @ few
+        size = few.shape[1]
+        values, vectors = np.linalg.eig(np.block([[np.zeros((size, size)), np.eye(size)], [-stiffness, -rate]]))
+        values, vectors = values[values.imag > 0], vectors[:size, values.imag > 0]
+        order = np.argsort(values.imag) if mode is not None else np.argsort(-values.real)
+        value, shape = values[order[mode or 0]], few @ vectors[:, order[mode or 0]]
+        return shape / np.linalg.norm(shape), float(value.imag), float(-value.real / abs(value))
 
     def _static_state(self) -> tuple[np.ndarray, np.ndarray]:
         """x at rest, and which contacts are open there."""
@@ -164,8 +208,11 @@ class FreeVibration:
     def first_guess(self, a: float) -> Point:
         """The reference mode about the static equilibrium."""
         x = self.rest.copy()
-        x[:, :, int(self.basis.has_static)] += a * (self.U @ self.reference).reshape(x.shape[:2])
-        zeta = float(self.reference @ self.damping @ self.reference) / (2 * self.reference_omega)
+        shape = (self.modes[self.first].U @ self.reference).reshape(x.shape[:2])
+        cosine = int(np.flatnonzero(self.basis.order == 1)[0])
+        x[:, :, cosine] += a * shape.real
+        x[:, :, cosine + 1] -= a * shape.imag
+        zeta = self.reference_damping
         flat = x.reshape(self._shape) / self._units(a)
         return self.evaluate(np.concatenate([flat.ravel(), [np.log(self.reference_omega), zeta, np.log(a)]]))
 
@@ -175,7 +222,7 @@ class FreeVibration:
 
     def _units(self, a: float) -> np.ndarray:
         """(n_coeff,) displacement per coordinate: for x_0 that of rest, for the rest the amplitude."""
-        vibration = float(np.linalg.norm(self.U @ self.reference))
+        vibration = float(np.linalg.norm(self.modes[self.first].U @ self.reference))
         still = float(np.linalg.norm(self.rest[:, :, 0])) if self.basis.has_static else 0.0
         return np.where(self.basis.order == 0, still or a * vibration, a * vibration)
 
@@ -188,23 +235,36 @@ class FreeVibration:
         cycle = self.balance.contact.cycle(x, self.basis, self.balance.memory)
         g = self.k[:, None] * flat - cycle.force.reshape(flat.shape)
         factors: list[Bordered] = []
-        for h in self.basis.harmonics:
+        for h, m in zip(self.basis.harmonics, self.modes, strict=True):
             s = 1j * h * omega
-            undamped = (self.lam if h else self.held) + s * s - 2 * zeta * omega * s
+            undamped = (m.lam if h else m.held) + s * s - 2 * zeta * omega * s
             border, corner = (self.reference, 0.0) if h == 1 else (np.zeros(self.n), 1.0)
-            if self.proportional or not h:
-                factors.append(DiagonalBordered(undamped + s * np.diag(self.damping), border, corner))
+            if m.proportional or (not h and m.flow is None):
+                factors.append(DiagonalBordered(undamped + s * np.diag(m.damping), border, corner))
             else:
-                factors.append(DenseBordered(s * self.damping + np.diag(undamped), border, corner))
-        rhs = self._rhs(self.U.T @ self.basis.to_complex(g), a)
+                flow = 0.0 if m.flow is None else m.flow
+                factors.append(DenseBordered(s * m.damping + np.diag(undamped) + flow, border, corner))
+        rhs = self._rhs(self._modal(self.basis.to_complex(g)), a)
         if self.basis.has_static:
             rhs[:-1, 0] += self.static_load
         eta, mismatch = self._solve(factors, rhs)
-        move = self.basis.to_real(self.U @ eta)
+        move = self._moved(eta)
         if self.basis.has_static:
             move[:, 0] -= self.base
         residual = self._residual(a, flat - move, mismatch)
         return Point(coordinates, a, x, omega, zeta, cycle, eta, residual, factors)
+
+    def _modal(self, force: np.ndarray) -> np.ndarray:
+        """Modal forces (n, n_harmonic) of contact forces (n_contact, n_harmonic)."""
+        if all(m is self.modes[0] for m in self.modes):
+            return self.modes[0].UH @ force
+        return np.stack([m.UH @ force[:, i] for i, m in enumerate(self.modes)], axis=1)
+
+    def _moved(self, eta: np.ndarray) -> np.ndarray:
+        """Contact displacement (n_contact, n_coeff) of modal amplitudes (n, n_harmonic)."""
+        if all(m is self.modes[0] for m in self.modes):
+            return self.basis.to_real(self.modes[0].U @ eta)
+        return self.basis.to_real(np.stack([m.U @ eta[:, i] for i, m in enumerate(self.modes)], axis=1))
 
     def _rhs(self, modal_force: np.ndarray | float, a: float) -> np.ndarray:
         """(n + 1, n_harmonic) right-hand side of the bordered systems."""
@@ -237,8 +297,8 @@ class FreeVibration:
         def product(y: np.ndarray) -> np.ndarray:
             d = y[:-3].reshape(self._shape) * units + y[-1] * dynamic
             dg = self.k[:, None] * d - np.matmul(jac, d.reshape(len(jac), -1, 1)).reshape(d.shape)
-            eta, mismatch = self._solve(p.factors, self._rhs(self.U.T @ self.basis.to_complex(dg), 0.0))
-            out = self._residual(p.a, d - self.basis.to_real(self.U @ eta), mismatch)
+            eta, mismatch = self._solve(p.factors, self._rhs(self._modal(self.basis.to_complex(dg)), 0.0))
+            out = self._residual(p.a, d - self._moved(eta), mismatch)
             return np.append(out + y[-3] * by_omega + y[-2] * by_zeta + y[-1] * by_a, normal @ y / size)
 
         return gmres(product, np.append(-p.residual, 0.0), tolerance, max_products)[0]
@@ -246,14 +306,15 @@ class FreeVibration:
     def _slopes(self, p: Point) -> tuple[np.ndarray, ...]:
         """Derivatives of the residual at fixed x by the logarithm of omega, by zeta and by the logarithm of a."""
         h = np.asarray(self.basis.harmonics)
-        by_omega = 1j * h * (self.damping @ p.eta) + (-2 * h**2 * p.omega - 4j * p.zeta * h * p.omega) * p.eta
+        damped = np.stack([m.damping @ p.eta[:, i] for i, m in enumerate(self.modes)], axis=1)
+        by_omega = 1j * h * damped + (-2 * h**2 * p.omega - 4j * p.zeta * h * p.omega) * p.eta
         by_zeta = (-2j * h * p.omega**2) * p.eta
         found = []
         for rhs in (self._rhs(-p.omega * by_omega, 0.0), self._rhs(-by_zeta, 0.0), self._rhs(0.0, p.a)):
             eta, mismatch = self._solve(p.factors, rhs)
-            found.append(self._residual(p.a, -self.basis.to_real(self.U @ eta), mismatch))
+            found.append(self._residual(p.a, -self._moved(eta), mismatch))
         return tuple(found)
 
     def outputs(self, p: Point) -> np.ndarray:
         """(n_output, n_coeff) response of the observed outputs [m]."""
-        return self.basis.to_real(self.O @ p.eta)
+        return self.basis.to_real(np.stack([m.O @ p.eta[:, i] for i, m in enumerate(self.modes)], axis=1))

@@ -109,7 +109,7 @@ def backbone(
     balance: HarmonicBalance,
     start: float,
     stop: float,
-    mode: int = 0,
+    mode: int | None = 0,
     output: str | None = None,
     options: BackboneOptions | None = None,
     modal: bool = False,
@@ -119,7 +119,7 @@ def backbone(
     balance : its vibration load plays no part, its static load does
     start, stop : amplitudes [m] of `output` (the first by default) in the reference mode; where `modal`, those of the
         mass-normalised mode itself [m kg^0.5]
-    mode : number of the reference mode, from 0, among the modes about the static equilibrium
+    mode : number of the reference mode, from 0, among the modes about the static equilibrium; None for the least damped
     Raises  ValueError for models whose harmonics see different systems, unknown outputs, no static equilibrium
     """
     options = options or BackboneOptions()
@@ -127,18 +127,18 @@ def backbone(
         raise ValueError(f"the amplitudes of a backbone must be > 0 and differ, not {start} and {stop}")
     problem = FreeVibration(balance, mode, output)
     a, goal = np.log(np.array([start, stop]) / (1.0 if modal else problem.per_amplitude))
-    solved, end = _walk(problem, float(a), float(goal), options)
+    solved, end = walk(problem, float(a), float(goal), options)
     return _result(problem, solved, end)
 
 
-def _walk(
+def walk(
     problem: FreeVibration, start: float, goal: float, options: BackboneOptions
 ) -> tuple[list[_Solved], Outcome[BranchEnd]]:
     """Points from the logarithm of the amplitude `start` to `goal`, and how the walk ends."""
     first = problem.first_guess(np.exp(start))
     fixed = np.zeros(len(first.coordinates))
     fixed[-1] = 1.0
-    solved = [_newton(problem, first, fixed, options.newton)]
+    solved = [newton_on(problem, first, fixed, options.newton)]
     if solved[0][1] != CONVERGED:
         return solved, BranchEnd.ENDED.say(f" the start: {solved[0][1]}")
     longest = abs(goal - start) / max(options.n_points - 1, 1)
@@ -151,7 +151,7 @@ def _walk(
         last = (ahead[-1] - goal) * (start - goal) <= 0
         if last:
             ahead = here + (goal - here[-1]) / tangent[-1] * tangent
-        found = _newton(problem, problem.evaluate(ahead), fixed if last else weight * tangent, options.newton)
+        found = newton_on(problem, problem.evaluate(ahead), fixed if last else weight * tangent, options.newton)
         turned = found[0].coordinates - here
         size = np.sqrt(turned @ (weight * turned))
         smooth = turned @ (weight * tangent) > 0.5 * size or step < CORNER_STEP * longest
@@ -173,7 +173,7 @@ def _walk(
     return solved, BranchEnd.POINTS_DONE.say(f" {options.max_points} points")
 
 
-def _newton(problem: FreeVibration, point: Point, normal: np.ndarray, options: NewtonOptions) -> _Solved:
+def newton_on(problem: FreeVibration, point: Point, normal: np.ndarray, options: NewtonOptions) -> _Solved:
     """The point of the curve in the hyperplane through a guess."""
     error = float(np.linalg.norm(point.residual))
     for step in range(options.max_steps):

@@ -1,0 +1,127 @@
+"""Limit cycles: free vibrations whose damping, that of flow and friction together, vanishes.
+
+On the backbone of the least damped mode the damping ratio zeta depends on the amplitude. Where it passes zero nothing
+needs to be added to sustain the motion: it is a limit cycle. It attracts the motions of its own wave beside it where
+zeta grows with the amplitude there. The phase is fixed by the reference mode, as on the backbone.
+Source  Krack 2015, section 2 (a nonlinear mode with zero damping is a limit cycle)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.continuation.free_vibration import FreeVibration, Point
+from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, newton_on, walk
+from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.threads import single
+
+FREQUENCY, DAMPING, AMPLITUDE = -3, -2, -1  # among the coordinates of a point
+
+
+@dataclass(frozen=True)
+class LimitCycle:
+    """One limit cycle.
+
+    amplitude : of the output in the reference mode [m]; omega : [rad/s]; attracts : motions of its own wave beside it
+    response : (n_output, n_coeff) of the outputs [m]; state : of the balance without harmonic loads
+    point : where it lies in the coordinates of its problem
+    """
+
+    amplitude: float
+    omega: float
+    attracts: bool
+    response: np.ndarray
+    state: State
+    point: Point
+
+    @property
+    def frequency(self) -> float:
+        """Frequency [Hz]."""
+        return self.omega / (2 * np.pi)
+
+
+@single
+def limit_cycles(
+    balance: HarmonicBalance,
+    start: float,
+    stop: float,
+    mode: int | None = None,
+    output: str | None = None,
+    options: BackboneOptions | None = None,
+) -> list[LimitCycle]:
+    """Limit cycles between two amplitudes [m] of an output, by rising amplitude; none where the damping keeps its sign.
+
+    mode, output : as for `backbone`; the least damped mode by default
+    Raises  ValueError as `backbone` does, and where the backbone does not reach the last amplitude
+    """
+    options = options or BackboneOptions()
+    if not 0 < start < stop:
+        raise ValueError(f"limit cycles need two rising amplitudes above 0, not {start} and {stop}")
+    problem = FreeVibration(balance, mode, output)
+    low, high = np.log(np.array([start, stop]) / problem.per_amplitude)
+    solved, end = walk(problem, float(low), float(high), options)
+    points = [point for point, outcome, _ in solved if outcome == CONVERGED]
+    found = []
+    for before, after in pairwise(points):
+        if np.sign(before.zeta) != np.sign(after.zeta):
+            share = before.zeta / (before.zeta - after.zeta)
+            guess = before.coordinates + share * (after.coordinates - before.coordinates)
+            rises = (after.zeta - before.zeta) * (after.a - before.a) > 0
+            if (cycle := _without_damping(problem, guess, rises, options)) is not None:
+                found.append(cycle)
+    if not found and solved[-1][1] != CONVERGED:
+        reached = points[-1].a * problem.per_amplitude if points else 0.0
+        raise ValueError(f"the damping was followed up to {reached:.3g} m only: the backbone {end}")
+    return sorted(found, key=lambda cycle: cycle.amplitude)
+
+
+@single
+def follow(
+    make: Callable[[float], HarmonicBalance],
+    values: Iterable[float],
+    first: LimitCycle,
+    mode: int | None = None,
+    output: str | None = None,
+    options: BackboneOptions | None = None,
+) -> list[tuple[float, LimitCycle]]:
+    """A limit cycle followed while the problem changes, such as with the density of the gas; ends where it is lost.
+
+    make : the problem at a value of the parameter; values : one after the other, beside that of `first`
+    """
+    options, found = options or BackboneOptions(), list[tuple[float, LimitCycle]]()
+    here = first.point.coordinates
+    for value in values:
+        problem = FreeVibration(make(value), mode, output)
+        cycle = _without_damping(problem, here, found[-1][1].attracts if found else first.attracts, options)
+        if cycle is None:
+            break
+        here = cycle.point.coordinates
+        found.append((value, cycle))
+    return found
+
+
+def _without_damping(
+    problem: FreeVibration, guess: np.ndarray, attracts: bool, options: BackboneOptions
+) -> LimitCycle | None:
+    """The point of zero damping near a guess, None where Newton's method does not find it."""
+    held = np.zeros(len(guess))
+    held[DAMPING] = 1.0
+    begin = guess.copy()
+    begin[DAMPING] = 0.0
+    point, outcome, _ = newton_on(problem, problem.evaluate(begin), held, options.newton)
+    if outcome != CONVERGED:
+        return None
+    still = replace(problem.balance, load_factor=0.0)
+    return LimitCycle(
+        amplitude=point.a * problem.per_amplitude,
+        omega=point.omega,
+        attracts=attracts,
+        response=problem.outputs(point),
+        state=still.evaluate(point.omega, point.x),
+        point=point,
+    )

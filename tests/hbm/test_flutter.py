@@ -1,0 +1,132 @@
+"""Flutter of a small wheel and its limit cycles by friction: eigenvalues of the whole wheel, and time integration."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.helpers import tiny_wheel as tiny
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.continuation.limit_cycles import follow, limit_cycles
+from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.stability.exponents import stability
+from tribodyn.hbm.time.time_integration import Options, leave_alone
+from tribodyn.reduction.cyclic import travelling_wave, wheel_model
+from tribodyn.reduction.damping import modal_damping
+from tribodyn.reduction.flow import Flow, aeroelastic, wheel_with_flow, with_flow
+
+FLOW = Flow({1: 0.012 + 0.002j, -1: -0.012 + 0.002j, 0: 0.004j})
+SPRINGS = np.array([[4e3, 6e3]])
+TURNING = 6.0
+ORDER = 1
+
+
+def damped(model):
+    return model.with_damping(lambda system, B: modal_damping(system, 0.005))
+
+
+def balance_of(model, copies):
+    contact = ContactParameters.of(("t1", "n"), np.tile(SPRINGS, (copies, 1)), gap=-2e-3, friction=0.4)
+    joint = Joint("contact", "jenkins", contact)
+    basis = HarmonicBasis(tuple(range(6)), 256, "located")
+    return HarmonicBalance.of(model, joint, basis, Excitation.of({}, {}), 500.0)
+
+
+def wave(factor=1.0):
+    """The wave of one nodal diameter that runs with the rotation, in a flow."""
+    reduced = tiny.sector(("t1", "n"), TURNING)
+    return balance_of(with_flow(damped(travelling_wave(reduced, ORDER)), SPRINGS, FLOW.scaled(factor)), 1)
+
+
+def whole(stiffness=None):
+    """All five sectors in the flow."""
+    reduced = tiny.sector(("t1", "n"), TURNING)
+    return wheel_with_flow(reduced, damped(wheel_model(reduced, stiffness)), SPRINGS, FLOW)
+
+
+def test_eigenvalues_of_nodal_diameters_are_those_of_the_whole_wheel():
+    one = damped(travelling_wave(tiny.sector(("t1", "n"), TURNING), ORDER))
+    found = aeroelastic(one, SPRINGS, FLOW)
+    assert sorted(found) == [-2, -1, 0, 1, 2]
+    assert found[1].real > 0 > found[-1].real  # the wave with the rotation flutters
+    model = whole()
+    system, B = model.system, np.asarray(model.interface.B)
+    K = system.stiffness + B.T @ (np.tile(SPRINGS.ravel(), tiny.N)[:, None] * B) + system.circulatory
+    n = len(K)
+    every = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-K, -system.velocity_matrix]]))
+    for value in found.values():
+        assert np.abs(every - value).min() < 1e-9 * abs(value)
+
+
+def test_damping_and_frequency_of_a_wave_are_what_the_coefficients_say():
+    """Without other damping: Im c / 2 of critical, the frequency shifted by Re c / 2, to first order."""
+    one = travelling_wave(tiny.sector(("t1", "n")), ORDER)
+    small = FLOW.scaled(1e-3)
+    still = aeroelastic(one, SPRINGS, small.scaled(1e-9))
+    for index, value in aeroelastic(one, SPRINGS, small).items():
+        c = small.of_index(index, tiny.N)
+        omega = still[index].imag
+        assert -value.real / omega == pytest.approx(c.imag / 2, abs=1e-8)
+        assert value.imag / omega - 1 == pytest.approx(c.real / 2, abs=1e-8)
+
+
+@pytest.fixture(scope="module")
+def cycle():
+    found = limit_cycles(wave(), 1e-5, 2e-2, output="tip", options=BackboneOptions(n_points=30))
+    assert found
+    assert found[0].attracts
+    return found[0]
+
+
+def test_the_limit_cycle_of_a_tuned_wheel_is_what_time_integration_comes_to(cycle):
+    """From three quarters of its amplitude, on the whole wheel, within 1 %."""
+    problem = wave()
+    begin = cycle.state.x.copy()
+    begin[..., 1:] *= 0.75
+    start = problem.evaluate(cycle.omega, begin)
+    alone = leave_alone(problem, cycle.omega, start, 160, Options(steps=128))
+    wanted = np.sqrt((cycle.response[0, 1:] ** 2).sum())
+    assert np.sqrt((problem.outputs(start)[0, 1:] ** 2).sum()) < 0.8 * wanted
+    assert alone.amplitude[0] == pytest.approx(wanted, rel=0.01)
+    assert alone.drift < 0.05
+
+
+def test_a_limit_cycle_has_a_neutral_exponent_and_leaves_its_own_wave_stable(cycle):
+    found = stability(wave(), cycle.state, top=9)
+    own = found.exponents[found.diameters == 0]
+    neutral = np.argmin(np.abs(own))
+    assert abs(own[neutral]) < 2e-3 * cycle.omega
+    assert np.delete(own, neutral).real.max() < 0
+
+
+def test_a_limit_cycle_is_followed_with_the_density_of_the_gas(cycle):
+    """More flow, more amplitude; each one is found afresh by itself."""
+    path = follow(wave, [1.05, 1.1, 1.15], cycle, output="tip")
+    assert [value for value, _ in path] == [1.05, 1.1, 1.15]
+    heights = [one.amplitude for _, one in path]
+    assert cycle.amplitude < heights[0] < heights[1] < heights[2]
+    again = limit_cycles(wave(1.15), 1e-5, 2e-2, output="tip", options=BackboneOptions(n_points=30))[0]
+    assert again.amplitude == pytest.approx(heights[2], rel=1e-5)
+    assert again.frequency == pytest.approx(path[2][1].frequency, rel=1e-6)
+
+
+def test_the_limit_cycle_of_a_mistuned_wheel_is_what_time_integration_comes_to():
+    """Sectors that differ by up to 2 %: the least damped mode of the whole wheel, within 1 % in every sector."""
+    model = whole([1.02, 0.985, 1.0, 0.99, 1.005])
+    problem = balance_of(model, tiny.N)
+    names = problem.compliance.output_names
+    found = limit_cycles(problem, 1e-5, 2e-2, output="tip@0", options=BackboneOptions(n_points=30))
+    assert found
+    assert found[0].attracts
+    rows = [names.index(f"tip@{n}") for n in range(tiny.N)]
+    wanted = np.linalg.norm(found[0].response[rows, 1:], axis=1)
+    assert np.ptp(wanted) > 0.03 * wanted.max()
+    begin = found[0].state.x.copy()
+    begin[..., 1:] *= 0.9
+    start = problem.evaluate(found[0].omega, begin)
+    alone = leave_alone(problem, found[0].omega, start, 240, Options(steps=128))
+    np.testing.assert_allclose(alone.amplitude[rows], wanted, rtol=0.01)
