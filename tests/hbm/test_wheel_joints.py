@@ -17,7 +17,6 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import SLIPS, ContactParameters
-from tribodyn.hbm.continuation.free_vibration import FreeVibration
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import expansion
 from tribodyn.hbm.linear import travelling_wave as waves
@@ -135,9 +134,3 @@ def test_unequal_blades_with_coriolis_forces_solve_the_equations_of_the_whole_wh
     assert np.abs(back - state.x).max() < 1e-6 * np.abs(state.x).max()
     heights = np.hypot(*wheel.outputs(state)[:, 1:3].T)
     assert np.ptp(heights[[name.startswith("tip") for name in wheel.compliance.output_names]]) > 0.01 * heights.max()
-
-
-def test_what_knows_no_coriolis_forces_says_so(turning):
-    _, wheel = small.wave_and_wheel(turning, 1, harmonics=(0, 1))
-    with pytest.raises(ValueError, match=r"leave them out, wheel.coriolis = false"):
-        FreeVibration(wheel, 0, None)
