@@ -13,6 +13,7 @@ from tribodyn.workflows.benchmarks.scoreboard import Judged, Row
 
 SEED = 2
 SCENES = (6, 7)  # a beam and a plate that take a second each
+KEPT = Path(__file__).parents[2] / "docs" / "accuracy" / "scoreboard_rows.jsonl"
 
 
 @pytest.fixture(scope="module")
@@ -74,3 +75,14 @@ def test_a_broken_promise_is_told(rows: list[Row], tmp_path: Path) -> None:
     table = (tmp_path / "scoreboard.csv").read_text().splitlines()
     assert table[1].split(",")[4:8] == ["energy", "1.0", "0.01", "0.09"]
     assert (tmp_path / "scoreboard.png").stat().st_size > 10_000
+
+
+def test_the_page_says_what_the_kept_rows_say(tmp_path: Path) -> None:
+    """The rows of the campaign are kept beside its page, whose counts, ratios and figure come from them."""
+    (tmp_path / scoreboard.ROWS).write_text(KEPT.read_text(encoding="utf-8"), encoding="utf-8")
+    kept = scoreboard.rows_in(tmp_path)
+    assert len({row.seed for row in kept}) == 1
+    page = KEPT.with_name("scoreboard.md").read_text(encoding="utf-8")
+    for line in scoreboard_table.summary(kept).splitlines():
+        assert line.rstrip() in page, line
+    assert scoreboard.run(len(kept), kept[0].seed, tmp_path, 1.0, lambda sentence: None) == kept  # nothing is run again
