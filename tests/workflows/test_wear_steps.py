@@ -26,7 +26,7 @@ def table() -> wear_steps.WearStepTable:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(wear_steps, "THESIS_STEPS", (0.5, 0.25))
         patch.setattr(wear_steps, "FINER_STEPS", (0.15,))
-        patch.setattr(wear_steps, "REFERENCE_TOLERANCES", (0.3, 0.2))
+        patch.setattr(wear_steps, "REFERENCE_TOLERANCES", (0.2, 0.1))
         patch.setattr(wear_steps, "TOLERANCES", (0.5,))
         return wear_steps.compare("beam", lambda _: None, SMALL)
 

@@ -30,7 +30,7 @@ from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 
-MOST = 0.8  # of the seconds, for more harmonics, which matter most
+MOST = 0.5  # of the seconds, for more harmonics, which matter most; a mesh needs what is left
 FOR_JUMP = 0.5  # of the seconds, for the instant of a jump to another peak, where there is one
 HALF = 0.5  # of the seconds that are left, for one measurement of several
 FOR_MESH = 0.75  # of the seconds that are left then
