@@ -15,11 +15,13 @@ import numpy as np
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.threads import single
 
 EXACT = 1e-11  # relative residual of the state at rest
 OPENINGS = 4  # steps in which faces are opened that do not fit
 
 
+@single
 def displacement(balance: HarmonicBalance, options: newton.NewtonOptions | None = None) -> np.ndarray:
     """Static displacement x (n_pair, n_component) [m] under the static loads alone, friction off.
 

@@ -26,16 +26,22 @@ FEW_NEWTON_STEPS, MANY_NEWTON_STEPS = 3, 7
 # per cent where the amplitude changes by decades.
 FREQUENCY_WEIGHT = 5.0
 CORNER_STEP = 1e-2  # share of the longest step below which any turn is taken as a corner of the curve
+# By how much a step may miss its prediction, over what a straight line between its ends may miss: eight on a curve of
+# constant curvature, four at a kink in the middle.
+PREDICTED_OVER_BETWEEN = 5.0
 
 
 @dataclass(frozen=True)
 class BackboneOptions:
     """n_points : amplitudes on an easy way, equidistant in the logarithm: this sets the longest step
 
+    between : what a straight line between neighbouring points may miss, of the frequency (relative) and of the damping
+        ratio: steps get shorter where slip begins
     min_step : shortest step, as a fraction of the longest; max_points : points after which to end
     """
 
     n_points: int = 40
+    between: float = 1e-3
     min_step: float = 1e-4
     max_points: int = 400
     newton: NewtonOptions = field(default_factory=NewtonOptions)
@@ -159,6 +165,10 @@ def walk(
             step *= 0.5
             if step < options.min_step * longest:
                 return [*solved, found], BranchEnd.ENDED.say(f" its last point: {found[1]}")
+            continue
+        missed = np.abs(found[0].coordinates - ahead)[-3:-1].max()
+        if missed > PREDICTED_OVER_BETWEEN * options.between and step >= CORNER_STEP * longest:
+            step *= 0.5
             continue
         solved.append(found)
         if last:

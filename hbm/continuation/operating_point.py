@@ -16,6 +16,7 @@ from tribodyn.hbm.continuation.branch import Branch, amplitude
 from tribodyn.hbm.continuation.methods import adaptive, arc_length
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED, SolveEnd
+from tribodyn.hbm.threads import single
 
 SCAN_TOLERANCE = 0.03  # of the response between the points of the first search
 SCAN_MISSES = 0.15  # of a peak's height, at most, between two points of the first search: five times their tolerance
@@ -80,10 +81,12 @@ class AtFrequency:
     omega: float
     newton: NewtonOptions = field(default_factory=NewtonOptions)
 
+    @single
     def first(self, balance: HarmonicBalance) -> OperatingPoint:
         """Solve without a neighbour, where need be along the folded curve of solutions over the load."""
         return OperatingPoint.of(balance, arc_length.solve_along_load(balance, self.omega, self.newton), self.output, 1)
 
+    @single
     def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
         """Solve from a neighbouring x; `omega` is the neighbour's and ignored here.
 
@@ -129,6 +132,7 @@ class AtPeak:
     scanned: int = SCANNED
     newton: NewtonOptions = field(default_factory=NewtonOptions)
 
+    @single
     def first(self, balance: HarmonicBalance) -> OperatingPoint:
         """Scan the range, points dense where the response bends, then refine its highest maximum.
 
@@ -161,10 +165,12 @@ class AtPeak:
                 break
         return replace(found, solves=solves)
 
+    @single
     def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
         """Refine from a neighbouring peak."""
         return self._refine(balance, omega, x, 2e-4 * omega)
 
+    @single
     def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> tuple[OperatingPoint | None, int]:
         """The higher peak that a sweep with rising frequency meets, None where the tracked one is the highest.
 
@@ -196,6 +202,7 @@ class AtPeak:
         apart = abs(omega - point.state.omega) > APART * point.state.omega
         return inside and apart and found.solution.converged and found.amplitude > OVERTAKES * point.amplitude
 
+    @single
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
         """The distance of a state to the peak, by its slope and as though one mode responded."""
         here = _Slope.of(balance, Solution(state, CONVERGED, 0, 0, ()), self.output)
@@ -318,10 +325,12 @@ class BesidePeak:
         """How exactly and how long Newton works."""
         return self.peak.newton
 
+    @single
     def first(self, balance: HarmonicBalance) -> OperatingPoint:
         """Find the peak, then go to the ratio."""
         return self._beside(balance, self.peak.first(balance))
 
+    @single
     def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
         """From a neighbouring x at the ratio: back to the peak, refine it, and to the ratio again."""
         solution, solves = self._walk(balance, omega, omega / self.ratio, x)
@@ -329,6 +338,7 @@ class BesidePeak:
         found = self._beside(balance, at_peak)
         return replace(found, solves=found.solves + solves)
 
+    @single
     def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> tuple[OperatingPoint | None, int]:
         """The cycle at the ratio to a peak that has overtaken the tracked one, None where none has; solves spent."""
         omega = point.state.omega
@@ -341,6 +351,7 @@ class BesidePeak:
         found = self._beside(balance, peak)
         return found, spent - peak.solves + found.solves
 
+    @single
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
         """The distance of a state to the ratio times the frequency of the peak, which is found from it."""
         solution, solves = self._walk(balance, state.omega, state.omega / self.ratio, state.x)

@@ -123,6 +123,7 @@ def stuck(balance: HarmonicBalance, state: State) -> np.ndarray:
     return held & balance.contact.sees[:, t]
 
 
+@single
 def amplitude_slope(balance: HarmonicBalance, state: State, output: str, tolerance: float = 1e-6) -> np.ndarray:
     """Derivative of the vibration amplitude of an output with respect to the residual shear of each stuck direction.
 

@@ -18,6 +18,7 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.stability import exponents
+from tribodyn.hbm.threads import single
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.time_integration import Options, PeriodicMotion
 
@@ -76,6 +77,7 @@ def march(balance: HarmonicBalance, state: State, omega: float, options: Options
     return time_integration.integrate(balance, omega, balance.evaluate(omega, state.x), options)
 
 
+@single
 def solutions_at(
     balance: HarmonicBalance, branch: Branch, omega: float, points: tuple[int, int] | None = None
 ) -> list[State]:
@@ -95,6 +97,7 @@ def solutions_at(
     return found
 
 
+@single
 def fold_in_time(
     balance: HarmonicBalance,
     branch: Branch,
@@ -139,6 +142,7 @@ def fold_in_time(
     return FoldInTime(fold, float(branch.omega[fold]), inside, last, 2 * bracket / 2**bisections, outcome)
 
 
+@single
 def coexisting(
     balance: HarmonicBalance, branch: Branch, low: float, high: float, output: str, frequencies: int = 24
 ) -> tuple[float, list[Coexisting]]:

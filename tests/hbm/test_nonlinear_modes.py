@@ -57,6 +57,23 @@ def test_frequency_and_damping_of_a_jenkins_element_are_the_closed_form():
     assert found.damping.max() > 9 * RATIO
 
 
+@pytest.mark.parametrize("between", [1e-3, 1e-4])
+def test_straight_lines_between_points_miss_no_more_than_asked_where_slip_begins(between):
+    slip = LIMIT / KT
+    found = backbone(jenkins(), 0.1 * slip, 100 * slip, options=BackboneOptions(between=between))
+    log_x = np.linspace(*np.log(found.amplitude[[0, -1]]), 2001)
+    x = np.exp(log_x)
+    slides = x > slip
+    theta = np.arccos(np.where(slides, 1 - 2 * slip / x, -1.0))
+    omega = np.sqrt((STIFFNESS + KT / np.pi * (theta - np.sin(theta) * np.cos(theta))) / MASS)
+    dissipated = 4 * LIMIT * np.maximum(x - slip, 0.0)
+    zeta = RATIO * np.sqrt(STIFFNESS / MASS) / omega + dissipated / (2 * np.pi * MASS * omega**2 * x**2)
+    there = np.log(found.amplitude)
+    assert np.abs(np.interp(log_x, there, found.omega) / omega - 1).max() < 1.5 * between
+    assert np.abs(np.interp(log_x, there, found.damping) - zeta).max() < 1.5 * between
+    assert len(found.omega) < 120 * np.sqrt(1e-3 / between)
+
+
 def duffing(harmonics: tuple[int, ...], ratio: float) -> HarmonicBalance:
     parameters = ContactParameters.of(("n",), [[KT]], cubic=2e9)
     basis = HarmonicBasis(harmonics, 256)

@@ -7,11 +7,12 @@ import pytest
 from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from tests.helpers.verification_models import oscillator
-from tribodyn.hbm import newton, threads
+from tribodyn.hbm import newton, rest, threads
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation.methods import adaptive, arc_length, natural
+from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 
@@ -35,6 +36,9 @@ ENTRIES = {
     "natural": lambda b: natural.follow(b, OMEGA, 1.1 * OMEGA, natural.Options(n_points=3)),
     "adaptive": lambda b: adaptive.follow(b, OMEGA, 1.1 * OMEGA),
     "arc length": lambda b: arc_length.follow(b, OMEGA, 1.1 * OMEGA),
+    "at rest": lambda b: rest.displacement(b),
+    "at a frequency": lambda b: AtFrequency("mass", OMEGA).first(b),
+    "at the peak": lambda b: AtPeak("mass", 110.0, 170.0, n_scan=5).first(b),
 }
 
 

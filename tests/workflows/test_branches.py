@@ -1,0 +1,61 @@
+"""`tribodyn branches`: random friction problems followed both ways, and a judge that sees what is wrong."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.helpers.command import leave
+from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.continuation.methods import arc_length
+from tribodyn.workflows.benchmarks import branches
+
+
+def test_curves_that_slip_lift_and_fold_are_followed_both_ways(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = leave(["branches", "--problems", "3", "--first", "5", "--json"], capsys)
+    assert code == 0, err
+    rows = json.loads(out)
+    assert [row["outcome"] for row in rows] == ["followed"] * 3
+    assert [row["folds"] for row in rows] == [2, 0, 2]
+    assert all(row["slips"] and row["lifts"] and row["defect"] < branches.DEFECT for row in rows)
+    assert "problem 7: followed" in err
+
+
+@pytest.mark.slow
+def test_twenty_problems_are_followed_or_refused() -> None:
+    rows = branches.run(range(20), lambda _: None)
+    assert all(row.outcome != branches.WRONG for row in rows), branches.as_text(rows)
+    assert sum(row.outcome == branches.FOLLOWED for row in rows) >= 18
+
+
+def test_the_judge_sees_points_off_the_curve_lost_folds_and_gaps() -> None:
+    given = branches.problem(7)
+    up = arc_length.follow(given.balance, given.low, given.high)
+    good = branches.checked(given.balance, up)
+    assert good < branches.DEFECT
+    assert branches.verdict(up, replace(up, **_backwards(up)), good)[0] == branches.FOLLOWED
+    off = replace(up, contact=up.contact * 1.01)
+    assert branches.checked(given.balance, off) > branches.DEFECT
+    outcome, reason = branches.verdict(up, replace(up, **_backwards(up) | {"folds": ()}), good)
+    assert outcome == branches.WRONG
+    assert reason == "2 folds upwards and 0 downwards, or not the same"
+    stepped = replace(up, end=replace(up.end, detail=f"{up.end.detail}; stepped over gaps in the curve at 3 Hz"))
+    assert branches.verdict(stepped, up, good)[0] == branches.REFUSED
+
+
+def _backwards(branch: Branch) -> dict[str, object]:
+    turned = tuple(len(branch.omega) - 1 - i for i in branch.folds)
+    return {"omega": branch.omega[::-1], "contact": branch.contact[::-1], "folds": turned}
+
+
+def test_the_table_counts_by_load() -> None:
+    row = branches.Curve(3, 2.0, 1, 2, branches.FOLLOWED, "", 50, 2, True, True, 1e-4, 1.5)
+    refused = replace(row, seed=4, load=20.0, outcome=branches.REFUSED, reason="up: ended at 3 Hz")
+    lines = branches.as_text([row, refused]).splitlines()
+    assert lines[1].split() == ["1", "to", "3", "1", "1", "0", "0", "1", "1", "2"]
+    assert lines[2].split() == ["from", "10", "1", "0", "1", "0", "1", "1", "2"]
+    assert lines[3] == "problem 4, refused: up: ended at 3 Hz"
+    assert np.isfinite(branches.problem(3).load)
