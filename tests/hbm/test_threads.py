@@ -38,7 +38,7 @@ ENTRIES = {
     "arc length": lambda b: arc_length.follow(b, OMEGA, 1.1 * OMEGA),
     "at rest": lambda b: rest.displacement(b),
     "at a frequency": lambda b: AtFrequency("mass", OMEGA).first(b),
-    "at the peak": lambda b: AtPeak("mass", 110.0, 170.0, n_scan=5).first(b),
+    "at the peak": lambda b: AtPeak("mass", 80.0, 160.0, n_scan=5).first(b),
 }
 
 
