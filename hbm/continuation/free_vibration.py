@@ -129,7 +129,7 @@ class FreeVibration:
         the one with the least damping
     output : whose motion in the reference mode measures the amplitude
     reference_omega : [rad/s]; reference_damping : ratio of the mode with Coriolis forces, damping and flow
-    per_amplitude : motion of the output per modal amplitude a
+    per_amplitude : motion of the output per modal amplitude a; one_system : whether all harmonics see the same
     Raises  ValueError for what has no such mode
     """
 
@@ -154,6 +154,7 @@ class FreeVibration:
             if id(system) not in made:
                 made[id(system)] = Modes(system, np.asarray(b), self.k, names)
             self.modes.append(made[id(system)])
+        self.one_system = len(made) == 1
         self.first = self.basis.harmonics.index(1)
         self.n = len(self.modes[self.first].lam)
         static, b = model.at_harmonic(self.basis.harmonics[0])
@@ -212,9 +213,12 @@ class FreeVibration:
         cosine = int(np.flatnonzero(self.basis.order == 1)[0])
         x[:, :, cosine] += a * shape.real
         x[:, :, cosine + 1] -= a * shape.imag
-        zeta = self.reference_damping
+        return self.at(x, self.reference_omega, self.reference_damping, a)
+
+    def at(self, x: np.ndarray, omega: float, zeta: float, a: float) -> Point:
+        """Everything at x (n_pair, c, n_coeff), frequency, damping ratio and modal amplitude."""
         flat = x.reshape(self._shape) / self._units(a)
-        return self.evaluate(np.concatenate([flat.ravel(), [np.log(self.reference_omega), zeta, np.log(a)]]))
+        return self.evaluate(np.concatenate([flat.ravel(), [np.log(omega), zeta, np.log(a)]]))
 
     @property
     def _shape(self) -> tuple[int, int]:
@@ -256,14 +260,20 @@ class FreeVibration:
 
     def _modal(self, force: np.ndarray) -> np.ndarray:
         """Modal forces (n, n_harmonic) of contact forces (n_contact, n_harmonic)."""
-        if all(m is self.modes[0] for m in self.modes):
-            return self.modes[0].UH @ force
+        if self.one_system:
+            to_modes = self.modes[0].UH
+            if np.isrealobj(to_modes):  # a product of real matrices is not one of complex copies
+                return to_modes @ force.real + 1j * (to_modes @ force.imag)
+            return to_modes @ force
         return np.stack([m.UH @ force[:, i] for i, m in enumerate(self.modes)], axis=1)
 
     def _moved(self, eta: np.ndarray) -> np.ndarray:
         """Contact displacement (n_contact, n_coeff) of modal amplitudes (n, n_harmonic)."""
-        if all(m is self.modes[0] for m in self.modes):
-            return self.basis.to_real(self.modes[0].U @ eta)
+        if self.one_system:
+            from_modes = self.modes[0].U
+            if np.isrealobj(from_modes):
+                return from_modes @ self.basis.to_real(eta)
+            return self.basis.to_real(from_modes @ eta)
         return self.basis.to_real(np.stack([m.U @ eta[:, i] for i, m in enumerate(self.modes)], axis=1))
 
     def _rhs(self, modal_force: np.ndarray | float, a: float) -> np.ndarray:

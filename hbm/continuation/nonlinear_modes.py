@@ -51,6 +51,7 @@ class BackboneOptions:
 class Backbone:
     """One nonlinear mode.
 
+    number : of its reference mode, from 0; None for the least damped
     modal_amplitude : (n_point,) a of the mass-normalised reference mode [m kg^0.5]
     amplitude : (n_point,) of the chosen output as the reference mode alone would move it [m]
     output : the chosen one
@@ -64,6 +65,7 @@ class Backbone:
     end : why the backbone ends; its text is a sentence
     """
 
+    number: int | None
     modal_amplitude: np.ndarray
     amplitude: np.ndarray
     output: str
@@ -134,7 +136,7 @@ def backbone(
     problem = FreeVibration(balance, mode, output)
     a, goal = np.log(np.array([start, stop]) / (1.0 if modal else problem.per_amplitude))
     solved, end = walk(problem, float(a), float(goal), options)
-    return _result(problem, solved, end)
+    return _result(problem, mode, solved, end)
 
 
 def walk(
@@ -207,12 +209,15 @@ def newton_on(problem: FreeVibration, point: Point, normal: np.ndarray, options:
     return point, SolveEnd.STEPS_SPENT.say(f" {options.max_steps} steps: {error:.1e}"), options.max_steps
 
 
-def _result(problem: FreeVibration, solved: list[_Solved], end: Outcome[BranchEnd]) -> Backbone:
+def _result(
+    problem: FreeVibration, number: int | None, solved: list[_Solved], end: Outcome[BranchEnd]
+) -> Backbone:
     points = [p for p, _, _ in solved]
     basis = problem.basis
     t = problem.balance.contact.tangential
     work = [float(basis.work_per_cycle(p.cycle.force[:, t], p.x[:, t]).sum()) for p in points]
     return Backbone(
+        number=number,
         modal_amplitude=np.array([p.a for p in points]),
         amplitude=np.array([p.a for p in points]) * problem.per_amplitude,
         output=problem.output,

@@ -236,7 +236,7 @@ class TimeStepper:
         contact = self.contact._replace(A=self.static)
         closed = np.zeros(self.n_pair, bool)
         _, rounds, _ = time_step.solve_contact(
-            self.law, contact, x_free, x.copy(), closed, s, x, f, float(np.abs(x).max())
+            self.law, contact, x_free, x.copy(), closed, s, x, f, float(np.abs(x).max()), np.zeros_like(self.static)
         )
         if rounds < 0:
             raise IntegrationFailed("the contact has no equilibrium to start from")

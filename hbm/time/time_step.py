@@ -96,9 +96,11 @@ def room(c, n_state):
 
 
 @numba.njit(cache=True)
-def advance(step, x0, was_open, x1, s, p, gap, normal, work):
+def advance(step, x0, was_open, x1, s, p, gap, normal, work, chained):
     """The law of one pair along the straight line from x0 to x1 with memory s before, into `work`.
 
+    chained : whether the slopes of the memory are wanted, too; clearing them is most of the work of laws that have
+        much of it
     Returns the status bits, negative where the pair touches on the way and the law has a memory: `before` in `work`
     then holds the derivative of that at the touch with respect to (x1, s, x0)
     """
@@ -125,7 +127,10 @@ def advance(step, x0, was_open, x1, s, p, gap, normal, work):
                 slide = dsx[r, a] * (x1[a] - x0[a]) / (x1[normal] - x0[normal])  # the instant moves, too
                 before[r, normal] -= share * slide
                 before[r, c + n_state + normal] -= (1.0 - share) * slide
-    clear(J, dfs, dsx, dss)
+    if chained or closes:
+        clear(J, dfs, dsx, dss)
+    else:
+        J[:] = 0.0
     bits = step(x1, memory, p, f, J, dfs, dsx, dss)
     if closes:
         for a in range(c):
@@ -193,7 +198,7 @@ def solve_pair(step, x0, was_open, x, s, p, gap, normal, own, b, near, work, M, 
     """Newton on x + own f(x) = b for one pair from the guess x, which is overwritten; returns bits, 0: failed."""
     f, J = work[0], work[2]
     c = x.size
-    bits = advance(step, x0, was_open, x, s, p, gap, normal, work)
+    bits = advance(step, x0, was_open, x, s, p, gap, normal, work, False)
     for it in range(LOCAL):
         size = 0.0
         for a in range(c):
@@ -211,7 +216,7 @@ def solve_pair(step, x0, was_open, x, s, p, gap, normal, own, b, near, work, M, 
         solve_small(M, r)
         for a in range(c):
             x[a] -= r[a] if it < DAMPED else 0.5 * r[a]
-        bits = advance(step, x0, was_open, x, s, p, gap, normal, work)
+        bits = advance(step, x0, was_open, x, s, p, gap, normal, work, False)
     return 0
 
 
@@ -260,15 +265,22 @@ def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, near, backward,
 
 
 @numba.njit(cache=True)
-def solve_contact(step, contact, x_free, x0, was_open, s, x, f, scale):
+def solve_contact(step, contact, x_free, x0, was_open, s, x, f, scale, inverse):
     """Solve x + A f(x) = x_free for all pairs from the guesses x, f, which are overwritten; s is the memory before.
 
+    inverse : (n_contact, n_contact) of the derivative in the last step that needed Newton's method, zeros before the
+        first; such steps come in a row, and one inverse serves many of them
     Returns status bits (n_pair,), rounds spent (negative: failed) and the scale of x
     """
     n_pair, c = x.shape
     n_state = s.shape[1]
     work, M, r, b = room(c, n_state), np.zeros((c, c)), np.zeros(c), np.zeros(c)
     bits = np.zeros(n_pair, np.int64)
+    if inverse[0, 0] != 0.0:
+        rounds, scale = chord(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inverse)
+        if rounds > 0:
+            return bits, rounds, scale
+        return newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inverse)
     y = times(contact.A, f)
     before = np.inf
     slow = 0
@@ -282,7 +294,7 @@ def solve_contact(step, contact, x_free, x0, was_open, s, x, f, scale):
         if moved < 0.0 or slow > 5:
             break
         before = moved
-    return newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits)
+    return newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inverse)
 
 
 @numba.njit(cache=True)
@@ -300,24 +312,65 @@ def times(A, f):
 
 
 @numba.njit(cache=True)
-def newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits):
+def residual(step, contact, x_free, x0, was_open, s, x, f, work, bits, J):
+    """x + A f(x) - x_free (n_contact,); forces, status and slopes of all pairs into f, bits and J."""
+    for i in range(x.shape[0]):
+        bits[i] = abs(
+            advance(step, x0[i], was_open[i], x[i], s[i], contact.p[i], contact.gap[i], contact.normal, work, False)
+        )
+        f[i] = work[0]
+        J[i] = work[2]
+    return x.ravel() - x_free + times(contact.A, f)
+
+
+@numba.njit(cache=True)
+def chord(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inverse):
+    """As `newton` with the inverse of an earlier step; x stays where it was if that does not get there."""
+    n_pair, c = x.shape
+    J, start = np.empty((n_pair, c, c)), x.copy()
+    before, slow = np.inf, 0
+    move, r_before = np.zeros(x.size), np.zeros(x.size)
+    for it in range(SWEEPS):
+        r = residual(step, contact, x_free, x0, was_open, s, x, f, work, bits, J)
+        scale = max(scale, np.abs(x).max())
+        error = np.abs(r).max()
+        if error <= TOLERANCE * scale:
+            return it + 1, scale
+        slow += error > SLOW * before
+        if slow > 2:
+            break
+        before = error
+        if it > 0:  # Broyden's update: the inverse learns what the last step has shown
+            u = np.dot(inverse, r - r_before)
+            along = move @ u
+            if abs(along) > SHORTEST**2 * (move @ move):
+                row = np.dot(move, inverse)
+                for a in range(move.size):
+                    share = (move[a] - u[a]) / along
+                    for b in range(move.size):
+                        inverse[a, b] += share * row[b]
+        move = -np.dot(inverse, r)
+        r_before = r
+        x += move.reshape(x.shape)
+    x[:] = start
+    return -1, scale
+
+
+@numba.njit(cache=True)
+def newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inverse):
     """As `solve_contact`, all pairs at once, where they are too stiffly coupled to be solved in turn."""
     n_pair, c = x.shape
     A = contact.A
     J = np.empty((n_pair, c, c))
+    full = np.eye(n_pair * c)
     best, length = np.inf, 1.0
     x_best, direction = x.copy(), np.zeros(x.size)
     for it in range(NEWTON):
-        for i in range(n_pair):
-            bits[i] = abs(
-                advance(step, x0[i], was_open[i], x[i], s[i], contact.p[i], contact.gap[i], contact.normal, work)
-            )
-            f[i] = work[0]
-            J[i] = work[2]
-        r = x.ravel() - x_free + times(A, f)
+        r = residual(step, contact, x_free, x0, was_open, s, x, f, work, bits, J)
         scale = max(scale, np.abs(x).max())
         error = np.abs(r).max()
         if error <= TOLERANCE * scale:
+            inverse[:] = np.linalg.inv(full)
             return bits, SWEEPS + it + 1, scale
         if error >= best and length > SHORTEST:  # a kink lies on the way: go less far
             length *= 0.5
@@ -344,6 +397,8 @@ def march(step, contact, linear, moving, record):
     m, n_state = linear.Q.shape[1], memory.shape[1]
     work = room(c, n_state)
     spent, scale = 0, np.abs(x).max()
+    chained = record.slopes.shape[0] > 0
+    inverse = np.zeros((x.size, x.size))
     record.bits[:] = 0
     f_before = f.copy()
     of_z = np.ascontiguousarray(linear.outputs[:, : 2 * m])
@@ -356,16 +411,25 @@ def march(step, contact, linear, moving, record):
         f_new = np.where(f == 0.0, 0.0, 2.0 * f - f_before)
         x_new = (x_free - times(contact.A, f_new)).reshape(n_pair, c)
         was_open = bits == SEPARATES
-        _, rounds, scale = solve_contact(step, contact, x_free, x, was_open, memory, x_new, f_new, scale)
+        _, rounds, scale = solve_contact(step, contact, x_free, x, was_open, memory, x_new, f_new, scale, inverse)
         spent += abs(rounds)
         if rounds < 0:
             return j, spent, speed
         for i in range(n_pair):
             now = advance(
-                step, x[i], was_open[i], x_new[i], memory[i], contact.p[i], contact.gap[i], contact.normal, work
+                step,
+                x[i],
+                was_open[i],
+                x_new[i],
+                memory[i],
+                contact.p[i],
+                contact.gap[i],
+                contact.normal,
+                work,
+                chained,
             )
             memory[i] = work[1]
-            if record.slopes.shape[0] > 0:
+            if chained:
                 slopes_of(now < 0, work, record.slopes[j, i])
             bits[i] = abs(now)
             record.bits[i] |= bits[i]
@@ -379,20 +443,31 @@ def march(step, contact, linear, moving, record):
 
 
 @numba.njit(cache=True)
+def along(step, before, xs, contact, memory, bits, forces):
+    """The law of all pairs through displacements xs (n_step, n_pair, c) that follow `before` (n_pair, c).
+
+    memory (n_pair, n_state) and bits (n_pair,) move on in place; forces : (n_step, n_pair, c) to be filled, or empty
+    """
+    n_step, n_pair, c = xs.shape
+    work = room(c, memory.shape[1])
+    for j in range(n_step):
+        for i in range(n_pair):
+            x0 = xs[j - 1, i] if j > 0 else before[i]
+            was_open = bits[i] == SEPARATES
+            bits[i] = abs(
+                advance(
+                    step, x0, was_open, xs[j, i], memory[i], contact.p[i], contact.gap[i], contact.normal, work, False
+                )
+            )
+            memory[i] = work[1]
+            if forces.shape[0] > 0:
+                forces[j, i] = work[0]
+
+
+@numba.njit(cache=True)
 def memory_after(step, xs, contact, memory):
     """Memory (n_pair, n_state) and status after two rounds of a periodic displacement xs (n_step, n_pair, c)."""
-    n_step, n_pair, c = xs.shape
-    s = memory.copy()
-    work = room(c, s.shape[1])
-    bits = np.zeros(n_pair, np.int64)
+    s, bits = memory.copy(), np.zeros(xs.shape[1], np.int64)
     for _ in range(2):
-        for j in range(n_step):
-            for i in range(n_pair):
-                was_open = bits[i] == SEPARATES
-                bits[i] = abs(
-                    advance(
-                        step, xs[j - 1, i], was_open, xs[j, i], s[i], contact.p[i], contact.gap[i], contact.normal, work
-                    )
-                )
-                s[i] = work[1]
+        along(step, xs[-1], xs, contact, s, bits, xs[:0])
     return s, bits

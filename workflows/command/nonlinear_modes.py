@@ -90,7 +90,7 @@ def ring_down(
     out: Path | None = None,
     as_json: Json = False,
 ) -> None:
-    """Let a nonlinear mode decay freely in time: frequency and damping from its peaks, beside the backbone.
+    """Let a nonlinear mode decay freely in time: frequency and damping from its output, beside the backbone.
 
     Parameters
     ----------
@@ -131,7 +131,9 @@ def ring_down(
             ("frequency", f"{first['frequency_hz']:.6g} -> {last['frequency_hz']:.6g} Hz"),
             ("damping", f"{100 * first['damping']:.4g} -> {100 * last['damping']:.4g} %"),
             ("from the backbone", f"frequency at most {_percent(said['largest_frequency_difference'])} off"),
-            ("", f"damping at most {_percent(said['largest_damping_difference'])} off"),
+            ("", f"damping at most {_percent(said['largest_decrement_difference'])} off its decrement"),
+            ("", f"and {_percent(said['largest_damping_difference'])} off its damping ratio, which counts otherwise"),
+            ("end", said["end"]),
         ]
     )
     print(folder / "ring_down.csv", folder / "ring_down.png", sep="\n")

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
-from tribodyn.geometry import surface_io
 from tribodyn.geometry.surface import HeightMap, prepare
-from tribodyn.geometry.surface_pair import centred, facing_gap, mirrored, onto_nodes, synthetic_pair
+from tribodyn.geometry.surface_pair import centred, facing_gap, onto_nodes
 from tribodyn.workflows.scene.contact import Surfaces
+from tribodyn.workflows.scene.measured import faces
 
 FLAT = 1e-6  # part of its size by which a flat patch may bulge
 
@@ -65,25 +65,6 @@ def mapped_gap(rows: np.ndarray, interface: ContactInterface, pairs: slice) -> n
     outside = ~np.isfinite(found)
     found[outside] = NearestNDInterpolator(at, rows[:, 3])(wanted[outside])
     return np.asarray(found - found.min())
-
-
-def faces(surfaces: Surfaces, folder: Path) -> list[HeightMap]:
-    """The face of body 1, and that of body 2 unless it is flat, in the same coordinates."""
-    if surfaces.synthetic is not None:
-        made = surfaces.synthetic
-        pair = synthetic_pair(made.seed, made.size, ridge=made.ridge, waviness=made.waviness, roughness=made.roughness)
-        return list(pair)
-    read = [
-        surface_io.read(
-            folder / name,
-            spacing=surfaces.spacing,
-            lateral_unit=surfaces.lateral_unit,
-            height_unit=surfaces.height_unit,
-        )
-        for name in (surfaces.first, surfaces.second)
-        if name is not None
-    ]
-    return [*read[:1], *(mirrored(face, surfaces.mirror) if surfaces.mirror else face for face in read[1:])]
 
 
 def patch_coordinates(interface: ContactInterface, axes: tuple[str, str]) -> np.ndarray:

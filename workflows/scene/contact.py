@@ -40,7 +40,8 @@ class Contact(LawTable):
     normal_stiffness: Annotated[Stiffness, Field(gt=0, le=1e16)] | None = None
     """Normal stiffness of all pairs together."""
     table: tuple[tuple[float, ...], ...] | None = None
-    """File of the law's own table beside the scene, comma-separated numbers, or its rows; where the law takes one."""
+    """File of the law's own table beside the scene, comma-separated numbers, or its rows; where the law takes one. Left
+    out, it is that of the measured faces in [surfaces], and so is the law's radius."""
 
     @field_validator("table", mode="before")
     @classmethod
@@ -185,6 +186,8 @@ class Surfaces(Table):
     """Axis of the second map that is reversed before it faces the first."""
     cutoff: Annotated[Length, Field(gt=0)]
     """Wavelength that separates waviness from roughness."""
+    shortest: Annotated[Length, Field(gt=0)] | None = None
+    """Wavelength below which waves are noise of the instrument, where a law takes its asperities from the faces."""
     mating_height: Length = 0.0
     """How far the faces are pushed on from their first touch."""
     lateral_unit: Annotated[Length, Field(gt=0)] = 1.0

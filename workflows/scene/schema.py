@@ -12,6 +12,8 @@ from typing import Any, ClassVar
 
 from pydantic import (
     Field,
+    ValidationError,
+    ValidationInfo,
     model_validator,
 )
 
@@ -22,6 +24,8 @@ from tribodyn.workflows.scene.fields import (
     Table,
 )
 from tribodyn.workflows.scene.loads import HarmonicLoad, Loads, Motion, Prescribed, Spring, StaticLoad
+from tribodyn.workflows.scene.measured import takes_asperities, with_asperities
+from tribodyn.workflows.scene.own import folder_of
 from tribodyn.workflows.scene.solution import (
     Damping,
     Harmonics,
@@ -114,6 +118,25 @@ class MeshScene(Scene):
     @abstractmethod
     def joints(self) -> Mapping[str, FaceContact]:
         """The contacts by name."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _asperities_of_its_faces(cls, data: Any, info: ValidationInfo) -> Any:
+        """A law that takes a table of asperities and is given none has that of the measured faces."""
+        folder = folder_of(info)
+        if folder is None or not isinstance(data, dict) or not isinstance(data.get("surfaces"), dict):
+            return data
+        several = data.get("contacts")
+        contacts: dict[str, Any] = several if isinstance(several, dict) else {"contact": data.get("contact")}
+        lacking = [name for name, contact in contacts.items() if takes_asperities(contact)]
+        try:
+            surfaces = Surfaces.model_validate(data["surfaces"]) if lacking else None
+        except ValidationError:  # it is told where the table itself is read
+            return data
+        if surfaces is None:
+            return data
+        found = {name: with_asperities(dict(contacts[name]), surfaces, folder) for name in lacking}
+        return {**data, **({"contacts": {**contacts, **found}} if several is contacts else found)}
 
     @model_validator(mode="after")
     def _what_a_sector_is(self) -> MeshScene:

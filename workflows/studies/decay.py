@@ -1,4 +1,4 @@
-"""A free decay of a scene in time from its nonlinear mode, and what its peaks say beside the backbone."""
+"""A free decay of a scene in time from its nonlinear mode, and what its output says beside the backbone."""
 
 from __future__ import annotations
 
@@ -8,9 +8,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.interpolate import PchipInterpolator
 
+from tribodyn.hbm import rest
+from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone
 from tribodyn.hbm.threads import limited
+from tribodyn.hbm.time.decrement import decrement
 from tribodyn.hbm.time.ring_down import RingDown, ring_down
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
@@ -21,32 +25,73 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.studies import modes
 
+TOLD = 4  # digits of amplitudes in sentences
+
 
 @dataclass(frozen=True)
 class Decay:
-    """mode : the backbone, converged to its last point; decay : from there."""
+    """A free decay and the backbone along which it goes.
+
+    mode : the backbone, converged to its last point; decay : from there
+    expected : (n_point,) logarithmic decrement over 2 pi that the backbone says, see `hbm.time.decrement`
+    asked : amplitude at which the decay was to end [m]
+    """
 
     mode: Backbone
     decay: RingDown
+    expected: np.ndarray
+    asked: float
 
     def at(self, values: np.ndarray) -> np.ndarray:
         """Values (n_point,) along the backbone at the amplitudes of the decay, nan beyond its ends."""
-        inside = np.interp(np.log(self.decay.amplitude), np.log(self.mode.first_harmonic), values, np.nan, np.nan)
-        return np.asarray(inside)
+        along = PchipInterpolator(np.log(self.mode.first_harmonic), values, extrapolate=False)
+        return np.asarray(along(np.log(self.decay.amplitude)))
+
+    @property
+    def end(self) -> str:
+        """Why the decay ends, as a sentence."""
+        last, asked = (f"{x:.{TOLD}g} m" for x in (self.decay.last, self.asked))
+        if self.decay.last <= self.asked:
+            return f"fell to the {asked} asked for"
+        return f"ended at {last} after all its periods, above the {asked} asked for: give more with --periods"
 
 
 def follow(file: SceneFile, asked: modes.Way, periods: int, steps: int, progress: Progress) -> Decay:
-    """Follow the backbone, then let the structure swing freely from its last point down to the first amplitude.
+    """Follow the backbone up, then let the structure swing freely from its last point down to the first amplitude.
 
+    Where the largest swing leaves a mark on the faces, as asperities that yield do, the backbone beside the decay is
+    that of the faces as they are after it.
     Raises  ValueError for what cannot be; SolveFailed where the backbone ends before the amplitude asked for
     """
+    if not asked.stop > asked.start:
+        raise ValueError("a free decay ends at a smaller amplitude than it begins at: give --from below --to")
     with limited(file.scene.solver.threads):
         balance = modelling.build(file, None, progress).balance
-        mode = modes.along(file, balance, asked, progress)
-        if not mode.converged.all():
-            raise SolveFailed(f"the backbone {mode.end}")
+        mode = _reached(modes.along(file, balance, asked, progress))
+        marked = _marked(balance, mode)
+        if marked is not None:
+            balance = marked
+            mode = _reached(modes.along(file, balance, asked, progress))
         with progress.stage("free decay"):
-            return Decay(mode, ring_down(balance, mode, periods, steps, least=float(mode.first_harmonic[0])))
+            least = float(mode.first_harmonic[0])
+            return Decay(mode, ring_down(balance, mode, periods, steps, least), decrement(balance, mode), least)
+
+
+def _reached(mode: Backbone) -> Backbone:
+    if not mode.converged.all():
+        raise SolveFailed(f"the backbone {mode.end}")
+    return mode
+
+
+def _marked(balance: HarmonicBalance, mode: Backbone) -> HarmonicBalance | None:
+    """The balance of faces that have swung as in the last point of a mode, None where that leaves no mark."""
+    if balance.at_rest is None or not all(hasattr(joint.module, "rested") for joint in balance.contact.joints):
+        return None
+    x = mode.contact[-1].reshape(*balance.at_rest.shape, -1)
+    deepest = balance.at_rest.copy()
+    normal = balance.contact.components.index("n")
+    deepest[:, normal] = np.maximum(deepest[:, normal], balance.basis.to_time(x[:, normal]).max(axis=1))
+    return balance.with_memory(rest.memory(balance, deepest))
 
 
 def record(found: Decay) -> dict[str, Any]:
@@ -57,13 +102,16 @@ def record(found: Decay) -> dict[str, Any]:
         "frequency_hz": d.omega / (2 * np.pi),
         "damping": d.damping,
         "backbone_frequency_hz": found.at(found.mode.omega) / (2 * np.pi),
+        "backbone_decrement": found.at(found.expected),
         "backbone_damping": found.at(found.mode.damping),
     }
     rows = np.array([*columns.values()]).T
     return {
         "rows": [{n: float(v) if np.isfinite(v) else None for n, v in zip(columns, row, strict=True)} for row in rows],
         "largest_frequency_difference": _largest(d.omega, found.at(found.mode.omega)),
+        "largest_decrement_difference": _largest(d.damping, found.at(found.expected)),
         "largest_damping_difference": _largest(d.damping, found.at(found.mode.damping)),
+        "end": found.end,
     }
 
 
@@ -80,18 +128,21 @@ def write(found: Decay, path: Path) -> None:
 
 
 def picture(found: Decay) -> Figure:
-    """The decay, and frequency and damping from its peaks beside the backbone."""
+    """The decay, and frequency and damping from it beside the backbone."""
     d = found.decay
     unit, scale = length_unit(d.amplitude.max())
     with axes_of(7.2, 7.6, rows=3, share=False) as (figure, (top, upper, lower)):
         top.plot(1e3 * d.time, scale * d.displacement, color=BLUE, lw=0.7)
         top.set(xlabel="time / ms", ylabel=f"displacement / {unit}", title="Free decay")
         upper.semilogx(scale * found.mode.first_harmonic, found.mode.frequency, color=BLUE, label="backbone")
-        upper.semilogx(scale * d.amplitude, d.omega / (2 * np.pi), ".", color=ORANGE, ms=4, label="peaks of the decay")
+        upper.semilogx(scale * d.amplitude, d.omega / (2 * np.pi), ".", color=ORANGE, ms=4, label="free decay")
         upper.set(ylabel="frequency / Hz")
         upper.legend(fontsize=9)
-        lower.semilogx(scale * found.mode.first_harmonic, 100 * found.mode.damping, color=BLUE)
+        lower.semilogx(scale * found.mode.first_harmonic, 100 * found.expected, color=BLUE, label="its decrement")
+        given = 100 * found.mode.damping
+        lower.semilogx(scale * found.mode.first_harmonic, given, color=BLUE, ls="--", lw=1, label="its damping ratio")
         lower.semilogx(scale * d.amplitude, 100 * d.damping, ".", color=ORANGE, ms=4)
         lower.set(xlabel=f"amplitude / {unit}", ylabel="damping ratio / %")
         lower.set_ylim(bottom=0)
+        lower.legend(fontsize=9)
     return figure
