@@ -134,6 +134,9 @@ def test_every_scene_reads_and_survives_json(name: str) -> None:
         ("beam", "wear.at={}", "wear.at: expected either frequency or peak"),
         ("blade", "contact.group=[]", "contact.group: expected a longer list"),
         ("beam", "response.points=1000000", "response.points: expected a value at most 20000"),
+        ("beam", "material.young=1e-300", "got 1e-300: give 0, or more than 1e-60"),
+        ("beam", "contact.normal_stiffness=1e-300", "got 1e-300: give 0, or more than 1e-60"),
+        ("beam", 'damping.modal="1e-300 %"', 'got "1e-300 %": give 0, or more than 1e-60'),
     ],
 )
 def test_what_fuzz_has_found_is_refused(scene: str, override: str, sentence: str) -> None:

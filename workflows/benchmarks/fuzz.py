@@ -41,7 +41,19 @@ ENDS = {0: "success", BAD_INPUT: "refused", FAILED_SOLVE: "failed"}
 GOOD = (*ENDS.values(),)
 LATE = 10.0  # times the limit, of the clock, after which a process that sleeps is killed; what compiling may take
 
-Active = dict[BaseProcess, tuple[str, str, str, Path, float]]
+
+@dataclass
+class Running:
+    """What a process tries; place : its folder; worked : its processor seconds so far; since : when it last worked."""
+
+    key: str
+    value: str
+    place: Path
+    worked: float
+    since: float
+
+
+Active = dict[BaseProcess, Running]
 
 
 @dataclass(frozen=True)
@@ -138,15 +150,15 @@ def fuzz(
                 same.append((key, value, first[meant.text]))
                 continue
             while len(active) >= workers:
-                found += _ended(active, seconds)
+                found += _ended(scene, active, seconds)
             place = Path(folder) / str(number)
             place.mkdir()
             changed = (*overrides, f"{key}={value}")
             process: BaseProcess = fork.Process(target=_run, args=(command, scene, changed, place, seconds))
             process.start()
-            active[process] = (scene, key, value, place, time.monotonic())
+            active[process] = Running(key, value, place, 0.0, time.monotonic())
         while active:
-            found += _ended(active, seconds)
+            found += _ended(scene, active, seconds)
     run = {(one.key, one.value): one for one in found}
     found += [replace(run[who], key=key, value=value, like="=".join(who)) for key, value, who in same]
     return sorted(found, key=lambda one: (one.key, NASTY.index(one.value)))
@@ -178,24 +190,39 @@ def _read(scene: str, overrides: tuple[str, ...], seconds: float) -> _Meant:
     return _Meant(text, "" if "\n" in refusal else refusal, time.process_time() - clock)
 
 
-def _ended(active: Active, seconds: float) -> list[Tried]:
-    """Wait for a process to end; those that have are taken from `active`."""
+def _ended(scene: str, active: Active, seconds: float) -> list[Tried]:
+    """Wait for a process to end; those that have are taken from `active`, those that sleep too long are killed.
+
+    A busy machine makes a run late, not wrong: only the clock of a process that does not work runs.
+    """
     connection.wait([process.sentinel for process in active], timeout=1.0)
     found = []
-    for process, (scene, key, value, place, start) in list(active.items()):
-        if process.is_alive() and time.monotonic() - start > LATE * seconds:
+    for process, running in list(active.items()):
+        if (worked := _worked(process.pid)) > running.worked:
+            running.worked, running.since = worked, time.monotonic()
+        if process.is_alive() and time.monotonic() - running.since > LATE * seconds:
             process.kill()
             process.join()
         if process.is_alive():
             continue
         process.join()
         del active[process]
+        place = running.place
         printed = (place / "printed").read_text(errors="replace") if (place / "printed").exists() else ""
         spent = float((place / "spent").read_text()) if (place / "spent").exists() else seconds
         end = _end(process.exitcode, printed, place / "out" / "result.h5")
         lines = [line for line in printed.splitlines() if line.startswith("tribodyn:")] if end in GOOD else [printed]
-        found.append(Tried(scene, key, value, end, "\n".join(lines)[-2000:], spent))
+        found.append(Tried(scene, running.key, running.value, end, "\n".join(lines)[-2000:], spent))
     return found
+
+
+def _worked(pid: int | None) -> float:
+    """Processor seconds of a process, 0 where the system does not tell (Linux does, in /proc)."""
+    try:
+        told = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(told[11]) + int(told[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _end(code: int | None, printed: str, file: Path) -> str:

@@ -37,6 +37,7 @@ UNITS: dict[str, tuple[Fraction, Dimension, str]] = {
 
 NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*$")
 BEYOND = 1e25  # in SI units: above it products of quantities overflow, and no structure has it
+BELOW = 1e-60  # and what is meant to be zero: its square, or another number over it, leaves the range of numbers
 FACTOR = re.compile(r"(%|[A-Za-z]+)(?:\^?(-?\d))?$")
 
 
@@ -95,6 +96,8 @@ def to_si(value: object, unit: str) -> float:
     if not isinstance(value, str):
         if not abs(value) < BEYOND:
             raise ValueError(f"{expected}, got {value}, beyond what a structure has")
+        if 0 < abs(value) < BELOW:
+            raise ValueError(f"{expected}, got {value}: give 0, or more than {BELOW:g}")
         return float(value)
     match = NUMBER.match(value)
     if match is None:
@@ -110,6 +113,8 @@ def to_si(value: object, unit: str) -> float:
     exact = Fraction(match[1]) * given.factor / wanted.factor
     if not abs(exact) < BEYOND:
         raise ValueError(f'{expected}, got "{value}", beyond what a structure has')
+    if 0 < abs(exact) < BELOW:
+        raise ValueError(f'{expected}, got "{value}": give 0, or more than {BELOW:g}')
     return float(exact)
 
 
