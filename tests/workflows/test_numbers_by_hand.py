@@ -17,9 +17,10 @@ from tribodyn.hbm.linear import recovery
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.wear.history import cycles_to_share
 from tribodyn.reduction.damping import rayleigh, rayleigh_of_ratios
-from tribodyn.workflows.accuracy import probes, verdict
+from tribodyn.workflows.accuracy import mesh_probe, probes, verdict
 from tribodyn.workflows.accuracy.limit import limit_of
 from tribodyn.workflows.accuracy.statement import Contribution
+from tribodyn.workflows.accuracy.time_probe import Checked
 from tribodyn.workflows.benchmarks.extremes_march import held
 from tribodyn.workflows.benchmarks.extremes_models import lattice
 from tribodyn.workflows.run import modelling
@@ -151,18 +152,18 @@ def test_the_ground_moves_ahead_by_its_phase() -> None:
 
 def test_the_total_error_is_the_sum_of_its_parts() -> None:
     parts = [Contribution("mesh", "preload", 0.1, ""), Contribution("modes", "preload", 0.02, "")]
-    result = SimpleNamespace(wear_steps=0, facts=SimpleNamespace())
-    said = verdict._statement("preload", 100.0, parts, [], "", result)
+    said = verdict._statement("preload", 100.0, parts, Checked((), 0, ""), SimpleNamespace(wear_steps=0))
     assert said.error == pytest.approx(0.12)
     assert said.dominated_by == "mesh"
 
 
-def test_life_is_off_by_depth_and_energy_together() -> None:
-    ours, there = probes.Answers(100.0, 1.0, 2.0, 5.0), probes.Answers(100.0, 1.0, 2.2, 5.0)
-    result = SimpleNamespace(wear_steps=3, facts=SimpleNamespace(delta_max_m=1.0))
-    found = dict(verdict._differences(there, 1.05, ours, result))
-    assert found["depth"] == pytest.approx(0.05)
-    assert found["life"] == pytest.approx(0.05 + 0.2 / 2)
+def test_life_is_off_by_depth_and_energy_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mesh_probe.convergence, "has_settled", lambda differences: True)
+    monkeypatch.setattr(mesh_probe.convergence, "bound", lambda differences, settled: differences[0])
+    found = {name: [0.0] for name in ("peak_frequency", "amplitude", "preload")} | {"energy": [0.2], "depth": [0.05]}
+    probe = mesh_probe.Probe(None, None, 1.0, "")
+    said = probe._contributions("mesh", mesh_probe.Seen({"elements": found}))
+    assert {one.quantity: one.error for one in said}["life"] == pytest.approx(0.25)
 
 
 def test_twice_the_energy_is_half_the_life() -> None:
