@@ -16,13 +16,15 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import recovery
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.wear.history import cycles_to_share
+from tribodyn.hbm.wear.law import Exposure
+from tribodyn.hbm.wear.laws import energy
 from tribodyn.reduction.damping import rayleigh, rayleigh_of_ratios
 from tribodyn.workflows.accuracy import mesh_probe, probes, verdict
 from tribodyn.workflows.accuracy.limit import limit_of
 from tribodyn.workflows.accuracy.statement import Contribution
 from tribodyn.workflows.accuracy.time_probe import Checked
 from tribodyn.workflows.benchmarks.extremes_march import held
-from tribodyn.workflows.benchmarks.extremes_models import lattice
+from tribodyn.workflows.benchmarks.extremes_models import lattice, rigid
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.references import delta_max
 from tribodyn.workflows.scene import scene_file
@@ -177,3 +179,21 @@ def test_twice_the_energy_is_half_the_life() -> None:
 def test_a_sequence_of_known_order_is_extrapolated_to_its_limit() -> None:
     found = limit_of([1, 2, 4], [1 + 1.0, 1 + 0.25, 1 + 0.0625])
     assert (found.value, found.order) == (pytest.approx(1.0), pytest.approx(2.0))
+
+
+def test_the_energy_law_takes_off_its_coefficient_times_the_work(solved: tuple[HarmonicBalance, State]) -> None:
+    balance, state = solved
+    area, none = np.linspace(1e-6, 2e-6, len(state.x)), np.zeros(len(state.x))
+    exposure = Exposure(balance, state, area, {"coefficient": np.full(len(area), 3e-15)}, none, 0.0)
+    np.testing.assert_allclose(energy.depth_rate(exposure), 3e-15 * balance.energy(state) / area, rtol=1e-12)
+
+
+def test_force_times_slip_is_the_friction_work_over_the_coefficient_of_friction() -> None:
+    """One direction, constant pressure: N |ds| = 4 N (u - mu N / k) in a cycle."""
+    body = rigid(1)
+    balance = body.balance(replace(body.ordinary, samples=4096, transitions="sampled"))
+    k, k_n = balance.contact.stiffness[0]
+    x = np.zeros((1, 2, 3))
+    x[0, 0, 1], x[0, 1, 0] = 3e-4, 100.0 / k_n
+    exposure = Exposure(balance, balance.evaluate(1100.0, x), np.ones(1), {}, np.zeros(1), 0.0)
+    assert exposure.normal_force_times_slip[0] == pytest.approx(4 * 100.0 * (3e-4 - 0.4 * 100.0 / k), rel=1e-4)
