@@ -62,6 +62,16 @@ def test_frequencies_converge_from_above(full: ReducedModel) -> None:
     assert omitted[-1] == np.inf
 
 
+def test_a_force_on_kept_dofs_moves_them_as_before(full: ReducedModel) -> None:
+    """Static shapes are kept whole, however few the interface modes are."""
+    places = [1, 5]
+    reduced = interface_modes(full, 4, full.info.master_dofs[places])
+    for mine, theirs in enumerate(places):
+        exact = np.linalg.solve(full.system.stiffness, np.eye(full.system.n_dof)[theirs])[places]
+        found = np.linalg.solve(reduced.system.stiffness, np.eye(reduced.system.n_dof)[mine])[:2]
+        assert found == pytest.approx(exact, rel=1e-7)
+
+
 def test_kept_dofs_are_displacements(full: ReducedModel) -> None:
     keep = full.info.master_dofs[[1, 5]]
     reduced = interface_modes(full, 10, keep)

@@ -163,7 +163,7 @@ def test_life_is_off_by_depth_and_energy_together(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(mesh_probe.convergence, "has_settled", lambda differences: True)
     monkeypatch.setattr(mesh_probe.convergence, "bound", lambda differences, settled: differences[0])
     found = {name: [0.0] for name in ("peak_frequency", "amplitude", "preload")} | {"energy": [0.2], "depth": [0.05]}
-    probe = mesh_probe.Probe(None, None, 1.0, "")
+    probe = mesh_probe.Probe(SimpleNamespace(wear=None), None, 1.0, "")
     said = probe._contributions("mesh", mesh_probe.Seen({"elements": found}))
     assert {one.quantity: one.error for one in said}["life"] == pytest.approx(0.25)
 
