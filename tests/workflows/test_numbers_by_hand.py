@@ -10,6 +10,7 @@ import pytest
 
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.continuation import operating_point
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -197,3 +198,8 @@ def test_force_times_slip_is_the_friction_work_over_the_coefficient_of_friction(
     x[0, 0, 1], x[0, 1, 0] = 3e-4, 100.0 / k_n
     exposure = Exposure(balance, balance.evaluate(1100.0, x), np.ones(1), {}, np.zeros(1), 0.0)
     assert exposure.normal_force_times_slip[0] == pytest.approx(4 * 100.0 * (3e-4 - 0.4 * 100.0 / k), rel=1e-4)
+
+
+def test_a_peak_is_looked_for_where_the_line_through_two_slopes_vanishes() -> None:
+    rises, falls = (SimpleNamespace(omega=w, weight=0.5, slope=s) for w, s in ((1.0, 2.0), (5.0, -6.0)))
+    assert operating_point._zero(rises, falls) == pytest.approx(2.0)
