@@ -203,3 +203,23 @@ def test_force_times_slip_is_the_friction_work_over_the_coefficient_of_friction(
 def test_a_peak_is_looked_for_where_the_line_through_two_slopes_vanishes() -> None:
     rises, falls = (SimpleNamespace(omega=w, weight=0.5, slope=s) for w, s in ((1.0, 2.0), (5.0, -6.0)))
     assert operating_point._zero(rises, falls) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("transitions", ["located", "sampled"])
+def test_forces_over_gaps_are_those_of_a_plain_march(transitions: str) -> None:
+    body = lattice(2, 2)
+    balance = body.balance(replace(body.ordinary, gap=-2e-6, transitions=transitions))
+    solution = arc_length.solve_along_load(balance, body.ordinary.omega)
+    assert solution.converged
+    assert [one.name for one in held(balance, solution.state) if one.off > one.allowed] == []
+
+
+def test_the_derivative_of_the_contact_forces_is_the_difference(solved: tuple[HarmonicBalance, State]) -> None:
+    balance, state = solved
+    jacobian, shape = balance.evaluate(state.omega, state.x).cycle.jacobian, state.x.shape
+    step = 1e-7 * np.abs(state.x).max()
+    for way in np.random.default_rng(0).normal(size=(3, *shape)):
+        ends = [balance.evaluate(state.omega, state.x + side * step * way, False).cycle.force for side in (1, -1)]
+        found = np.einsum("pij,pj->pi", jacobian, way.reshape(shape[0], -1)).reshape(shape)
+        difference = (ends[0] - ends[1]) / (2 * step)
+        assert np.abs(found - difference).max() < 1e-4 * np.abs(difference).max()
