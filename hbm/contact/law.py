@@ -8,6 +8,8 @@ A law is a module `hbm/contact/laws/<name>.py`, or a file of one's own, with
 - optionally `TABLE` : meaning of the columns of a table that it needs, and `tabulated(parameters)` : (n_pair, m) what
   it makes of it, with which every packed row ends
 - optionally `OWN_STIFFNESS` and `springs(parameters)` : its springs follow from its own numbers
+- optionally `LINEAR_WHERE_STUCK = True` : a pair that sticks all through a cycle is its springs and a slider that
+  stands still, so that a small perturbation of the cycle sees the springs alone
 - optionally `rested(x, parameters)` : memory of a contact without shear at x; positions of sliders without it
 - `step` : numba function that advances one pair by one time sample (see `hbm.contact.aft.march`); its p is a packed row
 - optionally `cycle(x, parameters, memory, basis, jacobian)` : the same periodic cycle at the samples, faster

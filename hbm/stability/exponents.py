@@ -270,7 +270,9 @@ def _departure_slope(balance: HarmonicBalance, state: State, basis: HarmonicBasi
     for j in range(c):
         for a in range(basis.n_coeff):
             slope[:, j, a, j, a] += k[:, j]
-    slope[cycle.status == STICKS] = 0.0  # where the slider stood still it does so in a small perturbation, too
+    for joint in balance.contact.joints:  # where a slider stood still it does so in a small perturbation, too
+        if getattr(joint.module, "LINEAR_WHERE_STUCK", False):
+            slope[joint.rows[cycle.status[joint.rows] == STICKS]] = 0.0
     return slope
 
 

@@ -235,7 +235,8 @@ def test_a_failed_solve_says_where_and_leaves_with_3(tmp_path: Path) -> None:
 
 def test_resuming_another_scene_is_refused(finished: Result, tmp_path: Path) -> None:
     store.save(tmp_path / "result.h5", finished)
-    process = start(tmp_path, "--resume", "--set", "contact.friction=0.4")
+    sizes = ("--set", "geometry.n_patch=5", "--set", "response.points=25")
+    process = start(tmp_path, "--resume", *sizes, "--set", "contact.friction=0.4")
     _, err = process.communicate()
     assert process.returncode == 2
     assert "contact.friction differs" in err

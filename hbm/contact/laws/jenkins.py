@@ -18,6 +18,7 @@ from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactCycle, Con
 from tribodyn.hbm.harmonics import HarmonicBasis
 
 COMPONENTS = (("t1", "t2", "n"), ("t1", "n"), ("t2", "n"))
+LINEAR_WHERE_STUCK = True
 
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3  # kinds of samples; slip by its sense
 SIDE = np.array([0.0, 0.0, 1.0, -1.0])  # sign of T in slip

@@ -18,6 +18,7 @@ from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactCycle, Con
 from tribodyn.hbm.harmonics import HarmonicBasis
 
 COMPONENTS = (("t1", "t2"), ("t1",), ("t2",))
+LINEAR_WHERE_STUCK = True
 
 located = transitions.cycle
 

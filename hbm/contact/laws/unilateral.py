@@ -14,6 +14,7 @@ from tribodyn.hbm.contact.law import SEPARATES, STICKS, ContactCycle, ContactPar
 from tribodyn.hbm.harmonics import HarmonicBasis
 
 COMPONENTS = (("n",),)
+LINEAR_WHERE_STUCK = True
 
 located = transitions.cycle
 
