@@ -15,8 +15,8 @@ from tribodyn.hbm.threads import single
 ZERO_SIZE = 1e-6  # size of x, relative to the start, below which a solution counts as zero
 UNRESISTED = 1e-9  # singular value over the largest of a Jacobian whose motion counts as not resisted
 MOST_DENSE = 3000  # unknowns up to which the dense Jacobian serves where Krylov steps fail at rest
-RAMP_SLOWEST = 0.9  # residual over that of two steps before, likewise: most steps that fail stand still
 RAMP_STEPS = 12  # Newton steps in one step of the load ramp; beyond it a shorter step costs less
+RAMP_SLOWEST = 0.9  # residual over that of two Newton steps before, likewise: those that fail mostly stand still
 FORCE_ACCURACY = 1e-4  # of the contact forces, wanted where these stretch their springs far less than x is large
 CURES = "more damping, a softer contact, fewer harmonics or a larger static load make it easier"
 LEAST_TOLERANCE = 1e-12  # residual over displacement that rounding still lets through
