@@ -209,9 +209,7 @@ def newton_on(problem: FreeVibration, point: Point, normal: np.ndarray, options:
     return point, SolveEnd.STEPS_SPENT.say(f" {options.max_steps} steps: {error:.1e}"), options.max_steps
 
 
-def _result(
-    problem: FreeVibration, number: int | None, solved: list[_Solved], end: Outcome[BranchEnd]
-) -> Backbone:
+def _result(problem: FreeVibration, number: int | None, solved: list[_Solved], end: Outcome[BranchEnd]) -> Backbone:
     points = [p for p, _, _ in solved]
     basis = problem.basis
     t = problem.balance.contact.tangential
