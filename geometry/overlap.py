@@ -30,17 +30,19 @@ def overlap(one: Any, other: Any) -> tuple[float, np.ndarray] | None:
 
 
 def _middles(mesh: Any) -> np.ndarray:
-    return np.asarray(mesh.doflocs[:, mesh.t].mean(axis=1).T)
+    """(n, 3) middles of elements: those of their corners lie elsewhere where few elements go around a ring."""
+    middle = mesh.refdom.p.mean(axis=1, keepdims=True)
+    return np.asarray(mesh.mapping().F(middle)[:, :, 0].T)
 
 
 def _triangles(mesh: Any) -> np.ndarray:
-    """(n, 3, 3) corners of the triangles of the surface, numbered outward."""
+    """(n, 3, 3) corners of the triangles of the surface, its edges taken as straight, numbered outward."""
     facets = np.flatnonzero(mesh.f2t[1] < 0)
     points = mesh.doflocs.T[mesh.facets[:, facets].T]
     n = points.shape[1]
     thirds = [(0, i, i + 1) for i in range(1, n - 1)]
     found = np.concatenate([points[:, list(third)] for third in thirds])
-    behind = np.tile(_middles(mesh)[mesh.f2t[0, facets]], (len(thirds), 1))
+    behind = np.tile(mesh.doflocs[:, mesh.t].mean(axis=1).T[mesh.f2t[0, facets]], (len(thirds), 1))
     normal = np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0])
     inward = np.einsum("nx,nx->n", normal, found.mean(axis=1) - behind) < 0
     found[inward] = found[inward, ::-1]

@@ -11,6 +11,8 @@ A law is a module `hbm/contact/laws/<name>.py`, or a file of one's own, with
 - optionally `LINEAR_WHERE_STUCK = True` : a pair that sticks all through a cycle is its springs and a slider that
   stands still, so that a small perturbation of the cycle sees the springs alone
 - optionally `rested(x, parameters)` : memory of a contact without shear at x; positions of sliders without it
+- optionally `sliders(x, parameters, memory, basis)` : where its sliders are over the cycle and what loads them, for
+  wear by slip path; without it a pair has one slider, at x less the force over the stiffness
 - `step` : numba function that advances one pair by one time sample (see `hbm.contact.aft.march`); its p is a packed row
 - optionally `cycle(x, parameters, memory, basis, jacobian)` : the same periodic cycle at the samples, faster
 - optionally `located(x, parameters, memory, basis, jacobian)` : the cycle with its transitions located between samples

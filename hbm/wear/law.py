@@ -94,14 +94,24 @@ class Exposure:
         """(n_pair,) integral of N |ds| over the cycle, s the slip path in the contact plane [J]."""
         if "n" not in self.components:
             raise ValueError("a wear law that needs the normal force cannot serve a contact without a normal component")
+        slider, normal = self._sliders()
+        step = np.linalg.norm(np.roll(slider, -1, axis=3) - slider, axis=2)
+        # geometric mean: a slider that moved while the pair was apart carried no load on the way
+        return np.sum(np.sqrt(normal * np.roll(normal, -1, axis=2)) * step, axis=(1, 2))
+
+    def _sliders(self) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (n_pair, n_slider, n_tangential, n_samples) [m], loads (n_pair, n_slider, n_samples) [N]."""
+        joint, balance = self.joint, self.balance
+        if hasattr(joint.module, "sliders"):
+            own = self.state.x[np.ix_(joint.rows, balance.contact.columns(joint))]
+            memory = balance.memory[joint.rows, : joint.n_state]
+            slider, normal = joint.module.sliders(own, joint.parameters, memory, balance.basis)
+            return slider, normal
         x, f = self.history
         t = self.components.index("n")
-        k = self.joint.parameters.stiffness[:, :t, None]
+        k = joint.parameters.stiffness[:, :t, None]
         slider = x[:, :t] - np.divide(f[:, :t], k, out=np.zeros_like(f[:, :t]), where=k > 0)
-        step = np.linalg.norm(np.roll(slider, -1, axis=2) - slider, axis=1)
-        # geometric mean: a slider that moved while the pair was apart carried no load on the way
-        normal = np.sqrt(np.maximum(f[:, t] * np.roll(f[:, t], -1, axis=1), 0.0))
-        return np.sum(normal * step, axis=1)
+        return slider[:, None], np.maximum(f[:, None, t], 0.0)
 
 
 KIND = Kind("wear law", "tribodyn.hbm.wear.laws", ("depth_rate",))

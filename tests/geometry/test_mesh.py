@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import skfem
 
+from tribodyn.geometry import bolt, nut
 from tribodyn.geometry import mesh as mesh_file
 from tribodyn.geometry.gmsh_session import save, session
 from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation
@@ -201,3 +202,17 @@ def test_a_body_that_reaches_into_another_is_found_and_one_that_touches_or_is_pr
     )
     assert overlap(ring, shaft) is None
     assert overlap(shaft, ring) is None
+
+
+def test_bolt_and_nut_of_few_elements_do_not_overlap(tmp_path: Path):
+    """Six elements around a bore: the middles of their corners lie inside the shank, those of the elements do not."""
+    paths = [tmp_path / f"{name}.msh" for name in ("bolt", "nut")]
+    bolt.build(bolt.Parameters(), paths[0])
+    nut.build(nut.Parameters(n_around=6), paths[1])
+    shank, ring = (mesh_file.read(path)[0] for path in paths)
+    below = bolt.Parameters().grip + bolt.Parameters().nut_height
+    held = replace(ring, doflocs=ring.doflocs - np.array([[0.0], [0.0], [below]]))
+    assert overlap(shank, held) is None
+    assert overlap(held, shank) is None
+    aside = replace(held, doflocs=held.doflocs + np.array([[2e-3], [0.0], [0.0]]))
+    assert overlap(aside, shank) is not None

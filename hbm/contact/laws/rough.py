@@ -141,7 +141,7 @@ class Asperity:
 
     def flattened(self, d_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Plastic depth [m] and root of the radius [m^0.5] of the Hertzian contact below the deepest approach d_m."""
-        d_m = np.maximum(d_m, np.finfo(float).tiny)
+        d_m = np.maximum(d_m, 1e-100)  # whose force is still above zero
         share = self.loading(d_m) / self.hertz(d_m)
         share = np.where(d_m > self.onset, share, 1.0)
         root = np.sqrt(self.R) / np.sqrt(share)  # F_m / (4/3 E* (share d_m)^3/2)
@@ -377,27 +377,75 @@ def located(
     return _cycle(transitions.cycle, x, parameters, memory, basis, jacobian)
 
 
-def _cycle(elements, x, parameters, memory, basis, jacobian) -> ContactCycle:
+@dataclass(frozen=True)
+class _Bed:
+    """The springs of all pairs in a cycle.
+
+    k, g, dk, dg : (n_pair, SPRINGS) as of `bed`; peak, angle : (n_pair,) deepest approach of the cycle [m] and where
+    grows : (n_pair,) whether that is deeper than all before
+    elements : the springs as Jenkins elements, pair by pair; sliders : (n_pair * SPRINGS, n_component - 1) their memory
+    """
+
+    k: np.ndarray
+    g: np.ndarray
+    dk: np.ndarray
+    dg: np.ndarray
+    peak: np.ndarray
+    angle: np.ndarray
+    grows: np.ndarray
+    elements: ContactParameters
+    sliders: np.ndarray
+
+    @classmethod
+    def of(cls, x, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, located: bool) -> _Bed:
+        """The bed at the deepest approach of the cycle x (n_pair, n_component, n_coeff) [m] and its past."""
+        n_pair, n_comp, _ = x.shape
+        peak, angle = _deepest(x[:, -1], basis, located)
+        peak = peak - parameters.gap
+        grows = peak > memory[:, 0]
+        k, g, dk, dg = bed(parameters.packed(), np.where(grows, peak, memory[:, 0]))
+        ratio = tangential_ratio(parameters.numbers["poisson"])[:, None]
+        stiff = np.stack([k if c == n_comp - 1 else ratio * k for c in range(n_comp)], axis=-1).reshape(-1, n_comp)
+        elements = ContactParameters(
+            parameters.components,
+            stiff,
+            (g + parameters.gap[:, None]).ravel(),
+            {"friction": np.repeat(parameters.numbers["friction"], SPRINGS)},
+        )
+        sliders = memory[:, 1:].reshape(n_pair, n_comp - 1, SPRINGS).transpose(0, 2, 1).reshape(-1, n_comp - 1)
+        return cls(k, g, dk, dg, peak, angle, grows, elements, np.ascontiguousarray(sliders))
+
+
+def sliders(
+    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions of the sliders of all springs over the periodic cycle x (n_pair, n_component, n_coeff), and their load.
+
+    Returns (n_pair, SPRINGS, n_component - 1, n_samples) [m], (n_pair, SPRINGS, n_samples) normal force [N]
+    """
+    made = _Bed.of(x, parameters, memory, basis, located=False)
+    moved = np.repeat(basis.to_time(x), SPRINGS, axis=0)
+    pressed = np.maximum(moved[:, -1] - made.elements.gap[:, None], 0.0)
+    ratio = tangential_ratio(parameters.numbers["poisson"])
+    reach = np.repeat(parameters.numbers["friction"] / ratio, SPRINGS)[:, None] * pressed  # at which one slips
+    at, found = made.sliders, np.empty((len(moved), moved.shape[1] - 1, basis.n_samples))
+    for _ in range(2):  # the memory of Jenkins elements repeats after the first
+        for i in range(basis.n_samples):
+            here, off = moved[:, :-1, i], reach[:, i, None]
+            at = found[:, :, i] = np.clip(at, here - off, here + off)
+    shape = (*made.k.shape, -1, basis.n_samples)
+    return found.reshape(shape), made.k[:, :, None] * pressed.reshape(*made.k.shape, -1)
+
+
+def _cycle(by_elements, x, parameters, memory, basis, jacobian) -> ContactCycle:
     """The bed at the deepest approach of the cycle and its past, its springs by the cycle of Jenkins elements.
 
     x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_state) at the start
     """
     n_pair, n_comp, n_coeff = x.shape
-    p = parameters.packed()
-    peak, where = _deepest(x[:, -1], basis, located=elements is transitions.cycle)
-    peak = peak - parameters.gap
-    grows = peak > memory[:, 0]
-    k, g, dk, dg = bed(p, np.where(grows, peak, memory[:, 0]))
-    ratio = tangential_ratio(parameters.numbers["poisson"])[:, None]
-    stiff = np.stack([k if c == n_comp - 1 else ratio * k for c in range(n_comp)], axis=-1).reshape(-1, n_comp)
-    own = ContactParameters(
-        parameters.components,
-        stiff,
-        (g + parameters.gap[:, None]).ravel(),
-        {"friction": np.repeat(parameters.numbers["friction"], SPRINGS)},
-    )
-    sliders = memory[:, 1:].reshape(n_pair, n_comp - 1, SPRINGS).transpose(0, 2, 1).reshape(-1, n_comp - 1)
-    each = elements(np.repeat(x, SPRINGS, axis=0), own, np.ascontiguousarray(sliders), basis, jacobian)
+    made = _Bed.of(x, parameters, memory, basis, located=by_elements is transitions.cycle)
+    k, dk, dg = made.k, made.dk, made.dg
+    each = by_elements(np.repeat(x, SPRINGS, axis=0), made.elements, made.sliders, basis, jacobian)
     force = each.force.reshape(n_pair, SPRINGS, n_comp, n_coeff)
     bits = each.status.reshape(n_pair, SPRINGS)
     status = np.bitwise_or.reduce(bits & ~SEPARATES, axis=1)
@@ -409,13 +457,13 @@ def _cycle(elements, x, parameters, memory, basis, jacobian) -> ContactCycle:
     m = n_comp * n_coeff
     jac = each.jacobian.reshape(n_pair, SPRINGS, m, m)
     slope = jac.sum(axis=1)
-    if grows.any() and basis.has_static:
-        i = np.flatnonzero(grows & (peak > 0))
+    if made.grows.any() and basis.has_static:
+        i = np.flatnonzero(made.grows & (made.peak > 0))
         relative = np.divide(dk[i], k[i], out=np.zeros_like(k[i]), where=k[i] > 0)
         still = (n_comp - 1) * n_coeff  # the mean normal displacement: a later touch is as a wider gap
         by_deepest = np.einsum("iq,iqa->ia", relative, force[i].reshape(len(i), SPRINGS, m))
         by_deepest -= np.einsum("iq,iqa->ia", dg[i], jac[i, :, :, still])
-        slope[i, :, still:] += by_deepest[:, :, None] * basis.functions(where[i])[:, None, :]
+        slope[i, :, still:] += by_deepest[:, :, None] * basis.functions(made.angle[i])[:, None, :]
     return ContactCycle(total, slope, status)
 
 
