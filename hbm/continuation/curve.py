@@ -110,6 +110,14 @@ class Segment:
         extreme = slopes[0] - b * b / (4 * a)
         return extreme * slopes[0] < -1e-3 * slopes[0] ** 2
 
+    @property
+    def distance_to_fold(self) -> float:
+        """Arc length from the end to where its tangent, turning on as before, has no share in the parameter."""
+        before, after = self.start.tangent.p, self.end.tangent.p
+        if self.end.fold or before * after <= 0 or abs(after) >= abs(before):
+            return np.inf
+        return self.length * abs(after) / (abs(before) - abs(after))
+
     def bare(self) -> Segment:
         """The segment without the solutions at its ends."""
         return Segment(self.start.bare(), self.end.bare(), self.metric)

@@ -25,6 +25,9 @@ TANGENT_ACCURACY = 1e-6  # relative; a tangent here only predicts, and the predi
 # slant of a smooth curve falls with the square of the step, and few steps have more.
 LARGEST_SLANT = 0.03
 MAX_HALVINGS = 6  # of a step that is checked: a jump of LARGEST_SLANT has shown itself after four
+# Step beyond the place where the tangents of the last two points foresee a fold, in distances to it: a step that lands
+# behind that fold finds it, a longer one may land behind its partner too and see neither.
+FOLD_REACH = 2.0
 CAP_GROWTH = 1.1  # growth per step of the cap on steps after a rewind; slow, so that the wrong turn is passed first
 
 
@@ -231,4 +234,5 @@ class Stepper:
             self._bend = (after - before) * (1.0 / segment.length)
             factor = min(factor, max(0.5, o.angle / max(segment.angle, 1e-9)))
         self._cap = min(o.max_step, CAP_GROWTH * self._cap)
-        self._step = float(np.clip(step * factor, o.min_step, self._cap))
+        longest = max(min(self._cap, FOLD_REACH * segment.distance_to_fold), o.min_step)
+        self._step = float(np.clip(step * factor, o.min_step, longest))
