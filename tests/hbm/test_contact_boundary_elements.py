@@ -12,8 +12,8 @@ import pytest
 from tests.helpers.rough_faces import gaussian
 from tribodyn.geometry.asperities import identify
 from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact.bed import bed
 from tribodyn.hbm.contact.law import ContactParameters
-from tribodyn.hbm.contact.laws import rough
 
 tm = pytest.importorskip("tamaas", reason="tamaas has no wheel for this platform: pip install tamaas")
 
@@ -36,7 +36,7 @@ def law_pressure(table: np.ndarray, radius: float, approach: np.ndarray) -> np.n
         deepest=float(max(approach.max(), table[:, 0].max())),
     )  # fmt: skip
     p = contact_law.checked("rough", made).packed().repeat(len(approach), axis=0)
-    k, g, _, _ = rough.bed(p, approach)
+    k, g, _, _ = bed(p, approach)
     return (k * np.maximum(approach[:, None] - g, 0.0)).sum(axis=1)
 
 

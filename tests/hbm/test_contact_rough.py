@@ -7,6 +7,8 @@ import pytest
 
 from tribodyn.hbm.contact import aft
 from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact.asperity import asperity, heights, pressure
+from tribodyn.hbm.contact.bed import bed
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.contact.laws import rough
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -32,7 +34,7 @@ def face(n_pair: int = 1, components: tuple[str, ...] = ALL, friction: float = 0
 
 def pressed(parameters: ContactParameters, deepest: float) -> tuple[np.ndarray, np.ndarray]:
     """Springs and their touch of the first pair."""
-    k, g, _, _ = rough.bed(parameters.packed()[:1], np.array([deepest]))
+    k, g, _, _ = bed(parameters.packed()[:1], np.array([deepest]))
     return k[0], g[0]
 
 
@@ -75,7 +77,7 @@ def test_a_loop_loses_what_mindlin_and_deresiewicz_found():
 
 
 def test_beyond_yield_the_loading_is_continuous_and_unloading_keeps_a_plastic_depth():
-    one = rough.asperity((YOUNG, POISSON, RADIUS, 331.7e6, 620e6))
+    one = asperity((YOUNG, POISSON, RADIUS, 331.7e6, 620e6))
     near = one.onset * np.array([1 - 1e-9, 1 + 1e-9])
     assert np.ptp(one.loading(near)) < 1e-7 * one.loading(near)[0]
     d = np.geomspace(1.01, 60, 200) * one.onset
@@ -101,7 +103,7 @@ def test_beyond_yield_two_spheres_are_twice_one_sphere_on_a_rigid_flat(tangent):
     plastic = np.exp(-0.25 * w ** (5 / 12)) * w**1.5 + 4 * hardness / C * (1 - np.exp(-0.04 * w ** (5 / 9))) * w
     plastic *= 4 / 3 * (R / E) ** 2 * (C * np.pi * S / 2) ** 3
     known = plastic + (4 / 3 * E * np.sqrt(R) * delta**1.5 - plastic) * (1 - np.exp(-3.3 * ratio))
-    one = rough.asperity((YOUNG, POISSON, RADIUS, S, tangent))
+    one = asperity((YOUNG, POISSON, RADIUS, S, tangent))
     assert one.onset == pytest.approx(2 * 1.9 * critical)
     off = one.loading(2 * delta) / known - 1
     assert np.abs(off).max() < 6e-3  # the jump that is taken off
@@ -109,13 +111,13 @@ def test_beyond_yield_two_spheres_are_twice_one_sphere_on_a_rigid_flat(tangent):
 
 
 def test_a_face_is_the_sum_of_its_asperities_on_loading_and_unloading():
-    one, rows = rough.asperity(tuple(STEEL.values())), rough._heights(FACE)
+    one, rows = asperity(tuple(STEEL.values())), heights(FACE)
     for deepest in (4e-6, 9e-6, 14e-6):
         k, g = pressed(face(), deepest)
         loading = rows[:, 1] @ one.loading(np.maximum(deepest - rows[:, 0], 0.0))
         assert (k * (deepest - g)).sum() == pytest.approx(2e-6 * loading, rel=3e-5)
         u = deepest - (deepest - g[-1]) * np.array([0.02, 0.1, 0.3, 0.6])
-        unloading = 2e-6 * rough.pressure(one, rows, u, deepest)
+        unloading = 2e-6 * pressure(one, rows, u, deepest)
         found = (k * np.maximum(u[:, None] - g, 0.0)).sum(axis=1)
         np.testing.assert_allclose(found, unloading, atol=1e-3 * unloading[0])
         assert (k >= 0).all()
@@ -202,7 +204,7 @@ def test_the_springs_at_a_pressure_carry_it():
     kt, _, kn = rough.springs(parameters)[0]
     deepest = np.linspace(5e-6, 2e-5, 4000)
     p = parameters.packed().repeat(len(deepest), axis=0)
-    k, g, _, _ = rough.bed(p, deepest)
+    k, g, _, _ = bed(p, deepest)
     at = np.searchsorted((k * (deepest[:, None] - g)).sum(axis=1), 5e6 * 2e-6)
     assert kn == pytest.approx(k[at].sum(), rel=2e-3)
     assert kt == pytest.approx(rough.tangential_ratio(POISSON) * kn)

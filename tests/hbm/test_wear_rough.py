@@ -13,9 +13,9 @@ from tests.helpers.verification_models import interface
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import rest
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.asperity import asperity
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import ContactParameters
-from tribodyn.hbm.contact.laws import rough
 from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -56,7 +56,7 @@ def test_a_sliding_block_wears_as_its_differential_equation_says() -> None:
     swing X less MU d' / RATIO, four times in a cycle.
     """
     balance = block()
-    own = rough.asperity((YOUNG, POISSON, RADIUS, YIELD, TANGENT))
+    own = asperity((YOUNG, POISSON, RADIUS, YIELD, TANGENT))
     preloaded = np.maximum(balance.at_rest[:, 1] - GAP, 0.0)
     duty, law = Duty(AtFrequency("tip", 1000.0)), JointWear.of("archard", coefficient=WEAR)
     problem = WearProblem(balance, (duty,), law, np.full(len(GAP), AREA))

@@ -90,32 +90,44 @@ def cycle(
 @numba.njit(cache=True)
 def _cycle(x, p, memory, phi, product, single, force, jac, status):
     n_pair, n_comp, n_time = x.shape
+    want = jac.shape[0] > 0
+    kind, slider, none = np.empty(n_time, np.int8), np.empty(n_time), np.empty((0, 0))
+    for i in range(n_pair):
+        own = jac[i] if want else none
+        k = p[i, :n_comp]
+        status[i] = element(k, p[i, 4], p[i, 3], memory[i], x[i], phi, product, single, force[i], own, kind, slider)
+
+
+@numba.njit(cache=True)
+def element(k, mu, gap, memory, x, phi, product, single, force, jac, kind, slider):
+    """The cycle of one element; writes its force (n_component, n_samples), adds to its Jacobian, returns the bits.
+
+    k : (n_component,) [N/m]; memory : (n_component - 1,); x : (n_component, n_samples); an empty jac is not asked for
+    kind, slider : (n_samples,) to work on
+    """
+    n_comp, n_time = x.shape
     t = n_comp - 1
     want = jac.shape[0] > 0
-    kind, slider = np.empty(n_time, np.int8), np.empty(n_time)
-    for i in range(n_pair):
-        kn, mu, gap = p[i, t], p[i, 4], p[i, 3]
-        bits = 0
-        n_open = 0
+    kn, bits, n_open = k[t], 0, 0
+    for j in range(n_time):
+        N = kn * (x[t, j] - gap)
+        force[t, j] = N if N > 0.0 else 0.0
+        if N <= 0.0:
+            n_open += 1
+    if n_open > 0:
+        bits |= SEPARATES
+    if want and n_open < n_time:
+        _add_normal(kn, n_open, force[t], product, t, jac)
+    for c in range(t):
+        if n_open == n_time:
+            force[c, :] = 0.0
+            continue
+        origin, sense = _march(k[c], mu, memory[c], x[c], force[t], force[c], kind, slider)
         for j in range(n_time):
-            N = kn * (x[i, t, j] - gap)
-            force[i, t, j] = N if N > 0.0 else 0.0
-            if N <= 0.0:
-                n_open += 1
-        if n_open > 0:
-            bits |= SEPARATES
-        if want and n_open < n_time:
-            _add_normal(kn, n_open, force[i, t], product, t, jac[i])
-        for c in range(t):
-            if n_open == n_time:
-                force[i, c, :] = 0.0
-                continue
-            origin, sense = _march(p[i, c], mu, memory[i, c], x[i, c], force[i, t], force[i, c], kind, slider)
-            for j in range(n_time):
-                bits |= STICKS if kind[j] == STICK else 0 if kind[j] == OPEN else SLIPS
-            if want:
-                _add_tangential(p[i, c], mu * kn, kind, origin, sense, c, t, phi, product, single, jac[i])
-        status[i] = bits
+            bits |= STICKS if kind[j] == STICK else 0 if kind[j] == OPEN else SLIPS
+        if want:
+            _add_tangential(k[c], mu * kn, kind, origin, sense, c, t, phi, product, single, jac)
+    return bits
 
 
 @numba.njit(cache=True)
@@ -126,7 +138,7 @@ def _add_normal(kn, n_open, N, product, t, jac):
     o = t * m
     if n_open == 0:
         for a in range(m):
-            jac[o + a, o + a] = kn
+            jac[o + a, o + a] += kn
         return
     j = 0
     while j < n_time:
@@ -182,7 +194,7 @@ def _add_tangential(kt, slope, kind, origin, sense, c, t, phi, product, single, 
     o, on = c * m, t * m
     if origin < 0:
         for a in range(m):
-            jac[o + a, o + a] = kt
+            jac[o + a, o + a] += kt
         return
     side = slope * SIDE[sense]
     start = 0

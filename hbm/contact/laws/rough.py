@@ -19,15 +19,15 @@ Source  Greenwood and Williamson 1966; Porter and Brake, MSSP 192 (2023) 110210;
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numba
 import numpy as np
 
 from tribodyn.declare import number
 from tribodyn.hbm.contact import located as transitions
+from tribodyn.hbm.contact.asperity import asperity
+from tribodyn.hbm.contact.bed import ROWS, SPRINGS, TABULATED, bed, look_up, table_of
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
 from tribodyn.hbm.contact.laws import jenkins
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -36,28 +36,7 @@ COMPONENTS = (("t1", "t2", "n"), ("t1", "n"), ("t2", "n"))
 OWN_STIFFNESS = True  # its springs follow from its own numbers
 TABLE = ("gap in m", "asperities per m2 and per m of gap, or per m2 where there is one row")
 
-SPRINGS = 40  # of the bed
-ROWS = 64  # depths at which the bed is tabulated, equidistant in the root of the deepest approach
-FIRST = 1e-4  # depth of the first spring below the deepest approach, over the whole depth of the bed
-WIDEST = 0.05  # largest distance of two springs, over the same
-HEIGHTS = 1000  # at which the density of gaps is summed, at least
-SLOPE_STEP = 0.2  # rows on either side between which slopes of the table are taken
-YIELD = 1.9  # d / d_y up to which an asperity is elastic
-FRICTION, AREA, TABULATED = 4, 5, 13  # places in a packed row: the law's numbers, then the table
-
-
-# depth of the springs below the deepest approach, over the depth of the bed: 0 < s_1 < ... < s_Q = 1
-def _depths() -> np.ndarray:
-    """In geometric progression while their distance is below WIDEST, equidistant from there on."""
-    for graded in range(SPRINGS - 1, 0, -1):  # the fewer graded ones, the finer the rest
-        even = SPRINGS - graded
-        low = np.geomspace(FIRST, 1 - even * WIDEST, graded) if even * WIDEST < 1 else None
-        if low is not None and low[-1] - low[-2] <= WIDEST:
-            return np.concatenate([[0.0], low, np.linspace(low[-1], 1.0, even + 1)[1:]])
-    raise AssertionError
-
-
-DEPTH = _depths()
+FRICTION, POISSON = 4, 7  # places in a packed row
 
 
 @dataclass(frozen=True)
@@ -84,122 +63,6 @@ class Parameters:
     """Deepest approach that is tabulated; the largest gap of the table by default."""
 
 
-@dataclass(frozen=True)
-class Asperity:
-    """One pair of asperities. E : E*; R : effective radius [m]; young, nu, yield_stress, tangent : of the material."""
-
-    E: float
-    R: float
-    young: float
-    nu: float
-    yield_stress: float
-    tangent: float
-
-    @property
-    def onset(self) -> float:
-        """Approach at which it begins to yield, 1.9 d_y [m]."""
-        return YIELD * self._d_y if self.yield_stress else np.inf
-
-    @property
-    def _C(self) -> float:
-        return 1.295 * float(np.exp(0.736 * self.nu))
-
-    @property
-    def _d_y(self) -> float:
-        return 4 * self.R * (np.pi * self._C * self.yield_stress / (4 * self.E)) ** 2
-
-    def hertz(self, d: np.ndarray) -> np.ndarray:
-        """Elastic force [N] at approaches d >= 0 [m]."""
-        return 4 / 3 * self.E * np.sqrt(self.R) * d**1.5
-
-    def loading(self, d: np.ndarray) -> np.ndarray:
-        """Force [N] at approaches d >= 0 [m] that were never exceeded."""
-        elastic = self.hertz(d)
-        if not self.yield_stress:
-            return elastic
-        w = np.maximum(d / self._d_y, YIELD)
-        jump = self._plastic(np.array(YIELD)) - self.hertz(np.array(self.onset))
-        return np.where(d > self.onset, self._plastic(w) - jump * np.exp(YIELD - w), elastic)
-
-    def _plastic(self, w: np.ndarray) -> np.ndarray:
-        d, C, S = w * self._d_y, self._C, self.yield_stress
-        elastic, hardening = self.hertz(d), self.tangent / self.young
-        a_e = np.sqrt(self.R * d)
-        B = 0.14 * np.exp(23 * S / (2 * self.E))
-        a_p = self.R * np.pi * C * S / (2 * self.E) * np.sqrt(w * (w / YIELD) ** B)
-        if hardening > np.finfo(float).eps:
-            root = np.sqrt(self.young / S)
-            upsilon = -2 * root * hardening ** (1 - (d - self._d_y) / (4 * self.R))
-            upsilon = upsilon / ((4 - 3 * np.exp(-2 * root * hardening)) * (1 - hardening))
-        else:
-            upsilon = np.zeros_like(d)
-        a = a_e + (a_p - a_e) * np.exp(upsilon)
-        hardness = 2.84 - 0.92 * (1 - np.cos(np.pi * a / (2 * self.R)))
-        F_c = 4 / 3 * (self.R / self.E) ** 2 * (C * np.pi * S / 2) ** 3
-        plastic = np.exp(-0.25 * w ** (5 / 12)) * w**1.5 + 4 * hardness / C * (1 - np.exp(-(w ** (5 / 9)) / 25)) * w
-        return F_c * plastic + (elastic - F_c * plastic) * (1 - np.exp(-3.3 * hardening))
-
-    def flattened(self, d_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Plastic depth [m] and root of the radius [m^0.5] of the Hertzian contact below the deepest approach d_m."""
-        d_m = np.maximum(d_m, 1e-100)  # whose force is still above zero
-        share = self.loading(d_m) / self.hertz(d_m)
-        share = np.where(d_m > self.onset, share, 1.0)
-        root = np.sqrt(self.R) / np.sqrt(share)  # F_m / (4/3 E* (share d_m)^3/2)
-        return d_m * (1 - share), root
-
-
-def asperity(numbers: tuple[float, ...]) -> Asperity:
-    """The asperity of (young, poisson, radius, yield stress, tangent modulus)."""
-    young, nu, radius, yield_stress, tangent = numbers
-    return Asperity(young / (2 * (1 - nu**2)), radius, young, nu, yield_stress, tangent)
-
-
-def pressure(one: Asperity, table: np.ndarray, u: np.ndarray, deepest: float) -> np.ndarray:
-    """Pressure p(u; u_m) [Pa] at approaches u (n,), the deepest so far being u_m; table : (k, 2) gaps and counts."""
-    gap, count = table.T
-    pressed = gap < deepest
-    offset, root = one.flattened(deepest - gap[pressed])
-    d = np.maximum(u[:, None] - gap[pressed] - offset, 0.0)
-    return (4 / 3 * one.E * root * d**1.5) @ count[pressed]
-
-
-@lru_cache(maxsize=32)
-def _bed_table(one: Asperity, flat: bytes, deepest: float) -> np.ndarray:
-    """(ROWS + 1, 2, 1 + SPRINGS) depth of the bed [m] and its springs [N/m3], and their slopes over the row number."""
-    table = _heights(np.frombuffer(flat).reshape(-1, 2))
-
-    def bed(row: float) -> np.ndarray:
-        u_m = deepest * (row / ROWS) ** 2
-        gap = table[:, 0]
-        pressed = gap < u_m
-        if not pressed.any():
-            return np.zeros(1 + SPRINGS)
-        offset, _ = one.flattened(u_m - gap[pressed])
-        depth = u_m - float((gap[pressed] + offset).min())
-        p = pressure(one, table, u_m - depth * DEPTH, u_m)
-        slope = np.append(-np.diff(p) / (depth * np.diff(DEPTH)), 0.0)
-        return np.concatenate([[depth], slope[:-1] - slope[1:]])
-
-    found = np.zeros((ROWS + 1, 2, 1 + SPRINGS))
-    for row in range(ROWS + 1):
-        found[row, 0] = bed(row)
-        before = max(row - SLOPE_STEP, 0.0)
-        found[row, 1] = (bed(row + SLOPE_STEP) - bed(before)) / (row + SLOPE_STEP - before)
-    return found
-
-
-def _heights(table: np.ndarray) -> np.ndarray:
-    """(k, 2) gaps [m] and asperities per m2 at them, from a density that is linear between the rows of a table."""
-    if len(table) == 1:
-        return table
-    gap, density = table.T
-    every = -(-HEIGHTS // (len(gap) - 1))
-    fine = np.interp(np.arange(every * (len(gap) - 1) + 1) / every, np.arange(len(gap)), gap)
-    width = np.gradient(np.concatenate([[2 * fine[0] - fine[1]], fine, [2 * fine[-1] - fine[-2]]]))[1:-1]
-    width[[0, -1]] /= 2
-    return np.column_stack([fine, width * np.interp(fine, gap, density)])
-
-
 def tabulated(parameters: ContactParameters) -> np.ndarray:
     """(n_pair, ...) what every packed row ends with: deepest tabulated approach [m], then the table of its bed."""
     if parameters.table is None:
@@ -217,7 +80,7 @@ def tabulated(parameters: ContactParameters) -> np.ndarray:
     rows = np.empty((parameters.n_pair, 1 + (ROWS + 1) * 2 * (1 + SPRINGS)))
     for i in range(parameters.n_pair):
         rows[i, 0] = top[i]
-        rows[i, 1:] = _bed_table(asperity(tuple(own[i].tolist())), given.tobytes(), float(top[i])).ravel()
+        rows[i, 1:] = table_of(asperity(tuple(own[i].tolist())), given.tobytes(), float(top[i])).ravel()
     return rows
 
 
@@ -238,59 +101,6 @@ def springs(parameters: ContactParameters) -> np.ndarray:
 def tangential_ratio(nu: np.ndarray) -> np.ndarray:
     """Tangential over normal stiffness of a stuck asperity (Mindlin 1949)."""
     return 2 * (1 - nu) / (2 - nu)
-
-
-def bed(p: np.ndarray, deepest: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Springs [N/m] and their approaches of touch [m], both (n_pair, SPRINGS), and d / d deepest of both.
-
-    p : packed rows; deepest : (n_pair,) [m]; nothing where it is not above zero
-    """
-    shape = (len(p), SPRINGS)
-    k, g, dk, dg = (np.zeros(shape) for _ in range(4))
-    _beds(p, deepest, k, g, dk, dg)
-    return k, g, dk, dg
-
-
-@numba.njit(cache=True)
-def _beds(p, deepest, k, g, dk, dg):
-    for i in range(p.shape[0]):
-        look_up(p[i], deepest[i], k[i], g[i], dk[i], dg[i])
-
-
-@numba.njit(cache=True)
-def look_up(p, deepest, k, g, dk, dg):
-    """The bed of one pair, cubic between the rows of its table and straight on beyond the last; see `bed`."""
-    area, top = p[AREA], p[TABULATED]
-    if deepest <= 0.0:
-        for q in range(SPRINGS):
-            k[q], g[q], dk[q], dg[q] = 0.0, 0.0, 0.0, 1.0
-        return
-    at = ROWS * math.sqrt(deepest / top)
-    rate = 0.5 * at / deepest  # d at / d deepest
-    row = min(int(at), ROWS - 1)
-    t = at - row
-    if t <= 1.0:
-        b0, b1 = (1 + 2 * t) * (1 - t) ** 2, t * t * (3 - 2 * t)
-        m0, m1 = t * (1 - t) ** 2, t * t * (t - 1)
-        db1 = 6 * t * (1 - t)
-        dm0, dm1 = (1 - t) * (1 - 3 * t), t * (3 * t - 2)
-        db0 = -db1
-    else:
-        b0, b1, m0, m1 = 0.0, 1.0, 0.0, t - 1.0
-        db0, db1, dm0, dm1 = 0.0, 0.0, 0.0, 1.0
-    width = 1 + SPRINGS
-    o = TABULATED + 1 + row * 2 * width
-    v0, s0, v1, s1 = o, o + width, o + 2 * width, o + 3 * width
-    depth = b0 * p[v0] + b1 * p[v1] + m0 * p[s0] + m1 * p[s1]
-    ddepth = rate * (db0 * p[v0] + db1 * p[v1] + dm0 * p[s0] + dm1 * p[s1])
-    for q in range(SPRINGS):
-        c = q + 1
-        k[q] = area * (b0 * p[v0 + c] + b1 * p[v1 + c] + m0 * p[s0 + c] + m1 * p[s1 + c])
-        dk[q] = area * rate * (db0 * p[v0 + c] + db1 * p[v1 + c] + dm0 * p[s0 + c] + dm1 * p[s1 + c])
-        if k[q] < 0.0:
-            k[q], dk[q] = 0.0, 0.0
-        g[q] = deepest - depth * DEPTH[c]
-        dg[q] = 1.0 - ddepth * DEPTH[c]
 
 
 def n_state(components: tuple[str, ...]) -> int:
@@ -317,7 +127,7 @@ def step(x, s, p, f, dfx, dfs, dsx, dss):
     else:
         dss[0, 0] = 1.0
     look_up(p, s[0], k, g, dk, dg)
-    ratio, mu = 2 * (1 - p[7]) / (2 - p[7]), p[FRICTION]
+    ratio, mu = 2 * (1 - p[POISSON]) / (2 - p[POISSON]), p[FRICTION]
     bits = 0
     for c in range(n + 1):
         f[c] = 0.0
@@ -367,14 +177,14 @@ def cycle(
     x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
 ) -> ContactCycle:
     """The periodic cycle at the samples of the basis; see `_cycle`."""
-    return _cycle(jenkins.cycle, x, parameters, memory, basis, jacobian)
+    return _cycle(x, parameters, memory, basis, jacobian, located=False)
 
 
 def located(
     x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
 ) -> ContactCycle:
     """The periodic cycle with the transitions of every spring and the deepest approach located between samples."""
-    return _cycle(transitions.cycle, x, parameters, memory, basis, jacobian)
+    return _cycle(x, parameters, memory, basis, jacobian, located=True)
 
 
 @dataclass(frozen=True)
@@ -383,9 +193,10 @@ class _Bed:
 
     k, g, dk, dg : (n_pair, SPRINGS) as of `bed`; peak, angle : (n_pair,) deepest approach of the cycle [m] and where
     grows : (n_pair,) whether that is deeper than all before
-    elements : the springs as Jenkins elements, pair by pair; sliders : (n_pair * SPRINGS, n_component - 1) their memory
+    sliders : (n_pair, SPRINGS, n_component - 1) their memory [m]; ratio : (n_pair,) tangential over normal stiffness
     """
 
+    parameters: ContactParameters
     k: np.ndarray
     g: np.ndarray
     dk: np.ndarray
@@ -393,27 +204,52 @@ class _Bed:
     peak: np.ndarray
     angle: np.ndarray
     grows: np.ndarray
-    elements: ContactParameters
     sliders: np.ndarray
+    ratio: np.ndarray
 
     @classmethod
     def of(cls, x, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, located: bool) -> _Bed:
         """The bed at the deepest approach of the cycle x (n_pair, n_component, n_coeff) [m] and its past."""
-        n_pair, n_comp, _ = x.shape
         peak, angle = _deepest(x[:, -1], basis, located)
         peak = peak - parameters.gap
         grows = peak > memory[:, 0]
-        k, g, dk, dg = bed(parameters.packed(), np.where(grows, peak, memory[:, 0]))
-        ratio = tangential_ratio(parameters.numbers["poisson"])[:, None]
-        stiff = np.stack([k if c == n_comp - 1 else ratio * k for c in range(n_comp)], axis=-1).reshape(-1, n_comp)
-        elements = ContactParameters(
-            parameters.components,
-            stiff,
-            (g + parameters.gap[:, None]).ravel(),
-            {"friction": np.repeat(parameters.numbers["friction"], SPRINGS)},
-        )
-        sliders = memory[:, 1:].reshape(n_pair, n_comp - 1, SPRINGS).transpose(0, 2, 1).reshape(-1, n_comp - 1)
-        return cls(k, g, dk, dg, peak, angle, grows, elements, np.ascontiguousarray(sliders))
+        springs = bed(parameters.packed(), np.where(grows, peak, memory[:, 0]))
+        sliders = memory[:, 1:].reshape(len(x), -1, SPRINGS).transpose(0, 2, 1)
+        ratio = tangential_ratio(parameters.numbers["poisson"])
+        return cls(parameters, *springs, peak, angle, grows, sliders, ratio)
+
+    @property
+    def touch(self) -> np.ndarray:
+        """(n_pair, SPRINGS) normal displacement at which a spring touches [m]."""
+        return self.g + self.parameters.gap[:, None]
+
+    def elements(self, pair: np.ndarray, spring: np.ndarray) -> ContactParameters:
+        """Some of the springs as Jenkins elements."""
+        k = self.k[pair, spring]
+        tangential = [self.ratio[pair] * k] * self.sliders.shape[2]
+        friction = {"friction": self.parameters.numbers["friction"][pair]}
+        stiff = np.stack([*tangential, k], axis=1)
+        return ContactParameters(self.parameters.components, stiff, self.touch[pair, spring], friction)
+
+    def at_rest(self, x: np.ndarray, basis: HarmonicBasis) -> tuple[np.ndarray, np.ndarray]:
+        """(n_pair, SPRINGS) whether a spring sticks all through the cycle x, and whether it never touches.
+
+        Where all springs of a pair start from one slider, neither asks for the stiffness: one bound serves them all.
+        """
+        samples = basis.to_time(x)
+        n, t, start = samples[:, -1], samples[:, :-1], self.sliders[:, -1]
+        mu, ratio = self.parameters.numbers["friction"], self.ratio
+        off = np.abs(t - start[:, :, None]).max(axis=1, initial=0.0)
+        slips_below = (ratio[:, None] * off - mu[:, None] * n).max(axis=1)  # sticks if below - mu touch
+        opens_below = n.min(axis=1)
+        if basis.transitions == "located":  # between samples a curve leaves its chord by its bend
+            bend = (np.abs(x) * basis.order**2).sum(axis=2) * (2 * np.pi / basis.n_samples) ** 2 / 8
+            slips_below = slips_below + ratio * bend[:, :-1].max(axis=1, initial=0.0) + mu * bend[:, -1]
+            opens_below = opens_below - bend[:, -1]
+        alike = (self.sliders == start[:, None]).all(axis=(1, 2))
+        sticks = slips_below[:, None] < -mu[:, None] * self.touch
+        sticks &= (opens_below[:, None] > self.touch) & alike[:, None]
+        return sticks, (self.peak + self.parameters.gap)[:, None] < self.touch
 
 
 def sliders(
@@ -424,47 +260,137 @@ def sliders(
     Returns (n_pair, SPRINGS, n_component - 1, n_samples) [m], (n_pair, SPRINGS, n_samples) normal force [N]
     """
     made = _Bed.of(x, parameters, memory, basis, located=False)
-    moved = np.repeat(basis.to_time(x), SPRINGS, axis=0)
-    pressed = np.maximum(moved[:, -1] - made.elements.gap[:, None], 0.0)
-    ratio = tangential_ratio(parameters.numbers["poisson"])
-    reach = np.repeat(parameters.numbers["friction"] / ratio, SPRINGS)[:, None] * pressed  # at which one slips
-    at, found = made.sliders, np.empty((len(moved), moved.shape[1] - 1, basis.n_samples))
+    moved = basis.to_time(x)
+    pressed = np.maximum(moved[:, None, -1] - made.touch[:, :, None], 0.0)
+    reach = (parameters.numbers["friction"] / made.ratio)[:, None, None] * pressed  # at which one slips
+    at, found = made.sliders, np.empty((*made.sliders.shape, basis.n_samples))
     for _ in range(2):  # the memory of Jenkins elements repeats after the first
         for i in range(basis.n_samples):
-            here, off = moved[:, :-1, i], reach[:, i, None]
-            at = found[:, :, i] = np.clip(at, here - off, here + off)
-    shape = (*made.k.shape, -1, basis.n_samples)
-    return found.reshape(shape), made.k[:, :, None] * pressed.reshape(*made.k.shape, -1)
+            here, off = moved[:, None, :-1, i], reach[:, :, None, i]
+            at = found[..., i] = np.clip(at, here - off, here + off)
+    return found, made.k[:, :, None] * pressed
 
 
-def _cycle(by_elements, x, parameters, memory, basis, jacobian) -> ContactCycle:
-    """The bed at the deepest approach of the cycle and its past, its springs by the cycle of Jenkins elements.
+def _cycle(x, parameters, memory, basis, jacobian, located: bool) -> ContactCycle:
+    """The bed at the deepest approach of the cycle and its past.
 
+    Springs that stick all through it are one spring; the others go by the cycle of Jenkins elements.
     x : (n_pair, n_component, n_coeff) [m]; memory : (n_pair, n_state) at the start
     """
+    made = _Bed.of(x, parameters, memory, basis, located)
+    sticks, open_ = made.at_rest(x, basis)
+    force, slope = _stuck(made, made.k * sticks, x, basis, jacobian)
+    add = _add_located if located else _add_sampled
+    grows = made.grows & (made.peak > 0)
+    status = np.where(sticks.any(axis=1), STICKS, 0)
+    by_deepest, _ = _stuck(made, made.dk * sticks, x, basis, False)
+    add(made, ~(sticks | open_), x, basis, force, slope, by_deepest, status)
+    status[open_[:, -1]] = SEPARATES
+    if slope is not None and grows.any() and basis.has_static:
+        m = slope.shape[1]
+        still = m - basis.n_coeff  # the mean normal displacement: a later touch is as a wider gap
+        by_deepest[:, -1, 0] -= (made.k * made.dg * sticks).sum(axis=1)
+        functions = basis.functions(made.angle[grows])
+        slope[grows, :, still:] += by_deepest.reshape(-1, m)[grows, :, None] * functions[:, None, :]
+    return ContactCycle(force, slope, status)
+
+
+def _add_located(made, active, x, basis, force, slope, by_deepest, status):
+    """Add what active springs (n_pair, SPRINGS) do, their transitions located, to what the others do.
+
+    force, by_deepest : (n_pair, n_component, n_coeff), its derivative along the deepest approach; slope : the
+        Jacobian, None where not asked for; status : (n_pair,)
+    """
     n_pair, n_comp, n_coeff = x.shape
-    made = _Bed.of(x, parameters, memory, basis, located=by_elements is transitions.cycle)
-    k, dk, dg = made.k, made.dk, made.dg
-    each = by_elements(np.repeat(x, SPRINGS, axis=0), made.elements, made.sliders, basis, jacobian)
-    force = each.force.reshape(n_pair, SPRINGS, n_comp, n_coeff)
-    bits = each.status.reshape(n_pair, SPRINGS)
-    status = np.bitwise_or.reduce(bits & ~SEPARATES, axis=1)
+    pair, spring = np.nonzero(active)
+    own = np.ascontiguousarray(made.sliders[pair, spring])
+    elements = made.elements(pair, spring)
+    each = transitions.cycle(np.ascontiguousarray(x[pair]), elements, own, basis, slope is not None)
+    force += _by_pair(each.force, pair, n_pair)
+    np.bitwise_or.at(status, pair, each.status & ~SEPARATES)
     # the deepest spring is the last to let go: only where it opens the pair does
-    status |= bits[:, -1] & SEPARATES
-    total = force.sum(axis=1)
+    deepest = spring == SPRINGS - 1
+    status[pair[deepest]] |= each.status[deepest] & SEPARATES
+    jac = each.jacobian
+    if slope is None or jac is None:
+        return
+    slope += _by_pair(jac, pair, n_pair)
+    k, dk, dg = (v[pair, spring, None, None] for v in (made.k, made.dk, made.dg))
+    relative = np.divide(dk, k, out=np.zeros_like(k), where=k > 0)
+    column = jac[:, :, (n_comp - 1) * n_coeff].reshape(each.force.shape)
+    by_deepest += _by_pair(relative * each.force - dg * column, pair, n_pair)
+
+
+def _add_sampled(made, active, x, basis, force, slope, by_deepest, status):
+    """As `_add_located`, at the samples of the basis."""
+    samples = basis.to_time(x)
+    sums, weighted = np.zeros_like(samples), np.zeros_like(samples)
+    jac = np.zeros((0, 0, 0)) if slope is None else slope
+    column = np.zeros(x.shape)
+    springs = (made.k, made.touch, made.dk, made.dg, made.ratio, made.parameters.numbers["friction"])
+    start = np.ascontiguousarray(made.sliders)
+    _sum(samples, *springs, start, active, basis.synthesis, *basis.prefix_sums, sums, weighted, jac, column, status)
+    force += basis.from_time(sums)
+    if slope is not None:
+        by_deepest += basis.from_time(weighted) + column
+
+
+@numba.njit(cache=True)
+def _sum(x, k, touch, dk, dg, ratio, mu, sliders, active, phi, product, single, force, weighted, jac, column, status):
+    """Forces of the active springs (n_pair, n_component, n_samples), the same times dk / k, and their derivatives."""
+    n_pair, n_comp, n_time = x.shape
+    n_coeff, want = phi.shape[1], jac.shape[0] > 0
+    m, still = n_comp * n_coeff, (n_comp - 1) * n_coeff
+    kind, slider = np.empty(n_time, np.int8), np.empty(n_time)
+    f, stiff = np.empty((n_comp, n_time)), np.empty(n_comp)
+    own = np.zeros((m, m)) if want else np.zeros((0, 0))
+    for i in range(n_pair):
+        for q in range(SPRINGS):
+            if not active[i, q]:
+                continue
+            stiff[: n_comp - 1], stiff[n_comp - 1] = ratio[i] * k[i, q], k[i, q]
+            if want:
+                own[:] = 0.0
+            bits = jenkins.element(
+                stiff, mu[i], touch[i, q], sliders[i, q], x[i], phi, product, single, f, own, kind, slider
+            )
+            # the deepest spring is the last to let go: only where it opens the pair does
+            status[i] |= bits if q == SPRINGS - 1 else bits & ~SEPARATES
+            force[i] += f
+            if not want:
+                continue
+            jac[i] += own
+            weighted[i] += (dk[i, q] / k[i, q] if k[i, q] > 0.0 else 0.0) * f
+            for c in range(n_comp):
+                for a in range(n_coeff):
+                    column[i, c, a] -= dg[i, q] * own[c * n_coeff + a, still]
+
+
+def _stuck(
+    made: _Bed, k: np.ndarray, x: np.ndarray, basis: HarmonicBasis, jacobian: bool
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Force of springs k (n_pair, SPRINGS) [N/m] that stick all through the cycle x, and its derivative."""
+    normal = k.sum(axis=1)
+    stiff = np.concatenate([(made.ratio * normal)[:, None]] * (x.shape[1] - 1) + [normal[:, None]], axis=1)
+    force = stiff[:, :, None] * x
+    if basis.has_static:
+        force[:, :-1, 0] -= stiff[:, :-1] * made.sliders[:, -1]
+        force[:, -1, 0] -= (k * made.touch).sum(axis=1)
     if not jacobian:
-        return ContactCycle(total, None, status)
-    m = n_comp * n_coeff
-    jac = each.jacobian.reshape(n_pair, SPRINGS, m, m)
-    slope = jac.sum(axis=1)
-    if made.grows.any() and basis.has_static:
-        i = np.flatnonzero(made.grows & (made.peak > 0))
-        relative = np.divide(dk[i], k[i], out=np.zeros_like(k[i]), where=k[i] > 0)
-        still = (n_comp - 1) * n_coeff  # the mean normal displacement: a later touch is as a wider gap
-        by_deepest = np.einsum("iq,iqa->ia", relative, force[i].reshape(len(i), SPRINGS, m))
-        by_deepest -= np.einsum("iq,iqa->ia", dg[i], jac[i, :, :, still])
-        slope[i, :, still:] += by_deepest[:, :, None] * basis.functions(made.angle[i])[:, None, :]
-    return ContactCycle(total, slope, status)
+        return force, None
+    m = force[0].size
+    slope = np.zeros((len(x), m, m))
+    slope[:, np.arange(m), np.arange(m)] = np.repeat(stiff, x.shape[2], axis=1)
+    return force, slope
+
+
+def _by_pair(values: np.ndarray, pair: np.ndarray, n_pair: int) -> np.ndarray:
+    """Sums (n_pair, ...) of values (n, ...) whose pairs (n,) rise."""
+    found = np.zeros((n_pair, *values.shape[1:]))
+    starts = np.flatnonzero(np.diff(pair, prepend=-1))
+    if len(starts):
+        found[pair[starts]] = np.add.reduceat(values, starts, axis=0)
+    return found
 
 
 def _deepest(x: np.ndarray, basis: HarmonicBasis, located: bool) -> tuple[np.ndarray, np.ndarray]:
