@@ -102,3 +102,8 @@ def heights(table: np.ndarray) -> np.ndarray:
     width = np.gradient(np.concatenate([[2 * fine[0] - fine[1]], fine, [2 * fine[-1] - fine[-2]]]))[1:-1]
     width[[0, -1]] /= 2
     return np.column_stack([fine, width * np.interp(fine, gap, density)])
+
+
+def tangential_ratio(nu: np.ndarray) -> np.ndarray:
+    """Tangential over normal stiffness of a stuck asperity (Mindlin 1949)."""
+    return 2 * (1 - nu) / (2 - nu)
