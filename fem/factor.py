@@ -105,7 +105,7 @@ class Pardiso:
         self.name = "MKL PARDISO, " + ("Cholesky" if definite else "LDL^T")
         self._upper = triu(K, format="csr")
         self._upper.sort_indices()
-        self._solver = PyPardisoSolver(mtype=2 if definite else -2)
+        self._solver = PyPardisoSolver(mtype=2 if definite else -2, size_limit_storage=0)  # keeps no copy of the matrix
         # METIS, and no iterative refinement unless pivots were perturbed: MKL's defaults refine twice, 5 times slower
         for place, value in {1: 1, 2: 2, 8: 0, 10: 8}.items():
             self._solver.set_iparm(place, value)
@@ -118,7 +118,10 @@ class Pardiso:
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """Solution of the same shape as rhs, (n,) or (n, k)."""
-        return self._solver.solve(self._upper, np.asarray(rhs, dtype=float))
+        # pypardiso's own `solve` first compares the matrix with the factorised one, as long as a back substitution
+        self._solver.set_phase(33)
+        found: np.ndarray = self._solver._call_pardiso(self._upper, np.asfortranarray(rhs, dtype=float))
+        return found
 
     def __del__(self) -> None:
         if hasattr(self, "_solver") and not sys.is_finalizing():  # with the process its memory goes anyway

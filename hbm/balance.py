@@ -24,6 +24,8 @@ from tribodyn.hbm.linear.compliance import CompliancePoint, ContactCompliance
 from tribodyn.reduction.model import ReducedModel
 
 ROUNDING = 1e-13  # of the work that a pair's force and motion could do at most
+NEARLY_ALL = 0.03  # share of the flexibility that products may leave out and still find Newton's directions alone
+INNER, INNER_PRODUCTS = 0.05, 60  # residual and products of a direction within a direction, where they leave out more
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,8 @@ class HarmonicBalance:
         contact = Contact.of(model, joints)
         if memory is None:
             memory = np.zeros((contact.n_pair, contact.n_state))
-        compliance = ContactCompliance(model, contact.stiffness, basis, excitation, omega_max)
+        springs = contact.stiffness if model.residual is None else model.residual.stiffness
+        compliance = ContactCompliance(model, springs, basis, excitation, omega_max)
         return cls(model, contact, basis, excitation, omega_max, memory, compliance)
 
     @property
@@ -236,6 +239,11 @@ class LinearSide(Protocol):
 
     def coarse_part(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]: ...
 
+    @property
+    def left_out(self) -> float: ...
+
+    def nearly(self, g: np.ndarray) -> np.ndarray: ...
+
 
 class Linearisation:
     """I - G dg/dx, with dg/dx block diagonal over pairs and zero where a pair stays stuck and closed.
@@ -320,7 +328,7 @@ class Linearisation:
             return rhs.copy()
         g = np.zeros(self._shape)
         g[self.rows] = self.g_slope(d)
-        full = rhs + self._point.apply(g)
+        full = rhs + self._point.nearly(g)
         full[self.rows] = d
         return full
 
@@ -332,13 +340,29 @@ class Linearisation:
         if len(self.active) == 0:
             return rhs.copy(), 0, 0.0
         shape = (len(self.rows), self._shape[1])
-        d, spent, reached = gmres(
-            lambda v: self.product(v.reshape(shape)).ravel(),
-            rhs[self.rows].ravel(),
-            tolerance,
-            max_products,
-            lambda v: self.precondition(v.reshape(shape)).ravel(),
-        )
+
+        def nearly(b: np.ndarray, wanted: float, most: int) -> tuple[np.ndarray, int, float]:
+            return gmres(
+                lambda v: self.product(v.reshape(shape)).ravel(),
+                b,
+                wanted,
+                most,
+                lambda v: self.precondition(v.reshape(shape)).ravel(),
+            )
+
+        def exactly(v: np.ndarray) -> np.ndarray:
+            g = np.zeros(self._shape)
+            g[self.rows] = self.g_slope(v.reshape(shape))
+            return v - self._point.apply(g)[self.rows].ravel()
+
+        b = rhs[self.rows].ravel()
+        if self._point.left_out <= NEARLY_ALL:
+            d, spent, reached = nearly(b, max(tolerance, self._point.left_out), max_products)
+        else:
+            # products that leave much out find a direction for one that leaves nothing out
+            d, spent, reached = gmres(
+                exactly, b, tolerance, max_products, lambda v: nearly(v, INNER, INNER_PRODUCTS)[0], flexible=True
+            )
         return self.spread(d.reshape(shape), rhs), spent, reached
 
     def solve_refined(self, rhs: np.ndarray, tolerance: float) -> np.ndarray:

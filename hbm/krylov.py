@@ -16,12 +16,14 @@ def gmres(
     tolerance: float,
     max_products: int,
     precondition: Callable[[np.ndarray], np.ndarray] | None = None,
+    flexible: bool = False,
 ) -> tuple[np.ndarray, int, float]:
     """Solve A x = b by GMRES without restart, orthogonalised twice.
 
     product : A times a vector (n,); precondition : an approximate inverse of A, applied from the right
+    flexible : the preconditioner is no linear map, such as an iteration of its own
     Returns x, products spent, relative residual reached
-    Source  Saad and Schultz 1986
+    Source  Saad and Schultz 1986; flexible: Saad 1993, doi 10.1137/0914028
     """
     beta = float(np.linalg.norm(b))
     if beta == 0.0:
@@ -34,8 +36,12 @@ def gmres(
     rhs = np.zeros(size + 1)
     rhs[0] = beta
     k = 0
+    directions: list[np.ndarray] = []
     for k in range(1, size + 1):
-        w = product(v[k - 1] if precondition is None else precondition(v[k - 1]))
+        z = v[k - 1] if precondition is None else precondition(v[k - 1])
+        if flexible:
+            directions.append(z)
+        w = product(z)
         span = v[:k]
         coefficients = span @ w
         w = w - coefficients @ span
@@ -58,6 +64,8 @@ def gmres(
     y = np.zeros(k)
     for i in range(k - 1, -1, -1):
         y[i] = (rhs[i] - h[i, i + 1 : k] @ y[i + 1 :]) / h[i, i]
+    if flexible:
+        return y @ np.array(directions[:k]), k, abs(rhs[k]) / beta
     x = y @ v[:k]
     return x if precondition is None else precondition(x), k, abs(rhs[k]) / beta
 

@@ -15,6 +15,7 @@ from tribodyn.hbm.threads import single
 ZERO_SIZE = 1e-6  # size of x, relative to the start, below which a solution counts as zero
 UNRESISTED = 1e-9  # singular value over the largest of a Jacobian whose motion counts as not resisted
 MOST_DENSE = 3000  # unknowns up to which the dense Jacobian serves where Krylov steps fail at rest
+MOST_DIRECT = 25000  # unknowns up to which it serves where Krylov steps fail elsewhere: 5 GB
 RAMP_STEPS = 12  # Newton steps in one step of the load ramp; beyond it a shorter step costs less
 RAMP_SLOWEST = 0.9  # residual over that of two Newton steps before, likewise: those that fail mostly stand still
 FORCE_ACCURACY = 1e-4  # of the contact forces, wanted where these stretch their springs far less than x is large
@@ -153,6 +154,9 @@ def solve(
         stalled = reached > max(10 * target, 0.5)
         if stalled and error <= options.tolerance:
             break
+        if stalled and balance.reference_stiffness.size * state.residual.shape[1] > MOST_DIRECT:
+            left = f" relative residual {error:.1e}, {spent} products leave {reached:.0%} of it"
+            return Solved(state, SolveEnd.NO_DIRECTION.say(left), step, products, tuple(history))
         if stalled:  # the direct way
             try:
                 direction = np.linalg.solve(linear.dense(), -state.residual.ravel()).reshape(state.residual.shape)

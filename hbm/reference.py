@@ -52,6 +52,7 @@ class DenseBalance:
     profile: Profile = field(default_factory=Profile)
 
     def __post_init__(self) -> None:
+        self.problem.model.require_masters("the dense reference")
         if self.problem.model.per_harmonic is not None:
             raise ValueError("the dense reference serves models whose harmonics share one real system")
         system, b = self.problem.model.at_harmonic(0)

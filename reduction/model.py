@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.system import SecondOrderSystem
+
+if TYPE_CHECKING:
+    from tribodyn.reduction.residual_flexibility import ResidualFlexibility
 
 Damping = Callable[[SecondOrderSystem, np.ndarray], np.ndarray | None]
 """Makes the damping matrix (n, n) [N s/m] of a system whose contact map is (n_contact, n), None for none."""
@@ -67,6 +71,7 @@ class ReducedModel:
     harmonic_basis : harmonic -> (n_full, n) basis where the coordinates of a harmonic are its own
     per_index : of a travelling wave, index -> (system, B) of any wave of the wheel, real for 0 and N/2; matrices of
         index -j are the conjugates of those of j
+    residual : static contact flexibility that the coordinates leave out, None where they hold every contact DOF
     """
 
     system: SecondOrderSystem
@@ -76,12 +81,21 @@ class ReducedModel:
     per_harmonic: Callable[[int], tuple[SecondOrderSystem, np.ndarray]] | None = None
     harmonic_basis: Callable[[int], np.ndarray] | None = None
     per_index: Callable[[int], tuple[SecondOrderSystem, np.ndarray]] | None = None
+    residual: ResidualFlexibility | None = None
 
     def at_harmonic(self, h: int) -> tuple[SecondOrderSystem, np.ndarray]:
         """System and contact map (n_pair * n_component, n) that harmonic h sees."""
         if self.per_harmonic is not None:
             return self.per_harmonic(h)
         return self.system, np.asarray(self.interface.B)
+
+    def require_masters(self, needed_by: str) -> None:
+        """Raise ValueError where the coordinates leave out a part of the contact's flexibility."""
+        if self.residual is not None:
+            raise ValueError(
+                f"{needed_by} needs a model that keeps every contact DOF, which this one with its "
+                f'{len(self.interface.B)} does not: set reduction.method = "craig_bampton", on a smaller contact'
+            )
 
     def reconstruct(self, q: np.ndarray, h: int = 1) -> np.ndarray:
         """Full displacement (n_full, ...) [m] of reduced coordinates q (n, ...) of harmonic h."""

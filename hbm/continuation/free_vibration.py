@@ -135,6 +135,7 @@ class FreeVibration:
 
     def __init__(self, balance: HarmonicBalance, mode: int | None, output: str | None):
         model, self.balance, self.basis = balance.model, balance, balance.basis
+        model.require_masters("nonlinear modes")
         if model.per_harmonic is not None and model.per_index is None:
             raise ValueError(
                 "nonlinear modes need one system for all harmonics: this model has one of its own per harmonic"

@@ -147,6 +147,8 @@ def widened(balance: HarmonicBalance, highest: int) -> HarmonicBalance:
     if excitation.base is not None:
         excitation = replace(excitation, base=balance.basis.transfer(excitation.base, basis))
     own, springs = balance.compliance, balance.contact.stiffness.ravel()
+    if balance.model.residual is not None:
+        springs = own.k
     known = _WIDE.get(own)
     if known is None or known.basis.harmonics[-1] < top or not np.array_equal(known.k, springs):
         known = _WIDE[own] = ContactCompliance(balance.model, springs, basis, excitation, balance.omega_max)

@@ -3,6 +3,9 @@
 The expansion of each system of the model (see `expansion`) at every harmonic of one frequency. Where all harmonics
 share one real system, as they do without cyclic symmetry, products are made with all harmonics at once, coefficients
 as rows.
+
+A model with residual flexibility has no dense compliance: see `ritz_expansion`. Newton's directions are then found with
+the modes alone, and what these leave out is a product with a sparse factor.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import all_harmonics
 from tribodyn.hbm.linear.expansion import Expansion, UnbalancedLoad
+from tribodyn.hbm.linear.ritz_expansion import RitzExpansion
 from tribodyn.reduction.model import ReducedModel
 
 POINTS_KEPT = 4  # frequencies at hand, for the duties of a mission that are solved in turn
@@ -25,7 +29,8 @@ UNBALANCED = 1e-7  # of the static loads, on a motion that nothing resists, take
 class ContactCompliance:
     """The linear side of a harmonic balance: G_h(w) between contacts, loads and outputs of a reduced model.
 
-    model : reduced model; stiffness : (n_pair, n_component) stuck springs [N/m]
+    model : reduced model; stiffness : (n_pair, n_component) stuck springs [N/m], of a model with residual flexibility
+        those that this was made with
     excitation : loads whose names are ports; omega_max : largest excitation frequency that will be asked for [rad/s]
     """
 
@@ -52,16 +57,21 @@ class ContactCompliance:
             outputs = [system.outputs[name][None] for name in self.output_names]
             ports = np.concatenate([np.asarray(rows) for rows in (b, *loads, *outputs)])
             s_max = basis.harmonics[max([*positions, *mirrored])] * omega_max
+            if model.residual is not None:
+                ritz = RitzExpansion(system, np.asarray(b), self.k, ports, s_max, model.residual)
+                self.groups.append((ritz, positions))
+                continue
             self.groups.append((Expansion(system, np.asarray(b), self.k, ports, s_max), positions))
             if mirrored:
                 self.groups.append((self.groups[-1][0].mirrored(), mirrored))
             if basis.has_static and 0 in positions:
                 self._check_balance(self.groups[-1 - bool(mirrored)][0])
+        self.residual = model.residual
         self.error = max(e.error for e, _ in self.groups)
         self.shared_real = self._one_real()
         self.coarse = self._coarse_modes()
         self._points: dict[float, CompliancePoint] = {}
-        self._active: tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray]]] | None = None
+        self._active: tuple[np.ndarray, list[tuple[np.ndarray | None, np.ndarray]]] | None = None
 
     def _one_real(self) -> bool:
         """Whether one real symmetric system serves all harmonics."""
@@ -104,14 +114,20 @@ class ContactCompliance:
         left, size, _ = np.linalg.svd(columns, full_matrices=False)
         return np.ascontiguousarray(left[:, size**2 > PRECONDITIONED_SHARE])
 
-    def on_rows(self, rows: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """W_0 and modes of each group at some contact rows, single precision; the last ones are kept."""
+    def on_rows(self, rows: np.ndarray) -> list[tuple[np.ndarray | None, np.ndarray]]:
+        """W_0, if any, and modes of each group at some contact rows, single precision; the last ones are kept."""
         if self._active is None or not np.array_equal(self._active[0], rows):
             n, of = self.n_contact, [e for e, _ in self.groups]
             if len(rows) == n:
                 self._active = (rows, [(e.w0_single, e.b_single) for e in of])
             else:
-                self._active = (rows, [(e.w0_single[np.ix_(rows, rows)], e.b_single[rows]) for e in of])
+                self._active = (
+                    rows,
+                    [
+                        (None if e.w0_single is None else e.w0_single[np.ix_(rows, rows)], e.b_single[rows])
+                        for e in of
+                    ],
+                )
         return self._active[1]
 
     def at(self, omega: float) -> CompliancePoint:
@@ -181,10 +197,26 @@ class CompliancePoint:
 
     def apply(self, g: np.ndarray) -> np.ndarray:
         """G g: (n_contact, n_coeff) relative displacement [m] under contact forces g (n_contact, n_coeff) [N]."""
+        residual = self.compliance.residual
+        if residual is not None:
+            return self.nearly(g) + residual.apply(g)
         if self.compliance.shared_real:
             return self._apply_shared_real(g)
         contacts, basis = slice(0, self.compliance.n_contact), self.compliance.basis
         return basis.to_real(self._through_ports(basis.to_complex(g), contacts, contacts))
+
+    @property
+    def left_out(self) -> float:
+        """Largest share of the contact flexibility that `nearly` and the products of `jacobian_product` leave out."""
+        residual = self.compliance.residual
+        return 0.0 if residual is None else residual.left_out
+
+    def nearly(self, g: np.ndarray) -> np.ndarray:
+        """G g without what a factor would have to be asked for; see `left_out`."""
+        if self.compliance.residual is None:
+            return self.apply(g)
+        b = self.compliance.groups[0][0].b[: self.compliance.n_contact]
+        return (self.modal(np.ascontiguousarray(g.T) @ b, 0) @ b.T).T
 
     def _apply_shared_real(self, g: np.ndarray) -> np.ndarray:
         """The same for one real system: every matrix meets all harmonics in one real product."""
@@ -271,10 +303,12 @@ class JacobianProduct:
             w0, b = self._parts[0]
             rows = d.T.astype(np.float32, order="C")
             y = self._point.modal(rows @ b, 0)
-            return (rows @ w0 + y.astype(np.float32) @ b.T).T
+            moved = y.astype(np.float32) @ b.T
+            return (moved if w0 is None else rows @ w0 + moved).T
         force = c.basis.to_complex(d).astype(np.complex64)
         moved = np.empty_like(force)
         for (w0, b), ports, (_, positions) in zip(self._parts, self._point.ports, c.groups, strict=True):
+            assert w0 is not None
             for port, p in zip(ports, positions, strict=True):
                 f = force[:, p]
                 moved[:, p] = w0 @ f + b @ port.through_core(b.conj().T @ f)

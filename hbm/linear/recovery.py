@@ -17,7 +17,7 @@ def coordinates(
     structure held by its contact alone is no exception
     """
     basis, excitation = balance.basis, balance.excitation
-    k = balance.contact.stiffness.ravel()
+    k = balance.reference_stiffness
     moved = displacement if excitation.base is None else displacement + balance.loaded(excitation.base)
     g = basis.to_complex(k[:, None] * moved - force)
     found = []
@@ -45,4 +45,10 @@ def full_displacement(
     amplitudes = coordinates(balance, displacement, force, omega)
     harmonics = balance.basis.harmonics
     full = [balance.model.reconstruct(q, h) for h, q in zip(harmonics, amplitudes, strict=True)]
-    return balance.basis.to_real(np.stack(full, axis=-1))
+    moved: np.ndarray = balance.basis.to_real(np.stack(full, axis=-1))
+    residual = balance.model.residual
+    if residual is not None:
+        base = balance.excitation.base
+        stretch = displacement if base is None else displacement + balance.loaded(base)
+        moved += residual.field(residual.stiffness[:, None] * stretch - force)
+    return moved

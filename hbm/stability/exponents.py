@@ -129,6 +129,7 @@ def stability(
     if method not in ("hill", "floquet"):
         raise ValueError(f"no stability method '{method}': there are hill, floquet")
     model = balance.model
+    model.require_masters("stability")
     if method == "hill" and model.per_index is not None:
         return _of_wave(balance, state, n_modes, top)
     if model.per_harmonic is not None:

@@ -131,6 +131,7 @@ class TimeStepper:
 
     def __init__(self, balance: HarmonicBalance, omega: float, options: Options):
         model = balance.model
+        model.require_masters("time integration")
         if model.per_harmonic is not None:
             raise ValueError(
                 "time integration needs one system for all harmonics: a cyclic part or a displacement prescribed in "

@@ -61,6 +61,15 @@ class _Points:
         """Displacement that a departure g causes, every duty at its frequency."""
         return self.join([p.apply(part) for p, part in zip(self.points, self.split(g), strict=True)])
 
+    def nearly(self, g: np.ndarray) -> np.ndarray:
+        """`apply` without what a sparse factor would have to be asked for."""
+        return self.join([p.nearly(part) for p, part in zip(self.points, self.split(g), strict=True)])
+
+    @property
+    def left_out(self) -> float:
+        """Largest share of the contact flexibility that `nearly` leaves out."""
+        return max(p.left_out for p in self.points)
+
     def jacobian_product(self, rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """`apply` from and to the rows of whole pairs."""
         products = [p.jacobian_product(self._own_rows(rows)) for p in self.points]

@@ -19,6 +19,7 @@ def bench(
     quick: Flag = False,
     scaling: Flag = False,
     fe: Annotated[tuple[str, ...], Parameter(name="--fe", negative=(), consume_multiple=False)] = (),
+    contact: Annotated[tuple[str, ...], Parameter(name="--contact", negative=(), consume_multiple=False)] = (),
     out: Path = Path("scaling.png"),
     as_json: Json = False,
 ) -> None:
@@ -33,6 +34,9 @@ def bench(
     fe
         Time and memory of a reduction at "30k", "100k", "300k" or "1M" DOFs instead, beside plain statements of the
         same library and beside multigrid, or of an "assembly" of 200 000 DOFs with three joints; can be repeated.
+    contact
+        Set-up, memory and seconds of one response at 0+3 on "500", "3k", "12k" or "48k" contact DOFs instead, with
+        residual flexibility and, up to 3k, beside the dense compliance; can be repeated.
     out
         File of the plot of --scaling.
     as_json
@@ -43,6 +47,12 @@ def bench(
 
         costs = large_fe.run(fe, aside)
         print(json.dumps(large_fe.as_records(costs), indent=2) if as_json else large_fe.as_text(costs))
+        return
+    if contact:
+        from tribodyn.workflows.benchmarks import large_contact
+
+        sizes = large_contact.run(contact, aside)
+        print(json.dumps(large_contact.as_records(sizes), indent=2) if as_json else large_contact.as_text(sizes))
         return
     if scaling:
         make_room(out, PICTURE)

@@ -28,6 +28,7 @@ def reduced_model(result: Result) -> ReducedModel:
 
 def arrays(model: ReducedModel, harmonic: int = 1) -> dict[str, np.ndarray]:
     """M, K, C (n, n), B (n_contact, n), loads and outputs by name as a harmonic sees them; complex for a wheel."""
+    model.require_masters("an export of matrices")
     system, B = model.at_harmonic(harmonic)
     found = {"M": _dense(system.mass), "K": _dense(system.stiffness), "B": _dense(B)}
     if system.damping is not None:

@@ -8,11 +8,12 @@ import numpy as np
 
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.material import Material
+from tribodyn.fem.part import Part
 from tribodyn.hbm.contact import law
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.stiffness import rectangular_punch
 from tribodyn.hbm.excitation import Excitation
-from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.model import ModelInfo, ReducedModel
 from tribodyn.workflows.run import bodies, decks
 from tribodyn.workflows.scene.contact import Contact, FaceContact
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, PartScene, Scene
@@ -36,6 +37,11 @@ def contact_stiffness(scene: Scene, reduced: ReducedModel) -> np.ndarray:
         along = [total[c] if c in contact.components else 0.0 for c in interface.components]
         k[pairs] = np.outer(interface.area[pairs] / interface.area[pairs].sum(), along)
     return k
+
+
+def unreduced(part: Part) -> ReducedModel:
+    """The part itself in the place of a reduced model, sparse."""
+    return ReducedModel(part.system, part.interface, info=ModelInfo(joints=dict(part.joints)))
 
 
 def joint_pairs(scene: Scene, reduced: ReducedModel) -> dict[str, slice]:

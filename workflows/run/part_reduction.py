@@ -21,9 +21,12 @@ from tribodyn.reduction.interface_modes import interface_modes
 from tribodyn.reduction.model import ReducedModel, StaticReaction
 from tribodyn.reduction.prescribed import prescribe
 from tribodyn.reduction.relative import body_1_dofs, relative
+from tribodyn.reduction.residual_flexibility import residual_flexibility
+from tribodyn.workflows.run import joints
 from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
 
 BOLTS = "bolts."  # begins the names of outputs that are elongations of bolts
+MOST_MASTERS = 6000  # contact DOFs up to which all of them stay coordinates by default
 
 
 def material(scene: MeshScene, mesh: Any = None) -> Any:
@@ -59,6 +62,9 @@ def contacts(scene: MeshScene) -> list[fem_part.Contact]:
 def reduce(scene: MeshScene, part: Part) -> ReducedModel:
     """The part on its contact, load and prescribed nodes and a few modes; not damped yet, nothing prescribed yet."""
     wanted, system, interface, back = scene.reduction, part.system, part.interface, None
+    if without_masters(scene, part):
+        springs = joints.contact_stiffness(scene, joints.unreduced(part))
+        return residual_flexibility(system, interface, springs, wanted.modes, wanted.cutoff)
     held = [part.dofs(given.group, given.axis) for given in scene.prescribed.values()]
     if held and len(part.held):
         raise ValueError("prescribed: a part whose turning is held cannot have prescribed nodes; hold it by springs")
@@ -86,6 +92,21 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
             keep = np.union1d(np.intersect1d(np.concatenate([[], *named]), masters), extra)
         reduced = interface_modes(reduced, wanted.interface_modes, keep.astype(int), apart=extra)
     return reduced if back is None else replace(reduced, basis=back @ reduced.basis)
+
+
+def without_masters(scene: MeshScene, part: Part) -> bool:
+    """Whether the contact DOFs do not stay coordinates: as the scene says, else where there are thousands of them.
+
+    Raises  ValueError where the scene says so and has what needs them
+    """
+    method, B = scene.reduction.method, part.interface.B
+    held = {"[wheel]": scene.wheel, "[prescribed]": scene.prescribed, "no_turning": len(part.held)}
+    needed = [name for name, there in held.items() if there]
+    if method == "residual_flexibility" and needed:
+        raise ValueError(f'reduction.method: "residual_flexibility" cannot do {needed[0]}: take "craig_bampton"')
+    if method != "auto":
+        return method == "residual_flexibility"
+    return B.shape[0] > MOST_MASTERS and not needed and not scene.reduction.needs_masters
 
 
 def anchors(part: Part, relative_dofs: np.ndarray) -> np.ndarray:

@@ -101,16 +101,18 @@ class PartResponse(Response, Output):
 
 
 class Reduction(Table):
-    """Craig-Bampton: how many fixed-interface modes, or up to which frequency."""
+    """How many modes, or up to which frequency: fixed-interface modes of Craig-Bampton, or those of the stuck part."""
 
-    method: Literal["craig_bampton"] = "craig_bampton"
-    """Reduction method."""
+    method: Literal["auto", "craig_bampton", "residual_flexibility"] = "auto"
+    """Reduction method: Craig-Bampton keeps every contact DOF; residual_flexibility keeps modes of the stuck structure
+    and leaves its static rest to a sparse factor, for thousands of contact DOFs. "auto" takes the latter above 6000
+    contact DOFs, where no key of the scene needs the former."""
     relative: StrictBool = False
     """Keep the relative displacement of node pairs instead of both nodes."""
     modes: Annotated[StrictInt, Field(ge=0)] | None = None
-    """Number of fixed-interface modes."""
+    """Number of modes."""
     cutoff: Annotated[Frequency, Field(gt=0)] | None = None
-    """Frequency up to which fixed-interface modes are kept, instead of their number."""
+    """Frequency up to which modes are kept, instead of their number."""
     solver: Literal["direct", "multigrid"] = "direct"
     """How the part's equations are solved: by a factor, or, where none fits the memory, by conjugate gradients with
     algebraic multigrid, which takes far longer."""
@@ -131,6 +133,19 @@ class Reduction(Table):
         if self.solver == "multigrid" and self.relative:
             raise ValueError('expected solver = "direct" with relative = true')
         return self
+
+    @model_validator(mode="after")
+    def _without_masters(self) -> Reduction:
+        if self.method == "residual_flexibility" and self.needs_masters:
+            raise ValueError(
+                'expected method = "craig_bampton" with relative = true, interface_modes or solver = "multigrid"'
+            )
+        return self
+
+    @property
+    def needs_masters(self) -> bool:
+        """Whether another key makes sense with contact DOFs as masters alone."""
+        return self.relative or self.interface_modes is not None or self.solver == "multigrid"
 
     @model_validator(mode="after")
     def _one_truncation(self) -> Reduction:

@@ -1,0 +1,217 @@
+"""Reduction without contact masters: modes of the stuck structure, Ritz vectors, and what flexibility these leave out.
+
+A Craig-Bampton model keeps every contact DOF, and with thousands of them its constraint modes, its matrices and the
+compliance made of these are dense. Here the structure with its contact springs k stuck and closed,
+
+    K_s = K + B^T k B,
+
+is described by few coordinates: its lowest modes, and its static shapes under every load, under every output and under
+smooth contact tractions, one for each component on each of some clusters of pairs. By Rayleigh and Ritz these give
+squared frequencies Lambda and shapes V of unit modal mass, V^T K_s V = Lambda. What flexibility they leave out,
+
+    R = B K_s^-1 B^T - B V Lambda^-1 V^T B^T,
+
+is static up to (omega / omega_next)^2 of itself and is added as it stands: never as a matrix, each product with it is
+one solution by the sparse factor of K_s. So statics under any contact force are exact, and set-up and memory grow as
+the factor does. R vanishes at loads and outputs, whose static shapes V holds.
+
+Source  residual flexibility of free-interface modes: MacNeal 1971, doi 10.1016/0045-7949(71)90031-9; Rubin 1975,
+    doi 10.2514/3.60497. Clusters of tractions in place of more modes, and contact springs in K_s, are ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.linalg as sla
+from scipy.sparse import csc_matrix, csr_matrix
+from threadpoolctl import threadpool_limits
+
+from tribodyn.fem.factor import Factor, factorise
+from tribodyn.fem.interface import ContactInterface
+from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.reduction.craig_bampton import REPORTED_MODES, fixed_interface_modes
+from tribodyn.reduction.linear import linear_modes, stuck_stiffness
+from tribodyn.reduction.model import ModelInfo, ReducedModel
+
+CLUSTERS = 64  # of pairs, each with a uniform traction for every component
+BLOCK = 16  # right-hand sides solved at once
+DEPENDENT = 1e-10  # share of its strain energy that a shape must add to the others to be kept
+POWER_STEPS, POWER_VECTORS = 6, 4  # of the iteration that measures how much flexibility is left out
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualFlexibility:
+    """Static contact flexibility that the coordinates of a reduced model leave out.
+
+    stiffness : (n_contact,) contact springs that are part of K_s [N/m]; matrix : (n_full, n_full) K_s, sparse
+    B : (n_contact, n_full) sparse contact map; shapes : (n_full, n) V; squares : (n,) Lambda [rad2/s2]
+    mass : (n_full, n_full) sparse
+    """
+
+    stiffness: np.ndarray
+    matrix: csr_matrix
+    B: csr_matrix
+    shapes: np.ndarray
+    squares: np.ndarray
+    mass: csr_matrix
+
+    @cached_property
+    def factor(self) -> Factor:
+        """Of K_s; it does not travel between processes, each makes its own."""
+        return factorise(self.matrix)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "factor"}
+
+    @cached_property
+    def at_contact(self) -> np.ndarray:
+        """(n_contact, n) shapes at the contact."""
+        return np.asarray(self.B @ self.shapes)
+
+    def field(self, force: np.ndarray) -> np.ndarray:
+        """Displacement (n_full, k) [m] under contact forces (n_contact, k) [N] that the coordinates leave out."""
+        return self._static(force) - self.shapes @ (self.at_contact.T @ force / self.squares[:, None])
+
+    def apply(self, force: np.ndarray) -> np.ndarray:
+        """R f: displacement of the contact (n_contact, k) [m] under contact forces (n_contact, k) [N]."""
+        moved: np.ndarray = self.B @ self._static(force)
+        return moved - self.at_contact @ (self.at_contact.T @ force / self.squares[:, None])
+
+    def _static(self, force: np.ndarray) -> np.ndarray:
+        return self.factor.solve(np.asfortranarray(self.B.T @ force))
+
+    @cached_property
+    def left_out(self) -> float:
+        """Largest eigenvalue of k^1/2 R k^1/2: 1 would be a contact that sees nothing else; by power iteration."""
+        root = np.sqrt(self.stiffness)[:, None]
+        x = np.random.default_rng(0).standard_normal((len(root), POWER_VECTORS))
+        size = np.zeros(1)
+        for _ in range(POWER_STEPS):
+            x, _ = np.linalg.qr(x)
+            y = root * self.apply(root * x)
+            size, turn = np.linalg.eigh(0.5 * (x.T @ y + y.T @ x))
+            x = y @ turn
+        return float(max(size[-1], 0.0))
+
+    def error(self, omega: float) -> float:
+        """Relative error of the contact compliance at a frequency [rad/s], by what moves the mass it leaves out.
+
+        The first term that is neglected, omega^2 R_M with R_M = B K_s^-1 M u, u the field left out, under two smooth
+        and two rough contact forces
+        """
+        root = np.sqrt(self.stiffness)[:, None]
+        rough = np.random.default_rng(0).standard_normal((len(root), 2))
+        smooth = self.apply(root**2 * rough)
+        force = np.concatenate([root * rough, root**2 * smooth / max(np.abs(smooth).max(), 1e-300)], axis=1)
+        field = self.field(force)
+        push = omega**2 * (self.mass @ field)
+        held = self.at_contact @ (self.shapes.T @ push / self.squares[:, None])
+        more = self.B @ self.factor.solve(np.asfortranarray(push)) - held
+        whole = self.B @ field + self.at_contact @ (self.at_contact.T @ force / (self.squares - omega**2)[:, None])
+        return float(np.max(np.linalg.norm(more, axis=0) / np.linalg.norm(whole, axis=0)))
+
+
+def residual_flexibility(
+    system: SecondOrderSystem,
+    interface: ContactInterface,
+    stiffness: np.ndarray,
+    n_modes: int | None = None,
+    cutoff: float | None = None,
+    clusters: int = CLUSTERS,
+    solver: str | None = None,
+) -> ReducedModel:
+    """Reduce a full system to modes of its stuck state and Ritz vectors, with the flexibility these leave out.
+
+    system : sparse, n_full DOFs; interface : B over the same DOFs
+    stiffness : (n_pair, n_component) contact springs [N/m]; n_modes : of the stuck structure
+        kept, or cutoff : all of them up to this frequency [Hz]; give one of the two
+    clusters : of pairs, whose tractions give Ritz vectors; solver : see fem.factor
+    Returns the model; its coordinates are modal, mass = 1; info: n_full, n_modes, factorisation,
+        first_omitted_frequency [Hz], of the stuck modes that were asked for, free_frequency and stuck_frequency [Hz]
+    Raises  ValueError where the structure can move rigidly with all contacts stuck
+    """
+    k = np.ravel(np.asarray(stiffness, float))
+    K_s = stuck_stiffness(csr_matrix(system.stiffness), interface.B, k)
+    M, B = csr_matrix(system.mass), csr_matrix(interface.B)
+    factor = factorise(K_s, solver=solver)
+    _, phi, omitted = fixed_interface_modes(K_s, M, factor, n_modes, cutoff)
+    forces = [np.asarray(v, float) for v in (*system.loads.values(), *system.outputs.values())]
+    tractions = csc_matrix(B.T @ clustered(interface, k, clusters))
+    found = [phi, *_statics(factor, forces, tractions)]
+    V, squares = _ritz(np.concatenate(found, axis=1), K_s, M)
+    at_contact = np.asarray(B @ V)
+    free = np.diag(squares) - at_contact.T @ (k[:, None] * at_contact)
+    reduced = SecondOrderSystem(
+        np.eye(len(squares)),
+        0.5 * (free + free.T),
+        None,
+        {name: V.T @ load for name, load in system.loads.items()},
+        {name: V.T @ row for name, row in system.outputs.items()},
+    )
+    info = ModelInfo(
+        n_full=system.n_dof,
+        n_modes=len(squares),
+        factorisation=factor.name,
+        first_omitted_frequency=omitted / (2 * np.pi),
+        stuck_frequency=np.sqrt(squares[:REPORTED_MODES]) / (2 * np.pi),
+    )
+    rest = ResidualFlexibility(k, K_s, B, V, squares, M)
+    rest.__dict__["factor"] = factor
+    model = ReducedModel(reduced, replace(interface, B=at_contact), V, info, residual=rest)
+    free = linear_modes(model, None, min(REPORTED_MODES, len(squares)))[0]
+    return replace(model, info=replace(info, free_frequency=free))
+
+
+def clustered(interface: ContactInterface, weight: np.ndarray, clusters: int) -> csr_matrix:
+    """Unit tractions (n_contact, n) on clusters of near pairs, a column for every component that a cluster has.
+
+    weight : (n_contact,) share of each row in the traction of its cluster, such as the contact springs
+    """
+    n_comp = len(interface.components)
+    label = _bisected(interface.points, clusters)
+    column = (label[:, None] * n_comp + np.arange(n_comp)).ravel()
+    n = (label.max(initial=0) + 1) * n_comp
+    shape = csr_matrix((weight, (np.arange(len(weight)), column)), shape=(len(weight), n))
+    return csr_matrix(shape[:, np.flatnonzero(np.bincount(column, weight, n))])
+
+
+def _bisected(points: np.ndarray, clusters: int) -> np.ndarray:
+    """(n,) cluster of each point: the largest cluster is halved across its longest side until there are enough."""
+    label = np.zeros(len(points), int)
+    parts = [np.arange(len(points))]
+    while len(parts) < min(clusters, len(points)):
+        widest = int(np.argmax([np.ptp(points[p], axis=0).max() if len(p) > 1 else -1.0 for p in parts]))
+        own = parts.pop(widest)
+        axis = int(np.ptp(points[own], axis=0).argmax())
+        order = own[np.argsort(points[own, axis], kind="stable")]
+        parts += [order[: len(order) // 2], order[len(order) // 2 :]]
+    for i, own in enumerate(parts):
+        label[own] = i
+    return label
+
+
+def _statics(factor: Factor, forces: Sequence[np.ndarray], tractions: csc_matrix) -> list[np.ndarray]:
+    """Static shapes (n_full, n) of forces (n_full,), and of sparse tractions (n_full, k) block by block."""
+    blocks = [np.stack([f for f in forces if f.any()], axis=1)] if any(f.any() for f in forces) else []
+    blocks += [tractions[:, at : at + BLOCK].toarray() for at in range(0, tractions.shape[1], BLOCK)]
+    with threadpool_limits(1):
+        return [factor.solve(np.asfortranarray(block)) for block in blocks]
+
+
+def _ritz(shapes: np.ndarray, K: csr_matrix, M: csr_matrix) -> tuple[np.ndarray, np.ndarray]:
+    """Ritz vectors (n_full, n) of unit modal mass and squared frequencies (n,) in the span of some shapes."""
+    shapes = shapes / np.sqrt(np.einsum("ij,ij->j", shapes, K @ shapes))
+    gram = shapes.T @ (K @ shapes)
+    size, turn = sla.eigh(0.5 * (gram + gram.T))
+    kept = size > DEPENDENT * size[-1]
+    basis = shapes @ (turn[:, kept] / np.sqrt(size[kept]))
+    mass = basis.T @ (M @ basis)
+    nu, y = sla.eigh(0.5 * (mass + mass.T), basis.T @ (K @ basis))
+    nu, y = nu[::-1], y[:, ::-1]
+    V = basis @ (y / np.sqrt(nu))
+    return V, 1.0 / nu

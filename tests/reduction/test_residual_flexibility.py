@@ -1,0 +1,139 @@
+"""Modes of the stuck structure with residual flexibility, against the full model and against Craig-Bampton."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tribodyn.fem.part import Part
+from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.linear.recovery import full_displacement
+from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.reduction.model import ReducedModel
+from tribodyn.reduction.residual_flexibility import clustered, residual_flexibility
+from tribodyn.workflows.run import joints, modelling
+from tribodyn.workflows.scene import scene_file
+
+SMALL = ["geometry.n_patch=5", "geometry.n_length=2", "geometry.n_height=1", "harmonics.kept=[0, 1, 2, 3]"]
+OMEGA = 2 * np.pi * 900.0
+FORCES = 1e-6  # relative difference of contact forces that the reduction is held to here
+
+
+@pytest.fixture(scope="module")
+def beam(tmp_path_factory: pytest.TempPathFactory) -> tuple[scene_file.SceneFile, Part, np.ndarray]:
+    """The beam scene, its small part, and its contact springs."""
+    file = scene_file.read("beam_thesis", SMALL)
+    mesh, node_sets = modelling.make_mesh(file, tmp_path_factory.mktemp("mesh"))
+    part = modelling.make_part(file.part_scene, mesh, node_sets)
+    return file, part, joints.contact_stiffness(file.scene, joints.unreduced(part))
+
+
+def _balance(file: scene_file.SceneFile, model: ReducedModel, harder: float = 1.0) -> HarmonicBalance:
+    made = joints.make_joints(file.scene, model)
+    changed: list[Joint] = [
+        replace(j, parameters=replace(j.parameters, stiffness=harder * j.parameters.stiffness)) for j in made
+    ]
+    basis = HarmonicBasis((0, 1, 2, 3), 100)
+    return HarmonicBalance.of(model, changed, basis, joints.excite(file.scene, None), 2 * np.pi * 1000.0)
+
+
+def _full(part: Part, model: ReducedModel) -> ReducedModel:
+    """Every DOF of the part, dense, with the damping of the reduced model on the same shapes."""
+    M = part.system.mass.toarray()
+    assert model.basis is not None
+    lifted = M @ model.basis
+    system = SecondOrderSystem(
+        M, part.system.stiffness.toarray(), lifted @ model.system.damping @ lifted.T, part.system.loads,
+        part.system.outputs,
+    )  # fmt: skip
+    return ReducedModel(system, replace(part.interface, B=part.interface.B.toarray()))
+
+
+@pytest.mark.parametrize(("harder", "modes", "clusters"), [(1.0, 60, 2), (30.0, 60, 6)])
+def test_contact_forces_are_those_of_the_full_model(beam, harder: float, modes: int, clusters: int) -> None:
+    """Few clusters cost products, not accuracy; springs far stiffer than the bulk cost the accuracy that is told."""
+    file, part, springs = beam
+    reduced = modelling.damped(
+        file.scene, residual_flexibility(part.system, part.interface, harder * springs, modes, clusters=clusters)
+    )
+    reduced_balance, full_balance = _balance(file, reduced, harder), _balance(file, _full(part, reduced), harder)
+    exact = NewtonOptions(tolerance=1e-9)
+    ours, theirs = (newton.solve_from_rest(b, OMEGA, exact) for b in (reduced_balance, full_balance))
+    assert ours.converged
+    assert theirs.converged
+    assert len(np.unique(theirs.state.cycle.status)) > 1  # some stick and some do not
+    wanted = theirs.state.cycle.force
+    limit = FORCES if harder == 1.0 else 10 * reduced_balance.compliance.error
+    assert np.abs(ours.state.cycle.force - wanted).max() < limit * np.abs(wanted).max()
+    found, expected = reduced_balance.outputs(ours.state), full_balance.outputs(theirs.state)
+    assert np.abs(found - expected).max() < limit * np.abs(expected).max()
+    slope = [b.frequency_slope(s.state) for b, s in ((reduced_balance, ours), (full_balance, theirs))]
+    for mine, other in zip(*slope, strict=True):
+        assert np.abs(mine - other).max() < 100 * limit * np.abs(other).max()
+    # the field of the whole part, with what its coordinates leave out
+    moved = full_displacement(
+        reduced_balance, ours.state.flat, ours.state.cycle.force.reshape(ours.state.flat.shape), OMEGA
+    )
+    relative = part.interface.B @ moved
+    assert np.abs(relative - ours.state.flat).max() < 1e-7 * np.abs(ours.state.flat).max()
+
+
+def test_statics_are_exact_and_what_is_left_out_is_told(beam) -> None:
+    """K_s^-1 between contacts, from a dense solve; the share left out is the largest eigenvalue of what the rest is."""
+    _, part, springs = beam
+    model = residual_flexibility(part.system, part.interface, springs, 8, clusters=3)
+    rest, B = model.residual, part.interface.B.toarray()
+    assert rest is not None
+    K_s = part.system.stiffness.toarray() + B.T @ (springs.ravel()[:, None] * B)
+    exact = B @ np.linalg.solve(K_s, B.T)
+    found = rest.apply(np.eye(len(B))) + rest.at_contact @ (rest.at_contact.T / rest.squares[:, None])
+    assert np.abs(found - exact).max() < 1e-10 * np.abs(exact).max()
+    root = np.sqrt(springs.ravel())
+    left = exact - rest.at_contact @ (rest.at_contact.T / rest.squares[:, None])
+    assert rest.left_out == pytest.approx(np.linalg.eigvalsh(root[:, None] * left * root)[-1], rel=0.02)
+    # loads and outputs have no rest at all
+    force = np.stack([*part.system.loads.values(), *part.system.outputs.values()], axis=1)
+    modal = np.stack([*model.system.loads.values(), *model.system.outputs.values()], axis=1)
+    moved = np.linalg.solve(K_s, force)
+    assert np.abs(rest.shapes @ (modal / rest.squares[:, None]) - moved).max() < 1e-8 * np.abs(moved).max()
+
+
+def test_the_error_is_that_of_the_mass_left_out(beam) -> None:
+    _, part, springs = beam
+    omega = 2 * np.pi * 3000.0
+    for modes, clusters in ((6, 1), (20, 4)):
+        model = residual_flexibility(part.system, part.interface, springs, modes, clusters=clusters)
+        rest, B = model.residual, part.interface.B.toarray()
+        assert rest is not None
+        K_s = part.system.stiffness.toarray() + B.T @ (springs.ravel()[:, None] * B)
+        exact = B @ np.linalg.solve(K_s - omega**2 * part.system.mass.toarray(), B.T)
+        modal = rest.at_contact @ (rest.at_contact.T / (rest.squares - omega**2)[:, None])
+        root = np.sqrt(springs.ravel())
+        force = root[:, None] * np.random.default_rng(1).normal(size=(75, 8))
+        off = (exact - modal - rest.apply(np.eye(len(B)))) @ force
+        size = np.linalg.norm(off) / np.linalg.norm(exact @ force)
+        assert 0.2 * size < rest.error(omega) < 20 * size
+
+
+def test_clusters_share_out_all_pairs(beam) -> None:
+    _, part, springs = beam
+    columns = clustered(part.interface, springs.ravel(), 4)
+    assert columns.shape == (75, 12)
+    assert (np.diff(columns.tocsr().indptr) == 1).all()
+    assert np.allclose(columns.sum(), springs.sum())
+
+
+def test_a_copy_in_another_process_makes_its_own_factor(beam) -> None:
+    _, part, springs = beam
+    rest = residual_flexibility(part.system, part.interface, springs, 4, clusters=2).residual
+    force = np.random.default_rng(0).normal(size=(75, 2))
+    again = pickle.loads(pickle.dumps(rest))
+    assert rest is not None
+    assert np.allclose(again.apply(force), rest.apply(force), rtol=1e-10, atol=0)
