@@ -43,6 +43,7 @@ if TYPE_CHECKING:  # what takes long to import is imported where it is needed
     from tribodyn.workflows.benchmarks.bench import Timing
     from tribodyn.workflows.benchmarks.extremes import Trial
     from tribodyn.workflows.benchmarks.fuzz import Tried
+    from tribodyn.workflows.benchmarks.planted_faults import Seen
     from tribodyn.workflows.benchmarks.scaling import SizeCost
 
 Place = str | PathLike[str]
@@ -188,6 +189,18 @@ def extremes(quick: bool = True, *, progress: Report = None) -> tuple[Trial, ...
     from tribodyn.workflows.benchmarks import extremes as table
 
     return table.run(quick, reporter(progress).say)
+
+
+def faults(tree: Place, folder: Place, *, seconds: float = 20.0, progress: Report = None) -> list[Seen]:
+    """Plant faults in the sources, one at a time: which test or setting of `extremes` sees each, and what it changes.
+
+    tree : root of a clone of the repository; folder : of the rows, those that it holds are taken
+    seconds : of the processor, for the tests of one fault
+    Raises  ValueError where the tree is no clone; RuntimeError where planting ends before its time
+    """
+    from tribodyn.workflows.benchmarks import planted_faults
+
+    return planted_faults.run(Path(tree).resolve(), Path(folder).resolve(), reporter(progress).say, seconds)
 
 
 def scaling(sizes: Sequence[int] = (7, 13), *, progress: Report = None) -> list[SizeCost]:

@@ -41,8 +41,8 @@ def scoreboard(
         raise RuntimeError(f"{broken} promises are broken, see {out / 'scoreboard.csv'}")
 
 
-def faults(*, tree: Path = Path(), seconds: float = 25.0, out: Path = Path("faults"), as_json: Json = False) -> None:
-    """Plant faults in a copy of the sources, one at a time, and tell which tests or extremes see them.
+def faults(*, tree: Path = Path(), seconds: float = 20.0, out: Path = Path("faults"), as_json: Json = False) -> None:
+    """Plant faults in the sources, one at a time: what each changes in results, and which test or setting sees it.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def faults(*, tree: Path = Path(), seconds: float = 25.0, out: Path = Path("faul
     seconds
         Processor seconds for the tests of one fault, and again for the judge of extremes.
     out
-        Folder of the copy, the rows and the table. Rows are kept: the same command goes on where it was ended.
+        Folder of the rows and the table. Rows are kept: the same command goes on where it was ended.
     as_json
         Print JSON for machines.
     """
