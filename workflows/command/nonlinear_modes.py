@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -32,6 +33,8 @@ def backbone(
 ) -> None:
     """Follow a nonlinear mode: frequency and damping against amplitude, as a table and a plot.
 
+    Where NAME.published.toml beside the scene has a table [backbone], what it says stands beside it.
+
     Parameters
     ----------
     scene
@@ -49,21 +52,24 @@ def backbone(
     as_json
         Print JSON for machines.
     """
+    from tribodyn.workflows.accuracy.published import published_backbone
     from tribodyn.workflows.pictures import backbone_maps
     from tribodyn.workflows.run.progress import Progress, console_progress
     from tribodyn.workflows.studies import modes
 
     file, asked, folder = _asked(scene, overrides, start, stop, mode, points, out)
+    published = published_backbone(file)
     balance, found = modes.follow_with_contact(file, asked, Progress() if as_json else console_progress())
     written = [folder / "backbone.csv", folder / "backbone.png"]
     modes.write(found, written[0])
-    modes.picture(found, file.name).savefig(written[1])
+    modes.picture(found, file.name, published).savefig(written[1])
+    others = None if published is None else modes.beside(found, published)
     maps = backbone_maps.picture(balance, found, file.name)
     if maps is not None:
         written.append(folder / "backbone_maps.png")
         maps.savefig(written[-1])
     if as_json:
-        print(json.dumps(modes.record(found), indent=2))
+        print(json.dumps(modes.record(found) | ({} if others is None else {"published": others}), indent=2))
     else:
         hertz, damping = found.omega / (2 * math.pi), 100 * found.damping
         print_lines(
@@ -71,10 +77,25 @@ def backbone(
                 ("at rest", f"{found.reference_omega / (2 * math.pi):.6g} Hz"),
                 ("frequency", f"{hertz[0]:.6g} -> {hertz[-1]:.6g} Hz"),
                 ("damping", f"{damping[0]:.4g} -> {damping[-1]:.4g} %, largest {damping.max():.4g} %"),
+                *_beside(others),
                 ("end", str(found.end)),
             ]
         )
         print(*written, sep="\n")
+
+
+def _beside(others: dict[str, Any] | None) -> Iterator[tuple[str, str]]:
+    """What is published of a backbone, as lines: at three of its amplitudes, ours after it."""
+    if others is None or not others["rows"]:
+        return
+    rows = others["rows"]
+    for row in (rows[0], rows[len(rows) // 2], rows[-1]):
+        yield (
+            others["source"] if row is rows[0] else "",
+            f"at {row['modal_amplitude']:.3g} m kg^0.5: {row['frequency_hz']:.5g} Hz ({100 * row['shift']:+.2f} %), "
+            f"{100 * row['damping']:.3g} %; here {row['our_frequency_hz']:.5g} Hz ({100 * row['our_shift']:+.2f} %), "
+            f"{100 * row['our_damping']:.3g} %",
+        )
 
 
 def ring_down(

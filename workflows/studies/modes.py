@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.interpolate import PchipInterpolator
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone, BackboneOptions, backbone
 from tribodyn.hbm.threads import limited
+from tribodyn.workflows.accuracy.published import PublishedBackbone
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, named
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
 from tribodyn.workflows.result.columns import write_columns
@@ -100,20 +102,53 @@ def record(found: Backbone) -> dict[str, Any]:
     }
 
 
+def beside(found: Backbone, published: PublishedBackbone) -> dict[str, Any]:
+    """A published backbone for machines, and ours at those of its amplitudes that ours has reached.
+
+    shift : change of the frequency from the first of these amplitudes on, of that frequency
+    """
+    good = found.converged
+    at, order = np.unique(found.modal_amplitude[good], return_index=True)
+    inside = (published.modal_amplitude >= at[0]) & (published.modal_amplitude <= at[-1])
+    a = published.modal_amplitude[inside]
+    ours = [PchipInterpolator(np.log(at), v[good][order])(np.log(a)) for v in (found.frequency, found.damping)]
+    theirs = [published.frequency[inside], published.damping[inside]]
+    columns = {
+        "modal_amplitude": a,
+        "frequency_hz": theirs[0],
+        "damping": theirs[1],
+        "our_frequency_hz": ours[0],
+        "our_damping": ours[1],
+        "shift": theirs[0] / theirs[0][:1] - 1,
+        "our_shift": ours[0] / ours[0][:1] - 1,
+    }
+    return {
+        "source": published.source,
+        "rows": [dict(zip(columns, map(float, row), strict=True)) for row in np.array([*columns.values()]).T],
+    }
+
+
 def write(found: Backbone, path: Path) -> None:
     """The converged points as comma-separated values."""
     columns = {name: value for name, value in record(found).items() if isinstance(value, list) and name != "rows"}
     write_columns(columns, path)
 
 
-def picture(found: Backbone, scene: str = "") -> Figure:
-    """Frequency and damping ratio against amplitude; scene : its name, for the title."""
+def picture(found: Backbone, scene: str = "", published: PublishedBackbone | None = None) -> Figure:
+    """Frequency and damping ratio against amplitude; scene : its name, for the title; published : drawn beside."""
     good = found.converged
     unit, scale = length_unit(found.amplitude[good].max())
     amplitude = scale * found.amplitude[good]
     with axes_of(7.2, 5.6, rows=2) as (figure, (upper, lower)):
         upper.plot(amplitude, found.omega[good] / (2 * np.pi), ".-", color=BLUE, ms=4)
         upper.axhline(found.reference_omega / (2 * np.pi), color=GREY, ls="--", lw=1.2, label="at rest")
+        if published is not None:
+            reached = published.modal_amplitude <= found.modal_amplitude[good].max()
+            of_mode = found.amplitude[good][0] / found.modal_amplitude[good][0]
+            there = scale * of_mode * published.modal_amplitude[reached]
+            kind = {"color": GREY, "marker": "o", "ms": 4, "lw": 1, "mfc": "none", "label": published.source}
+            upper.plot(there, published.frequency[reached], **kind)
+            lower.plot(there, 100 * published.damping[reached], **kind)
         upper.set(ylabel="frequency / Hz", title=named(scene, "backbone"))
         upper.legend(loc="best", fontsize=9)
         lower.plot(amplitude, 100 * found.damping[good], ".-", color=ORANGE, ms=4)

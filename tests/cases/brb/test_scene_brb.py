@@ -124,10 +124,17 @@ def test_rough_faces_soften_and_damp_along_the_backbone(name):
 def test_the_command_gives_rows_by_modal_amplitude(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch):
     model = built("brb")
     monkeypatch.setattr(modelling, "build", lambda file, *_: model)
-    words = ["backbone", "brb", "--points", "4", "--out", str(tmp_path), "--json"]
+    words = ["backbone", "brb_flat", "--points", "4", "--out", str(tmp_path), "--json"]  # beside what is published
     code, out, err = leave(words, capsys)
     assert code == 0, err
-    rows = json.loads(out)["rows"]
+    said = json.loads(out)
+    rows = said["rows"]
+    assert said["published"]["source"] == "Porter and Brake 2023"
+    first, last = said["published"]["rows"][0], said["published"]["rows"][-1]
+    assert first["frequency_hz"] == 168.502
+    assert last["shift"] == pytest.approx(160.778 / 168.502 - 1)
+    ours = [row["frequency_hz"] for row in rows]
+    assert all(min(ours) <= row["our_frequency_hz"] <= max(ours) for row in (first, last))
     assert set(rows[0]) >= {"modal_amplitude", "frequency_hz", "damping", "amplitude_m", "acceleration_m_s2"}
     first = rows[0]
     swing = (2 * np.pi * first["frequency_hz"]) ** 2 * first["amplitude_m"]
