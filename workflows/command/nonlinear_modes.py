@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from tribodyn.workflows.command.words import Json, Overrides, make_room, print_lines, quantity
+from tribodyn.workflows.command.words import Changes, Json, Overrides, make_room, print_lines, quantity
 
 if TYPE_CHECKING:  # the program starts sooner without them
     from tribodyn.workflows.scene.scene_file import SceneFile
+    from tribodyn.workflows.studies.changed_backbones import Changed
     from tribodyn.workflows.studies.modes import Way
 
 Start = Annotated[str | None, Parameter(name="--from")]
@@ -27,6 +28,7 @@ def backbone(
     stop: Stop = None,
     mode: int | None = None,
     points: int | None = None,
+    change: Changes = (),
     overrides: Overrides = (),
     out: Path | None = None,
     as_json: Json = False,
@@ -47,6 +49,9 @@ def backbone(
         Number of the mode about the static equilibrium, from 0; 0 or that of [backbone] by default.
     points
         Points on an easy way; there are more where the backbone bends. 40 or those of [backbone] by default.
+    change
+        Follow it again with this changed and say what it does, such as "harmonics.samples=256", or several keys joined
+        by ";"; can be repeated: what harmonics, samples and meshes change is their error.
     out
         Folder of backbone.csv, backbone.png and, where faces rub, backbone_maps.png; results/NAME by default.
     as_json
@@ -55,21 +60,25 @@ def backbone(
     from tribodyn.workflows.accuracy.published import published_backbone
     from tribodyn.workflows.pictures import backbone_maps
     from tribodyn.workflows.run.progress import Progress, console_progress
-    from tribodyn.workflows.studies import modes
+    from tribodyn.workflows.studies import changed_backbones, modes
 
     file, asked, folder = _asked(scene, overrides, start, stop, mode, points, out)
-    published = published_backbone(file)
-    balance, found = modes.follow_with_contact(file, asked, Progress() if as_json else console_progress())
+    published, others = published_backbone(file), changed_backbones.changed_scenes(file, change)
+    progress = Progress() if as_json else console_progress()
+    model, found = modes.follow_with_model(file, asked, progress)
     written = [folder / "backbone.csv", folder / "backbone.png"]
     modes.write(found, written[0])
     modes.picture(found, file.name, published).savefig(written[1])
-    others = None if published is None else modes.beside(found, published)
-    maps = backbone_maps.picture(balance, found, file.name)
+    printed = None if published is None else modes.beside(found, published)
+    maps = backbone_maps.picture(model.balance, found, file.name)
     if maps is not None:
         written.append(folder / "backbone_maps.png")
         maps.savefig(written[-1])
+    changed = changed_backbones.follow(file, asked, model, found, others, progress)
     if as_json:
-        print(json.dumps(modes.record(found) | ({} if others is None else {"published": others}), indent=2))
+        said = modes.record(found) | ({} if printed is None else {"published": printed})
+        said |= {"changes": [one.record() for one in changed]} if changed else {}
+        print(json.dumps(said, indent=2))
     else:
         hertz, damping = found.omega / (2 * math.pi), 100 * found.damping
         print_lines(
@@ -77,7 +86,8 @@ def backbone(
                 ("at rest", f"{found.reference_omega / (2 * math.pi):.6g} Hz"),
                 ("frequency", f"{hertz[0]:.6g} -> {hertz[-1]:.6g} Hz"),
                 ("damping", f"{damping[0]:.4g} -> {damping[-1]:.4g} %, largest {damping.max():.4g} %"),
-                *_beside(others),
+                *_beside(printed),
+                *_changed(changed),
                 ("end", str(found.end)),
             ]
         )
@@ -96,6 +106,19 @@ def _beside(others: dict[str, Any] | None) -> Iterator[tuple[str, str]]:
             f"{100 * row['damping']:.3g} %; here {row['our_frequency_hz']:.5g} Hz ({100 * row['our_shift']:+.2f} %), "
             f"{100 * row['our_damping']:.3g} %",
         )
+
+
+def _changed(changed: Sequence[Changed]) -> Iterator[tuple[str, str]]:
+    """What changes of the scene do, as lines: at the first, a middle and the last amplitude."""
+    from tribodyn.workflows.studies.changed_backbones import summed
+
+    for one in changed:
+        at = [0, len(one.modal_amplitude) // 2, -1]
+        frequency, damping = (", ".join(f"{100 * v[i]:+.3g}" for i in at) for v in (one.frequency, one.damping))
+        yield one.change, f"frequency {frequency} %, damping {damping} % in {one.seconds:.3g} s"
+    if changed:
+        frequency, damping = (f"{100 * share:.3g} %" for share in summed(changed))
+        yield "all of them", f"frequency {frequency}, damping {damping} at most, summed without signs"
 
 
 def ring_down(

@@ -58,17 +58,17 @@ def follow(file: SceneFile, asked: Way, progress: Progress) -> Backbone:
 
     Raises  ValueError for what cannot be; SolveFailed where not even the first point is found
     """
-    return follow_with_contact(file, asked, progress)[1]
+    return follow_with_model(file, asked, progress)[1]
 
 
-def follow_with_contact(file: SceneFile, asked: Way, progress: Progress) -> tuple[HarmonicBalance, Backbone]:
-    """The same with the balance that it was followed in, for what the contact does."""
+def follow_with_model(file: SceneFile, asked: Way, progress: Progress) -> tuple[modelling.Model, Backbone]:
+    """The same with the model that it was followed in, for what the contact does."""
     with limited(file.scene.solver.threads):
-        balance = modelling.build(file, None, progress).balance
-        found = along(file, balance, asked, progress)
+        model = modelling.build(file, None, progress)
+        found = along(file, model.balance, asked, progress)
     if not found.converged.any():
         raise SolveFailed(f"the backbone {found.end}")
-    return balance, found
+    return model, found
 
 
 def along(file: SceneFile, balance: HarmonicBalance, asked: Way, progress: Progress) -> Backbone:
@@ -107,12 +107,10 @@ def beside(found: Backbone, published: PublishedBackbone) -> dict[str, Any]:
 
     shift : change of the frequency from the first of these amplitudes on, of that frequency
     """
-    good = found.converged
-    at, order = np.unique(found.modal_amplitude[good], return_index=True)
-    inside = (published.modal_amplitude >= at[0]) & (published.modal_amplitude <= at[-1])
+    reached = found.modal_amplitude[found.converged]
+    inside = (published.modal_amplitude >= reached.min()) & (published.modal_amplitude <= reached.max())
     a = published.modal_amplitude[inside]
-    ours = [PchipInterpolator(np.log(at), v[good][order])(np.log(a)) for v in (found.frequency, found.damping)]
-    theirs = [published.frequency[inside], published.damping[inside]]
+    ours, theirs = at(found, a), (published.frequency[inside], published.damping[inside])
     columns = {
         "modal_amplitude": a,
         "frequency_hz": theirs[0],
@@ -122,10 +120,20 @@ def beside(found: Backbone, published: PublishedBackbone) -> dict[str, Any]:
         "shift": theirs[0] / theirs[0][:1] - 1,
         "our_shift": ours[0] / ours[0][:1] - 1,
     }
-    return {
-        "source": published.source,
-        "rows": [dict(zip(columns, map(float, row), strict=True)) for row in np.array([*columns.values()]).T],
-    }
+    return {"source": published.source, "rows": rows(columns)}
+
+
+def at(found: Backbone, modal_amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Frequency [Hz] and damping ratio between the points of a backbone."""
+    good = found.converged
+    a, order = np.unique(found.modal_amplitude[good], return_index=True)
+    values = (found.frequency[good][order], found.damping[good][order])
+    return tuple(PchipInterpolator(np.log(a), v)(np.log(modal_amplitude)) for v in values)
+
+
+def rows(columns: dict[str, np.ndarray]) -> list[dict[str, float]]:
+    """Columns (n,) as rows for machines."""
+    return [dict(zip(columns, map(float, row), strict=True)) for row in np.array([*columns.values()]).T]
 
 
 def write(found: Backbone, path: Path) -> None:
