@@ -231,7 +231,14 @@ class HarmonicBalance:
 
 
 class LinearSide(Protocol):
-    """The linear side of a balance at its frequency or frequencies, G; see `CompliancePoint`."""
+    """The linear side of a balance at its frequency or frequencies, G; see `CompliancePoint`.
+
+    blocks : (n_block, m, m) diagonal blocks of G over equal runs of contact rows with all their coefficients, which
+        then precondition; None where `coarse_part` does
+    """
+
+    @property
+    def blocks(self) -> np.ndarray | None: ...
 
     def apply(self, g: np.ndarray) -> np.ndarray: ...
 
@@ -265,7 +272,7 @@ class Linearisation:
         self.active = np.flatnonzero(np.abs(dg).max(axis=(1, 2)) > 1e-14 * k.max(axis=1))
         self.rows = (self.active[:, None] * n_comp + np.arange(n_comp)).ravel()
         self._dg = np.ascontiguousarray(dg[self.active])
-        self._shape = (n_pair * n_comp, n_coeff)
+        self._shape, self._n_pair = (n_pair * n_comp, n_coeff), n_pair
         self._point = point
         self._product = self._point.jacobian_product(self.rows)
 
@@ -286,11 +293,34 @@ class Linearisation:
         return d - self._product(self.g_slope(d))
 
     def precondition(self, d: np.ndarray) -> np.ndarray:
-        """An approximate solution of (I - G dg/dx) p = d on the rows of active pairs, by the coarse part of G."""
+        """An approximate solution of (I - G dg/dx) p = d on the rows of active pairs, by blocks or coarse part of G."""
+        if self._block_inverse is not None:
+            full = np.zeros(self._shape)
+            full[self.rows] = d
+            n = len(self._block_inverse)
+            solved: np.ndarray = np.matmul(self._block_inverse, full.reshape(n, -1, 1)).reshape(self._shape)
+            return solved[self.rows]
         if self._coarse_inverse is None:
             return d
         u, inverse = self._coarse_inverse
         return d + u @ (inverse @ (u.T @ self.g_slope(d)).ravel()).reshape(u.shape[1], -1)
+
+    @cached_property
+    def _block_inverse(self) -> np.ndarray | None:
+        """Inverses of the diagonal blocks of I - G dg/dx; None where there are none or one is singular."""
+        g = self._point.blocks
+        if g is None:
+            return None
+        n, m = len(g), g.shape[1]
+        pairs, width = self._n_pair, self._dg.shape[1]
+        slope = np.zeros((pairs, width, width))
+        slope[self.active] = self._dg
+        slope = slope.reshape(n, pairs // n, width, width)
+        through = np.matmul(g.reshape(n, m, pairs // n, width).transpose(0, 2, 1, 3), slope).transpose(0, 2, 1, 3)
+        try:
+            return np.linalg.inv(np.eye(m) - through.reshape(n, m, m))
+        except np.linalg.LinAlgError:
+            return None
 
     @cached_property
     def _coarse_inverse(self) -> tuple[np.ndarray, np.ndarray] | None:

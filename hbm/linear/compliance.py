@@ -171,6 +171,8 @@ class CompliancePoint:
     outputs_lin : (n_output, n_coeff) its outputs [m]
     """
 
+    blocks = None
+
     def __init__(self, compliance: ContactCompliance, omega: float):
         self.compliance = compliance
         self.omega = omega

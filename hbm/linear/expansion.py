@@ -320,9 +320,10 @@ class PortCompliance:
         return out
 
     def slope(self, force: np.ndarray) -> np.ndarray:
-        """d (apply) / d s of all ports under forces (n_port,)."""
+        """d (apply) / d s of all ports under forces (n_port, ...)."""
         x, s, ratio = self.expansion, self.s, self.ratio
-        z, dz = _product(x.b.conj().T, force).astype(complex), np.zeros(len(x.lam), complex)
+        z = _product(x.b.conj().T, force).astype(complex)
+        dz = np.zeros_like(z)
         d_core = 2 * s * np.eye(len(x.lam)) + x.c
         for k, (e, t) in enumerate(zip(x.e_in, x.t, strict=True), start=1):
             part = _product(e.conj().T, force)

@@ -46,6 +46,11 @@ class _Points:
         self.points = points
         self.n_component = n_component
 
+    @property
+    def blocks(self) -> np.ndarray | None:
+        """Diagonal blocks for a preconditioner, of one duty alone."""
+        return self.points[0].blocks if len(self.points) == 1 else None
+
     def split(self, rows: np.ndarray) -> list[np.ndarray]:
         """Rows (n * n_duty * n_component, n_coeff) duty by duty."""
         by_duty = rows.reshape(-1, len(self.points), self.n_component, rows.shape[-1])

@@ -6,14 +6,16 @@ import os
 import signal
 import threading
 from collections import Counter, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 
+from typing import Protocol, TypeVar
+
 from threadpoolctl import threadpool_limits
 
-from tribodyn.workflows.designs.task import Row, Task, solve
+from tribodyn.workflows.designs.task import Row
 
 ATTEMPTS = 3  # of a run whose process dies, such as for want of memory
 
@@ -23,15 +25,28 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def finished(tasks: Sequence[Task], workers: int) -> Iterator[Row]:
-    """Rows as they come; a run whose process died ATTEMPTS times is lost."""
+class Numbered(Protocol):
+    """A run, from 1, and the hash of all that its row depends on."""
+
+    @property
+    def number(self) -> int: ...
+
+    @property
+    def key(self) -> str: ...
+
+
+Work = TypeVar("Work", bound=Numbered)
+
+
+def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], Row]) -> Iterator[Row]:
+    """Rows as they come, made by `solve` of a module; a run whose process died ATTEMPTS times is lost."""
     # Gmsh, once used in this process, sets this to the default: a pipe to a dead process would end the study
     if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # as Python begins
     waiting, deaths = deque(tasks), Counter[int]()
     while waiting:
         pool = ProcessPoolExecutor(min(workers, len(waiting)), get_context("spawn"), _one_thread)
-        under_way: dict[Future[Row], Task] = {}
+        under_way: dict[Future[Row], Work] = {}
         try:
             while waiting or under_way:
                 # no more than there are processes: what is under way when one dies is then known

@@ -15,7 +15,7 @@ from tribodyn.workflows.designs.shared_models import shared
 from tribodyn.workflows.designs.space import Space
 from tribodyn.workflows.designs.study_file import Study
 from tribodyn.workflows.designs.table import StudyTable, table, write
-from tribodyn.workflows.designs.task import Row, Task
+from tribodyn.workflows.designs.task import Row, Task, solve
 from tribodyn.workflows.run.checkpoint import alone_in
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.reuse import early_of
@@ -104,7 +104,7 @@ def draw(study: Study, found: StudyTable, folder: Path) -> None:
 def _finished(tasks: Sequence[Task], workers: int, scheduler: str) -> Iterator[Row]:
     if not tasks:
         return iter(())
-    return cluster.finished(tasks, scheduler, workers) if scheduler else pool.finished(tasks, workers)
+    return cluster.finished(tasks, scheduler, workers) if scheduler else pool.finished(tasks, workers, solve)
 
 
 def task_at(study: Study, values: Mapping[str, Any]) -> Task:

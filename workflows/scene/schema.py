@@ -37,7 +37,7 @@ from tribodyn.workflows.scene.solution import (
     Solver,
 )
 from tribodyn.workflows.scene.wear import Wear
-from tribodyn.workflows.scene.wheel import Wheel
+from tribodyn.workflows.scene.wheel import Mistuning, Wheel
 from tribodyn.workflows.scene.words import unknown_key
 
 CENTRIFUGAL = "centrifugal"
@@ -110,6 +110,8 @@ class MeshScene(Scene):
     """The reduction."""
     wheel: Wheel | None = None
     """The wheel of which the part is one sector."""
+    mistuning: Mistuning | None = None
+    """How far its blades differ."""
 
     one_body: ClassVar[bool] = False
     """Whether it can have a single body only."""
@@ -144,6 +146,8 @@ class MeshScene(Scene):
             if self.wheel is None and contact.sector is not None:
                 raise ValueError(f"{name}: sector is for a [wheel], and the scene has none: leave it out")
         if self.wheel is None:
+            if self.mistuning is not None:
+                raise ValueError("mistuning is for a [wheel], and the scene has none: leave it out")
             return self
         for contact in self.joints.values():
             outward = contact.meets_next or self.one_body

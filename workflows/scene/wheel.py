@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field, StrictBool, StrictInt
 
-from tribodyn.workflows.scene.fields import Direction, Frequency, Table
+from tribodyn.workflows.scene.fields import Direction, Frequency, Length, Number, Table
 
 
 class Wheel(Table):
@@ -29,3 +29,32 @@ class Wheel(Table):
     """Speed of rotation: its centrifugal force is a static load, its stress stiffens, its frame softens and turns."""
     coriolis: StrictBool = True
     """Whether the Coriolis forces of the turning frame act: they part waves with the rotation from those against."""
+
+
+Spread = Annotated[Number, Field(ge=0, le=0.3)]
+
+
+class Mistuning(Table):
+    """Blades that differ: what is drawn for `tribodyn mistuning`, blade by blade and pattern by pattern.
+
+    All deviations are normally distributed and cut off at three standard deviations.
+    """
+
+    frequency: Spread = 0.0
+    """Standard deviation of the blades' own frequencies, relative: the stiffness of a sector goes with their square."""
+    friction: Spread = 0.0
+    """Standard deviation of the coefficient of friction of every blade's contacts, relative."""
+    gap: Annotated[Length, Field(ge=0)] = 0.0
+    """Standard deviation of the gap of every blade's contacts."""
+    body: str | None = None
+    """Body whose stiffness deviates; the whole sector by default."""
+    families: Annotated[StrictInt, Field(ge=1)] = 2
+    """Modes of every nodal diameter in which a deviating stiffness acts, beside the static shapes of the loads."""
+    left_out: Annotated[Number, Field(gt=0, lt=1)] = 1e-3
+    """Share of strain energy below which one of these shapes counts as made of the others; smaller is more exact."""
+    patterns: Annotated[StrictInt, Field(ge=1)] = 100
+    """Number of patterns that are drawn."""
+    seed: StrictInt = 1
+    """Of what is drawn: the same seed and number give the same pattern, however many there are."""
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] = 0.05
+    """Error of the response between the points at which a pattern is scanned for its highest peak."""

@@ -1,0 +1,91 @@
+"""Blades that differ: the balance of a whole wheel with contact on every blade, at the cost of its reduced sector.
+
+Sectors differ in stiffness on a few shapes (`hbm.linear.mistuned`) and in any parameter of their contacts. Rows of the
+contact and outputs "<name>@<sector>" are those of the whole wheel, sector by sector.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NoReturn
+
+import numpy as np
+
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.joint import Contact
+from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.linear.mistuned import Alike, MistunedCompliance
+from tribodyn.reduction.model import ReducedModel
+
+Change = Callable[[ContactParameters, np.ndarray], ContactParameters]
+"""Makes the parameters of a joint of sectors that differ from its own and the sector (n_pair,) of each pair."""
+
+
+@dataclass(frozen=True)
+class MistunedWheel:
+    """Sectors alike, ready to be made different.
+
+    wave : balance of one sector under a travelling wave, whose model has the outputs `ports`, see
+        `reduction.mistuning.with_ports`
+    """
+
+    wave: HarmonicBalance
+    ports: tuple[str, ...]
+
+    @property
+    def n_sectors(self) -> int:
+        """Number of sectors."""
+        return self.alike.n_sectors
+
+    @cached_property
+    def alike(self) -> Alike:
+        """The linear side of sectors alike, made once."""
+        one = self.wave
+        return Alike(one.model, one.contact.stiffness, one.basis, one.excitation, one.omega_max, self.ports)
+
+    @cached_property
+    def _model(self) -> ReducedModel:
+        n, one = self.n_sectors, self.wave.model
+        i = one.interface
+        faces = np.concatenate([i.faces + k * i.n_pair for k in range(n)])
+        whole = replace(
+            i,
+            points=np.tile(i.points, (n, 1)),
+            frames=np.tile(i.frames, (n, 1, 1)),
+            area=np.tile(i.area, n),
+            gap=np.tile(i.gap, n),
+            B=np.tile(np.asarray(i.B), (n, 1)),
+            faces=faces,
+        )
+        info = replace(one.info, joints={}, engine_order=None)
+        return replace(one, interface=whole, info=info, per_harmonic=_no_system, per_index=None, harmonic_basis=None)
+
+    def balance(self, deviation: np.ndarray, change: Change | None = None) -> HarmonicBalance:
+        """The wheel with relative deviations (N,) of stiffness, and contacts that are the sector's or changed ones.
+
+        Raises  ValueError for deviations that cannot be
+        """
+        one = self.wave
+        compliance = MistunedCompliance(self.alike, one.basis, deviation)
+        joints = one.contact.repeated(self.n_sectors)
+        if change is not None:
+            size = one.contact.n_pair
+            joints = tuple(replace(j, parameters=change(j.parameters, j.rows // size)) for j in joints)
+        contact = Contact.of(self._model, joints)
+        memory = np.tile(one.memory, (self.n_sectors, 1))
+        at_rest = None if one.at_rest is None else np.tile(one.at_rest, (self.n_sectors, 1))
+        whole = HarmonicBalance(
+            self._model, contact, one.basis, one.excitation, one.omega_max, memory, compliance, one.load_factor, at_rest
+        )
+        return whole
+
+
+def _no_system(h: int) -> NoReturn:
+    raise ValueError("sectors that differ have no system of one harmonic: stability and integration in time need one")
+
+
+def spread(values: Sequence[float] | np.ndarray, sector: np.ndarray) -> np.ndarray:
+    """Values of sectors (N,) at pairs, sector : (n_pair,)."""
+    return np.asarray(values, float)[sector]
