@@ -315,8 +315,9 @@ class Linearisation:
         pairs, width = self._n_pair, self._dg.shape[1]
         slope = np.zeros((pairs, width, width))
         slope[self.active] = self._dg
-        slope = slope.reshape(n, pairs // n, width, width)
-        through = np.matmul(g.reshape(n, m, pairs // n, width).transpose(0, 2, 1, 3), slope).transpose(0, 2, 1, 3)
+        of_block = slope.reshape(n, pairs // n, width, width)
+        columns = g.reshape(n, m, pairs // n, width).transpose(0, 2, 1, 3)
+        through = np.matmul(columns, of_block).transpose(0, 2, 1, 3)
         try:
             return np.linalg.inv(np.eye(m) - through.reshape(n, m, m))
         except np.linalg.LinAlgError:

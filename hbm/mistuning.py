@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NoReturn
+from typing import NoReturn, cast
 
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Contact
 from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.linear.mistuned import Alike, MistunedCompliance
 from tribodyn.reduction.model import ReducedModel
 
@@ -68,7 +69,8 @@ class MistunedWheel:
         Raises  ValueError for deviations that cannot be
         """
         one = self.wave
-        compliance = MistunedCompliance(self.alike, one.basis, deviation)
+        # to a balance it is what a ContactCompliance is; what needs matrices of a harmonic is refused by the model
+        compliance = cast(ContactCompliance, MistunedCompliance(self.alike, one.basis, deviation))
         joints = one.contact.repeated(self.n_sectors)
         if change is not None:
             size = one.contact.n_pair
@@ -76,10 +78,9 @@ class MistunedWheel:
         contact = Contact.of(self._model, joints)
         memory = np.tile(one.memory, (self.n_sectors, 1))
         at_rest = None if one.at_rest is None else np.tile(one.at_rest, (self.n_sectors, 1))
-        whole = HarmonicBalance(
+        return HarmonicBalance(
             self._model, contact, one.basis, one.excitation, one.omega_max, memory, compliance, one.load_factor, at_rest
         )
-        return whole
 
 
 def _no_system(h: int) -> NoReturn:

@@ -1,9 +1,9 @@
 """Stiffness of a sector on a few shapes: what differs from blade to blade, at the cost of as many coordinates.
 
-A sector whose stiffness K is a factor 1 + d away moves nearly in the modes that the wheel of sectors alike has there, of
-all nodal diameters (nominal modes). With Phi a K-orthonormal basis of these, d K is taken as d K Phi Phi^H K, which has
-the rank of Phi, is the same on all that Phi spans, and is d K itself where Phi spans everything. What is left out is of
-the second order of what a motion has beside Phi.
+A sector whose stiffness K is a factor 1 + d away moves nearly in the modes that the wheel of sectors alike has there,
+of all nodal diameters (nominal modes), and in the static shapes of its loads. With Phi a K-orthonormal basis of these,
+d K is taken as d K Phi Phi^H K, which has the rank of Phi, is the same on all that Phi spans, and is d K itself where
+Phi spans everything.
 Source  nominal modes: Yang and Griffin 2001, A reduced-order model of mistuning using a subset of nominal system modes
 """
 
@@ -20,6 +20,7 @@ from tribodyn.fem.hermitian import hermitian_modes
 from tribodyn.reduction.cyclic import ReducedSector
 from tribodyn.reduction.linear import stuck_stiffness
 
+HELD = (1.0, 0.05)  # share of the contact springs that acts: a contact that slips is nearly free
 RESISTED = 1e-12  # energy over that of the stiffest coordinate, from which on a shape strains
 PORT = "mistuning"
 
@@ -30,9 +31,14 @@ def port_name(k: int) -> str:
 
 
 def nominal_shapes(
-    reduced: ReducedSector, springs: np.ndarray, stiffness: np.ndarray, families: int, loads: Sequence[str], left_out: float
+    reduced: ReducedSector,
+    springs: np.ndarray,
+    stiffness: np.ndarray,
+    families: int,
+    loads: Sequence[str],
+    left_out: float,
 ) -> np.ndarray:
-    """K-orthonormal shapes (n, r) of a sector in which the wheel of sectors alike moves.
+    """K-orthonormal shapes (n, r) of a sector in which the wheel of sectors alike moves, contacts stuck or nearly free.
 
     springs : (n_pair, n_component) of closed, stuck contacts [N/m]; stiffness : (n, n) the part K that deviates [N/m]
     families : modes of every nodal diameter; loads : those whose static shapes are added, of every nodal diameter
@@ -41,12 +47,13 @@ def nominal_shapes(
     sector, columns = reduced.sector, []
     for index in range(sector.n_sectors // 2 + 1):
         system, B = at_index(sector, index)
-        K = np.asarray(stuck_stiffness(system.stiffness, np.asarray(B), springs))
-        modes = hermitian_modes(K, system.mass, min(families, len(K)))[1]
-        forces = [system.loads[name] for name in loads]
-        static = sla.solve(K, np.stack(forces, axis=1), assume_a="her") if forces else np.zeros((len(K), 0))
-        moved = seam_map(sector, index) @ np.concatenate([modes, static], axis=1)
-        columns += [moved.real, moved.imag]
+        forces = np.array([system.loads[name] for name in loads]).reshape(len(loads), -1).T
+        for share in HELD:
+            K = np.asarray(stuck_stiffness(system.stiffness, np.asarray(B), share * springs))
+            modes = hermitian_modes(K, system.mass, min(families, len(K)))[1]
+            static = sla.solve(K, forces, assume_a="her")
+            moved = seam_map(sector, index) @ np.concatenate([modes, static], axis=1)
+            columns += [moved.real, moved.imag]
     return orthonormal(stiffness, np.concatenate(columns, axis=1), left_out)
 
 

@@ -1,7 +1,8 @@
 """The linear side of a wheel whose sectors differ in stiffness: that of sectors alike, corrected on a few shapes.
 
-Sectors alike have a block-circulant compliance H(s): a discrete Fourier transform over the sectors leaves a small matrix
-for every nodal diameter. Sector n deviates by P^H d_n P, P its rows on a few shapes (`reduction.mistuning`), so that
+Sectors alike have a block-circulant compliance H(s): a discrete Fourier transform over the sectors leaves a small
+matrix for every nodal diameter. Sector n deviates by P^H d_n P, P its rows on a few shapes (`reduction.mistuning`), so
+that
 
     G = H - H P^H (I + d P H P^H)^-1 d P H
 
@@ -13,11 +14,13 @@ Source  Yang and Griffin 2001; Sherman and Morrison 1950; Woodbury 1950
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
+from scipy import fft
+from scipy.linalg import inv, lu_factor, lu_solve
 
 from tribodyn.fem.wheel import of_sector
 from tribodyn.hbm.excitation import Excitation
@@ -54,7 +57,7 @@ class Alike:
         names = sorted({name for _, name in excitation.loads})
         self.outputs = tuple(name for name in system.outputs if name not in ports)
         counts = np.cumsum([0, len(self.k), len(names), len(self.outputs), len(ports)])
-        self.contacts, self.loads, self.seen, self.ports = (slice(*pair) for pair in zip(counts, counts[1:]))  # noqa: B905
+        self.contacts, self.loads, self.seen, self.ports = (slice(*pair) for pair in pairwise(counts))
         self.n_port = int(counts[-1])
         self._of_index: list[Expansion] = []
         for index in range(N // 2 + 1):
@@ -89,7 +92,7 @@ class Alike:
         """d (at) / d s."""
         return self._of_every_index(lambda one: one.at(s).slope(np.eye(self.n_port, dtype=complex)))
 
-    def _of_every_index(self, make) -> np.ndarray:  # type: ignore[no-untyped-def]
+    def _of_every_index(self, make: Callable[[Expansion], np.ndarray]) -> np.ndarray:
         N = self.n_sectors
         found = np.empty((N, self.n_port, self.n_port), complex)
         for index, (one, other) in enumerate(zip(self._of_index, self._mirrored, strict=True)):
@@ -118,7 +121,9 @@ class MistunedCompliance:
         self.error = alike.error
         self._force = alike.force
         self._points: OrderedDict[float, MistunedPoint] = OrderedDict()
+        # stiffness at rest is the same at every frequency
         self._static: tuple[np.ndarray, np.ndarray] | None = None
+        self._static_inverse: np.ndarray | None = None
 
     def restricted(self, basis: HarmonicBasis) -> MistunedCompliance:
         """The same for fewer of the harmonics."""
@@ -137,14 +142,29 @@ class MistunedCompliance:
         """Factors of I + d P H P^H (N r, N r) of a harmonic, from P H P^H by distance of sectors (N, r, r)."""
         if h == 0 and self._static is not None:
             return self._static
-        N, r = self.alike.n_sectors, around.shape[1]
-        apart = (np.arange(N)[:, None] - np.arange(N)) % N
-        matrix = around[apart].transpose(0, 2, 1, 3).reshape(N * r, N * r) * np.repeat(self.deviation, r)[:, None]
-        matrix[np.arange(N * r), np.arange(N * r)] += 1.0
+        matrix = self.matrix(around)
         found: tuple[np.ndarray, np.ndarray] = lu_factor(matrix, overwrite_a=True, check_finite=False)
         if h == 0:
             self._static = found
         return found
+
+    def inverse(self, h: float, around: np.ndarray) -> np.ndarray:
+        """(I + d P H P^H)^-1 d of a harmonic in single precision; arguments as for `factor`."""
+        if h == 0 and self._static_inverse is not None:
+            return self._static_inverse
+        made = inv(self.matrix(around).astype(np.complex64), overwrite_a=True, check_finite=False)
+        found: np.ndarray = made * np.repeat(self.deviation, around.shape[1]).astype(np.float32)
+        if h == 0:
+            self._static_inverse = found
+        return found
+
+    def matrix(self, around: np.ndarray) -> np.ndarray:
+        """I + d P H P^H (N r, N r); see `factor`."""
+        N, r = self.alike.n_sectors, around.shape[1]
+        apart = (np.arange(N)[:, None] - np.arange(N)) % N
+        matrix = around[apart].transpose(0, 2, 1, 3).reshape(N * r, N * r) * np.repeat(self.deviation, r)[:, None]
+        matrix[np.arange(N * r), np.arange(N * r)] += 1.0
+        return matrix
 
     def at(self, omega: float) -> MistunedPoint:
         """The compliance at one excitation frequency [rad/s]; the last ones are kept."""
@@ -171,7 +191,7 @@ class MistunedPoint:
         self._moved = np.ascontiguousarray(H[:, :, a.ports])  # of the mistuned shapes, under all forces
         self._back = np.ascontiguousarray(H[:, :, :, a.ports])  # of all ports, under forces on these shapes
         self._contact = np.ascontiguousarray(H[:, :, a.contacts, a.contacts])
-        self._around = np.fft.fft(self._moved[:, :, :, a.ports], axis=1) / a.n_sectors  # by distance of two sectors
+        self._around = fft.fft(self._moved[:, :, :, a.ports], axis=1) / a.n_sectors  # by distance of two sectors
         self._factors = [compliance.factor(h, one) for h, one in zip(self._h, self._around, strict=True)]
         load = np.zeros((len(self._h), a.n_sectors, a.n_port), complex)
         load[:, :, a.loads] = compliance.force
@@ -184,18 +204,18 @@ class MistunedPoint:
         H : other matrices (n_harmonic, N, n_port, n_port) for the way from the forces, such as slopes
         """
         H = self._H if H is None else H
-        there = np.matmul(H, np.fft.ifft(force, axis=1)[..., None])[..., 0]
+        there = np.matmul(H, fft.ifft(force, axis=1)[..., None])[..., 0]
         reaction = self._reaction(there[:, :, self.compliance.alike.ports])
-        return np.asarray(np.fft.fft(there - np.matmul(self._back, reaction[..., None])[..., 0], axis=1))
+        return np.asarray(fft.fft(there - np.matmul(self._back, reaction[..., None])[..., 0], axis=1))
 
     def _reaction(self, waves: np.ndarray) -> np.ndarray:
         """Waves of the forces that deviating stiffness adds, from the waves of what sectors alike do (n_h, N, r)."""
         n_h, N, r = waves.shape
         if r == 0:
             return waves
-        pushed = (np.fft.fft(waves, axis=1) * self.compliance.deviation[:, None]).reshape(n_h, N * r)
+        pushed = (fft.fft(waves, axis=1) * self.compliance.deviation[:, None]).reshape(n_h, N * r)
         found = [lu_solve(factor, one, check_finite=False) for factor, one in zip(self._factors, pushed, strict=True)]
-        return np.asarray(np.fft.ifft(np.stack(found).reshape(n_h, N, r), axis=1))
+        return np.asarray(fft.ifft(np.stack(found).reshape(n_h, N, r), axis=1))
 
     def _contact_rows(self, moved: np.ndarray) -> np.ndarray:
         x = moved[:, :, self.compliance.alike.contacts]
@@ -217,10 +237,10 @@ class MistunedPoint:
     def apply(self, g: np.ndarray) -> np.ndarray:
         """G g: (N n_c, n_coeff) relative displacement [m] under contact forces g (N n_c, n_coeff) [N]."""
         c = self.compliance.alike.contacts
-        waves = np.fft.ifft(self._amplitudes(g), axis=1)[..., None]
+        waves = fft.ifft(self._amplitudes(g), axis=1)[..., None]
         reaction = self._reaction(np.matmul(self._moved[:, :, :, c], waves)[..., 0])
         there = np.matmul(self._contact, waves) - np.matmul(self._back[:, :, c], reaction[..., None])
-        moved = np.fft.fft(there[..., 0], axis=1)
+        moved = fft.fft(there[..., 0], axis=1)
         return self.compliance.basis.to_real(moved.reshape(len(moved), -1).T)
 
     def outputs(self, g: np.ndarray) -> np.ndarray:
@@ -236,8 +256,8 @@ class MistunedPoint:
         else:
             force = self._on_ports(g)
         # all forces on sectors alike, those of the deviating stiffness among them
-        waves = np.matmul(self._H, np.fft.ifft(force, axis=1)[..., None])[..., 0]
-        force[:, :, a.ports] -= np.fft.fft(self._reaction(waves[:, :, a.ports]), axis=1)
+        waves = np.matmul(self._H, fft.ifft(force, axis=1)[..., None])[..., 0]
+        force[:, :, a.ports] -= fft.fft(self._reaction(waves[:, :, a.ports]), axis=1)
         moved = self._displaced(force, self._slopes)
         return self._contact_rows(moved), self._output_rows(moved)
 
@@ -256,6 +276,15 @@ class MistunedPoint:
         return np.zeros((len(rows), 0)), np.zeros((0, 0))
 
     @cached_property
+    def single(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Single precision: contact to contact, contact to shapes, shapes to contact, (I + d P H P^H)^-1 d."""
+        c = self.compliance
+        parts = self._contact, self._moved[:, :, :, c.alike.contacts], self._back[:, :, c.alike.contacts]
+        inverse = [c.inverse(h, one) for h, one in zip(self._h, self._around, strict=True)]
+        contact, moved, back = (np.ascontiguousarray(part, np.complex64) for part in parts)
+        return contact, moved, back, np.stack(inverse)
+
+    @cached_property
     def blocks(self) -> np.ndarray:
         """(N, n_c n_coeff, n_c n_coeff) what the contacts of a sector do to themselves, of its own and its neighbours'
         deviations; a preconditioner."""
@@ -264,8 +293,8 @@ class MistunedPoint:
         found = np.repeat(self._contact.mean(axis=1)[:, None], N, axis=1)  # (n_h, N, n_c, n_c)
         if r:
             near = np.unique(np.array([-1, 0, 1]) % N)
-            to = np.fft.fft(self._back[:, :, a.contacts], axis=1)[:, -near % N] / N  # (n_h, near, n_c, r)
-            out = np.fft.fft(self._moved[:, :, :, a.contacts], axis=1)[:, near] / N  # (n_h, near, r, n_c)
+            to = fft.fft(self._back[:, :, a.contacts], axis=1)[:, -near % N] / N  # (n_h, near, n_c, r)
+            out = fft.fft(self._moved[:, :, :, a.contacts], axis=1)[:, near] / N  # (n_h, near, r, n_c)
             n, m = len(near), len(near) * r
             around = self._around[:, (near[:, None] - near) % N].transpose(0, 1, 3, 2, 4).reshape(-1, 1, m, m)
             d = np.repeat(self.compliance.deviation[(np.arange(N)[:, None] + near) % N], r, axis=1)[None, :, :, None]
@@ -282,17 +311,25 @@ class MistunedPoint:
         return blocks.reshape(N, n_c * basis.n_coeff, -1)
 
 
-@dataclass(frozen=True)
 class JacobianProduct:
-    """G restricted to rows of the contact."""
+    """G restricted to rows of the contact, in single precision: as exact as a Newton direction needs."""
 
-    point: MistunedPoint
-    rows: np.ndarray
+    def __init__(self, point: MistunedPoint, rows: np.ndarray):
+        self._point, self._rows = point, rows
+        self._contact, self._moved, self._back, self._inverse = point.single
 
     def __call__(self, d: np.ndarray) -> np.ndarray:
         """G d for d (n_rows, n_coeff)."""
-        if len(self.rows) == self.point.compliance.n_contact:
-            return self.point.apply(d)
-        full = np.zeros((self.point.compliance.n_contact, d.shape[1]))
-        full[self.rows] = d
-        return self.point.apply(full)[self.rows]
+        c = self._point.compliance
+        full = np.zeros((c.n_contact, d.shape[1]))
+        full[self._rows] = d
+        force = c.basis.to_complex(full).astype(np.complex64).T.reshape(len(self._contact), c.alike.n_sectors, -1)
+        waves = fft.ifft(force, axis=1)[..., None]
+        there = np.matmul(self._contact, waves)
+        n_h, N, r = self._back.shape[0], self._back.shape[1], self._back.shape[3]
+        if r:
+            moved = fft.fft(np.matmul(self._moved, waves)[..., 0], axis=1).reshape(n_h, N * r, 1)
+            reaction = fft.ifft(np.matmul(self._inverse, moved).reshape(n_h, N, r), axis=1)
+            there -= np.matmul(self._back, reaction[..., None])
+        found = fft.fft(there[..., 0], axis=1).reshape(n_h, -1)
+        return c.basis.to_real(found.T)[self._rows]

@@ -200,8 +200,8 @@ def test_the_key_of_a_run_follows_its_files(tmp_path: Path) -> None:
 
 def test_a_process_that_dies_takes_no_other_run_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     good = Task(1, "none", "", (), tmp_path)
-    monkeypatch.setattr(pool, "solve", die_at_two)
-    rows = {row.run: row for row in pool.finished([replace(good, number=n) for n in (1, 2, 3, 4)], 2)}
+    tasks = [replace(good, number=n) for n in (1, 2, 3, 4)]
+    rows = {row.run: row for row in pool.finished(tasks, 2, die_at_two)}
     assert {n: row.status for n, row in rows.items()} == {1: "refused", 2: "lost", 3: "refused", 4: "refused"}
     assert "died 3 times" in rows[2].sentence
 

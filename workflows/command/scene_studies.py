@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from tribodyn.workflows.command.words import Changes, Json, Overrides, aside, make_room, quantity
+from tribodyn.workflows.command.words import Changes, Flag, Json, Overrides, aside, make_room, quantity
 
 Areas = Annotated[tuple[str, ...], Parameter(name="--area", negative=(), consume_multiple=False)]
 
@@ -106,22 +106,79 @@ def mistuned(
         Print JSON for machines.
     """
     from tribodyn.workflows.scene import scene_file
-    from tribodyn.workflows.studies import mistuning
+    from tribodyn.workflows.studies import mistuning as one_wheel
 
     make_room(out)
     factors = None if stiffness is None else [quantity("--stiffness", one, "") for one in stiffness.split(",")]
     file = scene_file.read(scene, overrides)
-    found = mistuning.respond(file, factors, quantity("--spread", spread, ""), seed)
+    found = one_wheel.respond(file, factors, quantity("--spread", spread, ""), seed)
     folder = out or Path("results") / file.name
     folder.mkdir(parents=True, exist_ok=True)
-    mistuning.write(found, folder / "mistuned.csv")
-    mistuning.picture(found).savefig(folder / "mistuned.png")
+    one_wheel.write(found, folder / "mistuned.csv")
+    one_wheel.picture(found).savefig(folder / "mistuned.png")
     if as_json:
         print(json.dumps(found.record(), indent=2))
         return
     print("factors on the stiffness: " + ", ".join(f"{factor:.4f}" for factor in found.stiffness))
     print(f"largest amplitude over that of sectors alike: {found.amplification:.3f}")
     print(folder / "mistuned.csv", folder / "mistuned.png", sep="\n")
+
+
+def mistuning(
+    scene: str,
+    *,
+    wear: int | None = None,
+    workers: int | None = None,
+    resume: Flag = False,
+    overrides: Overrides = (),
+    out: Path | None = None,
+    as_json: Json = False,
+) -> None:
+    """Draw patterns of blades that differ, and tell how far they amplify; contact acts on every blade of each.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene with [wheel] and [mistuning], or a .toml file.
+    wear
+        Number of a pattern whose wheel wears by the scene's [wear] instead.
+    workers
+        Processes; as many as there are cores by default.
+    resume
+        Take the rows that the folder holds of the same patterns.
+    out
+        Folder of tables and pictures; results/NAME by default.
+    as_json
+        Print JSON for machines.
+    """
+    from tribodyn.workflows.run.progress import Progress, console_progress
+    from tribodyn.workflows.scene import scene_file
+    from tribodyn.workflows.studies import mistuned_wear, patterns
+
+    make_room(out)
+    file = scene_file.read(scene, overrides)
+    folder = out or Path("results") / file.name
+    if wear is not None:
+        if wear < 1:
+            raise ValueError(f"--wear {wear}: patterns are counted from 1")
+        worn = mistuned_wear.study(
+            file, wear, lambda row: aside(f"{row.cycles:.4g} cycles, {1e6 * row.depth.max():.4g} um")
+        )
+        folder.mkdir(parents=True, exist_ok=True)
+        mistuned_wear.write(worn, table := folder / "mistuned_wear.csv")
+        mistuned_wear.picture(worn).savefig(drawing := folder / "mistuned_wear.png")
+        record, said = worn.record(), worn.lines()
+    else:
+        progress = Progress() if as_json else console_progress()
+        found = patterns.run(file, folder, progress, workers, resume)
+        table, drawing = folder / "patterns.csv", folder / "mistuning.png"
+        if found.complete:
+            patterns.picture(found).savefig(drawing)
+        record, said = found.record(), found.lines()
+    if as_json:
+        print(json.dumps(record, indent=2))
+        return
+    print(*said, table, *([drawing] if drawing.exists() else []), sep="\n")
 
 
 def supports(
@@ -172,4 +229,4 @@ def supports(
     print(table)
 
 
-COMMANDS = (vary, folds, mistuned, supports)
+COMMANDS = (vary, folds, mistuned, mistuning, supports)

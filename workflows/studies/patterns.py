@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Callable
+import tomllib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from tribodyn.fem.constraints import named
 from tribodyn.hbm.balance import HarmonicBalance
@@ -29,7 +31,9 @@ from tribodyn.reduction.cyclic import ReducedSector
 from tribodyn.version import __version__
 from tribodyn.workflows.designs import pool
 from tribodyn.workflows.designs.journal import Journal
-from tribodyn.workflows.designs.task import Row
+from tribodyn.workflows.designs.task import Row, Status
+from tribodyn.workflows.pictures.plots import axes_of
+from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, RED
 from tribodyn.workflows.result.columns import write_columns
 from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.checkpoint import alone_in
@@ -219,7 +223,7 @@ def solve(task: PatternTask) -> Row:
             pattern = drawn(asked_of(blades.file), blades.wheel.n_sectors, task.number)
             found, blade = blades.peak(pattern)
         except (ValueError, RuntimeError, np.linalg.LinAlgError, MemoryError) as error:
-            status = "refused" if isinstance(error, SceneError) else "failed"
+            status: Status = "refused" if isinstance(error, SceneError) else "failed"
             return Row(task.number, task.key, status, " ".join(str(error).split()), {}, time.perf_counter() - start)
     numbers = {
         "amplification": found.amplitude / alike.amplitude,
@@ -281,7 +285,8 @@ class Patterns:
         if "p50" in said:
             lines += [
                 "largest amplitude of any blade over that of blades alike:",
-                f"  half of the wheels below {said['p50']:.4f}, 95 % below {said['p95']:.4f}, 99 % below {said['p99']:.4f}",
+                f"  half of the wheels below {said['p50']:.4f}, 95 % below {said['p95']:.4f}, "
+                f"99 % below {said['p99']:.4f}",
                 f"  largest {said['largest']:.4f}, pattern {said['largest_pattern']}, blade {said['largest_blade']}; "
                 f"no linear wheel passes {said['whitehead']:.4f} (Whitehead 1966)",
                 f"{said['seconds']:.4g} s of solving",
@@ -295,11 +300,9 @@ def run(
     progress: Progress,
     workers: int | None = None,
     resume: bool = False,
-    overrides: tuple[str, ...] = (),
 ) -> Patterns:
     """Solve the patterns of a scene and leave their table in a folder.
 
-    overrides : with which the scene was read
     workers : processes, as many as there are cores by default; resume : take the rows that the folder holds
     Raises  SceneError
     """
@@ -308,11 +311,12 @@ def run(
         raise SceneError(f"{file.name} has no [wheel]: this study is for a sector of one")
     if workers is not None and workers < 1:
         raise ValueError(f"workers {workers}: give at least 1")
-    content = repr((__version__, file.text, _but_count(overrides), digests([overrides, file.text], file.folder)))
+    values = [tomllib.loads(file.text), *(one.partition("=")[2].strip(" \"'") for one in file.overrides)]
+    content = repr((__version__, file.text, _but_count(file.overrides), digests(values, file.folder)))
     folder.mkdir(parents=True, exist_ok=True)
     with alone_in(folder):
         tasks = [
-            PatternTask(n, file.name, file.text, tuple(overrides), file.folder, _key(content, n))
+            PatternTask(n, file.name, file.text, file.overrides, file.folder, _key(content, n))
             for n in range(1, asked.patterns + 1)
         ]
         journal = Journal(folder)
@@ -336,7 +340,7 @@ def run(
     return found
 
 
-def _finished(tasks: list[PatternTask], workers: int):  # type: ignore[no-untyped-def]
+def _finished(tasks: Sequence[PatternTask], workers: int) -> Iterator[Row]:
     if workers == 1:
         return map(solve, tasks)
     return pool.finished(tasks, workers, solve) if tasks else iter(())
@@ -348,4 +352,19 @@ def _key(content: str, number: int) -> str:
 
 def _but_count(overrides: tuple[str, ...]) -> list[str]:
     """Overrides but the number of patterns, on which no pattern depends."""
-    return [one for one in overrides if not one.partition("=")[0].strip() == "mistuning.patterns"]
+    return [one for one in overrides if one.partition("=")[0].strip() != "mistuning.patterns"]
+
+
+def picture(found: Patterns) -> Figure:
+    """How often which amplification was met, with its percentiles and what no linear wheel passes."""
+    values, said = found.column("amplification"), found.record()
+    with axes_of(7.6, 4.2) as (figure, axes):
+        axes.hist(values, bins="auto" if len(values) > 20 else 10, color=BLUE, alpha=0.8)
+        for name, colour in (("p50", INK), ("p95", ORANGE), ("p99", RED)):
+            axes.axvline(said[name], color=colour, lw=1.5, label=f"{name.upper()} {said[name]:.3f}")
+        bound = whitehead(found.n_sectors)
+        axes.axvline(bound, color=GREY, ls="--", label=f"Whitehead's bound {bound:.3f}")
+        axes.set(xlabel="largest amplitude of any blade over that of blades alike", ylabel="patterns")
+        axes.set_title(f"{found.name}: {len(values)} patterns of {found.n_sectors} blades")
+        axes.legend(fontsize=9)
+    return figure

@@ -1,0 +1,105 @@
+"""Patterns of blades that differ, drawn and solved by the command; the wear of one of them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.workflows.test_mistuning import WHEEL
+from tribodyn.workflows.command import main as cli
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.scene_file import SceneError
+from tribodyn.workflows.scene.wheel import Mistuning
+from tribodyn.workflows.studies import mistuned_wear, patterns
+
+CHANGED = {'["400 Hz", "404 Hz"]': '["700 Hz", "900 Hz"]', "friction = 5.0": "friction = 0.3", '"20 N"': '"100 N"'}
+DIFFER = """
+[mistuning]
+frequency = "1 %"
+friction = "10 %"
+gap = "5 um"
+families = 1
+left_out = 0.01
+patterns = 2
+
+[wear]
+coefficient = "1e5 um3/J"
+step = "5 um"
+max_steps = 3
+"""
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("wheel") / "wheel.toml"
+    text = WHEEL
+    for before, after in CHANGED.items():
+        assert before in text
+        text = text.replace(before, after)
+    path.write_text(text + DIFFER, encoding="utf-8")
+    return path
+
+
+def test_a_pattern_depends_on_seed_and_number_alone() -> None:
+    asked = Mistuning(frequency=0.02, friction=0.1, gap=1e-6, patterns=3)
+    one, again = patterns.drawn(asked, 400, 7), patterns.drawn(asked.model_copy(update={"patterns": 9}), 400, 7)
+    np.testing.assert_array_equal(one.stiffness, again.stiffness)
+    assert np.sqrt(1 + one.stiffness).std() == pytest.approx(0.02, rel=0.1)
+    assert one.friction.std() == pytest.approx(0.1, rel=0.1)
+    assert one.gap.std() == pytest.approx(1e-6, rel=0.1)
+    assert abs(np.corrcoef(one.stiffness, one.friction)[0, 1]) < 0.2
+    assert not np.allclose(one.stiffness, patterns.drawn(asked, 400, 8).stiffness)
+
+
+def test_the_command_draws_patterns_and_resumes(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["mistuning", str(scene), "--workers", "1", "--out", str(tmp_path), "--json"]
+    cli.app(words, result_action="return_value")
+    said = json.loads(capsys.readouterr().out)
+    assert said["complete"] == 2
+    assert 1.0 < said["largest"] < said["whitehead"] == pytest.approx(0.5 * (1 + np.sqrt(6)))
+    assert (tmp_path / "mistuning.png").stat().st_size > 5000
+    table = (tmp_path / "patterns.csv").read_text(encoding="utf-8").splitlines()
+    assert table[0].startswith("pattern,status,amplification,peak_m,peak_hz,blade")
+    cli.app([*words, "--resume"], result_action="return_value")
+    assert json.loads(capsys.readouterr().out) == said
+
+
+def test_blades_alike_amplify_nothing(scene: Path) -> None:
+    """The search for the highest peak of the whole wheel finds that of the wave."""
+    blades = patterns.Blades.of(scene_file.read(str(scene), ("mistuning.frequency=0", "mistuning.friction=0")))
+    none = np.zeros(6)
+    found, _ = blades.peak(patterns.Pattern(0, none, none, none))
+    assert found.amplitude == pytest.approx(blades.alike.amplitude, rel=1e-4)
+    assert found.state.omega == pytest.approx(blades.alike.state.omega, rel=1e-4)
+
+
+def test_blades_that_differ_wear_by_their_own_work(scene: Path, tmp_path: Path) -> None:
+    """Worn volume differs by blade, is that of its own work, and changes whose amplitude is how large."""
+    found = mistuned_wear.study(scene_file.read(str(scene)), 1)
+    assert len(found.history.cycles) == 3
+    volume = found.volume[-1]
+    assert volume.min() >= 0
+    assert np.ptp(volume) > 0.05 * volume.max() > 0
+    work = found.history.work[:-1].sum(axis=0).reshape(6, -1).sum(axis=1)
+    np.testing.assert_allclose(volume, 1e-13 * work, rtol=1e-6)
+    assert np.abs(found.heights[-1] / found.heights[0] - 1).max() > 1e-4
+    mistuned_wear.write(found, tmp_path / "wear.csv")
+    mistuned_wear.picture(found).savefig(tmp_path / "wear.png")
+    assert (tmp_path / "wear.csv").read_text(encoding="utf-8").startswith("cycles,peak_Hz,amplitude_m@0")
+
+
+def test_what_cannot_be_is_one_sentence(scene: Path, tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"blade has no \[mistuning\]"):
+        patterns.run(scene_file.read("blade"), tmp_path, Progress())
+    with pytest.raises(SceneError, match=r"mistuning is for a \[wheel\]"):
+        scene_file.read("beam", ('mistuning.frequency="1 %"',))
+    with pytest.raises(SceneError, match=r"mistuning\.frequency"):
+        scene_file.read(str(scene), ("mistuning.frequency=2",))
+    with pytest.raises(SceneError, match="unknown"):
+        patterns.Blades.of(scene_file.read(str(scene), ('mistuning.body="blade"',)))
