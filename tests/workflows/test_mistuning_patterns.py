@@ -16,7 +16,12 @@ from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.wheel import Mistuning
 from tribodyn.workflows.studies import mistuned_wear, patterns
 
-CHANGED = {'["400 Hz", "404 Hz"]': '["700 Hz", "900 Hz"]', "friction = 5.0": "friction = 0.3", '"20 N"': '"100 N"'}
+CHANGED = {
+    '["400 Hz", "404 Hz"]': '["750 Hz", "880 Hz"]',
+    "friction = 5.0": "friction = 0.3",
+    '"-0.1 mm"': '"-0.2 mm"',
+    '"20 N"': '"100 N"',
+}
 DIFFER = """
 [mistuning]
 frequency = "1 %"
@@ -29,7 +34,7 @@ patterns = 2
 [wear]
 coefficient = "1e5 um3/J"
 step = "5 um"
-max_steps = 3
+max_steps = 2
 """
 
 
@@ -82,7 +87,7 @@ def test_blades_alike_amplify_nothing(scene: Path) -> None:
 def test_blades_that_differ_wear_by_their_own_work(scene: Path, tmp_path: Path) -> None:
     """Worn volume differs by blade, is that of its own work, and changes whose amplitude is how large."""
     found = mistuned_wear.study(scene_file.read(str(scene)), 1)
-    assert len(found.history.cycles) == 3
+    assert len(found.history.cycles) == 2
     volume = found.volume[-1]
     assert volume.min() >= 0
     assert np.ptp(volume) > 0.05 * volume.max() > 0

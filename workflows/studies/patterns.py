@@ -50,6 +50,7 @@ from tribodyn.workflows.studies import wheel as wheels
 FURTHEST = 3.0  # standard deviations at which what is drawn is cut off
 TRIED = 3  # peaks of a scan that are refined, the highest first
 NEARLY = 0.9  # of the highest point of a scan, from which on a peak may be the highest
+SHORTEST = 2e-3  # step of a scan, of its range: beyond a jump it continues
 SCANNED_TO = 1e-6  # residual of the points of a scan
 
 
@@ -125,7 +126,7 @@ class Blades:
         balance, names = self.balance(pattern), [f"{OUTPUT}@{n}" for n in range(self.wheel.n_sectors)]
         options = replace(settings.newton_options(scene), tolerance=SCANNED_TO)
         low, high = settings.response_range(scene)
-        scan = adaptive.Options(tolerance=asked_of(self.file).tolerance, step=0.02, newton=options)
+        scan = adaptive.Options(tolerance=asked_of(self.file).tolerance, step=0.02, min_step=SHORTEST, newton=options)
         branch = adaptive.follow(balance, low, high, scan)
         if branch.ended is not BranchEnd.REACHED:
             raise SolveFailed(f"the frequency response {branch.end}")
