@@ -46,7 +46,7 @@ from tribodyn.workflows.run.reuse import Bench, reaction
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import PartScene, Scene
-from tribodyn.workflows.studies import forces, mistuning
+from tribodyn.workflows.studies import forces, mistuned_wear, mistuning, patterns
 from tribodyn.workflows.studies import wheel as wheels
 from tribodyn.workflows.studies.identification import Identification, Measured, Parameter
 from tribodyn.workflows.studies.identification import fit as identify
@@ -122,6 +122,7 @@ __all__ = [
     "match_kinds",
     "match_modes",
     "mistuned",
+    "mistuned_patterns",
     "patch_maps",
     "peak_memory",
     "plot_axes",
@@ -129,6 +130,7 @@ __all__ = [
     "plot_campbell",
     "plot_mistuned",
     "plot_nodal_diameters",
+    "plot_patterns",
     "plot_safe",
     "published_wear_steps",
     "reaction",
@@ -141,6 +143,7 @@ __all__ = [
     "vary",
     "verify_in_time",
     "wear",
+    "wear_mistuned",
     "worn",
     "write_mistuned",
     "write_whole",
@@ -149,6 +152,9 @@ __all__ = [
 body_forces = forces.study
 build_wheel = wheels.build
 mistuned = mistuning.respond
+mistuned_patterns = patterns.run
+plot_patterns = patterns.picture
+wear_mistuned = mistuned_wear.study
 mark_stability = exponents.mark
 peak_memory = memory.peak
 
