@@ -180,7 +180,10 @@ class MistunedPoint:
 
     x_lin : (N n_c, n_coeff) relative displacement of the stuck, closed wheel under the excitation [m]
     outputs_lin : (n_output, n_coeff) its outputs [m]
+    left_out : of its flexibility, by `nearly` and the products
     """
+
+    left_out = 0.0
 
     def __init__(self, compliance: MistunedCompliance, omega: float):
         self.compliance, self.omega = compliance, omega
@@ -242,6 +245,8 @@ class MistunedPoint:
         there = np.matmul(self._contact, waves) - np.matmul(self._back[:, :, c], reaction[..., None])
         moved = fft.fft(there[..., 0], axis=1)
         return self.compliance.basis.to_real(moved.reshape(len(moved), -1).T)
+
+    nearly = apply
 
     def outputs(self, g: np.ndarray) -> np.ndarray:
         """(n_output, n_coeff) outputs under contact forces g alone [m]."""
