@@ -264,7 +264,7 @@ def _place(points: np.ndarray, at: np.ndarray, e: np.ndarray) -> np.ndarray:
         N, slopes = tabulate(k, xi[:, open_])
         local = points[open_]
         off = np.einsum("nix,nx->ni", e[open_], at[open_] - np.einsum("an,nax->nx", N, local))
-        J = np.einsum("nix,ajn,nax->nij", e[open_], slopes, local)
+        J = e[open_] @ (slopes.T @ local).transpose(0, 2, 1)
         det = J[:, 0, 0] * J[:, 1, 1] - J[:, 0, 1] * J[:, 1, 0]
         det = np.where(det == 0, np.inf, det)
         step = (
