@@ -123,10 +123,7 @@ class ContactCompliance:
             else:
                 self._active = (
                     rows,
-                    [
-                        (None if e.w0_single is None else e.w0_single[np.ix_(rows, rows)], e.b_single[rows])
-                        for e in of
-                    ],
+                    [(None if e.w0_single is None else e.w0_single[np.ix_(rows, rows)], e.b_single[rows]) for e in of],
                 )
         return self._active[1]
 

@@ -352,6 +352,17 @@ class Result:
             raise ValueError("the result holds no worn patch with faces to draw a map on")
         return maps.patch_maps(self, None if rows is None else np.asarray(rows))
 
+    def plot_motion(self, rows: Sequence[int] | None = None) -> Figure:
+        """Maps of slide, gap and friction work of a cycle at wear rows: the first, a middle and the last by default.
+
+        Raises  ValueError where nothing was worn or the patch has no faces
+        """
+        from tribodyn.workflows.pictures import motion_maps
+
+        if not self.wear_steps or self.patch is None or not len(self.patch.faces):
+            raise ValueError("the result holds no worn patch with faces to draw a map on")
+        return motion_maps.motion_maps(self, None if rows is None else np.asarray(rows))
+
     def animate(
         self,
         over: Literal["wear", "cycle"],
