@@ -138,13 +138,14 @@ def test_fields_on_the_mesh_are_those_of_the_result(worn: td.Result) -> None:
 def test_every_plot_is_a_figure(worn: td.Result, tmp_path: Path) -> None:
     courses = ("depth", "peak", "preload", "energy", "cycles_per_step")
     figures = [worn.plot_response(), worn.plot_hysteresis(), worn.plot_patch(), worn.plot_patch([0])]
+    figures += [worn.plot_motion(), worn.plot_motion([0])]
     figures += [worn.plot_wear(what) for what in courses]  # type: ignore[arg-type]
     assert all(figure.axes for figure in figures)
     with pytest.raises(ValueError, match='no wear plot "life"'):
         worn.plot_wear("life")  # type: ignore[arg-type]
     unworn = td.run("beam", overrides={**SMALL, "wear.max_steps": 0})
     assert unworn.plot_hysteresis().axes
-    for draw in (unworn.plot_wear, unworn.plot_patch):
+    for draw in (unworn.plot_wear, unworn.plot_patch, unworn.plot_motion):
         with pytest.raises(ValueError, match="the result holds no"):
             draw()
 
