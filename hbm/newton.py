@@ -135,13 +135,13 @@ def solve(
     forcing = 1e-3
     products = 0
     for step in range(1, options.max_steps + 1):
-        wanted = min(options.tolerance, _finer(balance, state, x_lin, least))
-        if error <= wanted:
+        goal = wanted(balance, state, x_lin, options, least)
+        if error <= goal:
             return Solved(state, CONVERGED, step - 1, products, tuple(history))
         if not np.isfinite(error):
             return Solved(state, SolveEnd.NOT_FINITE.say(), step - 1, products, tuple(history))
         linear = balance.linearise(state)
-        target = max(min(forcing, options.krylov), 0.3 * wanted / error, 1e-12)
+        target = max(min(forcing, options.krylov), 0.3 * goal / error, 1e-12)
         try:
             with np.errstate(over="raise"):
                 if options.least_motion:
@@ -195,6 +195,17 @@ def _leans(balance: Balance[Frequency, Evaluated], state: Evaluated, x_lin: np.n
     """Whether the contact carries a share of what the stuck one would."""
     stuck = balance.reference_stiffness[:, None] * x_lin.reshape(state.g.shape)
     return float(np.linalg.norm(state.cycle.force)) > HELD * float(np.linalg.norm(stuck))
+
+
+def wanted(
+    balance: Balance[Frequency, Evaluated],
+    state: Evaluated,
+    x_lin: np.ndarray,
+    options: NewtonOptions,
+    least: float = 0.0,
+) -> float:
+    """The relative residual that is wanted: the tolerance, or less where the contact forces need it."""
+    return min(options.tolerance, _finer(balance, state, x_lin, least))
 
 
 def _finer(balance: Balance[Frequency, Evaluated], state: Evaluated, x_lin: np.ndarray, least: float) -> float:

@@ -25,6 +25,7 @@ from tribodyn.hbm.continuation.branch import Branch, BranchBuilder
 from tribodyn.hbm.continuation.curve import CurvePoint, Segment
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.continuation.stepper import Stepper
+from tribodyn.hbm.continuation.stiffening import solve_along_stiffness
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import BranchEnd, Outcome
 from tribodyn.hbm.threads import single
@@ -122,13 +123,17 @@ def follow(
 def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None) -> Solution:
     """Solve at one frequency [rad/s] without a neighbouring solution, also where the curve in the load has folds.
 
-    Newton from rest and its load ramp are tried first; else the curve of solutions over the load is followed
-    Returns a Solution; its outcome is the one from rest where the curve does not reach the load either
+    Newton from rest and its load ramp are tried first; else the contact is stiffened from soft springs, else the curve
+    of solutions over the load is followed
+    Returns a Solution; its outcome is the one from rest where no way leads to the load
     """
     options = options or NewtonOptions()
     first = newton.solve_from_rest(balance, omega, options)
     if first.converged:
         return first
+    stiffened = solve_along_stiffness(balance, omega, options)
+    if stiffened is not None:
+        return stiffened
     ramp = follow(parameter.load(balance, omega), 0.0, balance.load_factor, Options(newton=options))
     if ramp.parameter[-1] != balance.load_factor:
         return first

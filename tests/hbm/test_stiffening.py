@@ -1,0 +1,58 @@
+"""Contacts far stiffer than the body, which lift and slip: solved, and held against the dense free structure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from tribodyn.hbm import newton
+from tribodyn.hbm.continuation.methods import arc_length
+from tribodyn.hbm.continuation.stiffening import solve_along_stiffness
+from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.workflows.benchmarks.extremes_march import held
+from tribodyn.workflows.benchmarks.extremes_models import lattice
+
+
+@pytest.mark.parametrize(("stiffness", "transitions"), [(1e10, "sampled"), (1e12, "located")])
+def test_a_stiff_contact_that_lifts_is_solved(stiffness: float, transitions: str) -> None:
+    body = lattice(3, 3)
+    setting = replace(body.ordinary, tangential=stiffness, normal=stiffness, transitions=transitions)
+    balance, omega = body.balance(setting), setting.omega
+    solution = arc_length.solve_along_load(balance, omega)
+    assert solution.converged
+    assert solution.products == 0  # directions of the dense Jacobian: it was solved by stiffening
+    state = solution.state
+    assert {4, 7} <= set(state.cycle.status.tolist())
+    system, b = balance.model.system, np.asarray(balance.model.interface.B)
+    force, x = (balance.basis.to_complex(a.reshape(len(b), -1)) for a in (state.cycle.force, state.x))
+    loads = [setting.preload * system.loads["press"], setting.force * system.loads["shake"]]
+    for h in (0, 1):  # the free structure under the contact forces, without the springs of the contact
+        s = 1j * h * omega
+        dynamic = system.stiffness + s * system.damping + s * s * system.mass
+        expected = b @ np.linalg.solve(dynamic, loads[h] - b.T @ force[:, h])
+        np.testing.assert_allclose(x[:, h], expected, atol=1e-6 * np.abs(expected).max())
+    assert [one.name for one in held(balance, state) if one.off > one.allowed] == []
+
+
+def test_the_limit_of_stiff_springs_is_come_to() -> None:
+    """A contact ten times stiffer moves the forces by a third less: its touch is shorter by the third root."""
+    body = lattice(2, 2)
+    found = []
+    for stiffness in (1e10, 1e11, 1e12):
+        setting = replace(body.ordinary, tangential=stiffness, normal=stiffness)
+        solution = solve_along_stiffness(body.balance(setting), setting.omega, NewtonOptions())
+        assert solution is not None
+        found.append(solution.state.cycle.force[:, 2])
+    steps = [np.linalg.norm(b - a) for a, b in pairwise(found)]
+    assert steps[1] < 0.7 * steps[0]
+    assert steps[1] < 0.05 * np.linalg.norm(found[-1])
+
+
+def test_too_many_unknowns_are_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    body = lattice(2, 2)
+    balance = body.balance(body.ordinary)
+    monkeypatch.setattr(newton, "MOST_DENSE", balance.n_unknown - 1)
+    assert solve_along_stiffness(balance, body.ordinary.omega, NewtonOptions()) is None
