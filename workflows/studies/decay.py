@@ -16,7 +16,7 @@ from tribodyn.hbm.continuation.nonlinear_modes import Backbone
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time.decrement import decrement
 from tribodyn.hbm.time.ring_down import RingDown, ring_down
-from tribodyn.workflows.pictures.plots import axes_of, length_unit
+from tribodyn.workflows.pictures.figures import axes_of, length_unit, log_axis
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
 from tribodyn.workflows.result.columns import write_columns
 from tribodyn.workflows.run import modelling
@@ -134,15 +134,17 @@ def picture(found: Decay) -> Figure:
     with axes_of(7.2, 7.6, rows=3, share=False) as (figure, (top, upper, lower)):
         top.plot(1e3 * d.time, scale * d.displacement, color=BLUE, lw=0.7)
         top.set(xlabel="time / ms", ylabel=f"displacement / {unit}", title="Free decay")
-        upper.semilogx(scale * found.mode.first_harmonic, found.mode.frequency, color=BLUE, label="backbone")
-        upper.semilogx(scale * d.amplitude, d.omega / (2 * np.pi), ".", color=ORANGE, ms=4, label="free decay")
+        upper.plot(scale * found.mode.first_harmonic, found.mode.frequency, color=BLUE, label="backbone")
+        upper.plot(scale * d.amplitude, d.omega / (2 * np.pi), ".", color=ORANGE, ms=4, label="free decay")
         upper.set(ylabel="frequency / Hz")
         upper.legend(fontsize=9)
-        lower.semilogx(scale * found.mode.first_harmonic, 100 * found.expected, color=BLUE, label="its decrement")
+        lower.plot(scale * found.mode.first_harmonic, 100 * found.expected, color=BLUE, label="its decrement")
         given = 100 * found.mode.damping
-        lower.semilogx(scale * found.mode.first_harmonic, given, color=BLUE, ls="--", lw=1, label="its damping ratio")
-        lower.semilogx(scale * d.amplitude, 100 * d.damping, ".", color=ORANGE, ms=4)
+        lower.plot(scale * found.mode.first_harmonic, given, color=BLUE, ls="--", lw=1, label="its damping ratio")
+        lower.plot(scale * d.amplitude, 100 * d.damping, ".", color=ORANGE, ms=4)
         lower.set(xlabel=f"amplitude / {unit}", ylabel="damping ratio / %")
         lower.set_ylim(bottom=0)
+        for axes in (upper, lower):
+            log_axis(axes.xaxis, found.mode.first_harmonic.min(), found.mode.first_harmonic.max())
         lower.legend(fontsize=9)
     return figure
