@@ -60,6 +60,8 @@ class HarmonicBalance:
     compliance : the linear side, which problems that differ in contact or load share
     load_factor : on the harmonics >= 1 of the excitation
     at_rest : (n_pair, n_component) displacement under the static loads, where it is known [m]
+    held_rest : (n_contact, n_coeff) what the residual flexibility of the model is taken to give, whatever the contact
+        forces are [m]; None where it follows them, or there is none
     """
 
     model: ReducedModel
@@ -71,6 +73,7 @@ class HarmonicBalance:
     compliance: ContactCompliance
     load_factor: float = 1.0
     at_rest: np.ndarray | None = None
+    held_rest: np.ndarray | None = None
 
     @classmethod
     def of(
@@ -164,7 +167,20 @@ class HarmonicBalance:
         cycle = self.contact.cycle(x, self.basis, self.memory, jacobian)
         flat = x.reshape(-1, x.shape[2])
         g = self.reference_stiffness[:, None] * flat - cycle.force.reshape(flat.shape)
-        return State(omega, x, cycle, g, flat - self.x_lin(omega) - self.at(omega).apply(g))
+        point = self.at(omega)
+        moved = point.apply(g) if self.held_rest is None else point.nearly(g) + self.held_rest
+        return State(omega, x, cycle, g, flat - self.x_lin(omega) - moved)
+
+    @property
+    def corrects_rest(self) -> bool:
+        """Whether residual flexibility is little enough to be held while Newton solves, and taken anew afterwards."""
+        residual = self.model.residual
+        return residual is not None and self.held_rest is None and residual.left_out <= NEARLY_ALL
+
+    def rest(self, state: State) -> np.ndarray:
+        """(n_contact, n_coeff) what the residual flexibility gives in a state of this balance [m]."""
+        moved: np.ndarray = state.flat - self.x_lin(state.omega) - state.residual
+        return moved - self.at(state.omega).nearly(state.g)
 
     def linearise(self, state: State) -> Linearisation:
         """d R / d x at a state whose contact derivative was asked for."""

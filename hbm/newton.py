@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar, cast
 
 import numpy as np
 
@@ -16,6 +16,7 @@ ZERO_SIZE = 1e-6  # size of x, relative to the start, below which a solution cou
 UNRESISTED = 1e-9  # singular value over the largest of a Jacobian whose motion counts as not resisted
 MOST_DENSE = 3000  # unknowns up to which the dense Jacobian serves where Krylov steps fail at rest
 MOST_DIRECT = 25000  # unknowns up to which it serves where Krylov steps fail elsewhere: 5 GB
+MOST_CORRECTIONS, CORRECTED = 8, 0.5  # of a residual flexibility, and what each leaves of the residual at the most
 RAMP_STEPS = 12  # Newton steps in one step of the load ramp; beyond it a shorter step costs less
 RAMP_SLOWEST = 0.9  # residual over that of two Newton steps before, likewise: those that fail mostly stand still
 FORCE_ACCURACY = 1e-4  # of the contact forces, wanted where these stretch their springs far less than x is large
@@ -127,6 +128,41 @@ def solve(
     Source  inexact Newton with the forcing term of Eisenstat and Walker 1996, choice 2
     """
     options = options or NewtonOptions()
+    if isinstance(balance, HarmonicBalance) and isinstance(omega, float) and balance.corrects_rest:
+        return cast(Solved[Evaluated], _solve_with_rest(balance, omega, start, options))
+    return _solve(balance, omega, start, options)
+
+
+def _solve_with_rest(balance: HarmonicBalance, omega: float, start: np.ndarray, options: NewtonOptions) -> Solution:
+    """The same with a residual flexibility: it is held while Newton solves, then taken anew, until nothing changes.
+
+    Each correction is smaller by about what the modes leave out; one that is not gives way to Newton's method on all
+    """
+    steps = products = 0
+    x, before = start, np.inf
+    x_lin, least = balance.x_lin(omega), ZERO_SIZE * float(np.linalg.norm(start))
+    history: tuple[float, ...] = ()
+    closer = replace(options, tolerance=0.3 * options.tolerance)
+    for _ in range(MOST_CORRECTIONS):
+        exact = balance.evaluate(omega, x)
+        error = relative_residual(exact, x_lin, least)
+        history += (error,)
+        if error <= min(options.tolerance, _finer(balance, exact, x_lin, least)):
+            return Solved(exact, CONVERGED, steps, products, history)
+        if not error < CORRECTED * before:
+            break
+        held = _solve(replace(balance, held_rest=balance.rest(exact)), omega, x, closer)
+        steps, products, x, before = steps + held.steps, products + held.products, held.state.x, error
+        if not held.converged:
+            return replace(held, steps=steps, products=products)
+    found = _solve(balance, omega, x, options)
+    return replace(found, steps=steps + found.steps, products=products + found.products)
+
+
+def _solve(
+    balance: Balance[Frequency, Evaluated], omega: Frequency, start: np.ndarray, options: NewtonOptions
+) -> Solved[Evaluated]:
+    """The same with Newton's method alone."""
     x_lin = balance.x_lin(omega)
     state = balance.evaluate(omega, start)
     least = ZERO_SIZE * float(np.linalg.norm(start))

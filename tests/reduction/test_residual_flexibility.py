@@ -16,9 +16,11 @@ from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.recovery import full_displacement
 from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.stability.exponents import stability
+from tribodyn.hbm.time.time_integration import Options, TimeStepper
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.residual_flexibility import clustered, residual_flexibility
-from tribodyn.workflows.run import joints, modelling
+from tribodyn.workflows.run import joints, modelling, part_reduction
 from tribodyn.workflows.scene import scene_file
 
 SMALL = ["geometry.n_patch=5", "geometry.n_length=2", "geometry.n_height=1", "harmonics.kept=[0, 1, 2, 3]"]
@@ -137,3 +139,29 @@ def test_a_copy_in_another_process_makes_its_own_factor(beam) -> None:
     again = pickle.loads(pickle.dumps(rest))
     assert rest is not None
     assert np.allclose(again.apply(force), rest.apply(force), rtol=1e-10, atol=0)
+
+
+def test_a_scene_with_thousands_of_pairs_does_without_masters(beam) -> None:
+    file, _, _ = beam
+    scene = scene_file.read("beam_thesis", ['reduction.method="auto"']).part_scene
+    assert not part_reduction.without_masters(scene, part_reduction.MOST_MASTERS, False)
+    assert part_reduction.without_masters(scene, part_reduction.MOST_MASTERS + 1, False)
+    assert not part_reduction.without_masters(scene, part_reduction.MOST_MASTERS + 1, True)
+    assert not part_reduction.without_masters(file.part_scene, 10**5, False)  # it says craig_bampton
+    asked = scene_file.read("beam_thesis", ['reduction.method="residual_flexibility"']).part_scene
+    assert part_reduction.without_masters(asked, 75, False)
+    with pytest.raises(ValueError, match='cannot do no_turning: take "craig_bampton"'):
+        part_reduction.without_masters(asked, 75, True)
+
+
+def test_what_needs_every_contact_dof_says_so(beam) -> None:
+    file, part, springs = beam
+    model = modelling.damped(file.scene, residual_flexibility(part.system, part.interface, springs, 8, clusters=3))
+    balance = _balance(file, model)
+    with pytest.raises(ValueError, match=r'time integration needs .* set reduction.method = "craig_bampton"'):
+        TimeStepper(balance, OMEGA, Options())
+    state = newton.solve_from_rest(balance, OMEGA).state
+    with pytest.raises(ValueError, match="stability needs a model that keeps every contact DOF"):
+        stability(balance, state)
+    with pytest.raises(scene_file.SceneError, match='method = "craig_bampton" with relative'):
+        scene_file.read("beam_thesis", ['reduction.method="residual_flexibility"', "reduction.relative=true"])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.command import leave
-from tribodyn.workflows.benchmarks import large_fe, scaling
+from tribodyn.workflows.benchmarks import large_contact, large_fe, scaling
 
 
 def test_small_sizes_converge_and_memory_is_their_own(
@@ -62,3 +62,20 @@ def test_an_assembly_is_measured_from_its_files_to_its_reduced_model(monkeypatch
     assert list(rows[0].seconds) == ["files", "assembly", "reduction"]
     assert list(rows[1].seconds) == ["files", "assembly", "factor", "modes", "constraint modes", "projection"]
     assert "assembly" in large_fe.ASSEMBLIES
+
+
+def test_both_ways_of_a_large_contact_are_measured_and_agree() -> None:
+    ours, forces = large_contact.measure(3, 24, "residual_flexibility", 30)
+    dense, theirs = large_contact.measure(3, 24, "craig_bampton", 30)
+    assert ours.contact_dofs == dense.contact_dofs == 27
+    assert ours.converged == ours.points == dense.points == 24
+    assert ours.compliance_error < 1e-3
+    assert np.abs(forces - theirs).max() < 1e-3 * np.abs(theirs).max()
+    twice = replace(ours, contact_dofs=54, setup_seconds=2 * ours.setup_seconds, peak_bytes=4 * ours.peak_bytes)
+    powers = large_contact.powers([ours, twice])
+    assert powers["set-up"] == pytest.approx(1.0)
+    assert powers["memory"] == pytest.approx(2.0)
+    text = large_contact.as_text([dense, ours, twice])
+    assert "residual_flexibility: powers of the contact DOFs: set-up 1.00" in text
+    with pytest.raises(ValueError, match='no size "5k": there are 500, 3k, 12k, 48k'):
+        large_contact.run(["5k"], lambda said: None)

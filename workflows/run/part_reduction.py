@@ -62,7 +62,7 @@ def contacts(scene: MeshScene) -> list[fem_part.Contact]:
 def reduce(scene: MeshScene, part: Part) -> ReducedModel:
     """The part on its contact, load and prescribed nodes and a few modes; not damped yet, nothing prescribed yet."""
     wanted, system, interface, back = scene.reduction, part.system, part.interface, None
-    if without_masters(scene, part):
+    if without_masters(scene, interface.B.shape[0], len(part.held) > 0):
         springs = joints.contact_stiffness(scene, joints.unreduced(part))
         return residual_flexibility(system, interface, springs, wanted.modes, wanted.cutoff)
     held = [part.dofs(given.group, given.axis) for given in scene.prescribed.values()]
@@ -94,19 +94,20 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
     return reduced if back is None else replace(reduced, basis=back @ reduced.basis)
 
 
-def without_masters(scene: MeshScene, part: Part) -> bool:
+def without_masters(scene: MeshScene, contact_dofs: int, held: bool) -> bool:
     """Whether the contact DOFs do not stay coordinates: as the scene says, else where there are thousands of them.
 
+    held : whether motions are held besides the clamps
     Raises  ValueError where the scene says so and has what needs them
     """
-    method, B = scene.reduction.method, part.interface.B
-    held = {"[wheel]": scene.wheel, "[prescribed]": scene.prescribed, "no_turning": len(part.held)}
-    needed = [name for name, there in held.items() if there]
+    method = scene.reduction.method
+    needs = {"[wheel]": scene.wheel, "[prescribed]": scene.prescribed, "no_turning": held}
+    needed = [name for name, there in needs.items() if there]
     if method == "residual_flexibility" and needed:
         raise ValueError(f'reduction.method: "residual_flexibility" cannot do {needed[0]}: take "craig_bampton"')
     if method != "auto":
         return method == "residual_flexibility"
-    return B.shape[0] > MOST_MASTERS and not needed and not scene.reduction.needs_masters
+    return contact_dofs > MOST_MASTERS and not needed and not scene.reduction.needs_masters
 
 
 def anchors(part: Part, relative_dofs: np.ndarray) -> np.ndarray:

@@ -17,10 +17,11 @@ from tribodyn.fem.assembly import pieces
 from tribodyn.fem.constraints import free_dofs, named
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.reduction.craig_bampton import POINT_LOAD
+from tribodyn.reduction.residual_flexibility import CLUSTERS
 from tribodyn.workflows.run import matrix_model
 from tribodyn.workflows.run import memory as memory_use
 from tribodyn.workflows.run.modelling import clamps, make_mesh
-from tribodyn.workflows.run.part_reduction import components
+from tribodyn.workflows.run.part_reduction import components, without_masters
 from tribodyn.workflows.run.settings import check_names
 from tribodyn.workflows.scene.afterwards import VerdictOptions
 from tribodyn.workflows.scene.matrices import MatrixScene
@@ -32,6 +33,7 @@ FACTOR_SECONDS = 2e-7  # N^1.5 law
 BACK_SUBSTITUTION_SECONDS = 1.5e-7  # for each DOF and right-hand side
 DENSE_SECONDS = 3e-9  # for each cubed coordinate of the reduced model, all eigenvalue problems together
 SOLVE_SECONDS = 6e-8  # of a balance solve, for each squared contact coordinate and harmonic coefficient
+SPARSE_SECONDS = 1.7e-6  # of a balance solve with residual flexibility, for each DOF and harmonic coefficient
 SOLVES_AT_PEAK = {"error_controlled": 40, "thesis": 3}  # a step; the former looks for higher peaks; beam scene
 LIKELY = tuple(range(8))  # harmonics where a scene leaves the choice
 CONTROLLED_STEPS, CONTROLLED_EXPONENT = 23, -0.4  # at a tolerance of 5 %; beam scene
@@ -95,6 +97,7 @@ def plan(file: SceneFile) -> Plan:
     scene = file.scene
     check_names(scene, own_files=False)
     elements = nodes = held = 0
+    sparse = False
     if isinstance(scene, MatrixScene):
         reduced = matrix_model.make(scene, file.folder)
         pairs, masters = reduced.interface.n_pair, reduced.system.n_dof
@@ -113,6 +116,9 @@ def plan(file: SceneFile) -> Plan:
         pairs, masters = _contact(built, mesh, node_sets, free)
         held = int(isinstance(built, PartScene) and built.geometry.no_turning is not None)
         modes, cutoff = built.reduction.modes, built.reduction.cutoff
+        sparse = without_masters(built, pairs * len(components(scene)), held > 0)
+        if sparse:
+            masters = CLUSTERS * len(components(scene)) + 5
     basis = HarmonicBasis(scene.harmonics.kept or LIKELY, scene.harmonics.samples)
     n_component = len(components(scene))
     contact = pairs * n_component
@@ -122,7 +128,7 @@ def plan(file: SceneFile) -> Plan:
         + memory_use.FACTOR_BYTES * full
         + 3 * 8.0 * full * model
         + 10 * 8.0 * model**2
-        + 8 * 8.0 * contact**2
+        + (0.0 if sparse else 8 * 8.0 * contact**2)
         + 4 * 8.0 * pairs * (n_component * basis.n_coeff) ** 2
     )
     reduction = FACTOR_SECONDS * full**1.5 + BACK_SUBSTITUTION_SECONDS * full * model + 4 * DENSE_SECONDS * model**3
@@ -139,7 +145,7 @@ def plan(file: SceneFile) -> Plan:
         response_solves=scene.response.points,
         wear_steps=steps,
         wear_solves=solves,
-        solve_seconds=5e-3 + SOLVE_SECONDS * contact**2 * basis.n_coeff,
+        solve_seconds=5e-3 + basis.n_coeff * (SPARSE_SECONDS * full if sparse else SOLVE_SECONDS * contact**2),
         verdict=scene.verdict,
     )
 
