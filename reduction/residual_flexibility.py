@@ -21,14 +21,13 @@ Source  residual flexibility of free-interface modes: MacNeal 1971, doi 10.1016/
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import scipy.linalg as sla
-from scipy.sparse import csc_matrix, csr_matrix
+from scipy.sparse import csc_matrix, csr_matrix, hstack
 from threadpoolctl import threadpool_limits
 
 from tribodyn.fem.factor import Factor, factorise
@@ -139,11 +138,11 @@ def residual_flexibility(
     K_s = stuck_stiffness(csr_matrix(system.stiffness), interface.B, k)
     M, B = csr_matrix(system.mass), csr_matrix(interface.B)
     factor = factorise(K_s, solver=solver)
-    _, phi, omitted = fixed_interface_modes(K_s, M, factor, n_modes, cutoff)
+    omega, phi, omitted = fixed_interface_modes(K_s, M, factor, n_modes, cutoff)
     forces = [np.asarray(v, float) for v in (*system.loads.values(), *system.outputs.values())]
-    tractions = csc_matrix(B.T @ clustered(interface, k, clusters))
-    found = [phi, *_statics(factor, forces, tractions)]
-    V, squares = _ritz(np.concatenate(found, axis=1), K_s, M)
+    tractions = B.T @ clustered(interface, k, clusters)
+    pushed = csc_matrix(hstack([*(csc_matrix(f[:, None]) for f in forces if f.any()), tractions]))
+    V, squares = _ritz(omega, phi, pushed, factor, M)
     at_contact = np.asarray(B @ V)
     free = np.diag(squares) - at_contact.T @ (k[:, None] * at_contact)
     reduced = SecondOrderSystem(
@@ -195,23 +194,30 @@ def _bisected(points: np.ndarray, clusters: int) -> np.ndarray:
     return label
 
 
-def _statics(factor: Factor, forces: Sequence[np.ndarray], tractions: csc_matrix) -> list[np.ndarray]:
-    """Static shapes (n_full, n) of forces (n_full,), and of sparse tractions (n_full, k) block by block."""
-    blocks = [np.stack([f for f in forces if f.any()], axis=1)] if any(f.any() for f in forces) else []
-    blocks += [tractions[:, at : at + BLOCK].toarray() for at in range(0, tractions.shape[1], BLOCK)]
+def _ritz(
+    omega: np.ndarray, phi: np.ndarray, forces: csc_matrix, factor: Factor, M: csr_matrix
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ritz vectors (n_full, n) of unit modal mass and squared frequencies (n,) of modes and of statics under forces.
+
+    omega (k,), phi (n_full, k) : modes of K_s, M; forces : (n_full, j); factor : of K_s
+    K_s times a static shape is its force, and times a mode M phi omega^2: K_s itself is not asked for
+    """
+    k, n = len(omega), len(omega) + forces.shape[1]
+    shapes = np.empty((len(phi), n), order="F")
+    shapes[:, :k] = phi
     with threadpool_limits(1):
-        return [factor.solve(np.asfortranarray(block)) for block in blocks]
-
-
-def _ritz(shapes: np.ndarray, K: csr_matrix, M: csr_matrix) -> tuple[np.ndarray, np.ndarray]:
-    """Ritz vectors (n_full, n) of unit modal mass and squared frequencies (n,) in the span of some shapes."""
-    shapes = shapes / np.sqrt(np.einsum("ij,ij->j", shapes, K @ shapes))
-    gram = shapes.T @ (K @ shapes)
-    size, turn = sla.eigh(0.5 * (gram + gram.T))
+        for at in range(0, n - k, BLOCK):
+            block = forces[:, at : at + BLOCK].toarray(order="F")
+            shapes[:, k + at : k + at + BLOCK] = factor.solve(block)
+    energy = np.diag(np.concatenate([omega**2, np.zeros(n - k)]))
+    energy[k:] = forces.T @ shapes
+    energy[:k, k:] = energy[k:, :k].T
+    inertia = np.concatenate([shapes.T @ (M @ shapes[:, at : at + BLOCK]) for at in range(0, n, BLOCK)], axis=1)
+    scale = np.sqrt(np.diag(energy))
+    size, turn = sla.eigh(0.5 * (energy + energy.T) / np.outer(scale, scale))
     kept = size > DEPENDENT * size[-1]
-    basis = shapes @ (turn[:, kept] / np.sqrt(size[kept]))
-    mass = basis.T @ (M @ basis)
-    nu, y = sla.eigh(0.5 * (mass + mass.T), basis.T @ (K @ basis))
+    basis = turn[:, kept] / np.sqrt(size[kept]) / scale[:, None]  # of unit energy
+    inertia = basis.T @ inertia @ basis
+    nu, y = sla.eigh(0.5 * (inertia + inertia.T))
     nu, y = nu[::-1], y[:, ::-1]
-    V = basis @ (y / np.sqrt(nu))
-    return V, 1.0 / nu
+    return shapes @ (basis @ (y / np.sqrt(nu))), 1.0 / nu
