@@ -182,6 +182,12 @@ class HarmonicBalance:
         moved: np.ndarray = state.flat - self.x_lin(state.omega) - state.residual
         return moved - self.at(state.omega).nearly(state.g)
 
+    def with_own_rest(self, state: State, held: np.ndarray) -> State:
+        """A state of the same balance with this `held_rest`, as this one has it: its residual alone differs."""
+        residual = self.model.residual
+        assert residual is not None
+        return replace(state, residual=state.residual + held - residual.apply(state.g))
+
     def linearise(self, state: State) -> Linearisation:
         """d R / d x at a state whose contact derivative was asked for."""
         return Linearisation(self.at(state.omega), self.reference_stiffness, state.x, state.cycle)

@@ -130,7 +130,7 @@ def solve(
     options = options or NewtonOptions()
     if isinstance(balance, HarmonicBalance) and isinstance(omega, float) and balance.corrects_rest:
         return cast(Solved[Evaluated], _solve_with_rest(balance, omega, start, options))
-    return _solve(balance, omega, start, options)
+    return _solve(balance, omega, balance.evaluate(omega, start), options)
 
 
 def _solve_with_rest(balance: HarmonicBalance, omega: float, start: np.ndarray, options: NewtonOptions) -> Solution:
@@ -139,33 +139,34 @@ def _solve_with_rest(balance: HarmonicBalance, omega: float, start: np.ndarray, 
     Each correction is smaller by about what the modes leave out; one that is not gives way to Newton's method on all
     """
     steps = products = 0
-    x, before = start, np.inf
+    before = np.inf
+    exact = balance.evaluate(omega, start)
     x_lin, least = balance.x_lin(omega), ZERO_SIZE * float(np.linalg.norm(start))
     history: tuple[float, ...] = ()
     closer = replace(options, tolerance=0.3 * options.tolerance)
     for _ in range(MOST_CORRECTIONS):
-        exact = balance.evaluate(omega, x)
         error = relative_residual(exact, x_lin, least)
         history += (error,)
         if error <= min(options.tolerance, _finer(balance, exact, x_lin, least)):
             return Solved(exact, CONVERGED, steps, products, history)
         if not error < CORRECTED * before:
             break
-        held = _solve(replace(balance, held_rest=balance.rest(exact)), omega, x, closer)
-        steps, products, x, before = steps + held.steps, products + held.products, held.state.x, error
+        rest, before = balance.rest(exact), error
+        held = _solve(replace(balance, held_rest=rest), omega, exact, closer)
+        steps, products = steps + held.steps, products + held.products
         if not held.converged:
             return replace(held, steps=steps, products=products)
-    found = _solve(balance, omega, x, options)
+        exact = balance.with_own_rest(held.state, rest)
+    found = _solve(balance, omega, exact, options)
     return replace(found, steps=steps + found.steps, products=products + found.products)
 
 
 def _solve(
-    balance: Balance[Frequency, Evaluated], omega: Frequency, start: np.ndarray, options: NewtonOptions
+    balance: Balance[Frequency, Evaluated], omega: Frequency, state: Evaluated, options: NewtonOptions
 ) -> Solved[Evaluated]:
-    """The same with Newton's method alone."""
+    """The same with Newton's method alone, from a state evaluated with its derivative."""
     x_lin = balance.x_lin(omega)
-    state = balance.evaluate(omega, start)
-    least = ZERO_SIZE * float(np.linalg.norm(start))
+    least = ZERO_SIZE * float(np.linalg.norm(state.x))
     error = relative_residual(state, x_lin, least)
     history = [error]
     forcing = 1e-3
