@@ -17,6 +17,10 @@ KINK_ANGLE = 0.75  # turn between neighbouring points beyond which they lie on e
 FOLD_NEWTON_SHARE = 1e-3  # of Newton's tolerance elsewhere: near a fold the state goes as the root of the parameter
 FOLD_TRIALS = 80
 FOLD_TANGENT_ACCURACY = 1e-10  # relative; the sign of their frequency part says where the fold is
+# A step whose cubic has less than this share of the parameter that its ends have may hide two folds: contact makes the
+# slope change by pieces, which a cubic rounds off.
+NEARLY_FOLDS = 0.5
+TURN_AT_FOLD = 0.35  # of the tangent, in a step over a fold, beyond which it may have passed three [rad]
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +104,12 @@ class Segment:
 
     @property
     def hides_folds(self) -> bool:
-        """Whether the cubic through the ends turns back twice although the tangents at its ends agree."""
+        """Whether there may be two folds more between the ends than their tangents tell.
+
+        Where these agree, the cubic through the ends turns back twice, or nearly; where they do not, they lie far apart
+        """
+        if self.turns:
+            return TURN_AT_FOLD < self.angle <= KINK_ANGLE
         slopes = np.array([self.start.tangent.p, self.end.tangent.p]) * self.length
         rise = self.chord.p
         a = 3 * (slopes[0] + slopes[1] - 2 * rise)  # derivative of the Hermite cubic: a s^2 + b s + c
@@ -108,7 +117,7 @@ class Segment:
         if a == 0.0 or not 0.0 < -b / (2 * a) < 1.0:
             return False
         extreme = slopes[0] - b * b / (4 * a)
-        return extreme * slopes[0] < -1e-3 * slopes[0] ** 2
+        return bool(extreme * np.sign(slopes[0]) < NEARLY_FOLDS * np.min(np.abs(slopes)))
 
     @property
     def distance_to_fold(self) -> float:

@@ -213,8 +213,10 @@ class Stepper:
 
         Where not careful such a segment is taken as it is.
         """
+        if careful and segment.hides_folds:
+            return None
         if not segment.turns:
-            return None if careful and segment.hides_folds else [segment]
+            return [segment]
         fold = locate_fold(self._path, segment, self._options.newton, self._options.fold_tolerance)
         if fold is None:
             return None if careful else [segment]

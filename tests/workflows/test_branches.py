@@ -27,6 +27,13 @@ def test_curves_that_slip_lift_and_fold_are_followed_both_ways(capsys: pytest.Ca
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("number", "folds"), [(39, 8), (95, 18)])
+def test_no_pair_of_folds_is_stepped_over(number: int, folds: int) -> None:
+    row = branches.judged(number)
+    assert (row.outcome, row.folds) == (branches.FOLLOWED, folds), row.reason
+
+
+@pytest.mark.slow
 def test_twenty_problems_are_followed_with_the_same_folds_both_ways() -> None:
     rows = branches.run(range(20), lambda _: None)
     assert all(row.outcome == branches.FOLLOWED for row in rows), branches.as_text(rows)

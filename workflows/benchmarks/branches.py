@@ -30,7 +30,7 @@ from tribodyn.reduction.model import ReducedModel
 
 HARMONICS = ((0, 1), (0, 1), (0, 1, 2, 3))
 SPAN = (0.75, 1.25)  # of the chosen mode's frequency, stuck
-MARCHES = (4096, 32768)  # time steps of the independent check, the finer one where the coarse one misses
+MARCHES = (4096, 32768, 131072)  # time steps of the independent check, finer ones where coarser ones miss
 CHECKED = 6  # points of a curve that are checked
 DEFECT = 3e-4  # of the displacement, that a march may miss; its error falls with its steps
 SAME_FOLD = 1e-6  # relative distance of frequencies within which two folds are one
