@@ -200,6 +200,8 @@ def locate_fold(path: Parameter, segment: Segment, options: NewtonOptions, toler
     metric = segment.metric
     try:
         ends = [replace(p, tangent=_sharp_tangent(path, p, metric, tight)) for p in (segment.start, segment.end)]
+        if ends[0].tangent.p * ends[1].tangent.p >= 0:  # one end is the fold, up to the accuracy of its tangent before
+            return replace(min(ends, key=lambda end: abs(end.tangent.p)), fold=True)
         segment, weight, corner = Segment(ends[0], ends[1], metric), [1.0, 1.0], np.inf
         for _ in range(FOLD_TRIALS):
             before, corner = corner, _corner_value(segment)
