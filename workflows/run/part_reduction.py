@@ -26,7 +26,7 @@ from tribodyn.workflows.run import joints
 from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
 
 BOLTS = "bolts."  # begins the names of outputs that are elongations of bolts
-MOST_MASTERS = 6000  # contact DOFs up to which all of them stay coordinates by default
+MOST_MASTERS = 3000  # contact DOFs up to which all of them stay coordinates by default
 
 
 def material(scene: MeshScene, mesh: Any = None) -> Any:

@@ -105,7 +105,7 @@ class Reduction(Table):
 
     method: Literal["auto", "craig_bampton", "residual_flexibility"] = "auto"
     """Reduction method: Craig-Bampton keeps every contact DOF; residual_flexibility keeps modes of the stuck structure
-    and leaves its static rest to a sparse factor, for thousands of contact DOFs. "auto" takes the latter above 6000
+    and leaves its static rest to a sparse factor, for thousands of contact DOFs. "auto" takes the latter above 3000
     contact DOFs, where no key of the scene needs the former."""
     relative: StrictBool = False
     """Keep the relative displacement of node pairs instead of both nodes."""
