@@ -98,10 +98,10 @@ class ResidualFlexibility:
         return float(max(size[-1], 0.0))
 
     def error(self, omega: float) -> float:
-        """Relative error of the contact compliance at a frequency [rad/s], by what moves the mass it leaves out.
+        """Error of the contact compliance at a frequency [rad/s], over the static one, by the mass that R leaves out.
 
-        The first term that is neglected, omega^2 R_M with R_M = B K_s^-1 M u, u the field left out, under two smooth
-        and two rough contact forces
+        The first term that is neglected, omega^2 B K_s^-1 M u less its part in V, u the field left out, under two
+        smooth and two rough contact forces
         """
         root = np.sqrt(self.stiffness)[:, None]
         rough = np.random.default_rng(0).standard_normal((len(root), 2))
@@ -111,7 +111,7 @@ class ResidualFlexibility:
         push = omega**2 * (self.mass @ field)
         held = self.at_contact @ (self.shapes.T @ push / self.squares[:, None])
         more = self.B @ self.factor.solve(np.asfortranarray(push)) - held
-        whole = self.B @ field + self.at_contact @ (self.at_contact.T @ force / (self.squares - omega**2)[:, None])
+        whole = self.B @ field + self.at_contact @ (self.at_contact.T @ force / self.squares[:, None])
         return float(np.max(np.linalg.norm(more, axis=0) / np.linalg.norm(whole, axis=0)))
 
 
@@ -148,9 +148,10 @@ def residual_flexibility(
     reduced = SecondOrderSystem(
         np.eye(len(squares)),
         0.5 * (free + free.T),
-        None,
+        None if system.damping is None else V.T @ (system.damping @ V),
         {name: V.T @ load for name, load in system.loads.items()},
         {name: V.T @ row for name, row in system.outputs.items()},
+        None if system.gyroscopic is None else V.T @ (system.gyroscopic @ V),
     )
     info = ModelInfo(
         n_full=system.n_dof,

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_matrix, diags_array
 
 from tribodyn.fem.part import Part
 from tribodyn.fem.system import SecondOrderSystem
@@ -26,6 +27,12 @@ from tribodyn.workflows.scene import scene_file
 SMALL = ["geometry.n_patch=5", "geometry.n_length=2", "geometry.n_height=1", "harmonics.kept=[0, 1, 2, 3]"]
 OMEGA = 2 * np.pi * 900.0
 FORCES = 1e-6  # relative difference of contact forces that the reduction is held to here
+
+
+def skew(n: int) -> csr_matrix:
+    """(n, n) antisymmetric."""
+    upper = diags_array([np.ones(n - 1)], offsets=[1])
+    return csr_matrix(upper - upper.T)
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +129,16 @@ def test_the_error_is_that_of_the_mass_left_out(beam) -> None:
         off = (exact - modal - rest.apply(np.eye(len(B)))) @ force
         size = np.linalg.norm(off) / np.linalg.norm(exact @ force)
         assert 0.2 * size < rest.error(omega) < 20 * size
+
+
+def test_matrices_of_velocity_are_projected(beam) -> None:
+    _, part, springs = beam
+    M = part.system.mass
+    turning = replace(part.system, damping=3.0 * M, gyroscopic=M @ skew(part.system.n_dof) @ M)
+    model = residual_flexibility(turning, part.interface, springs, 5, clusters=2)
+    assert np.allclose(model.system.damping, 3.0 * np.eye(model.system.n_dof), atol=1e-8)
+    assert np.allclose(model.system.gyroscopic, -model.system.gyroscopic.T)
+    assert np.abs(model.system.gyroscopic).max() > 0
 
 
 def test_clusters_share_out_all_pairs(beam) -> None:
