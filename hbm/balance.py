@@ -8,8 +8,8 @@ Source  design of tribodyn; x_lin and G in hbm.linear.compliance; f_c from a con
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -62,6 +62,7 @@ class HarmonicBalance:
     at_rest : (n_pair, n_component) displacement under the static loads, where it is known [m]
     held_rest : (n_contact, n_coeff) what the residual flexibility of the model is taken to give, whatever the contact
         forces are [m]; None where it follows them, or there is none
+    at_speed : the problem of the same contact at other speeds of rotation [Hz], where a mission asks for them
     """
 
     model: ReducedModel
@@ -74,6 +75,7 @@ class HarmonicBalance:
     load_factor: float = 1.0
     at_rest: np.ndarray | None = None
     held_rest: np.ndarray | None = None
+    at_speed: Mapping[float, HarmonicBalance] = field(default_factory=dict)
 
     @classmethod
     def of(

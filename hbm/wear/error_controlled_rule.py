@@ -221,7 +221,7 @@ def _overtaken(problem: WearProblem, state: WearState) -> tuple[tuple[OperatingP
     Returns them and the balance solves spent
     """
     searched = [
-        duty.site.overtaken(problem.at_depth(state.depth).with_load(duty.load), point)
+        duty.site.overtaken(problem.in_duty(duty, state.depth), point)
         for duty, point in zip(problem.mission, state.points, strict=True)
     ]
     solves = sum(spent for _, spent in searched)
@@ -274,7 +274,7 @@ def _stages(
     omega = np.array([point.state.omega for point in state.points])
     guess = []
     for duty, point in zip(problem.mission, state.points, strict=True):
-        balance = problem.at_depth(state.depth).with_load(duty.load)
+        balance = problem.in_duty(duty, state.depth)
         guess.append(point.state.x + balance.gap_response(point.state, GAMMA * stride * state.rate))
     cycles = state.cycles + GAMMA * stride
     ahead = GAMMA * stride
@@ -301,7 +301,7 @@ def _stage(
 ) -> WearState:
     """Solve depth = base + stretch rate(depth) with every duty at its site; `near` tells the wear per work to try."""
     duties = problem.mission
-    unworn = [problem.balance.with_load(duty.load) for duty in duties]
+    unworn = [problem.in_duty(duty) for duty in duties]
     gain = _gain(problem, near)
     accuracy = np.array([duty.site.accuracy for duty in duties])
     x, depth = np.concatenate(guess, axis=1), near.depth + stretch * near.rate
@@ -316,7 +316,7 @@ def _stage(
         depth = worn_at.depth
         points, corrections = [], []
         for w, duty, part in zip(omega, duties, balance.parts(solution.state.x), strict=True):
-            worn = problem.at_depth(depth).with_load(duty.load)
+            worn = problem.in_duty(duty, depth)
             state = worn.evaluate(float(w), part)
             reached = newton.Solution(state, solution.outcome, solution.steps, solution.products, solution.history)
             points.append(OperatingPoint.of(worn, reached, duty.site.output, 0))

@@ -23,11 +23,15 @@ ENDLESS = 1e12  # cycles: thirty years at 1 kHz, longer than any machine runs
 
 @dataclass(frozen=True)
 class Duty:
-    """A part of the mission: `share` of all cycles run at `site`, with the harmonic loads times `load`."""
+    """A part of the mission: `share` of all cycles run at `site`, with the harmonic loads times `load`.
+
+    balance : its own unworn problem over the same contact, as at another speed of rotation; None for the common one
+    """
 
     site: Site
     share: float = 1.0
     load: float = 1.0
+    balance: HarmonicBalance | None = None
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,10 @@ class WearProblem:
         shares = [duty.share for duty in self.mission]
         if not self.mission or min(shares) < 0 or abs(sum(shares) - 1) > 1e-9:
             raise ValueError(f"the shares of the mission's duties must be >= 0 and sum to 1, not {shares}")
+        for duty in self.mission:
+            own = self.balance if duty.balance is None else duty.balance
+            if own.basis != self.balance.basis or own.contact.n_pair != self.balance.contact.n_pair:
+                raise ValueError("every duty of a mission needs the same contact pairs and harmonics")
         if not self.wearing:
             raise ValueError("no joint wears: give at least one of them a wear law")
         if self.lost_below_at_rest is not None and (
@@ -92,6 +100,12 @@ class WearProblem:
     def at_depth(self, depth: np.ndarray) -> HarmonicBalance:
         """The balance with the gap that a wear depth (n_pair,) [m] has opened."""
         return self.balance.with_gap(self.balance.contact.gap + depth)
+
+    def in_duty(self, duty: Duty, depth: np.ndarray | None = None) -> HarmonicBalance:
+        """The problem of a duty with its loads, worn by a depth (n_pair,) [m]; unworn by default."""
+        own = self.balance if duty.balance is None else duty.balance
+        worn = own if depth is None else own.with_gap(own.contact.gap + depth)
+        return worn.with_load(duty.load)
 
 
 @dataclass(frozen=True)
@@ -130,10 +144,9 @@ class WearState:
 
 def assess(problem: WearProblem, depth: np.ndarray, cycles: float, before: WearState | None) -> WearState:
     """Solve every duty at a wear depth, warm from a neighbouring state, and apply the wear law."""
-    unloaded = problem.at_depth(depth)
     points = []
     for i, duty in enumerate(problem.mission):
-        balance = unloaded.with_load(duty.load)
+        balance = problem.in_duty(duty, depth)
         if before is None:
             points.append(duty.site.first(balance))
         else:
@@ -147,7 +160,7 @@ def worn_state(
     """The wear law applied to solved duties."""
     rate, work = np.zeros_like(depth), np.zeros_like(depth)
     for duty, point in zip(problem.mission, points, strict=True):
-        balance = problem.at_depth(depth).with_load(duty.load)
+        balance = problem.in_duty(duty, depth)
         for name, wear in problem.wearing.items():
             pairs = balance.contact.joint(name).rows
             of_joint = (problem.area[pairs], problem.numbers(name), depth[pairs])
@@ -166,7 +179,7 @@ def _neighbour(
     depth: np.ndarray,
 ) -> OperatingPoint:
     omega, opening = known.state.omega, depth - known_depth
-    before = problem.at_depth(known_depth).with_load(duty.load)
+    before = problem.in_duty(duty, known_depth)
     guess = known.state.x + before.gap_response(before.evaluate(omega, known.state.x), opening)
     point = duty.site.next(balance, omega, guess)
     if point.solution.converged:
@@ -256,7 +269,7 @@ def row_of(
     plan: np.ndarray | None = None,
 ) -> WearRow:
     """The history row of a state, with what its step wears [m] and dissipates [J]."""
-    balance = problem.at_depth(state.depth).with_load(problem.mission[0].load)
+    balance = problem.in_duty(problem.mission[0], state.depth)
     taken = (cycles_in_step, worn, work, state.solves, step_error, plan, state.preload_at_rest)
     preload = problem.preload(state.points[0].state)
     return WearRow.of(balance, state.points, state.depth, state.cycles, preload, *taken)
@@ -266,7 +279,7 @@ def state_of(problem: WearProblem, row: WearRow) -> WearState:
     """The state that a row was made from, solved points included, so that a run resumes bit for bit."""
     points = []
     for i, duty in enumerate(problem.mission):
-        balance = problem.at_depth(row.depth).with_load(duty.load)
+        balance = problem.in_duty(duty, row.depth)
         x = row.duty_displacement[i].reshape(len(row.depth), -1, balance.basis.n_coeff)
         state = balance.evaluate(float(row.duty_omega[i]), x)
         outcome = newton.Solution(state, CONVERGED, 0, 0, ())

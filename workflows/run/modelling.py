@@ -291,7 +291,19 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
         )
         chosen = choice.harmonics
     final = balance(harmonics.kept or chosen)
+    if part is not None and isinstance(scene, MeshScene) and scene.other_speeds:
+        final = replace(final, at_speed=_at_speeds(scene, part, harmonics.kept or chosen))
     return Model(part, final.model, final, choice)
+
+
+def _at_speeds(scene: MeshScene, part: Part, harmonics: tuple[int, ...]) -> dict[float, HarmonicBalance]:
+    """The problem at every other speed of the wheel that the mission of the scene has."""
+    found = {}
+    assert scene.wheel is not None
+    for speed in scene.other_speeds:
+        there = scene.model_copy(update={"wheel": scene.wheel.model_copy(update={"speed": speed}), "wear": None})
+        found[speed] = make_model(there, part, reduce_part(there, part), harmonics).balance
+    return found
 
 
 def preloaded(scene: Scene, reduced: ReducedModel, balance: HarmonicBalance) -> HarmonicBalance:

@@ -11,7 +11,7 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
-from tribodyn.hbm.wear.evolution import WearProblem
+from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import WearHistory, WearRow, history, rows_to_resume
 from tribodyn.hbm.wear.law import JointWear
 from tribodyn.workflows.result.facts import Stage
@@ -71,8 +71,26 @@ def wear_problem(
     area = balance.model.interface.area
     vibrating, resting = (0.0, lost_below) if at_rest else (lost_below, None)
     any_joint = scene.wear.lost_of == "any"
-    highest = references.highest_linear(balance, settings.OUTPUT, *settings.response_range(scene))
-    return WearProblem(balance, settings.mission(scene, highest), wear, area, vibrating, resting, any_joint)
+    return WearProblem(balance, _mission(scene, balance), wear, area, vibrating, resting, any_joint)
+
+
+def _mission(scene: Scene, balance: HarmonicBalance) -> tuple[Duty, ...]:
+    """The duties of a scene, those at another speed of the wheel with the problem there."""
+    assert scene.wear is not None
+
+    def highest(there: HarmonicBalance) -> float:
+        return references.highest_linear(there, settings.OUTPUT, *settings.response_range(scene))
+
+    duties = settings.mission(scene, highest(balance))
+    if not balance.at_speed:
+        return duties
+    found = []
+    for duty, table in zip(duties, scene.wear.mission, strict=True):
+        own = None if table.speed is None else balance.at_speed.get(table.speed)
+        if own is not None:
+            duty = replace(duty, site=settings.site_of(scene, table.at, highest(own)), balance=own)
+        found.append(duty)
+    return tuple(found)
 
 
 def evolve(

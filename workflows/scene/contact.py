@@ -12,6 +12,7 @@ from pydantic import Field, StrictBool, StrictInt, ValidationInfo, field_validat
 from tribodyn import declare
 from tribodyn.hbm.contact import law as contact_law
 from tribodyn.workflows.scene.fields import Angle, Direction, Length, Stiffness, Table
+from tribodyn.workflows.scene.hot import ByTemperature, Change
 from tribodyn.workflows.scene.own import LawTable, beside, folder_of, is_file
 
 
@@ -117,6 +118,18 @@ class FaceContact(Contact):
     punch: tuple[Annotated[Length, Field(gt=0)], Annotated[Length, Field(gt=0)]] | None = None
     """Sides of a rectangular punch along t1 and t2, from which the contact stiffness is calculated instead of given
     numbers."""
+
+    temperature: Change | None = None
+    """Change of temperature of the contact, for `by_temperature`; by default the mean over its two bodies of what
+    static loads heat them by."""
+    by_temperature: ByTemperature | None = None
+    """Friction and stiffness at several temperatures, instead of numbers of this table."""
+
+    @model_validator(mode="after")
+    def _temperature_is_for_a_table(self) -> Self:
+        if self.temperature is not None and self.by_temperature is None:
+            raise ValueError(f"{self.TABLE}.temperature is for by_temperature, which is not there: leave it out")
+        return self
 
     @model_validator(mode="after")
     def _map_is_there(self, info: ValidationInfo) -> Self:

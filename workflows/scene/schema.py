@@ -23,6 +23,7 @@ from tribodyn.workflows.scene.contact import Contact, FaceContact, Surfaces
 from tribodyn.workflows.scene.fields import (
     Table,
 )
+from tribodyn.workflows.scene.hot import with_numbers_when_hot
 from tribodyn.workflows.scene.loads import HarmonicLoad, Loads, Motion, Prescribed, Spring, StaticLoad
 from tribodyn.workflows.scene.measured import takes_asperities, with_asperities
 from tribodyn.workflows.scene.own import folder_of
@@ -139,6 +140,39 @@ class MeshScene(Scene):
             return data
         found = {name: with_asperities(dict(contacts[name]), surfaces, folder) for name in lacking}
         return {**data, **({"contacts": {**contacts, **found}} if several is contacts else found)}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _numbers_when_hot(cls, data: Any) -> Any:
+        """A contact with a table over temperature has the numbers of its own one."""
+        if not isinstance(data, dict):
+            return data
+        loads = data.get("loads")
+        static = loads.get("static") if isinstance(loads, dict) else None
+        several = data.get("contacts")
+        contacts: dict[str, Any] = several if isinstance(several, dict) else {"contact": data.get("contact")}
+        prefix = "contacts." if several is contacts else ""
+        found = {
+            name: with_numbers_when_hot(prefix + name, contact, static)
+            for name, contact in contacts.items()
+            if isinstance(contact, dict) and "by_temperature" in contact
+        }
+        if not found:
+            return data
+        return {**data, **({"contacts": {**contacts, **found}} if several is contacts else found)}
+
+    @property
+    def other_speeds(self) -> tuple[float, ...]:
+        """Speeds of the wheel [Hz] in duties of the mission, without that of the wheel itself."""
+        own = 0.0 if self.wheel is None else self.wheel.speed
+        mission = () if self.wear is None else self.wear.mission
+        return tuple(sorted({duty.speed for duty in mission if duty.speed is not None} - {own}))
+
+    @model_validator(mode="after")
+    def _speeds_of_a_wheel(self) -> MeshScene:
+        if self.other_speeds and (self.wheel is None or not self.wheel.speed):
+            raise ValueError("wear.mission has a speed: give the speed of the wheel too, in wheel.speed")
+        return self
 
     @model_validator(mode="after")
     def _what_a_sector_is(self) -> MeshScene:

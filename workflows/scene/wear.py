@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
 from tribodyn.hbm.wear import law as wear_law
-from tribodyn.workflows.scene.fields import Number, Table
+from tribodyn.workflows.scene.fields import Frequency, Number, Table
 from tribodyn.workflows.scene.own import LawTable
 from tribodyn.workflows.scene.units import to_si
 
@@ -75,6 +75,8 @@ class MissionDuty(Table):
     """Share of all cycles."""
     load: Annotated[Number, Field(ge=0)] = 1.0
     """Factor on the harmonic loads."""
+    speed: Annotated[Frequency, Field(gt=0)] | None = None
+    """Speed of the wheel meanwhile; `wheel.speed` by default."""
 
 
 class JointWear(LawTable):

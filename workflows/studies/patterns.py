@@ -51,7 +51,7 @@ FURTHEST = 3.0  # standard deviations at which what is drawn is cut off
 TRIED = 3  # peaks of a scan that are refined, the highest first
 NEARLY = 0.9  # of the highest point of a scan, from which on a peak may be the highest
 SHORTEST = 2e-3  # step of a scan, of its range: beyond a jump it continues
-SCANNED_TO = 1e-6  # residual of the points of a scan
+SCANNED_TO = 1e-4  # residual of the points of a scan
 
 
 @dataclass(frozen=True)

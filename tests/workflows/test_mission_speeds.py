@@ -1,0 +1,74 @@
+"""A mission of a wheel over several speeds of rotation: wear adds over them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.workflows.test_mistuning import WHEEL
+from tribodyn.hbm.wear.history import WearHistory
+from tribodyn.workflows.run import modelling, wear_run
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.scene_file import SceneError
+
+WEAR = """
+[wear]
+coefficient = "1e5 um3/J"
+step = "2 um"
+max_steps = 2
+"""
+SLIPPING = ("contact.friction=0.3", "contact.gap=-0.2 mm", "loads.harmonic.wave.value=200 N")
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("wheel") / "wheel.toml"
+    text = WHEEL.replace('["400 Hz", "404 Hz"]', '["750 Hz", "880 Hz"]') + WEAR
+    path.write_text(text.replace("sectors = 6", 'sectors = 6\nspeed = "6000 rpm"'), encoding="utf-8")
+    return path
+
+
+def worn(scene: Path, *changes: str) -> WearHistory:
+    file = scene_file.read(str(scene), (*SLIPPING, *changes))
+    model = modelling.build(file, None, Progress())
+    wear = file.scene.wear
+    assert wear is not None
+    problem = wear_run.wear_problem(file.scene, file.folder, model.balance)
+    return wear_run.evolve(problem, wear, 2e-6, wear.max_steps)
+
+
+def rate(history: WearHistory) -> np.ndarray:
+    """Depth per cycle of the unworn wheel [m]."""
+    return history.worn[0] / history.cycles_in_step[0]
+
+
+def test_wear_adds_over_the_speeds(scene: Path) -> None:
+    """The rate of a mission is that of its speeds, each by itself, by their shares of the cycles."""
+    slow = rate(worn(scene, "wear.at=810 Hz", "wear.max_steps=1"))
+    fast = rate(worn(scene, "wear.at=805 Hz", "wear.max_steps=1", "wheel.speed=7000 rpm"))
+    assert np.abs(fast - slow).max() > 0.05 * slow.max() > 0
+    mission = 'wear.mission=[{at="810 Hz", share="30 %"}, {at="805 Hz", share="70 %", speed="7000 rpm"}]'
+    both = rate(worn(scene, mission, "wear.max_steps=1"))
+    np.testing.assert_allclose(both, 0.3 * slow + 0.7 * fast, rtol=1e-6)
+
+
+@pytest.mark.parametrize("rule", ["thesis", "error_controlled"])
+def test_a_mission_of_two_equal_points_is_one(scene: Path, rule: str) -> None:
+    changes = (f"wear.rule={rule}", 'wear.tolerance="5 %"')
+    one = worn(scene, "wear.at=810 Hz", *changes)
+    mission = 'wear.mission=[{at="810 Hz", share=0.5}, {at="810 Hz", share=0.5, speed="6000 rpm"}]'
+    two = worn(scene, mission, *changes)
+    assert len(one.cycles) == len(two.cycles) == 2
+    np.testing.assert_allclose(two.depth, one.depth, rtol=1e-6, atol=1e-15)
+    np.testing.assert_allclose(two.cycles, one.cycles, rtol=1e-6)
+
+
+def test_a_speed_needs_a_wheel_that_turns(scene: Path) -> None:
+    mission = 'wear.mission=[{at="810 Hz", share=1, speed="9000 rpm"}]'
+    with pytest.raises(SceneError, match=r"in wheel\.speed"):
+        scene_file.read(str(scene), ("wheel.speed=0", mission))
+    with pytest.raises(SceneError, match=r"in wheel\.speed"):
+        scene_file.read("beam", ("wear.at=", 'wear.mission=[{at="peak", share=1, speed="9000 rpm"}]'))
