@@ -44,6 +44,11 @@ def test_the_temperature_is_that_of_both_bodies() -> None:
     assert numbers(turbine(*heat), "root_left") == pytest.approx((0.5, 1000e6, 1200e6))
 
 
+def test_a_scene_that_was_written_out_reads_again() -> None:
+    scene = turbine(f"{ROOT}.temperature=700 K").mesh_scene
+    assert type(scene).model_validate_json(scene.model_dump_json()) == scene
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [

@@ -74,13 +74,14 @@ def with_numbers_when_hot(key: str, contact: Mapping[str, Any], static: Any) -> 
         first = error.errors()[0]
         where = ".".join(str(part) for part in (key, *first["loc"]))
         raise ValueError(f"{where}: {first['msg'].removeprefix('Value error, ')}") from None
-    twice = [name for name in read.by_temperature.columns if name in contact]
-    if twice:
-        raise ValueError(f"{key}.{twice[0]}: by_temperature gives it too: leave one of them out")
     try:
         found = read.by_temperature.at(_warmed(contact, static) if read.temperature is None else read.temperature)
     except ValueError as error:
         raise ValueError(f"{key}: {error}") from None
+    # a scene that was written out has the numbers beside the table
+    twice = [name for name, value in found.items() if contact.get(name, value) not in (None, value)]
+    if twice:
+        raise ValueError(f"{key}.{twice[0]}: by_temperature gives it too: leave one of them out")
     return {**contact, **found}
 
 

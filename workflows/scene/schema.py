@@ -155,7 +155,7 @@ class MeshScene(Scene):
         found = {
             name: with_numbers_when_hot(prefix + name, contact, static)
             for name, contact in contacts.items()
-            if isinstance(contact, dict) and "by_temperature" in contact
+            if isinstance(contact, dict) and contact.get("by_temperature") is not None
         }
         if not found:
             return data
