@@ -123,6 +123,7 @@ if TYPE_CHECKING:
     from tribodyn.workflows.api.surfaces import Asperities, HeightMap, asperities
     from tribodyn.workflows.api.whole_scenes import (
         benchmark,
+        check_accuracy,
         check_promise,
         compare_wear_steps,
         converge,
@@ -136,6 +137,7 @@ if TYPE_CHECKING:
         posterior,
         report,
         scaling,
+        scoreboard,
         track,
         trade,
         verify,
@@ -284,6 +286,7 @@ _HOME |= dict.fromkeys(
 _HOME |= dict.fromkeys(
     (
         "benchmark",
+        "check_accuracy",
         "check_promise",
         "compare_wear_steps",
         "converge",
@@ -297,6 +300,7 @@ _HOME |= dict.fromkeys(
         "inspect",
         "report",
         "scaling",
+        "scoreboard",
         "track",
         "trade",
         "verify",
@@ -363,6 +367,7 @@ __all__ = [
     "campbell",
     "changed",
     "chatter",
+    "check_accuracy",
     "check_promise",
     "coexisting",
     "compare_wear_steps",
@@ -424,6 +429,7 @@ __all__ = [
     "run_to_accuracy",
     "scaling",
     "scene_names",
+    "scoreboard",
     "shades",
     "solutions_at",
     "state_at",

@@ -128,7 +128,12 @@ def test_accuracy_meets_what_it_promises(table: Trade, tmp_path: Path, capsys: p
     assert choice.seconds <= accuracy.choose(table, wanted / 2).seconds
 
 
-LEAF = ("geometry.n_column=11", "geometry.pin_column=2", 'response.frequency=["100 Hz", "200 Hz"]')
+LEAF = (
+    "harmonics.kept=[0, 1]",
+    "geometry.n_column=11",
+    "geometry.pin_column=2",
+    'response.frequency=["100 Hz", "200 Hz"]',
+)
 BLADE = ("geometry.n_along=3", "geometry.n_up=3", "wear=", "response.points=30")
 RIG = ("geometry.n_contact_length=3", "geometry.n_contact_width=3", "wear=", 'response.method="natural"')
 RIG = (*RIG, "response.points=9", 'response.frequency=["289 Hz", "293 Hz"]')
@@ -433,7 +438,7 @@ def test_where_one_step_tells_nothing_of_the_harmonics_the_trade_does(tmp_path: 
     table = trade_table.load(shipped_trade("leaf_seal"))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(budget.accuracy, "table_of", lambda _: table)
-        file = scene_file.read("leaf_seal", ('response.frequency=["120 Hz", "180 Hz"]', "verdict.enabled=false"))
+        file = scene_file.read("leaf_seal_thesis", ('response.frequency=["120 Hz", "180 Hz"]', "verdict.enabled=false"))
         entries = pipeline.run(file, tmp_path, Progress()).budget
     found = {entry.quantity: entry for entry in entries if entry.source == "harmonics"}
     assert {entry.by for entry in found.values()} == {"trade: kept=[0, 1]"}

@@ -43,11 +43,11 @@ RUNS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
         ),
         {"pairs": 25, "components": 3, "coefficients": 3, "systems": 1, "groups": ALWAYS | {"wear"}},
     ),
-    "leaf_seal": (
+    "leaf_seal_thesis": (
         ("response.frequency=[250, 300]",),
         {"pairs": 126, "components": 1, "coefficients": 3, "systems": 1, "groups": ALWAYS | {"stability"} | DRAWN},
     ),
-    "rig": (
+    "rig_thesis": (
         ("response.method='natural'", "response.points=2", "response.frequency=[250, 252]", "wear="),
         # harmonic 0 has the platform's height prescribed, the others do not
         {"pairs": 55, "components": 3, "coefficients": 7, "systems": 2, "groups": ALWAYS | DRAWN},

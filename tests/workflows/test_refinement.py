@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -9,8 +10,9 @@ from typing import cast
 import pytest
 
 import tribodyn as td
-from tribodyn.workflows.accuracy import refinement
+from tribodyn.workflows.accuracy import reference, refinement
 from tribodyn.workflows.accuracy.statement import QUANTITIES, Contribution, Statement, Verdict
+from tribodyn.workflows.command import main
 
 TINY = (
     "harmonics.kept=[0, 1]",
@@ -40,15 +42,28 @@ def test_what_is_promised_is_what_the_last_run_measured(
     assert sorted(path.name for path in (folder / "rounds").iterdir()) == [str(n) for n in range(1, promise.rounds + 1)]
 
 
-def test_the_promise_holds_against_finer_settings(reached: tuple[td.Result, refinement.Promise, Path]) -> None:
+def test_the_promise_holds_against_a_reference_that_is_finer(
+    reached: tuple[td.Result, refinement.Promise, Path],
+) -> None:
     result, promise, _ = reached
-    finer = [*TINY, "wear=", "harmonics.kept=[0,1,2,3,4,5,6,7]", "geometry.n_patch=7", "geometry.n_length=8",
-             "geometry.n_height=2", "reduction.modes=15", "verdict.seconds=20"]  # fmt: skip
-    reference = td.run("beam", overrides=finer).summary()["verdict"]
-    ours = result.summary()["verdict"]
-    for name in ("peak_frequency", "preload"):
-        found = ours[name]["value"] / reference[name]["value"] - 1
-        assert abs(found) <= promise.wanted, (name, found)
+    found, lacking = td.check_accuracy("beam", result, promise, overrides=TINY)
+    assert not lacking
+    assert {one.quantity for one in found} == {"peak_frequency", "preload"}
+    assert not any(one.broken for one in found)
+    assert all(1e-5 < one.true < 0.2 for one in found if one.true is not None)  # another answer, but not far away
+    text = reference.as_text(found, lacking)
+    assert text.endswith("promise kept")
+    bad = [replace(found[0], true=0.3), *found[1:]]
+    assert "30.00%  BROKEN" in reference.as_text(bad, "")
+    assert reference.as_text(bad, "").endswith("promise broken")
+    assert reference.as_text(found, "its reference is too dear").endswith("too dear")
+
+
+def test_a_check_needs_a_promise(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as left:
+        main.main(["run", "beam", "--check"])
+    assert left.value.code == 2
+    assert "--check is of what --accuracy promises" in capsys.readouterr().err
 
 
 def test_a_resumed_search_repeats_no_round(reached: tuple[td.Result, refinement.Promise, Path]) -> None:
@@ -91,6 +106,7 @@ def test_only_what_contributes_is_made_finer() -> None:
     assert promise.errors == {"energy": pytest.approx(0.0041)}
     added = set(rounds[1]) - set(rounds[0])
     assert added == {"harmonics.kept=[0, 1, 2, 3]"}
+    assert promise.alone == ("modes",)
 
 
 def test_what_nothing_helps_is_said() -> None:
@@ -113,6 +129,8 @@ def test_what_is_given_is_left_alone_and_named() -> None:
     assert promise.kept
     assert len(rounds) == 1
     assert promise.errors == {"energy": 0.003}
+    assert promise.alone == ("samples",)
+    assert promise.sentence.endswith("; left as the scene has them: samples")
     assert "not counted: harmonics" in promise.sentence
 
 

@@ -152,7 +152,7 @@ SMALL = {
         "geometry.n_patch=3", "geometry.n_length=2", "geometry.n_height=1", "reduction.modes=3", "response.points=6",
         "wear.tolerance=20 %", "wear.max_steps=4",
     ),
-    "leaf_seal": ("geometry.n_column=7", "geometry.pin_column=2", "response.points=6"),
+    "leaf_seal": ("harmonics.kept=[0, 1]", "geometry.n_column=7", "geometry.pin_column=2", "response.points=6"),
     "blade": ("geometry.n_along=2", "geometry.n_up=2", "response.points=8", "wear.step=20 %", "wear.max_steps=3"),
     "rig": (
         "geometry.n_contact_length=3", "geometry.n_contact_width=3", "reduction.modes=4", "harmonics.kept=[0, 1]",

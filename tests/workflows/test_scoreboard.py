@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import tribodyn as td
+from tribodyn.workflows.accuracy import reference
 from tribodyn.workflows.benchmarks import scoreboard, scoreboard_scenes, scoreboard_table
 from tribodyn.workflows.benchmarks.scoreboard import Judged, Row
 
@@ -34,7 +36,7 @@ def test_the_reference_is_finer_in_every_knob(tmp_path: Path) -> None:
     assert drawn.text == scoreboard_scenes.draw(SCENES[0], SEED, tmp_path).text
     assert drawn.text != scoreboard_scenes.draw(SCENES[0], SEED + 1, tmp_path).text
     ours = drawn.file(tmp_path)
-    fine = ours.changed(*scoreboard.finer(ours)).part_scene
+    fine = reference.finer(ours).part_scene
     scene = ours.part_scene
     for name in ("n_patch", "n_length", "n_height"):
         assert fine.geometry.parameters[name] > scene.geometry.parameters[name]
@@ -54,7 +56,8 @@ def test_rows_are_kept_and_taken_up_again(rows: list[Row], tmp_path: Path, monke
         return replace(rows[0], number=number, seed=seed)
 
     monkeypatch.setattr(scoreboard, "measured", measured)
-    scoreboard.run(2, SEED, tmp_path, 1.0, lambda sentence: None)
+    assert td.scoreboard(2, tmp_path, seed=SEED, seconds=1.0) == [replace(rows[0], number=n) for n in range(2)]
+    assert (tmp_path / "scoreboard.png").exists()
     with (tmp_path / scoreboard.ROWS).open("a") as file:
         file.write('{"number": 7, "se')  # killed while it wrote
     again = scoreboard.run(3, SEED, tmp_path, 1.0, lambda sentence: None)

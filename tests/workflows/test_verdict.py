@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import signal
 from time import process_time
@@ -83,6 +84,20 @@ def _life(checks: list[InTime], error: float = 0.05) -> statement.Statement:
     seen = tuple((probes.State(row, 1e6 * row, *(None,) * 4), check) for row, check in enumerate(checks))  # type: ignore[arg-type]
     parts = [Contribution("harmonics", "life", error, "estimate")]
     return verdict._statement("life", 1e7, parts, time_probe.Checked(seen, 3, "no seconds"), td.Result({}, {}, ""))
+
+
+def test_a_depth_is_not_stated_where_a_worn_motion_does_not_stay() -> None:
+    """Arm 14 of seed 31: worn through with one harmonic; with more of them the contact survives, at a fifth of it."""
+    parts = [Contribution("wear steps", "depth", 0.04, ""), Contribution("harmonics", "life", 0.1, "")]
+
+    def depth(*checks: InTime) -> statement.Statement:
+        seen = tuple((probes.State(row, 1e6 * row, *(None,) * 4), check) for row, check in enumerate(checks))  # type: ignore[arg-type]
+        return verdict._statement("depth", 0.02, parts, time_probe.Checked(seen, 2, ""), td.Result({}, {}, ""))
+
+    off = depth(_in_time(0.01), _in_time(0.2))
+    assert (off.stated, off.error) == (True, 0.04)
+    assert not depth(_in_time(0.01), _in_time(0.0, stable=False)).stated
+    assert "contradicts" in depth(_in_time(0.01), _in_time(0.4)).reason
 
 
 def _in_time(
@@ -176,6 +191,19 @@ def test_work_beyond_its_seconds_is_stopped() -> None:
     with processor_seconds(5.0):
         pass
     assert signal.getitimer(signal.ITIMER_PROF) == (0.0, 0.0)
+
+
+def test_what_a_library_makes_of_the_end_of_the_seconds_is_the_end_of_the_seconds() -> None:
+    def hidden() -> None:
+        try:
+            _spin()
+        except TimeUp as up:
+            raise ctypes.ArgumentError(f"argument 2: {up}") from None
+
+    with pytest.raises(TimeUp), processor_seconds(0.02):
+        hidden()
+    with pytest.raises(ctypes.ArgumentError), processor_seconds(5.0):
+        raise ctypes.ArgumentError("of its own")
 
 
 def test_a_verdict_without_seconds_says_what_is_not_known() -> None:

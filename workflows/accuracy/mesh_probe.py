@@ -22,6 +22,10 @@ ANSWERS = ("peak_frequency", "amplitude", "energy", "preload")
 # no better known than the frequency of the peak they belong to: its stiffness limits the motion, too, as in
 # F / (2 zeta m omega^2); differences that cancel between two meshes say nothing of a third
 AT_A_PEAK = ("amplitude", "energy")
+# least error of the energy over that of the amplitude: what slips is what moves, and the friction work is the work of
+# the drive, which goes with the amplitude; where both differ otherwise on two meshes, that is taken for chance
+ENERGY_OVER_AMPLITUDE = 0.5
+ONE_ELEMENT = 4  # pairs of a contact face that a single element covers: too coarse for any order
 
 
 @dataclass
@@ -57,7 +61,9 @@ class Probe:
                 return unknown(MESH, str(refusal))
             seen.refused.clear()
             self._solve([other for other in more if not (both and other.file == both[0].file)], seen, end)
-        return self._contributions(MESH, seen)
+        contact = self.first.balance.contact
+        fine_enough = contact.n_pair > ONE_ELEMENT * len(contact.joints)
+        return self._contributions(MESH, seen, fine_enough)
 
     def of_modes(self, other: Other) -> Iterator[Contribution]:
         """With more modes."""
@@ -84,8 +90,11 @@ class Probe:
             for name, (a, b) in pairs.items():
                 of.setdefault(name, []).append(convergence.difference(other.size, a, b))
 
-    def _contributions(self, source: str, seen: Seen) -> Iterator[Contribution]:
-        """Errors of different kinds are added: they are of different directions, and their signs are not known.
+    def _contributions(self, source: str, seen: Seen, fine_enough: bool = True) -> Iterator[Contribution]:
+        """What is seen, as errors.
+
+        fine_enough : whether the scene's own mesh may have an order
+        Errors of different kinds are added: they are of different directions, and their signs are not known.
 
         One mesh of several that change the same is enough where the others have no solution or the seconds are used up
         """
@@ -95,11 +104,12 @@ class Probe:
             return
         how, errors = ", ".join(dict.fromkeys(seen.said)), dict[str, float]()
         for of in seen.differences.values():
-            settled = convergence.has_settled([one for name in ANSWERS for one in of[name]])
+            settled = fine_enough and convergence.has_settled([one for name in ANSWERS for one in of[name]])
             for name, differences in of.items():
                 errors[name] = errors.get(name, 0.0) + convergence.bound(differences, settled)
         for name in AT_A_PEAK:
             errors[name] = max(errors[name], errors["peak_frequency"])
+        errors["energy"] = max(errors["energy"], ENERGY_OVER_AMPLITUDE * errors["amplitude"])
         if "depth" in errors:  # wear passes a depth in cycles that are inverse to the energy
             errors["life"] = errors["depth"] + errors["energy"]
         worn = self.result.wear

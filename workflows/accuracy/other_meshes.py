@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,11 +76,23 @@ def coarser(file: SceneFile, n_dof: int) -> list[Other]:
                 f"the mesh is given, and its elements halved would have some {8 * n_dof:.2g} DOFs, beyond the "
                 f"{MOST_HALVED:.2g} that a verdict solves: compare with a run on another mesh"
             ) from None
-        texts = tuple(f"{key}.halved={table.halved + 1}" for key, table in tables.items())
-        return [Other(file.changed(*texts), HALF, "halved elements", "most edges")]
+        return [Other(file.changed(*_halved(tables)), HALF, "halved elements", "most edges")]
     single = tuple(text for key, table in tables.items() for text in _more_of_single_ones(key, table))
     short = [Other(file.changed(*single), HALF, "more elements along short edges", "short edges")] if single else []
     return [*found.values(), *short]
+
+
+def refined(file: SceneFile, share: float) -> SceneFile:
+    """The scene with more elements along every edge: a share of its own, or twice as many where its mesh is given.
+
+    Unchanged where it has no mesh
+    """
+    try:
+        return _remeshed(file, share, "a finer mesh").file
+    except Given:
+        return file.changed(*_halved(_meshed(file)))
+    except ValueError:
+        return file
 
 
 def with_more_modes(file: SceneFile) -> Other | None:
@@ -96,6 +109,11 @@ def _remeshed(file: SceneFile, share: float, how: str) -> Other:
     new = [_rescaled(key, table, file.folder, share) for key, table in _meshed(file).items()]
     texts = tuple(text for more, _ in new for text in more)
     return Other(file.changed(*texts), float(np.mean([size for _, size in new])), how, "most edges")
+
+
+def _halved(tables: dict[str, Mesh]) -> Iterator[str]:
+    """Overrides that cut every element into eight."""
+    yield from (f"{key}.halved={table.halved + 1}" for key, table in tables.items())
 
 
 def _meshed(file: SceneFile) -> dict[str, Mesh]:

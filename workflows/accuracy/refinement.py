@@ -39,6 +39,7 @@ class Promise:
     wanted : relative error; errors : by quantity, None where a part is not known; reasons : by quantity, why it is not
     promised, empty where it is; overrides : that the rounds have added; given : sources whose error is not counted
     left : sources that contribute and could not be made finer; rounds : runs that were made
+    alone : sources that contribute too little to be made finer: the scene's own settings
     """
 
     wanted: float
@@ -48,6 +49,7 @@ class Promise:
     given: tuple[str, ...]
     left: tuple[str, ...]
     rounds: int
+    alone: tuple[str, ...] = ()
 
     @property
     def kept(self) -> bool:
@@ -64,7 +66,8 @@ class Promise:
         said += f"; total errors measured on this scene: {', '.join(good)}" if good else ""
         said += f"; not promised: {', '.join(bad)}" if bad else ""
         said += f"; not counted: {', '.join(self.given)}" if self.given else ""
-        return said + (f"; could not be made finer: {', '.join(self.left)}" if self.left else "")
+        said += f"; could not be made finer: {', '.join(self.left)}" if self.left else ""
+        return said + (f"; left as the scene has them: {', '.join(self.alone)}" if self.alone else "")
 
 
 def to_accuracy(file: SceneFile, accuracy: str, run: Runner, say: Callable[[str], None]) -> tuple[Result, Promise]:
@@ -85,6 +88,7 @@ def to_accuracy(file: SceneFile, accuracy: str, run: Runner, say: Callable[[str]
     if named and not any(name in OF_WEAR for name in named):
         always["wear"] = ""
     added: dict[str, str] = {}
+    refined: set[str] = set()
     for number in range(1, ROUNDS + 1):
         more = (f"{key}={value}" for key, value in (always | added).items())
         current = file.changed(*more)
@@ -92,13 +96,16 @@ def to_accuracy(file: SceneFile, accuracy: str, run: Runner, say: Callable[[str]
         found = loaded(result.verdict)
         of = asked or tuple(name for name, said in found.statements.items() if said.value is not None)
         promise = _promise(found, wanted, of, given, added, number)
+        promise = replace(promise, alone=_alone(found, of, given, refined))
         if not of:
             raise RuntimeError(f"nothing of {file.name} can be promised: {found.statements['peak_frequency'].reason}")
         say(f"round {number}: {promise.sentence}")
         if promise.kept:
             break
         finer = {s: SETTINGS[s](current, result) if s in SETTINGS else () for s in _large(found, wanted, of, given)}
-        promise = replace(promise, left=tuple(source for source, texts in finer.items() if not texts))
+        left = tuple(source for source, texts in finer.items() if not texts)
+        promise = replace(promise, left=left, alone=_alone(found, of, given, refined | set(left)))
+        refined |= {source for source, texts in finer.items() if texts}
         if number == ROUNDS or not any(finer.values()):
             break
         added |= dict(text.split("=", 1) for texts in finer.values() for text in texts)
@@ -147,6 +154,12 @@ def _large(found: Verdict, wanted: float, of: Sequence[str], given: Sequence[str
     parts = [part for part in found.contributions if part.quantity in of and part.source not in given]
     parts = sorted((part for part in parts if size(part) > SHARE * wanted), key=size, reverse=True)
     return list(dict.fromkeys(part.source for part in parts))
+
+
+def _alone(found: Verdict, of: Sequence[str], given: Sequence[str], others: set[str]) -> tuple[str, ...]:
+    """Sources of errors of what is asked for that are neither given nor among others."""
+    sources = dict.fromkeys(part.source for part in found.contributions if part.quantity in of)
+    return tuple(source for source in sources if source not in given and source not in others)
 
 
 def _harmonics(file: SceneFile, result: Result) -> Iterator[str]:

@@ -22,7 +22,8 @@ def processor_seconds(limit: float) -> Iterator[None]:
 
     The timer of a process belongs to its main thread: in another one, and on systems without it, nothing is limited.
     A compiler is not interrupted: a function that is compiled by half could not be called in this process any more.
-    Raises  TimeUp, also at once where `limit` is not above 0
+    Raises  TimeUp, also at once where `limit` is not above 0, and in place of what a library makes of it: ctypes tells
+        an exception in the conversion of an argument as an error of the argument
     """
     if limit <= 0:
         raise TimeUp(f"{limit:g} s are left")
@@ -30,16 +31,23 @@ def processor_seconds(limit: float) -> Iterator[None]:
         yield
         return
 
+    raised: list[TimeUp] = []
+
     def up(number: int, frame: FrameType | None) -> None:
         if _compiles(frame):
             signal.setitimer(signal.ITIMER_PROF, AGAIN)
         else:
-            raise TimeUp(f"{limit:g} s are used up")
+            raised.append(TimeUp(f"{limit:g} s are used up"))
+            raise raised[0]
 
     before = signal.signal(signal.SIGPROF, up)
     signal.setitimer(signal.ITIMER_PROF, limit)
     try:
         yield
+    except Exception as made_of_it:
+        if raised and made_of_it is not raised[0]:
+            raise raised[0] from made_of_it
+        raise
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
         signal.signal(signal.SIGPROF, before)

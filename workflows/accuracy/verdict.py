@@ -7,7 +7,7 @@ time integration contradicts, is not stated.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from time import process_time
 
 import numpy as np
@@ -36,7 +36,8 @@ HALF = 0.5  # of the seconds that are left, for one measurement of several
 FOR_MESH = 0.75  # of the seconds that are left then
 CONTRADICTION = 3.0  # times the estimated error, from which on time integration contradicts the balance
 LEAST_OWN_ERROR = 1e-3  # of a time integration: how far it is from periodic adds to what its steps make
-AT_A_GIVEN_FREQUENCY = ("peak_frequency", "depth")  # a motion at a given frequency tells nothing about these
+AT_A_GIVEN_FREQUENCY = ("peak_frequency",)  # a motion at a given frequency tells nothing about it
+OF_WEAR = ("depth", "life")  # belong to all states: where a worn motion does not stay, the contact may survive
 RESPONSE = ("amplitude", "energy", "preload")
 
 
@@ -178,12 +179,15 @@ def _statement(
     own = [part for part in parts if part.quantity == name]
     known = [part for part in own if part.error is not None and np.isfinite(part.error)]
     lacking = [part for part in own if part.error is None or not np.isfinite(part.error)]
-    sum_of_known = float(sum(part.error or 0.0 for part in known))
+    sum_of_known = _sum(known)
     largest = max(known, key=lambda part: part.error or 0.0, default=None)
     dominated = largest.source if largest is not None else None
-    concerned = () if name in AT_A_GIVEN_FREQUENCY else checked.found if name == "life" else checked.found[:1]
-    wanted = 0 if name in AT_A_GIVEN_FREQUENCY else checked.wanted if name == "life" else min(checked.wanted, 1)
-    miss, trouble = _in_time(name, concerned, sum_of_known)
+    concerned = () if name in AT_A_GIVEN_FREQUENCY else checked.found if name in OF_WEAR else checked.found[:1]
+    wanted = 0 if name in AT_A_GIVEN_FREQUENCY else checked.wanted if name in OF_WEAR else min(checked.wanted, 1)
+    if name == "depth":  # what the energy of a cycle is off by moves the cycles, not the depth
+        miss, trouble = 0.0, _in_time("life", concerned, _sum(part for part in parts if part.quantity == "life"))[1]
+    else:
+        miss, trouble = _in_time(name, concerned, sum_of_known)
     total = None if lacking else max(sum_of_known, miss)
     if miss > sum_of_known:
         dominated = "harmonics, by time integration"
@@ -203,6 +207,11 @@ def _statement(
         at = f" at all but {len(concerned)} of {wanted} states" if concerned else ""
         reason += f"; not held against time integration{at}: {checked.refusal}"
     return Statement(value, total, dominated, True, reason)
+
+
+def _sum(parts: Iterable[Contribution]) -> float:
+    """Sum of the errors that are known."""
+    return float(sum(part.error for part in parts if part.error is not None and np.isfinite(part.error)))
 
 
 def _in_time(name: str, concerned: Sequence[tuple[State, InTime]], error: float) -> tuple[float, str]:

@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from tribodyn.fem.material import Material
 from tribodyn.workflows.accuracy import converge as grids
-from tribodyn.workflows.accuracy import knob_trade, promise, verification, wear_steps
+from tribodyn.workflows.accuracy import knob_trade, promise, reference, verification, wear_steps
 from tribodyn.workflows.accuracy.converge import Study as GridStudy
 from tribodyn.workflows.accuracy.promise import Check
+from tribodyn.workflows.accuracy.reference import Held
+from tribodyn.workflows.accuracy.refinement import Promise
 from tribodyn.workflows.accuracy.trade_table import Trade
 from tribodyn.workflows.accuracy.verification import Comparison
 from tribodyn.workflows.accuracy.wear_steps import WearStepTable
@@ -45,6 +47,7 @@ if TYPE_CHECKING:  # what takes long to import is imported where it is needed
     from tribodyn.workflows.benchmarks.fuzz import Tried
     from tribodyn.workflows.benchmarks.planted_faults import Seen
     from tribodyn.workflows.benchmarks.scaling import SizeCost
+    from tribodyn.workflows.benchmarks.scoreboard import Row
 
 Place = str | PathLike[str]
 
@@ -134,6 +137,17 @@ def check_promise(
     return promise.check(fspath(scene), override_texts(overrides), accuracy, by, reporter(progress).say)
 
 
+def check_accuracy(
+    source: Source, result: Result, promised: Promise, *, seconds: float = 3600.0, overrides: Overrides = ()
+) -> tuple[tuple[Held, ...], str]:
+    """Hold what `run_to_accuracy` has promised against a reference that is finer in every knob.
+
+    source, overrides : as given to run_to_accuracy; result, promised : what it returned; seconds : of the processor
+    Returns each promise beside the reference, and "" or why the reference lacks something
+    """
+    return reference.held(read_scene(source, overrides), result, promised, seconds)
+
+
 def converge(
     scene: Place, *, most: float = 99, overrides: Overrides = (), progress: Report = None
 ) -> tuple[GridStudy, ...]:
@@ -208,6 +222,22 @@ def scaling(sizes: Sequence[int] = (7, 13), *, progress: Report = None) -> list[
     from tribodyn.workflows.benchmarks import scaling as table
 
     return table.run(sizes, reporter(progress).say)
+
+
+def scoreboard(
+    scenes: int, folder: Place, *, seed: int = 1, seconds: float = 60.0, progress: Report = None
+) -> list[Row]:
+    """Hold verdicts on scenes drawn at random against references that are finer in every knob.
+
+    folder : where rows, table and histogram are kept: the same call goes on where it was ended
+    seconds : of the processor, that the run of a scene may take, and its reference again
+    """
+    from tribodyn.workflows.benchmarks import scoreboard as board
+    from tribodyn.workflows.benchmarks import scoreboard_table
+
+    rows = board.run(scenes, seed, Path(folder), seconds, reporter(progress).say)
+    scoreboard_table.write(rows, Path(folder))
+    return rows
 
 
 def fuzz(

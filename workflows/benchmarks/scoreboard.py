@@ -7,7 +7,7 @@ modes, harmonics, samples, points and wear steps. A row is kept as soon as its s
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,34 +16,19 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.geometry import parts
-from tribodyn.hbm import threads
-from tribodyn.hbm.continuation.operating_point import NoPeak
-from tribodyn.hbm.wear.history import WearHistory, cycles_to_preload
-from tribodyn.workflows.accuracy import mesh_probe, probes, refinement, verdict
+from tribodyn.workflows.accuracy import probes, reference, refinement, verdict
 from tribodyn.workflows.accuracy.statement import QUANTITIES
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.benchmarks.scoreboard_scenes import draw
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.run import modelling, pipeline, settings, wear_run
+from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.run.references import free_deflection
-from tribodyn.workflows.scene.body import Geometry
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.scene.schema import PartScene
-from tribodyn.workflows.scene.structure import Body, StructureScene
 
 ROWS = "rows.jsonl"
-ELEMENTS = 2.6  # of the reference along every edge, over those of the scene: three where that has one
-OF_PROMISED = 1.75  # the same, over those that a promise was made with, which are finer already
-MODES, CUTOFF = 3, 2  # times those of the scene
-HARMONICS, LOWEST = 3, 5  # more than the scene's; the highest at the least
-STEPS = 3  # wear steps in each of the scene
 ROUNDING = 1e-8  # relative difference that says nothing
-PROMISED = 7  # every so many scenes a promise is asked for too
+PROMISED = 14  # every so many scenes a promise is asked for too
 WANTED = "20 % of peak frequency, amplitude, energy, preload"
-
-Values = dict[str, float | None]
 
 
 @dataclass(frozen=True)
@@ -64,8 +49,9 @@ class Judged:
 
     @property
     def promised(self) -> bool:
-        """Whether there is a stated error and a reference to hold it against."""
-        return self.stated and self.error is not None and self.true is not None
+        """Whether there is a stated error and a reference to hold it against; not where the scene gives the number."""
+        known = self.stated and self.error is not None and self.true is not None
+        return known and max(self.error or 0.0, self.true or 0.0) > ROUNDING
 
     @property
     def broken(self) -> bool:
@@ -155,7 +141,7 @@ def measured(number: int, seed: int, seconds: float) -> Row:
         ran = process_time() - clock
         said = verdict.judge(file, model, result, Progress(), ran)
         clock = process_time()
-        truth, outcome = reference(file, seconds)
+        truth, outcome = reference.solved(file, seconds)
         referred = process_time() - clock
         return replace(
             row,
@@ -180,74 +166,7 @@ def solved(file: SceneFile) -> tuple[Result, modelling.Model]:
     return pipeline.run(file.changed("verdict.enabled=false"), None, Progress(), build=build), models[-1]
 
 
-def reference(file: SceneFile, seconds: float, elements: float = ELEMENTS) -> tuple[Values, str]:
-    """What the scene says with all knobs finer, and "measured" or why there is nothing to say.
-
-    Its peak is found by the search that wear runs begin with, which needs no points of a response. Without wear first;
-    then with wear in what is left of the seconds
-    """
-    fine = file.changed(*finer(file, elements))
-    values: Values = dict.fromkeys(QUANTITIES)
-    what, end = "its reference", process_time() + seconds
-    try:
-        with processor_seconds(seconds), threads.limited(1):
-            model = modelling.build(fine, None, Progress())
-            there, _ = probes.unworn_of(fine, model)
-        values |= {name: value for name, value, _ in mesh_probe.compared(there, there)}
-        if fine.scene.wears:
-            what = "the reference of its wear"
-            with processor_seconds(end - process_time()), threads.limited(1):
-                worn = _worn(fine, model)
-            if worn.ended.failed:
-                raise RuntimeError(str(worn.end))
-            values["depth"] = float((worn.depth[-1] + worn.worn[-1]).max())
-            values["life"] = cycles_to_preload(worn)
-    except TimeUp:
-        return values, f"{'measured, ' * (what != 'its reference')}{what} is too dear"
-    except (NoPeak, ValueError, RuntimeError) as refusal:
-        return values, f"{'measured, ' * (what != 'its reference')}{what} is refused: {refusal}"
-    return values, "measured"
-
-
-def _worn(file: SceneFile, model: modelling.Model) -> WearHistory:
-    wear = file.scene.wear
-    assert wear is not None
-    problem = wear_run.wear_problem(file.scene, file.folder, model.balance, wear.lost_below)
-    limit = settings.step_limit(file.scene, free_deflection(model.balance), problem.area)
-    return wear_run.evolve(problem, wear, limit, wear.max_steps)
-
-
-def finer(file: SceneFile, elements: float = ELEMENTS) -> Iterator[str]:
-    """Overrides that make every knob of a scene finer."""
-    scene = file.scene
-    tables: dict[str, Geometry | Body] = {}
-    if isinstance(scene, PartScene | StructureScene) and scene.geometry is not None:
-        tables["geometry"] = scene.geometry
-    elif isinstance(scene, StructureScene):
-        tables = {f"bodies.{name}": body for name, body in scene.bodies.items()}
-    for key, table in tables.items():
-        part = parts.load(str(table.part_name))
-        more = parts.rescaled(part, part.Parameters(**table.parameters), elements)
-        yield from (f"{key}.{name}={count}" for name, count in more.items())
-    reduction = getattr(scene, "reduction", None)
-    if reduction is not None and reduction.modes is not None:
-        yield f"reduction.modes={MODES * reduction.modes}"
-    if reduction is not None and reduction.cutoff is not None:
-        yield f"reduction.cutoff={CUTOFF * reduction.cutoff!r}"
-    top = max(max(scene.harmonics.kept) + HARMONICS, LOWEST)
-    yield f"harmonics.kept={list(range(top + 1))}"
-    yield f"harmonics.samples={max(2 * scene.harmonics.samples, 16 * top)}"
-    yield f"solver.tolerance={0.1 * scene.solver.tolerance!r}"
-    wear = scene.wear
-    if wear is not None:
-        yield f"wear.max_steps={4 * STEPS * wear.max_steps}"
-        if wear.rule == "error_controlled" and wear.tolerance is not None:
-            yield f"wear.tolerance={wear.tolerance / STEPS!r}"
-        elif wear.step is not None and wear.step.share is not None:
-            yield f"wear.step={wear.step.share / STEPS!r}"
-
-
-def _judged(name: str, said: verdict.Verdict, truth: Values) -> Judged:
+def _judged(name: str, said: verdict.Verdict, truth: reference.Values) -> Judged:
     one, right = said.statements[name], truth[name]
     true = None if one.value is None or right is None else probes.relative(one.value, right)
     return Judged(name, one.value, one.error, one.dominated_by, one.stated, right, true, one.reason)
@@ -255,13 +174,11 @@ def _judged(name: str, said: verdict.Verdict, truth: Values) -> Judged:
 
 def _promise(file: SceneFile, seconds: float) -> tuple[Judged, ...]:
     """What `run --accuracy` promises of the unworn response, against a reference that is finer than its last round."""
-    last: list[SceneFile] = []
     start = process_time()
 
     def round_of(one: SceneFile, number: int) -> Result:
         if process_time() - start > seconds:
             raise RuntimeError(f"the promise takes above {seconds:g} s")
-        last.append(one)
         clock = process_time()
         result, model = solved(one)
         said = verdict.judge(one, model, result, Progress(), process_time() - clock)
@@ -271,10 +188,7 @@ def _promise(file: SceneFile, seconds: float) -> tuple[Judged, ...]:
         result, promise = refinement.to_accuracy(file, WANTED, round_of, lambda sentence: None)
     except (ValueError, RuntimeError):
         return ()
-    truth, _ = reference(last[-1], seconds, OF_PROMISED)
-    found = []
-    for name, why in promise.reasons.items():
-        value, right = refinement.loaded(result.verdict).statements[name].value, truth[name]
-        true = None if value is None or right is None else probes.relative(value, right)
-        found.append(Judged(name, value, promise.wanted, None, not why, right, true, why))
-    return tuple(found)
+    found, _ = reference.held(file, result, promise, seconds)
+    return tuple(
+        Judged(one.quantity, one.value, promise.wanted, None, True, one.reference, one.true, "") for one in found
+    )

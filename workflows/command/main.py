@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,7 +18,10 @@ from tribodyn.workflows.command.words import Flag, Json, Overrides, make_room, p
 from tribodyn.workflows.scene import scene_file
 
 if TYPE_CHECKING:
+    from tribodyn.workflows.accuracy.refinement import Promise
     from tribodyn.workflows.result.result import Result
+    from tribodyn.workflows.run.progress import Progress
+    from tribodyn.workflows.scene.scene_file import SceneFile
 
 Formats = Annotated[tuple[str, ...], Parameter(name="--format", negative=(), consume_multiple=True)]
 
@@ -53,6 +57,7 @@ def run(
     overrides: Overrides = (),
     accuracy: str | None = None,
     table: Path | None = None,
+    check: Flag = False,
     out: Path | None = None,
     resume: Flag = False,
     pictures: Annotated[bool, Parameter(negative="--no-pictures")] = True,
@@ -74,6 +79,9 @@ def run(
         scene has it, and its error out.
     table
         A trade of this scene to choose the settings by instead, the cheapest that it promises.
+    check
+        Hold what --accuracy promises against a reference that is finer than its last run in mesh, contact grid, modes,
+        harmonics, samples, Newton and wear steps, too; exit code 1 where it is broken. It takes ten times as long.
     out
         Folder of the result; results/NAME by default.
     resume
@@ -95,6 +103,10 @@ def run(
     file = scene_file.read(scene, overrides)
     if accuracy is None and table is not None:
         raise ValueError("--table is the trade that --accuracy goes by: give --accuracy, too")
+    if check and (accuracy is None or table is not None):
+        raise ValueError(
+            "--check is of what --accuracy promises without a table; that of a table: tribodyn trade --check"
+        )
     if accuracy is not None and table is not None:
         file, choice = tuned(scene, overrides, accuracy, table)
         progress.say(choice.sentence)
@@ -114,8 +126,22 @@ def run(
     progress.say(f"result: {path}")
     if pictures:
         _draw(result, folder / "pictures", tell=progress.say)
+    if promise is not None and check:
+        _check(file, result, promise, progress)
     if promise is not None and not promise.kept:
         raise RuntimeError(f"{promise.sentence}; the result is kept in {path}")
+
+
+def _check(file: SceneFile, result: Result, promise: Promise, progress: Progress) -> None:
+    """Print a promise beside its reference; raises SystemExit 1 where it is broken."""
+    from tribodyn.workflows.accuracy import reference
+    from tribodyn.workflows.api import whole_scenes
+
+    with progress.stage("reference"):
+        found, lacking = whole_scenes.check_accuracy(file, result, promise)
+    print(reference.as_text(found, lacking))
+    if any(one.broken for one in found):
+        sys.exit(1)
 
 
 def _kept(path: Path, scene: str, overrides: Sequence[str]) -> str:

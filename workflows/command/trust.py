@@ -29,12 +29,11 @@ def scoreboard(
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.benchmarks import scoreboard as board
+    from tribodyn.workflows.api import whole_scenes
     from tribodyn.workflows.benchmarks import scoreboard_table as table
 
     make_room(out)
-    rows = board.run(scenes, seed, out, seconds, aside)
-    table.write(rows, out)
+    rows = whole_scenes.scoreboard(scenes, out, seed=seed, seconds=seconds, progress=aside)
     print(json.dumps([asdict(row) for row in rows], indent=2) if as_json else table.summary(rows))
     broken = sum(one.broken for row in rows for one in (*row.judged, *row.promise))
     if broken:

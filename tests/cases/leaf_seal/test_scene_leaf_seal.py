@@ -31,12 +31,12 @@ LOW, HIGH, UNIQUE = 144.94, 400.0, 177.0  # [Hz]: three solutions; linear; one s
 
 @pytest.fixture(scope="module")
 def leaf():
-    return respond(scene_file.read("leaf_seal"))
+    return respond(scene_file.read("leaf_seal_thesis"))
 
 
 def built(folder, *overrides):
     """The model of the scene with changes."""
-    file = scene_file.read("leaf_seal", overrides)
+    file = scene_file.read("leaf_seal_thesis", overrides)
     mesh, node_sets = modelling.make_mesh(file, folder)
     part = modelling.make_part(file.scene, mesh, node_sets)
     return modelling.make_model(file.scene, part, modelling.reduce_part(file.scene, part))
@@ -75,7 +75,7 @@ def test_exactly_one_unknown_for_each_pair_and_coefficient(leaf):
 
 
 def test_the_plan_counts_what_the_run_builds(leaf):
-    plan = planning.plan(scene_file.read("leaf_seal"))
+    plan = planning.plan(scene_file.read("leaf_seal_thesis"))
     assert (plan.contact_pairs, plan.unknowns) == (126, 378)
     assert int(plan.model_dofs) == leaf.balance.model.system.n_dof
 
@@ -99,7 +99,7 @@ def test_free_leaf_has_two_rigid_modes_and_contact_alone_holds_it(tmp_path):
 
 
 def test_fitted_columns_stand_beside_the_published_ones():
-    scene = scene_file.read("leaf_seal").scene
+    scene = scene_file.read("leaf_seal_thesis").scene
     found = leaf_fit.of_scene(scene)
     errors = found.errors[leaf_fit.COUNTED]
     assert found.rms < 0.072
@@ -111,7 +111,7 @@ def test_fitted_columns_stand_beside_the_published_ones():
 
 
 def test_the_scene_has_the_stiffnesses_that_suit_its_leaf_best():
-    scene = scene_file.read("leaf_seal").scene
+    scene = scene_file.read("leaf_seal_thesis").scene
     p = leaf_fit.dimensions(scene)
     leaf = leaf_fit.reduced_leaf(p)
     mass = 7860 * p["angle"] * p["radius"] * p["height"] * p["thickness"]
@@ -123,7 +123,7 @@ def test_the_scene_has_the_stiffnesses_that_suit_its_leaf_best():
 
 
 def test_the_fit_stays_at_the_leaf_of_the_scene():
-    scene = scene_file.read("leaf_seal").scene
+    scene = scene_file.read("leaf_seal_thesis").scene
     shape = leaf_fit.shape_of(leaf_fit.dimensions(scene))
     found = leaf_fit.fit(scene, 3, shape, max_steps=2)
     assert found.rms == pytest.approx(leaf_fit.of_scene(scene).rms, rel=0.003)
@@ -131,7 +131,7 @@ def test_the_fit_stays_at_the_leaf_of_the_scene():
 
 
 def test_a_leaf_gives_way_only_to_one_that_the_numbers_tell_apart():
-    own = leaf_fit.of_scene(scene_file.read("leaf_seal").scene)
+    own = leaf_fit.of_scene(scene_file.read("leaf_seal_thesis").scene)
     published = np.array(list(leaf_fit.PUBLISHED.values()))
 
     def with_errors(errors):
@@ -204,7 +204,7 @@ def test_five_points_show_linear_and_chattering_contact(leaf):
 
 def test_three_solutions_share_a_frequency_and_time_integration_knows_which_are_stable():
     """Harmonics 0 to 5, at a frequency where workflows.leaf_accuracy finds such three."""
-    file = scene_file.read("leaf_seal", ("harmonics.kept=[0,1,2,3,4,5]", "response.frequency=[140, 180]"))
+    file = scene_file.read("leaf_seal_thesis", ("harmonics.kept=[0,1,2,3,4,5]", "response.frequency=[140, 180]"))
     response = respond(file)
     balance, omega = response.balance, 2 * np.pi * LOW
     assert len(response.branch.folds) == 2
@@ -245,7 +245,7 @@ def test_inclination_leaves_the_ends_or_the_centre_in_contact(tmp_path):
 
 def test_liner_motion_enters_the_contact_and_the_linear_references():
     still = ("loads.harmonic.pulsation.pressure=0", "response.frequency=[300, 310]")
-    moved = respond(scene_file.read("leaf_seal", (*liner(0.0, 1j), *still)))
+    moved = respond(scene_file.read("leaf_seal_thesis", (*liner(0.0, 1j), *still)))
     base = moved.balance.excitation.base
     assert (base[:63] == 0).all()
     np.testing.assert_allclose(base[63:, 0], 0.0)
@@ -259,7 +259,7 @@ def test_liner_motion_enters_the_contact_and_the_linear_references():
 
 def test_a_smaller_load_moves_the_liner_less_in_every_answer():
     """Of a linear answer, all stuck: half of the harmonic loads is half of the motion; the static part stays."""
-    moved = respond(scene_file.read("leaf_seal", (*liner(0.0, 1.0), "response.frequency=[300, 310]")))
+    moved = respond(scene_file.read("leaf_seal_thesis", (*liner(0.0, 1.0), "response.frequency=[300, 310]")))
     full, half = moved.balance, moved.balance.with_load(0.5)
     omega, answers = 2 * np.pi * 300, []
     for balance in (full, half):
@@ -281,14 +281,14 @@ def test_wear_by_impacts_grows_where_the_leaf_chatters(tmp_path):
         "wear.law=impact", "wear.coefficient=1e-12 m3/J", f"wear.at={UNIQUE} Hz", "wear.step=2 um", "wear.max_steps=2",
         "response.frequency=[100, 180]", "verdict.enabled=false",
     )  # fmt: skip
-    result = pipeline.run(scene_file.read("leaf_seal", overrides), tmp_path, Progress())
+    result = pipeline.run(scene_file.read("leaf_seal_thesis", overrides), tmp_path, Progress())
     status, worn = result.wear.status[0], result.wear.worn[0]
     assert ((worn > 0) == (status == STICKS | SEPARATES)).all()
     assert worn.max() == pytest.approx(2e-6, rel=1e-3)
 
 
 def test_the_study_has_its_thirty_configurations_and_writes_what_it_found(tmp_path):
-    scene = scene_file.read("leaf_seal").scene
+    scene = scene_file.read("leaf_seal_thesis").scene
     every = cases(scene)
     assert len(every) == 31
     count = {group: sum(case.group == group for case in every) for group in dict.fromkeys(c.group for c in every)}
@@ -296,7 +296,7 @@ def test_the_study_has_its_thirty_configurations_and_writes_what_it_found(tmp_pa
         "liner": 7, "excitation": 4, "liner without force": 4, "K_n": 4, "K_spring": 4, "inclination": 4, "bow": 4,
     }  # fmt: skip
     for case in every:
-        scene_file.read("leaf_seal", case.overrides)
+        scene_file.read("leaf_seal_thesis", case.overrides)
     impossible = Case("bow", "impossible", ("contact.plane=", "contact.inclination=1 deg"))
     few = [every[0], impossible, next(case for case in every if case.label == "+4°")]
     told = []
@@ -313,8 +313,10 @@ def test_the_study_has_its_thirty_configurations_and_writes_what_it_found(tmp_pa
     assert again[0].response is None
     assert again[0].numbers == records[0].numbers
     np.testing.assert_array_equal(again[0].amplitude, records[0].amplitude)
-    assert leaf_record.load(few[0], scene_file.read("leaf_seal", few[2].overrides).scene, tmp_path / "x") is None
-    assert leaf_record.load(few[0], scene_file.read("leaf_seal", few[2].overrides).scene, tmp_path / KEPT) is None
+    assert leaf_record.load(few[0], scene_file.read("leaf_seal_thesis", few[2].overrides).scene, tmp_path / "x") is None
+    assert (
+        leaf_record.load(few[0], scene_file.read("leaf_seal_thesis", few[2].overrides).scene, tmp_path / KEPT) is None
+    )
     paths = leaf_study.draw(records, tmp_path)
     drawn = {path.stem for path in paths}
     assert drawn == {"summary", "response", "contact", "history", "inclination", "chatter"}

@@ -35,12 +35,12 @@ from tribodyn.workflows.studies.identification import Measured, Parameter, fit
 
 @pytest.fixture(scope="module")
 def rig():
-    return Rig.of(scene_file.read("rig", COARSE))
+    return Rig.of(scene_file.read("rig_thesis", COARSE))
 
 
 @pytest.fixture(scope="module")
 def joints():
-    return joints_of(scene_file.read("rig", COARSE))
+    return joints_of(scene_file.read("rig_thesis", COARSE))
 
 
 # ---- prescribed height ----
@@ -55,7 +55,7 @@ def test_the_force_at_the_screws_is_the_preload(rig):
 
 def test_forces_at_rest_leave_a_prescribed_height_to_what_holds_the_part():
     """Both contact faces are of the one part: what they give to it adds up to nothing."""
-    (part,) = body_forces(scene_file.read("rig", COARSE))
+    (part,) = body_forces(scene_file.read("rig_thesis", COARSE))
     assert part.held
     assert not part.load.any()
     assert np.abs(part.joints["contact"]).max() < 1e-9
@@ -150,7 +150,7 @@ def test_the_height_is_found_from_the_preload(rig):
 
 
 def test_life_and_work_tell_the_coefficient(rig):
-    run = wear_down(Rig.of(scene_file.read("rig", QUICK)), 0.0, lambda sentence: None)
+    run = wear_down(Rig.of(scene_file.read("rig_thesis", QUICK)), 0.0, lambda sentence: None)
     assert run.lost
     found = rig_fit.fit_coefficient(run, 5.5e-15)
     ratios = [run.history.cycles[-1] / published.LIFE_MEASURED, run.spent[-1] / published.WORK]
@@ -163,7 +163,7 @@ def test_life_and_work_tell_the_coefficient(rig):
 
 def test_both_wear_rules_use_up_the_preload_alike():
     def run(*more: str) -> RigWear:
-        return wear_down(Rig.of(scene_file.read("rig", (*QUICK, *more))), 0.0, lambda sentence: None)
+        return wear_down(Rig.of(scene_file.read("rig_thesis", (*QUICK, *more))), 0.0, lambda sentence: None)
 
     explicit, controlled = run("wear.step=4 %"), run("wear.rule=error_controlled", "wear.tolerance=5 %")
     level = np.linspace(0.9, 0.4, 6) * explicit.rest[0]
@@ -221,13 +221,13 @@ def test_the_study_compares_every_number_and_draws(tmp_path, capsys, monkeypatch
 )
 def test_a_scene_that_is_not_this_rig_is_one_sentence(override, words):
     with pytest.raises(ValueError, match=words):
-        Rig.of(scene_file.read("rig", (override,)))
+        Rig.of(scene_file.read("rig_thesis", (override,)))
 
 
 def test_a_wear_law_beside_the_scene_is_found(tmp_path):
     """The law of a file, the energy's own written once more, gives the same wear."""
     law = (Path(wear_law.__file__).parent / "laws" / "energy.py").read_text(encoding="utf-8")
-    text = scene_file.find("rig").read_text(encoding="utf-8")
+    text = scene_file.find("rig_thesis").read_text(encoding="utf-8")
     (tmp_path / "own.py").write_text(law, encoding="utf-8")
     (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
     depths = []

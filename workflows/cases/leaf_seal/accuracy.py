@@ -27,7 +27,7 @@ HILL = 5  # harmonics of the solutions whose stability is compared with time int
 
 def with_harmonics(top: int) -> LeafResponse:
     """The response of the scene with harmonics 0 to `top`."""
-    return respond(read_scene("leaf_seal", (f"harmonics.kept={list(range(top + 1))}",)))
+    return respond(read_scene("leaf_seal_thesis", (f"harmonics.kept={list(range(top + 1))}",)))
 
 
 def resonance(response: LeafResponse) -> tuple[int, int, float]:

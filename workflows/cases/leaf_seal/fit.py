@@ -140,7 +140,7 @@ def reduced_leaf(parameters: Dimensions) -> JointSprings:
     units = {"angle": "rad", **dict.fromkeys(LENGTHS, "m")}
     said = [f"geometry.{name}={value!r} {units[name]}" for name, value in parameters.items() if name in units]
     said.append(f"geometry.pin_column={int(parameters['pin_column'])}")
-    return joint_springs(read_scene("leaf_seal", said))
+    return joint_springs(read_scene("leaf_seal_thesis", said))
 
 
 def dimensions(scene: PartScene) -> Dimensions:
@@ -233,7 +233,7 @@ def search(tell: Callable[[str], None]) -> Fit:
 
     tell : called with a sentence on every fit
     """
-    scene = read_scene("leaf_seal").part_scene
+    scene = read_scene("leaf_seal_thesis").part_scene
     with threadpool_limits(1):
         first = dimensions(scene)
         own = fit(scene, int(first["pin_column"]), shape_of(first))

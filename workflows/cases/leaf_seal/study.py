@@ -49,7 +49,7 @@ def sizes(response: LeafResponse) -> str:
 def solve(case: Case) -> Record:
     """Solve one configuration; what goes wrong stands in the record."""
     try:
-        return leaf_record.of_response(case, respond(read_scene("leaf_seal", case.overrides)))
+        return leaf_record.of_response(case, respond(read_scene("leaf_seal_thesis", case.overrides)))
     except (ArithmeticError, RuntimeError, ValueError) as error:
         return leaf_record.of_failure(case, " ".join(str(error).split()))
 
@@ -63,7 +63,7 @@ def study(
     """
     records: list[Record] = []
     for case in chosen:
-        scene = read_scene("leaf_seal", case.overrides).scene
+        scene = read_scene("leaf_seal_thesis", case.overrides).scene
         kept = leaf_record.load(case, scene, folder / KEPT) if resume else None
         record = kept if kept is not None and kept.complete else solve(case)
         if record is not kept:
@@ -179,7 +179,7 @@ def whole(folder: Path, resume: bool, tell: Callable[[str], None]) -> Study:
     folder.mkdir(parents=True, exist_ok=True)
     tell("  ".join(f"{name:{_width(name)}}" for name in COLUMNS))
     with threadpool_limits(1):
-        records = study(cases(read_scene("leaf_seal").part_scene), folder, resume, tell)
+        records = study(cases(read_scene("leaf_seal_thesis").part_scene), folder, resume, tell)
         first = _response(records[0])
         paths = draw([replace(records[0], response=first), *records[1:]], folder)
         allocated = "" if first is None else sizes(first)

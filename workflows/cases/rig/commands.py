@@ -11,7 +11,7 @@ from tribodyn.command_words import Changes, Flag, Json, Overrides, aside, make_r
 
 def rig(
     work: Literal["fit", "study", "life"],
-    scene: str = "rig",
+    scene: str = "rig_thesis",
     *,
     column: Flag = False,
     wear: Flag = False,
