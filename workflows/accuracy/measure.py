@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from tribodyn.hbm.continuation.operating_point import AtFrequency, OperatingPoint
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
 from tribodyn.workflows.accuracy.trade_table import ANSWERED, QUANTITIES
-from tribodyn.workflows.run import memory, modelling, pipeline, settings, wear_run
+from tribodyn.workflows.run import curve, memory, modelling, pipeline, settings, wear_run
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import free_deflection
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -91,7 +91,7 @@ def depth_at(worn: WearHistory, cycles: float) -> np.ndarray:
 def _peak(file: SceneFile, model: modelling.Model, refined: bool) -> OperatingPoint:
     """The highest point of the response in the scene's range."""
     balance, site = model.balance, settings.peak_of(file.scene)
-    branch = pipeline.follow_response(file.scene, balance, lambda share, note: None)
+    branch = curve.follow_response(file.scene, balance, lambda share, note: None)
     pipeline.check_branch(branch)
     height = branch.amplitude(settings.OUTPUT)
     best = int(np.argmax(np.where(branch.converged, height, -1.0)))

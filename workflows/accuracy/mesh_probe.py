@@ -73,10 +73,11 @@ class Probe:
 
     def _solve(self, others: Sequence[Other], seen: Seen, end: float) -> None:
         ours = Answers.of(self.first.balance, self.first.here)
+        folded = isinstance(self.first.site, probes.OnCurve)
         for other in others:
             try:
                 with processor_seconds(end - process_time()):
-                    there, deepest = probes.unworn(other.file, self.result.harmonics)
+                    there, deepest = probes.unworn(other.file, self.result.harmonics, folded)
             except (TimeUp, ValueError, RuntimeError) as refusal:
                 why = self.skipped if isinstance(refusal, TimeUp) else f"{other.how}: {refusal}"
                 seen.refused[other.along] = why

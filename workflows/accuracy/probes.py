@@ -14,15 +14,20 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import harmonic_choice
+from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.operating_point import NoPeak, OperatingPoint, Site
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.newton import Solution
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.wear.history import LIFE_SHARE
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.run import modelling, settings
+from tribodyn.workflows.run import curve, modelling, settings
+from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import delta_max, free_deflection
 from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.schema import Scene
 
 CLIMB = (3, 5, 7, 9)  # highest harmonics that the estimate climbs through: each start is near enough for Newton
 FURTHER = 6  # harmonics beyond the kept ones that it looks at, where more than CLIMB are kept
@@ -59,8 +64,46 @@ class State:
     cycles: float
     depth: np.ndarray
     balance: HarmonicBalance
-    site: Site
+    site: Site | OnCurve
     here: OperatingPoint
+
+
+@dataclass(frozen=True)
+class OnCurve:
+    """The highest point of a response curve that turns back.
+
+    It may be a fold, whose neighbours a search at given frequencies does not see: the whole curve is followed
+    """
+
+    scene: Scene
+
+    def first(self, balance: HarmonicBalance) -> OperatingPoint:
+        """Follow the curve of a contact as the run does. Raises NoPeak, SolveFailed."""
+        branch = curve.follow_response(self.scene, balance, lambda share, note: None)
+        if not branch.converged[-1]:
+            raise SolveFailed(f"the frequency response {branch.end}")
+        return highest_of(branch, balance)
+
+    def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
+        """The same: a neighbouring solution may lie beyond a fold."""
+        return self.first(balance)
+
+
+def highest_of(branch: Branch, balance: HarmonicBalance) -> OperatingPoint:
+    """The highest point of a response curve, as it is; raises NoPeak where that is an end of it."""
+    height = np.where(branch.converged, branch.amplitude(branch.output_names[0]), -1.0)
+    best = int(np.argmax(height))
+    if best in (0, len(height) - 1):
+        raise NoPeak("the response is highest at an end of response.frequency, which is no peak: widen the range")
+    x = branch.contact[best].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
+    state = balance.evaluate(float(branch.omega[best]), x)
+    return OperatingPoint.of(balance, Solution(state, CONVERGED, 0, 0, ()), branch.output_names[0], len(height))
+
+
+def turns_back(branch: Branch) -> bool:
+    """Whether a response curve has folds."""
+    forward = np.diff(branch.omega) > 0
+    return bool(forward.any() and not forward.all())
 
 
 def states(file: SceneFile, balance: HarmonicBalance, result: Result) -> list[State]:
@@ -69,6 +112,9 @@ def states(file: SceneFile, balance: HarmonicBalance, result: Result) -> list[St
     basis = HarmonicBasis(result.harmonics, balance.basis.n_samples)
     wear = result.wear
     if wear is None or not len(wear.cycles) or scene.wear is None:
+        if result.response is not None and turns_back(result.response) and balance.contact.n_pair:
+            here = highest_of(result.response, balance)
+            return [State(None, 0.0, np.zeros(balance.contact.n_pair), balance, OnCurve(scene), here)]
         return [state] if (state := _at_response_peak(scene_peak(file), balance, result)) is not None else []
     left = np.flatnonzero(wear.preload > LIFE_SHARE * wear.preload[0]) if wear.preload[0] > 0 else np.arange(1)
     last = int(left[-1]) if len(left) else 0
@@ -92,17 +138,17 @@ def scene_peak(file: SceneFile) -> Site:
 
 
 def _at_response_peak(site: Site, balance: HarmonicBalance, result: Result) -> State | None:
-    curve = result.response
-    if curve is None:
+    branch = result.response
+    if branch is None:
         return None
-    height = np.where(curve.converged, curve.amplitude(curve.output_names[0]), -1.0)
+    height = np.where(branch.converged, branch.amplitude(branch.output_names[0]), -1.0)
     best = int(np.argmax(height))
     if height[best] <= 0 or balance.contact.n_pair == 0:
         return None
     if best in (0, len(height) - 1):
         raise NoPeak("the response is highest at an end of response.frequency, which is no peak: widen the range")
-    x = curve.contact[best].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
-    point = site.next(balance, float(curve.omega[best]), x)
+    x = branch.contact[best].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
+    point = site.next(balance, float(branch.omega[best]), x)
     return State(None, 0.0, np.zeros(len(x)), balance, site, point) if point.solution.converged else None
 
 
@@ -130,18 +176,20 @@ def with_more_harmonics(state: State) -> Answers | None:
     return answers
 
 
-def unworn(other: SceneFile, harmonics: tuple[int, ...]) -> tuple[Answers, float]:
+def unworn(other: SceneFile, harmonics: tuple[int, ...], folded: bool = False) -> tuple[Answers, float]:
     """Answers of the unworn contact of a scene on another mesh, and its delta_max [m].
 
+    folded : whether the scene's answers are those of the highest point of a curve that turns back
     Raises  ValueError where it has no peak; RuntimeError where it has no solution
     """
-    return unworn_of(other, modelling.build(other, None, Progress(), harmonics))
+    return unworn_of(other, modelling.build(other, None, Progress(), harmonics), folded)
 
 
-def unworn_of(file: SceneFile, model: modelling.Model) -> tuple[Answers, float]:
+def unworn_of(file: SceneFile, model: modelling.Model, folded: bool = False) -> tuple[Answers, float]:
     """Answers of the unworn contact of a model, and its delta_max [m], nan where nothing wears; raises as `unworn`."""
     scene, balance = file.scene, model.balance
-    site, load = scene_peak(file), 1.0
+    site: Site | OnCurve = OnCurve(scene) if folded else scene_peak(file)
+    load = 1.0
     if scene.wear is not None:
         duty = settings.mission(scene)[0]
         site, load = duty.site, duty.load
@@ -185,7 +233,8 @@ def each(seen: list[State], look: Callable[[State], Answers | None], seconds: fl
     for done, state in enumerate(seen):
         try:
             left = end - process_time()  # half of it for the first state: all quantities but depth and life are its own
-            with processor_seconds(left / (len(seen) - done) if done else 0.5 * left):
+            share = 0.5 if not done and len(seen) > 1 else 1 / (len(seen) - done)
+            with processor_seconds(share * left):
                 answers = look(state)
             yield answers
         except (ValueError, RuntimeError, TimeUp):

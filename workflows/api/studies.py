@@ -39,7 +39,7 @@ from tribodyn.workflows.pictures.wheel_diagrams import safe as plot_safe
 from tribodyn.workflows.pictures.wheel_diagrams import shades
 from tribodyn.workflows.result.result import Patch, References, Result
 from tribodyn.workflows.result.whole_file import replacing as write_whole
-from tribodyn.workflows.run import memory, pipeline, references, settings, wear_run
+from tribodyn.workflows.run import curve, memory, references, settings, wear_run
 from tribodyn.workflows.run.description import described
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.reuse import Bench, reaction
@@ -183,7 +183,7 @@ def worn(balance: HarmonicBalance, depth: np.ndarray) -> HarmonicBalance:
 
 def follow_response(file: SceneFile, balance: HarmonicBalance) -> Branch:
     """The response over the scene's range by the scene's method, as far as it goes, see `Branch.end`."""
-    return pipeline.follow_response(file.scene, balance, lambda done, said: None)
+    return curve.follow_response(file.scene, balance, lambda done, said: None)
 
 
 def follow_arc_length(file: SceneFile, balance: HarmonicBalance) -> Branch:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import harmonic_choice, residual_shear
 from tribodyn.hbm.continuation.branch import Branch
@@ -14,9 +15,18 @@ from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.stability import exponents
 from tribodyn.workflows.result.result import CurveStability, ShearBounds
+from tribodyn.workflows.run import settings
+from tribodyn.workflows.scene.schema import Scene
 
 CHOICES = 3  # times that harmonics are chosen, at the peak that the last choice has
 SAME_PEAK = 1e-3  # distance of peaks, relative, that is none
+
+
+def follow_response(scene: Scene, balance: HarmonicBalance, advance: Callable[[float, str], None]) -> Branch:
+    """The response curve of the unworn contact by the scene's continuation method."""
+    method, options = continuation.load(scene.response.method_name), settings.response_options(scene)
+    low, high = settings.response_range(scene)
+    return method.follow(balance, low, high, options, lambda done, wanted: advance(done / wanted, ""))
 
 
 def choose_harmonics(

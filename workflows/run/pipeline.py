@@ -9,7 +9,6 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.outcome import BranchEnd
@@ -64,7 +63,7 @@ def run(
         keep(result)
         if result.response is None:
             with progress.track("frequency response") as advance:
-                frf = follow_response(scene, model.balance, advance)
+                frf = curve.follow_response(scene, model.balance, advance)
             with progress.stage("linear references"):
                 low, high = scene.response.references or scene.response.frequency
                 linear = references.linear_references(model.balance, settings.OUTPUT, 2 * np.pi * low, 2 * np.pi * high)
@@ -80,7 +79,7 @@ def run(
             with progress.track("responses of the worn contact") as advance:
 
                 def again(worn: HarmonicBalance) -> Branch:
-                    return follow_response(scene, worn, lambda done, text: None)
+                    return curve.follow_response(scene, worn, lambda done, text: None)
 
                 count = scene.wear.responses
                 curves = worn_responses.curves(result, model.balance, count, again, advance)
@@ -105,13 +104,6 @@ def judged(scene: Scene, balance: HarmonicBalance, result: Result, progress: Pro
             bounds = curve.shear_bounds(balance, frf, settings.OUTPUT, settings.newton_options(scene), advance)
             result = replace(result, bounds=bounds)
     return result
-
-
-def follow_response(scene: Scene, balance: HarmonicBalance, advance: Callable[[float, str], None]) -> Branch:
-    """The response curve of the unworn contact by the scene's continuation method."""
-    method, options = continuation.load(scene.response.method_name), settings.response_options(scene)
-    low, high = settings.response_range(scene)
-    return method.follow(balance, low, high, options, lambda done, wanted: advance(done / wanted, ""))
 
 
 def check_branch(branch: Branch | None) -> None:
