@@ -14,7 +14,7 @@ from tribodyn.workflows.benchmarks import scoreboard, scoreboard_scenes, scorebo
 from tribodyn.workflows.benchmarks.scoreboard import Judged, Row
 
 SEED = 2
-SCENES = (6, 7)  # a beam and a plate that take a second each
+SCENES = (12, 7)  # a beam and a plate that take a second each
 KEPT = Path(__file__).parents[2] / "docs" / "accuracy" / "scoreboard_rows.jsonl"
 
 
@@ -71,6 +71,7 @@ def test_a_broken_promise_is_told(rows: list[Row], tmp_path: Path) -> None:
     assert off.broken
     assert not replace(off, error=0.1).broken
     assert not replace(off, stated=False).broken
+    assert not replace(off, error=0.0, true=0.0).promised  # a frequency that the scene gives
     assert "energy: stated 0.01, true 0.09" in scoreboard_table.summary(bad)
     assert "broken:" not in scoreboard_table.summary(rows)
     assert np.isclose(scoreboard_table.overestimates(bad, "energy")[0], 0.01 / 0.09)
