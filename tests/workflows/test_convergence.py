@@ -56,7 +56,7 @@ def test_a_difference_that_vanishes_by_chance_deceives_nobody() -> None:
     assert bound(seen(up_and_down.__getitem__)) > 0.04
 
 
-def test_meshes_too_coarse_for_an_order_count_three_times() -> None:
+def test_meshes_too_coarse_for_an_order_count_twice() -> None:
     differences = seen(lambda h: 1 + 0.01 * h**2)
     assert bound(differences, settled=False) == pytest.approx(UNSETTLED * bound(differences))
     assert has_settled(differences)

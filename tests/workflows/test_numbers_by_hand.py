@@ -179,6 +179,25 @@ def test_the_energy_is_not_known_better_than_half_the_amplitude(monkeypatch: pyt
     assert {one.quantity: one.error for one in said}["energy"] == pytest.approx(0.07)
 
 
+def test_a_flat_top_leaves_the_energy_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Amplitude 1 - |w - 1| / 10 and energy w: within 1 % of the amplitude the peak may lie 10 % away."""
+
+    def beside(output: str, omega: float, newton: object) -> SimpleNamespace:
+        return SimpleNamespace(next=lambda balance, _, x: point(omega))
+
+    def point(omega: float) -> SimpleNamespace:
+        solution = SimpleNamespace(converged=True)
+        state = SimpleNamespace(omega=omega, x=None)
+        return SimpleNamespace(state=state, amplitude=1 - 0.1 * abs(omega - 1), solution=solution)
+
+    monkeypatch.setattr(probes, "AtFrequency", beside)
+    balance = SimpleNamespace(energy=lambda state: np.array([state.omega]))
+    state = SimpleNamespace(here=point(1.0), balance=balance, site=probes.AtPeak("tip", 0.5, 2.0))
+    assert probes.energy_beside(state, 0.1, 0.0101) == pytest.approx(0.1)
+    assert probes.energy_beside(state, 0.1, 0.0051) == pytest.approx(0.05)  # the ends of the reach are lower
+    assert probes.energy_beside(state, 0.0, 0.0101) == 0.0
+
+
 def test_twice_the_energy_is_half_the_life() -> None:
     here = SimpleNamespace(state=None)
     balance = SimpleNamespace(energy=lambda state: np.array([1.0]))

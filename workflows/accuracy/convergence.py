@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 SAFETY = 1.35  # of a bound from two meshes: it covers orders from 0.75 on, of corners and borders of contacts
-UNSETTLED = 3.0  # times as much where the meshes are too coarse for any order
-SETTLED = 0.5  # relative difference to another mesh above which a quantity has not begun to settle
+UNSETTLED = 2.0  # times as much where the meshes are too coarse for any order
+SETTLED = 0.2  # relative difference to another mesh above which a quantity has not begun to settle
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ AT_A_PEAK = ("amplitude", "energy")
 # least error of the energy over that of the amplitude: what slips is what moves, and the friction work is the work of
 # the drive, which goes with the amplitude; where both differ otherwise on two meshes, that is taken for chance
 ENERGY_OVER_AMPLITUDE = 0.5
+PLATEAU = 1 / 3  # of the error of the amplitude: where it falls by less, the peak of another mesh may lie as well
 ONE_ELEMENT = 4  # pairs of a contact face that a single element covers: too coarse for any order
 
 
@@ -63,7 +64,7 @@ class Probe:
             self._solve([other for other in more if not (both and other.file == both[0].file)], seen, end)
         contact = self.first.balance.contact
         fine_enough = contact.n_pair > ONE_ELEMENT * len(contact.joints)
-        return self._contributions(MESH, seen, fine_enough)
+        return self._contributions(MESH, seen, fine_enough, beside=True)
 
     def of_modes(self, other: Other) -> Iterator[Contribution]:
         """With more modes."""
@@ -91,10 +92,13 @@ class Probe:
             for name, (a, b) in pairs.items():
                 of.setdefault(name, []).append(convergence.difference(other.size, a, b))
 
-    def _contributions(self, source: str, seen: Seen, fine_enough: bool = True) -> Iterator[Contribution]:
+    def _contributions(
+        self, source: str, seen: Seen, fine_enough: bool = True, beside: bool = False
+    ) -> Iterator[Contribution]:
         """What is seen, as errors.
 
-        fine_enough : whether the scene's own mesh may have an order
+        fine_enough : whether the scene's own mesh may have an order; beside : whether frequencies beside a peak are
+        looked at
         Errors of different kinds are added: they are of different directions, and their signs are not known.
 
         One mesh of several that change the same is enough where the others have no solution or the seconds are used up
@@ -110,7 +114,9 @@ class Probe:
                 errors[name] = errors.get(name, 0.0) + convergence.bound(differences, settled)
         for name in AT_A_PEAK:
             errors[name] = max(errors[name], errors["peak_frequency"])
-        errors["energy"] = max(errors["energy"], ENERGY_OVER_AMPLITUDE * errors["amplitude"])
+        errors["energy"] = max(
+            errors["energy"], ENERGY_OVER_AMPLITUDE * errors["amplitude"], self._on_a_plateau(errors) if beside else 0.0
+        )
         if "depth" in errors:  # wear passes a depth in cycles that are inverse to the energy
             errors["life"] = errors["depth"] + errors["energy"]
         worn = self.result.wear
@@ -124,6 +130,13 @@ class Probe:
                 yield Contribution(source, name, error, how)
             else:
                 yield Contribution(source, name, None, "the free body does not say how deep the contact can wear")
+
+    def _on_a_plateau(self, errors: dict[str, float]) -> float:
+        """Error of the energy where a flat top of the response leaves open where its peak lies."""
+        try:
+            return probes.energy_beside(self.first, errors["peak_frequency"], PLATEAU * errors["amplitude"])
+        except (ValueError, RuntimeError):
+            return 0.0
 
 
 def compared(a: Answers, b: Answers) -> Iterator[tuple[str, float, float]]:

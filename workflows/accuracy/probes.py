@@ -15,7 +15,7 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import harmonic_choice
 from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.continuation.operating_point import NoPeak, OperatingPoint, Site
+from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak, NoPeak, OperatingPoint, Site
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import CONVERGED
@@ -199,6 +199,24 @@ def unworn_of(file: SceneFile, model: modelling.Model, folded: bool = False) -> 
     area = balance.model.interface.area
     deepest = delta_max(scene, free_deflection(balance), area) if scene.wear is not None else float("nan")
     return Answers.of(balance.with_load(load), point), deepest
+
+
+def energy_beside(state: State, reach: float, drop: float) -> float:
+    """Largest relative change of the energy at frequencies that the peak might lie at as well.
+
+    reach : relative distance of frequencies from the peak; drop : of the amplitude, relative, within which a frequency
+        is as good a peak. On a plateau the energy is another one at each end, and little decides which one is highest
+    """
+    peak, energy = state.here, float(state.balance.energy(state.here.state).sum())
+    if not isinstance(state.site, AtPeak) or energy == 0 or reach == 0:
+        return 0.0
+    most = 0.0
+    for share in (-1.0, -0.5, 0.5, 1.0):
+        site = AtFrequency(state.site.output, peak.state.omega * (1 + share * reach), state.site.newton)
+        beside = site.next(state.balance, peak.state.omega, peak.state.x)
+        if beside.solution.converged and abs(beside.amplitude - peak.amplitude) <= drop * peak.amplitude:
+            most = max(most, abs(float(state.balance.energy(beside.state).sum()) - energy) / energy)
+    return most
 
 
 def carried_to_life(seen: list[State], finer: list[Answers | None], cycles: float) -> float | None:
