@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from time import process_time
@@ -18,6 +19,8 @@ from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.studies import modes
 
 COMPARED = 9  # amplitudes at which two backbones are compared
+LATE: Any = {"harmonics": True, "solver": True, "loads": {"static": {"__all__": {"value", "pressure"}}}}
+"""What a scene may change without another part or reduction."""
 
 
 @dataclass(frozen=True)
@@ -59,12 +62,11 @@ def follow(
     model, found : of the scene itself; of the model is used what a change leaves as it is; others : `changed_scenes`
     Raises  ValueError for what cannot be; SolveFailed where a changed backbone is not found
     """
-    same = {"harmonics": file.scene.harmonics, "solver": file.scene.solver}
     done = []
     for text, other in others.items():
         clock = process_time()
         with limited(other.scene.solver.threads), progress.stage(text):
-            if other.scene.model_copy(update=same) == file.scene:
+            if _early(other) == _early(file):
                 balance = modelling.make_model(other.scene, model.part, model.reduced).balance
             else:
                 balance = modelling.build(other, None, progress).balance
@@ -82,6 +84,11 @@ def follow(
         off = [t / o - 1 for t, o in zip(modes.at(there, a), modes.at(found, a), strict=True)]
         done.append(Changed(text, a, off[0], off[1], process_time() - clock))
     return done
+
+
+def _early(file: SceneFile) -> str:
+    """What part and reduction are made of: equal texts, equal models."""
+    return json.dumps(file.scene.model_dump(mode="json", exclude=LATE), sort_keys=True)
 
 
 def summed(changed: Sequence[Changed]) -> tuple[float, float]:
