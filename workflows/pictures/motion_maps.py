@@ -75,7 +75,10 @@ def draw(patch: Patch, columns: Sequence[Fields], titles: Sequence[str], heading
 def _map(figure: Figure, axes: mpl.axes.Axes, patch: Patch, values: np.ndarray, name: str, colors: str) -> None:
     """One field with its own scale: lengths in the unit that suits them."""
     if name == "friction work":
-        unit, factor = ("mJ/m²", 1e3) if values.max() < 0.5 else ("J/m²", 1.0)
+        largest = float(values.max())
+        small = [("J", 1.0), ("mJ", 1e3), ("µJ", 1e6), ("nJ", 1e9)]
+        prefix, factor = next((one for one in small if one[1] * largest >= 0.5), small[-1] if largest > 0 else small[0])
+        unit = f"{prefix}/m²"
     else:
         unit, factor = length_unit(float(np.abs(values).max()))
     shown = factor * values
