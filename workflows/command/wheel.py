@@ -69,4 +69,49 @@ def wheel(
         print(line)
 
 
-COMMANDS = (wheel,)
+def flutter(
+    scene: str,
+    *,
+    start: Annotated[str | None, Parameter(name="--from")] = None,
+    stop: Annotated[str | None, Parameter(name="--to")] = None,
+    points: int = 40,
+    overrides: Overrides = (),
+    out: Path | None = None,
+    as_json: Json = False,
+) -> None:
+    """Tell which waves of a wheel flutter in the flow of the scene, and at which amplitude friction limits them.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene with [wheel] and [flow], or a .toml file; its harmonic loads play no part.
+    start
+        Amplitude of the response from which limit cycles are looked for, such as 1um; none by default.
+    stop
+        Amplitude up to which they are looked for.
+    points
+        Points of the backbone between these amplitudes.
+    out
+        Folder of flutter.csv and flutter.png; results/NAME by default.
+    as_json
+        Print JSON for machines.
+    """
+    from tribodyn.workflows.scene import scene_file
+    from tribodyn.workflows.studies import flutter as study
+
+    make_room(out)
+    low = None if start is None else quantity("--from", start, "m")
+    high = None if stop is None else quantity("--to", stop, "m")
+    file = scene_file.read(scene, overrides)
+    found = study.study(file, low, high, points)
+    folder = out or Path("results") / file.name
+    folder.mkdir(parents=True, exist_ok=True)
+    study.write(found, table := folder / "flutter.csv")
+    study.picture(found).savefig(drawing := folder / "flutter.png")
+    if as_json:
+        print(json.dumps(found.record(), indent=2))
+        return
+    print(*found.lines(), table, drawing, sep="\n")
+
+
+COMMANDS = (wheel, flutter)

@@ -38,7 +38,7 @@ from tribodyn.workflows.scene.solution import (
     Solver,
 )
 from tribodyn.workflows.scene.wear import Wear
-from tribodyn.workflows.scene.wheel import Mistuning, Wheel
+from tribodyn.workflows.scene.wheel import Flow, Mistuning, Wheel
 from tribodyn.workflows.scene.words import unknown_key
 
 CENTRIFUGAL = "centrifugal"
@@ -113,6 +113,8 @@ class MeshScene(Scene):
     """The wheel of which the part is one sector."""
     mistuning: Mistuning | None = None
     """How far its blades differ."""
+    flow: Flow | None = None
+    """The flow round its blades, for `tribodyn flutter`."""
 
     one_body: ClassVar[bool] = False
     """Whether it can have a single body only."""
@@ -180,9 +182,12 @@ class MeshScene(Scene):
             if self.wheel is None and contact.sector is not None:
                 raise ValueError(f"{name}: sector is for a [wheel], and the scene has none: leave it out")
         if self.wheel is None:
-            if self.mistuning is not None:
-                raise ValueError("mistuning is for a [wheel], and the scene has none: leave it out")
+            for name, table in (("mistuning", self.mistuning), ("flow", self.flow)):
+                if table is not None:
+                    raise ValueError(f"{name} is for a [wheel], and the scene has none: leave it out")
             return self
+        if self.flow is not None:
+            self.flow.coefficients(self.wheel.sectors)
         for contact in self.joints.values():
             outward = contact.meets_next or self.one_body
             if outward and (contact.opposite is None or not isinstance(contact.group, str)):

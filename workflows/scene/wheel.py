@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field, StrictBool, StrictInt
+import numpy as np
+from pydantic import Field, StrictBool, StrictInt, model_validator
 
 from tribodyn.workflows.scene.fields import Direction, Frequency, Length, Number, Table
 
@@ -58,3 +59,42 @@ class Mistuning(Table):
     """Of what is drawn: the same seed and number give the same pattern, however many there are."""
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 0.05
     """Error of the response between the points at which a pattern is scanned for its highest peak."""
+
+
+Influence = tuple[StrictInt, Number, Number]
+
+
+class Flow(Table):
+    """Forces of a flow on the vibrating blades of the wheel, by coefficients of one family of modes; see the theory of
+    flutter.
+    """
+
+    influence: tuple[Influence, ...] = ()
+    """Rows [k, real, imaginary] of the influence coefficients: of the blade k places to the left on a blade."""
+    by_diameter: tuple[Influence, ...] = ()
+    """Rows [j, real, imaginary] for every wave of the wheel instead, j > 0 with the rotation: half the imaginary part
+    is the aerodynamic damping ratio, half of the real part the relative shift of frequency."""
+    mode: Annotated[StrictInt, Field(ge=0)] = 0
+    """Number of the family, from 0, among the modes of the stuck wheel."""
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Flow:
+        if bool(self.influence) == bool(self.by_diameter):
+            raise ValueError("flow: give either influence or by_diameter")
+        for name, rows in (("influence", self.influence), ("by_diameter", self.by_diameter)):
+            if len({row[0] for row in rows}) != len(rows):
+                raise ValueError(f"flow.{name}: a row is there twice")
+        return self
+
+    def coefficients(self, sectors: int) -> dict[int, complex]:
+        """Influence coefficients c_k of a wheel of so many sectors; raises ValueError where waves are missing."""
+        if self.influence:
+            return {k: complex(real, imaginary) for k, real, imaginary in self.influence}
+        waves = {j % sectors: complex(real, imaginary) for j, real, imaginary in self.by_diameter}
+        if len(waves) != sectors or len(self.by_diameter) != sectors:
+            raise ValueError(
+                f"flow.by_diameter: give a row for each of the {sectors} waves, such as j = 0 to {sectors - 1}"
+            )
+        turns = [np.exp(2j * np.pi * np.arange(sectors) * k / sectors) for k in range(sectors)]
+        values = np.array([waves[j] for j in range(sectors)])
+        return {k: complex(values @ turn) / sectors for k, turn in enumerate(turns)}

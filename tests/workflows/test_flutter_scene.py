@@ -1,0 +1,91 @@
+"""Flutter from a scene: which waves of the wheel, and the limit cycle that friction makes of them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.workflows.test_mistuning import WHEEL
+from tribodyn.reduction.cyclic import travelling_wave
+from tribodyn.reduction.flow import Flow, aeroelastic
+from tribodyn.workflows.command import main as cli
+from tribodyn.workflows.run import modelling
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.scene_file import SceneError
+from tribodyn.workflows.studies import flutter
+from tribodyn.workflows.studies import wheel as wheels
+
+COEFFICIENTS = {0: 0.012j, 1: 0.012 + 0.002j, -1: -0.012 + 0.002j}
+FLOW = """
+[flow]
+influence = [[0, 0, 0.012], [1, 0.012, 0.002], [-1, -0.012, 0.002]]
+"""
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("wheel") / "wheel.toml"
+    text = WHEEL.replace("friction = 5.0", "friction = 0.3").replace('"2 %"', '"0.1 %"') + FLOW
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_waves_of_a_scene_have_the_eigenvalues_of_its_coefficients(scene: Path) -> None:
+    """Also by nodal diameter, which is the same flow written otherwise."""
+    file = scene_file.read(str(scene))
+    found = flutter.study(file).eigenvalues
+    wheel = wheels.build(file)
+    calm = modelling.damped(wheel.scene, travelling_wave(wheel.reduced, 1))
+    expected = aeroelastic(calm, wheel.springs, Flow(COEFFICIENTS))
+    assert found == pytest.approx(expected, rel=1e-9)
+    assert min(value.real for value in found.values()) < 0 < max(value.real for value in found.values())
+    waves = [[j, (c := Flow(COEFFICIENTS).of_index(j, 6)).real, c.imag] for j in range(-2, 4)]
+    again = flutter.study(file.changed("flow.influence=", f"flow.by_diameter={waves}")).eigenvalues
+    assert again == pytest.approx(found, rel=1e-9)
+
+
+def test_a_limit_cycle_needs_no_load(scene: Path) -> None:
+    """It attracts, and the balance in the flow holds there without harmonic loads and without added damping."""
+    found = flutter.study(scene_file.read(str(scene)), 1e-6, 1e-3, 20)
+    flutters = {index for index, ratio in found.damping.items() if ratio < 0}
+    assert set(found.cycles) == flutters
+    cycles = [one for cycles in found.cycles.values() if not isinstance(cycles, str) for one in cycles]
+    assert any(one.attracts for one in cycles)
+    for one in cycles:
+        assert 1e-6 < one.amplitude < 1e-3
+        moving = np.linalg.norm(one.state.flat[:, 1:])
+        assert np.linalg.norm(one.state.residual) < 1e-4 * moving
+    assert sum("limit cycle of wave" in line for line in found.lines()) == len(cycles)
+    assert len(found.record()["limit_cycles"]) == len(cycles)
+
+
+def test_the_command_tells_which_waves_flutter(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cli.app(["flutter", str(scene), "--out", str(tmp_path), "--json"], result_action="return_value")
+    said = json.loads(capsys.readouterr().out)
+    assert {wave["index"] for wave in said["waves"]} == set(range(-2, 4))
+    assert any(wave["damping"] < 0 for wave in said["waves"])
+    assert (tmp_path / "flutter.png").stat().st_size > 5000
+    assert (tmp_path / "flutter.csv").read_text(encoding="utf-8").startswith("index,frequency_Hz,damping")
+    with pytest.raises(ValueError, match="give both amplitudes"):
+        flutter.study(scene_file.read(str(scene)), 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (("flow.by_diameter=[[0, 0, 0.01]]",), "either influence or by_diameter"),
+        (("flow.influence=", "flow.by_diameter=[[0, 0, 0.01]]"), "a row for each of the 6 waves"),
+        (("flow.influence=[[1, 0, 0.1], [1, 0, 0.2]]",), "a row is there twice"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(scene: Path, changes: tuple[str, ...], said: str) -> None:
+    with pytest.raises(SceneError, match=said):
+        scene_file.read(str(scene), changes)
+
+
+def test_a_scene_without_flow_is_refused() -> None:
+    with pytest.raises(SceneError, match=r"blade has no \[flow\]"):
+        flutter.study(scene_file.read("blade"))
