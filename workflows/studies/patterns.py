@@ -364,7 +364,10 @@ def picture(found: Patterns) -> Figure:
         for name, colour in (("p50", INK), ("p95", ORANGE), ("p99", RED)):
             axes.axvline(said[name], color=colour, lw=1.5, label=f"{name.upper()} {said[name]:.3f}")
         bound = whitehead(found.n_sectors)
-        axes.axvline(bound, color=GREY, ls="--", label=f"Whitehead's bound {bound:.3f}")
+        shown = [bound] if bound < 1.5 * values.max() else []  # further out it would squeeze the distribution
+        axes.vlines(
+            shown, 0, 1, GREY, "--", transform=axes.get_xaxis_transform(), label=f"bound {bound:.3f}, Whitehead"
+        )
         axes.set(xlabel="largest amplitude of any blade over that of blades alike", ylabel="patterns")
         axes.set_title(f"{found.name}: {len(values)} patterns of {found.n_sectors} blades")
         axes.legend(fontsize=9)
