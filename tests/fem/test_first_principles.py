@@ -14,6 +14,7 @@ from tribodyn.fem.loads import NodalForce, Sum
 from tribodyn.fem.material import Material, Orthotropic
 from tribodyn.fem.prestress import coriolis, geometric_stiffness, spin_softening
 from tribodyn.fem.springs import Mass
+from tribodyn.fem.surface import surface
 from tribodyn.fem.thermal import Heating
 
 STEEL = Material(210e9, 0.3, 7860.0, expansion=1e-5)
@@ -67,6 +68,23 @@ def test_the_gap_of_a_bowed_and_inclined_face_is_its_height_above_the_ground(blo
     t2 = found.frames[0, 1]
     away = found.gap + np.tan(1e-2) * found.points @ t2
     np.testing.assert_allclose(leaning.gap, away - away.min(), atol=1e-15)
+
+
+def test_the_area_of_a_curved_face_is_its_arc_length_times_its_width() -> None:
+    """z = a x^2: the arc from 0 to 1 is sqrt(1 + 4 a^2) / 2 + asinh(2 a) / (4 a)."""
+    mesh = skfem.MeshHex2.from_mesh(skfem.MeshHex.init_tensor([0, 1.0], [0, 0.5, 1.0], [0, 1.0]))
+    bent, a = mesh.doflocs.copy(), 0.8
+    top = bent[2] > 1 - 1e-9
+    bent[2, top] += a * bent[0, top] ** 2
+    mesh = type(mesh)(bent, mesh.t)
+    facets = mesh.facets_satisfying(lambda x: x[2] > 1 + 1e-9, boundaries_only=True)
+    facets = [
+        f for f in facets if np.ptp(mesh.p[0, mesh.facets[:, f]]) > 0.5 and np.ptp(mesh.p[1, mesh.facets[:, f]]) > 0
+    ]
+    found = surface(mesh, np.array(facets))
+    arc = np.sqrt(1 + 4 * a**2) / 2 + np.arcsinh(2 * a) / (4 * a)
+    assert found.area.sum() == pytest.approx(arc, rel=1e-4)
+    assert found.area @ found.points[:, 1] == pytest.approx(0.5 * arc, rel=1e-4)
 
 
 def test_forces_of_a_turning_frame_have_their_resultants(block):

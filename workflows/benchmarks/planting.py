@@ -21,6 +21,7 @@ from pathlib import Path
 from time import process_time
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tribodyn.workflows.benchmarks import extremes, planted_faults, reference_runs
@@ -28,7 +29,7 @@ from tribodyn.workflows.benchmarks.planted_faults import Fault, Seen
 
 Send = Callable[[Any], None]
 ACCESSORS = ("fget", "fset")
-PLAIN = (bool, int, float, str, tuple, list, dict, frozenset)  # constants of a module that may be replaced
+PLAIN = (bool, int, float, str, tuple, list, dict, frozenset, np.ndarray)  # constants of a module that may be replaced
 DEPTH = 5  # of decorators around a function
 
 
@@ -65,7 +66,10 @@ def judged(
     """What sees a fault among tests (files), and what it changes in reference runs; base : their numbers without it.
 
     sound : tests that have failed with some fault, and whether they pass without one; is added to
+    Raises  ValueError where the fault cannot be planted
     """
+    if not in_child(partial(_planted, fault, tree), seconds):
+        raise ValueError(f"{fault.file}: {fault.does}: this cannot be planted, see what is printed")
     clock = os.times()
     ordered = sorted(tests, key=lambda test: ("by_hand" not in test, Path(fault.file).stem not in test))
     by_test = _failing(fault, tree, ordered, seconds, sound)
@@ -109,6 +113,11 @@ def _failing(fault: Fault, tree: Path, tests: Sequence[str], seconds: float, sou
         sound[found] = not in_child(partial(_tested, None, tree, words), 10 * seconds)
         if sound[found]:
             return found
+
+
+def _planted(fault: Fault, tree: Path, send: Send) -> None:
+    plant(fault, tree)
+    send(True)
 
 
 def _tested(fault: Fault | None, tree: Path, words: list[str], send: Send) -> None:
