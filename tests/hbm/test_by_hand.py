@@ -16,7 +16,7 @@ from tribodyn.hbm.contact import aft
 from tribodyn.hbm.contact import law as contact_law
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import ContactParameters
-from tribodyn.hbm.contact.laws import unilateral
+from tribodyn.hbm.contact.laws import jenkins, unilateral
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.expansion import Expansion
@@ -46,6 +46,19 @@ def test_a_contact_that_is_just_open_does_not_pull() -> None:
     for x, expected in ((1e-6 - 1e-7, 0.0), (1e-6 + 1e-7, 0.1)):
         unilateral.step(np.array([x]), none[0], p, force, slope, none, none.T, np.zeros((0, 0)))
         assert force[0] == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_slider_is_dragged_and_lets_go_where_it_turns() -> None:
+    """Pushed to twice the slip, T = mu N; back by d, T = mu N - k d; back by more than 2 mu N / k, T = -mu N."""
+    k, normal, mu = 2.0, 5.0, 0.4
+    p, memory = np.array([k, 1.0, 0.0, 0.0, mu]), np.zeros(1)
+    force, slopes = np.zeros(2), [np.zeros((2, 2)), np.zeros((2, 1)), np.zeros((1, 2)), np.zeros((1, 1))]
+    found = []
+    for x in (2.0, 1.7, -1.0):
+        jenkins.step(np.array([x, normal]), memory, p, force, *slopes)
+        found.append(force.copy())
+    limit = mu * normal
+    np.testing.assert_allclose(found, [[limit, normal], [limit - 0.3 * k, normal], [-limit, normal]], rtol=1e-12)
 
 
 def test_friction_that_turns_back_by_a_little_and_goes_on() -> None:
