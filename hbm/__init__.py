@@ -3,6 +3,7 @@
 harmonics, excitation                 basis and loads
 balance, newton, krylov, anderson     the balance and how it is solved; reference: the dense algorithm
 rest                                  the preloaded state that friction begins from
+mistuning                             wheels whose blades differ
 outcome, threads                      how a solve or a run ended; threads of BLAS
 contact/                              joints and their laws
 linear/                               compliance of the structure where it touches
