@@ -169,7 +169,7 @@ def test_resuming_repeats_nothing_and_takes_what_a_larger_study_shares(
     (tmp_path / "rows.jsonl").write_text(lines[0] + lines[1] + '{"run": 2, "key": "torn')
     asked: list[int] = []
 
-    def pretend(tasks: list[Task], workers: int) -> Any:
+    def pretend(tasks: list[Task], workers: int, solve: Any) -> Any:
         for one in tasks:
             asked.append(one.number)
             yield Row(one.number, one.key, "failed", "at 400 Hz")
@@ -243,12 +243,12 @@ def test_processes_share_what_is_made_once(tmp_path: Path, monkeypatch: pytest.M
     own = reuse._made
     monkeypatch.setattr(reuse, "_made", lambda file: made.append(file.folder) or own(file))
 
-    def every_process_new(tasks: list[Task], workers: int) -> Any:
+    def every_process_new(tasks: list[Task], workers: int, solve: Any) -> Any:
         for one in tasks:
             assert one.store is not None
             assert one.store.parent.is_dir()
             task._bench.early = ""  # as in a process that has done nothing yet
-            yield task.solve(one)
+            yield solve(one)
 
     monkeypatch.setattr(pool, "finished", every_process_new)
     found = td.study(TABLES | {"vary": both}, tmp_path, workers=2)
