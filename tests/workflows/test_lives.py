@@ -20,7 +20,7 @@ from tribodyn.workflows.designs import study as studies
 from tribodyn.workflows.designs.sensitivity import influences
 from tribodyn.workflows.designs.space import Space
 from tribodyn.workflows.designs.surrogate import Level, Surrogate
-from tribodyn.workflows.designs.task import Row, Task, solve
+from tribodyn.workflows.designs.task import Row, Task
 from tribodyn.workflows.lives import quantiles
 from tribodyn.workflows.lives.quantiles import Sample
 
@@ -73,7 +73,7 @@ def lasts(values: dict[str, float]) -> float:
 def engine(life: Callable[[dict[str, float], Task], dict[str, float] | None]) -> Any:
     """In place of the processes: rows with a closed-form life."""
 
-    def finished(tasks: Sequence[Task], workers: int) -> Iterator[Row]:
+    def finished(tasks: Sequence[Task], workers: int, solve: Any) -> Iterator[Row]:
         for task in tasks:
             said = dict(text.split("=", 1) for text in task.overrides)
             numbers = life({key: float(said[key]) for key in VARY}, task)
@@ -288,7 +288,7 @@ def test_what_cannot_be_is_refused(
 def test_the_command_tells_the_verdict_with_the_distribution(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(pool, "finished", lambda tasks, workers: map(solve, tasks))
+    monkeypatch.setattr(pool, "finished", lambda tasks, workers, solve: map(solve, tasks))
     file = tmp_path / "mine.toml"
     file.write_text(
         '[study]\nscene = "beam"\ndesign = "sobol"\nruns = 8\nset = ["harmonics.kept=[0, 1]", "geometry.n_patch=3", '

@@ -17,7 +17,6 @@ import pytest
 import tribodyn as td
 from tribodyn.workflows.designs import pool
 from tribodyn.workflows.designs.journal import Journal
-from tribodyn.workflows.designs.task import solve
 
 pytest.importorskip("distributed")
 
@@ -93,7 +92,7 @@ class InProcess:
 def reference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The study done without any engine."""
     with monkeypatch.context() as patch:
-        patch.setattr(pool, "finished", lambda tasks, workers: map(solve, tasks))
+        patch.setattr(pool, "finished", lambda tasks, workers, solve: map(solve, tasks))
         td.study(TABLES, tmp_path / "here", workers=1)
     return tmp_path / "here"
 
