@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.workflows.test_mistuning import WHEEL
+from tests.helpers.wheel_scene import WHEEL
 from tribodyn.reduction.cyclic import travelling_wave
 from tribodyn.reduction.flow import Flow, aeroelastic
 from tribodyn.workflows.command import main as cli

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.workflows.test_mistuning import WHEEL
+from tests.helpers.wheel_scene import WHEEL
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.run import modelling, wear_run
 from tribodyn.workflows.run.progress import Progress

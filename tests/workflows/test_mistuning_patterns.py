@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.workflows.test_mistuning import WHEEL
+from tests.helpers.wheel_scene import WHEEL
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file

@@ -203,6 +203,7 @@ def test_five_points_show_linear_and_chattering_contact(leaf):
     assert pins["left_pin"] == pytest.approx(pins["right_pin"], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_three_solutions_share_a_frequency_and_time_integration_knows_which_are_stable():
     """Harmonics 0 to 5, at a frequency where workflows.leaf_accuracy finds such three."""
     file = scene_file.read("leaf_seal_thesis", ("harmonics.kept=[0,1,2,3,4,5]", "response.frequency=[140, 180]"))
@@ -288,6 +289,7 @@ def test_wear_by_impacts_grows_where_the_leaf_chatters(tmp_path):
     assert worn.max() == pytest.approx(2e-6, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_study_has_its_thirty_configurations_and_writes_what_it_found(tmp_path):
     scene = scene_file.read("leaf_seal_thesis").scene
     every = cases(scene)

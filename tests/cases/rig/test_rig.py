@@ -81,6 +81,7 @@ def test_lost_contact_is_the_open_rig(rig):
     assert worn.preload == 0.0
 
 
+@pytest.mark.slow
 def test_the_force_found_instead_of_the_height_makes_the_same_motion(rig):
     """The balance is the same to rounding, and comes closer to time integration with more harmonics."""
     errors = []
