@@ -14,11 +14,8 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
 
-FINE = (
-    1024,
-    4096,
-    16384,
-)  # equidistant instants where the solver locates its transitions; more where too little is known
+# equidistant instants where the solver locates its transitions; more where too little is known
+FINE = (1024, 4096, 16384)
 KNOWN = 0.9  # of SMALLEST: doubt of a force that is little enough
 CLOSER = 12  # instants beside a transition, each half as far from it as the one before
 LONGEST = 50  # cycles after which the sliders must repeat
@@ -67,8 +64,7 @@ def _held_at(balance: HarmonicBalance, state: State, fine: int) -> list[Held]:
         for name, part in (("friction", tangential), ("normal", normal))
     ]
     travel = np.maximum(balance.basis.order, 1) * state.x[:, tangential]
-    rounds = np.linalg.norm(force[:, tangential], axis=2) + spring[:, tangential]
-    most = np.pi * (rounds * np.linalg.norm(travel, axis=2)).sum(axis=1)
+    most = np.pi * (np.linalg.norm(force[:, tangential], axis=2) * np.linalg.norm(travel, axis=2)).sum(axis=1)
     energy = balance.energy(state)
     return [*found, _held("work", work - energy, work, work_doubt, most)]
 

@@ -6,19 +6,14 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from cyclopts import Parameter
-
-from tribodyn.workflows.command.words import Changes, Json, Overrides, make_room, print_lines, quantity
+from tribodyn.workflows.command.words import Changes, Json, Overrides, Start, Stop, make_room, print_lines, quantity
 
 if TYPE_CHECKING:  # the program starts sooner without them
     from tribodyn.workflows.scene.scene_file import SceneFile
     from tribodyn.workflows.studies.changed_backbones import Changed
     from tribodyn.workflows.studies.modes import Way
-
-Start = Annotated[str | None, Parameter(name="--from")]
-Stop = Annotated[str | None, Parameter(name="--to")]
 
 
 def backbone(

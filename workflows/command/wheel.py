@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from tribodyn.workflows.command.words import Json, Overrides, make_room, quantity
+from tribodyn.workflows.command.words import Json, Overrides, Start, Stop, make_room, quantity
 
 Orders = Annotated[tuple[int, ...], Parameter(name="--order", negative=(), consume_multiple=True)]
 Formats = Annotated[tuple[str, ...], Parameter(name="--format", negative=(), consume_multiple=True)]
@@ -17,8 +17,8 @@ Formats = Annotated[tuple[str, ...], Parameter(name="--format", negative=(), con
 def wheel(
     scene: str,
     *,
-    slow: Annotated[str | None, Parameter(name="--from")] = None,
-    fast: Annotated[str | None, Parameter(name="--to")] = None,
+    slow: Start = None,
+    fast: Stop = None,
     order: Orders = (),
     families: int = 4,
     speeds: int = 7,
@@ -72,8 +72,8 @@ def wheel(
 def flutter(
     scene: str,
     *,
-    start: Annotated[str | None, Parameter(name="--from")] = None,
-    stop: Annotated[str | None, Parameter(name="--to")] = None,
+    start: Start = None,
+    stop: Stop = None,
     points: int = 40,
     overrides: Overrides = (),
     out: Path | None = None,

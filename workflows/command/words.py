@@ -14,6 +14,8 @@ Overrides = Annotated[
     Parameter(name="--set", negative=(), consume_multiple=False, help="Change a key of the scene: section.key=value."),
 ]
 Changes = Annotated[tuple[str, ...], Parameter(name="--change", negative=(), consume_multiple=False)]
+Start = Annotated[str | None, Parameter(name="--from")]
+Stop = Annotated[str | None, Parameter(name="--to")]
 Json = Annotated[bool, Parameter(name="--json", negative=())]
 Flag = Annotated[bool, Parameter(negative=())]
 PICTURE = (".png", ".pdf", ".svg")
