@@ -1,7 +1,8 @@
-"""Sparse factorisation of a symmetric matrix: PARDISO where it is installed, else SuperLU after METIS; or multigrid."""
+"""Solutions of a symmetric sparse matrix by a factor, of PARDISO or of SuperLU after METIS, or without one."""
 
 from __future__ import annotations
 
+import ctypes
 import os
 import sys
 from collections.abc import Callable
@@ -13,11 +14,15 @@ from scipy.sparse import csc_matrix, csr_matrix, triu
 from scipy.sparse.linalg import splu
 
 from tribodyn.fem.multigrid import Multigrid
+from tribodyn.fem.mumps import Mumps
+from tribodyn.fem.refined import Refined
 
 # Relative residual of the softest direction that still counts as regular. Measured: a plate 2000 times longer than
 # thick reaches 0.05, a body that can move rigidly 6 to 1000.
 SINGULAR = 0.5
 NO_MEMORY = -2  # error code of PARDISO
+ANALYSE_AND_FACTORISE, SOLVE = 12, 33  # phases of PARDISO
+SOLVERS = ("pardiso", "superlu", "mumps", "single_precision", "multigrid")
 
 
 class SingularStiffness(ValueError):
@@ -36,19 +41,27 @@ def factorise(K: Any, definite: bool = True, solver: str | None = None, shapes: 
     """Factorise a sparse symmetric real matrix once, for many right-hand sides.
 
     K : (n, n) scipy.sparse; definite : K is positive definite (False for a shifted, indefinite matrix)
-    solver : "pardiso" or "superlu", the best available by default; "multigrid" has no factor and iterates
+    solver : "pardiso" or "superlu", the best available by default; "mumps" in MPI processes of another Python;
+        "single_precision" has a factor of half the size and refines, "multigrid" has none and iterates, both for a
+        definite K
     shapes : (n, k) motions that K hardly resists, for multigrid
     Raises  SingularStiffness where K is singular, as when a body can still move rigidly; MemoryError
     """
     K = csr_matrix(K)
     if solver is None:
         solver = "pardiso" if pardiso_available() else "superlu"
-    elif solver not in ("pardiso", "superlu", "multigrid"):
-        raise ValueError(f"no solver '{solver}': there are pardiso, superlu, multigrid")
+    elif solver not in SOLVERS:
+        raise ValueError(f"no solver '{solver}': there are {', '.join(SOLVERS)}")
+    elif solver == "single_precision" and not pardiso_available():
+        raise ValueError("the solver single_precision needs the packages pypardiso and mkl: install them with pip")
     try:
         factor: Factor
         if solver == "multigrid":
             factor = Multigrid(K, shapes)
+        elif solver == "single_precision":
+            factor = Refined(K, lambda scaled: Pardiso(scaled, single=True))
+        elif solver == "mumps":
+            factor = Mumps(K, definite)
         else:
             factor = Pardiso(K, definite) if solver == "pardiso" else SuperLU(K, definite)
         regular = softest_residual(K, factor.solve) < SINGULAR
@@ -96,31 +109,53 @@ def pardiso_available() -> bool:
 
 
 class Pardiso:
-    """MKL PARDISO on the upper triangle, mtype 2 (positive definite) or -2 (indefinite)."""
+    """MKL PARDISO on the upper triangle, mtype 2 (positive definite) or -2 (indefinite), where `single` in float32."""
 
-    def __init__(self, K: csr_matrix, definite: bool = True) -> None:
+    def __init__(self, K: csr_matrix, definite: bool = True, single: bool = False) -> None:
         from pypardiso import PyPardisoSolver
-        from pypardiso.pardiso_wrapper import PyPardisoError
 
         self.name = "MKL PARDISO, " + ("Cholesky" if definite else "LDL^T")
-        self._upper = triu(K, format="csr")
-        self._upper.sort_indices()
-        self._solver = PyPardisoSolver(mtype=2 if definite else -2, size_limit_storage=0)  # keeps no copy of the matrix
+        self._kind = np.float32 if single else np.float64
+        upper = triu(K, format="csr")
+        upper.sort_indices()
+        if not np.diff(upper.indptr).all():
+            raise ArithmeticError("a row is empty")  # PARDISO would crash
+        # as Fortran counts; pypardiso's own call makes these arrays anew at each solution
+        rows, columns = (1 + array.astype(np.int32) for array in (upper.indptr, upper.indices))
+        self._matrix = upper.data.astype(self._kind), rows, columns
+        del upper
+        self._solver = PyPardisoSolver(mtype=2 if definite else -2)
         # METIS, and no iterative refinement unless pivots were perturbed: MKL's defaults refine twice, 5 times slower
-        for place, value in {1: 1, 2: 2, 8: 0, 10: 8}.items():
+        for place, value in {1: 1, 2: 2, 8: 0, 10: 8, 28: int(single)}.items():
             self._solver.set_iparm(place, value)
-        try:
-            self._solver.factorize(self._upper)
-        except (PyPardisoError, ValueError) as error:
-            if getattr(error, "value", None) == NO_MEMORY:
-                raise MemoryError(f"the memory is not enough for the factors of {K.shape[0]} equations") from error
-            raise ArithmeticError(str(error)) from error
+        self._call(ANALYSE_AND_FACTORISE, np.zeros(K.shape[0], self._kind))
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """Solution of the same shape as rhs, (n,) or (n, k)."""
-        # pypardiso's own `solve` first compares the matrix with the factorised one, as long as a back substitution
-        self._solver.set_phase(33)
-        found: np.ndarray = self._solver._call_pardiso(self._upper, np.asfortranarray(rhs, dtype=float))
+        return np.ascontiguousarray(self._call(SOLVE, np.asfortranarray(rhs, dtype=self._kind)))
+
+    def _call(self, phase: int, rhs: np.ndarray) -> np.ndarray:
+        """One call of PARDISO; rhs (n,) or (n, k) in Fortran's order. Raises MemoryError, ArithmeticError."""
+        found, trouble, own = np.zeros_like(rhs), ctypes.c_int32(0), self._solver
+        values, rows, columns = self._matrix
+
+        def number(value: int) -> Any:
+            return ctypes.byref(ctypes.c_int32(value))
+
+        def integers(array: np.ndarray) -> Any:
+            return array.ctypes.data_as(ctypes.POINTER(ctypes.c_int32))
+
+        own._mkl_pardiso(
+            own.pt.ctypes.data_as(ctypes.POINTER(own._pt_type[0])), number(1), number(1), number(own.mtype),
+            number(phase), number(len(rows) - 1), values.ctypes.data_as(ctypes.c_void_p), integers(rows),
+            integers(columns), integers(own.perm), number(rhs.size // max(len(rows) - 1, 1)), integers(own.iparm),
+            number(0), rhs.ctypes.data_as(ctypes.c_void_p), found.ctypes.data_as(ctypes.c_void_p),
+            ctypes.byref(trouble),
+        )  # fmt: skip
+        if trouble.value == NO_MEMORY:
+            raise MemoryError(f"the memory is not enough for the factors of {len(rows) - 1} equations")
+        if trouble.value:
+            raise ArithmeticError(f"PARDISO's error {trouble.value}")
         return found
 
     def __del__(self) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 SYSTEM_LIBRARIES = "libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1"
+LAST = 20  # bytes of a mesh file that hold the end of its last section
 
 
 class GmshUnavailable(ValueError):
@@ -40,8 +42,15 @@ def session() -> Iterator[Any]:
 
 
 def save(gmsh: Any, path: str | Path) -> None:
-    """Write the current mesh as binary MSH 4.1, elements of physical groups only."""
+    """Write the current mesh as binary MSH 4.1, elements of physical groups only.
+
+    Raises  OSError where the file does not come to its end, of which Gmsh itself says nothing
+    """
     gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
     gmsh.option.setNumber("Mesh.Binary", 1)
     gmsh.option.setNumber("Mesh.SaveAll", 0)
     gmsh.write(str(path))
+    with open(path, "rb") as file:
+        file.seek(-min(LAST, file.seek(0, os.SEEK_END)), os.SEEK_END)
+        if b"$End" not in file.read():
+            raise OSError(f"the mesh cannot be written to '{path}': is the disk full?")

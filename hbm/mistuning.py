@@ -18,6 +18,8 @@ from tribodyn.hbm.contact.joint import Contact
 from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.linear.mistuned import Alike, MistunedCompliance
+from tribodyn.hbm.linear.recovery import stuck_dynamic_stiffness
+from tribodyn.reduction.cyclic import ReducedSector, travelling_wave
 from tribodyn.reduction.model import ReducedModel
 
 Change = Callable[[ContactParameters, np.ndarray], ContactParameters]
@@ -81,6 +83,58 @@ class MistunedWheel:
         return HarmonicBalance(
             self._model, contact, one.basis, one.excitation, one.omega_max, memory, compliance, one.load_factor, at_rest
         )
+
+    def coordinates(
+        self, balance: HarmonicBalance, displacement: np.ndarray, force: np.ndarray, omega: float
+    ) -> list[list[np.ndarray]]:
+        """Waves of the wheel's motion: complex amplitudes (n,) of the coordinates of every index, by harmonic [m].
+
+        balance : of this wheel; displacement, force : of its contacts (n_contact, n_coeff) [m], [N]; omega : [rad/s]
+        Sector n moves by the sum over the indices j of exp(-i 2 pi j n / N) times what wave j does
+        """
+        a, basis, k = self.alike, balance.basis, balance.reference_stiffness
+        compliance = cast(MistunedCompliance, balance.compliance)
+        pushed = np.zeros((len(basis.harmonics), a.n_sectors, a.n_port), complex)
+        g = basis.to_complex(k[:, None] * displacement - force)
+        pushed[:, :, a.contacts] = g.T.reshape(len(basis.harmonics), a.n_sectors, -1)
+        vibrates = np.array(basis.harmonics) > 0
+        pushed[:, :, a.loads] = np.where(vibrates, balance.load_factor, 1.0)[:, None, None] * compliance.force
+        pushed[:, :, a.ports] = compliance.at(omega).deviating(pushed)
+        waves = np.fft.ifft(pushed, axis=1)
+        assert self.wave.model.per_index is not None
+        springs, found = self.wave.reference_stiffness, []
+        for h, of_harmonic in zip(basis.harmonics, waves, strict=True):
+            s, each = 1j * h * omega, []
+            for index, wave in enumerate(of_harmonic):
+                system, B = self.wave.model.per_index(index)
+                B = np.asarray(B)
+                dynamic = stuck_dynamic_stiffness(system, B, springs, s)
+                loads = np.array([system.loads[name] for name in a.load_names]).reshape(-1, len(dynamic))
+                ports = np.array([system.outputs[name] for name in self.ports]).reshape(-1, len(dynamic))
+                total = B.conj().T @ wave[a.contacts] + wave[a.loads] @ loads + wave[a.ports] @ ports.conj()
+                each.append(np.linalg.solve(dynamic, total))
+            found.append(each)
+        return found
+
+    def full_displacement(
+        self,
+        reduced: ReducedSector,
+        balance: HarmonicBalance,
+        displacement: np.ndarray,
+        force: np.ndarray,
+        omega: float,
+    ) -> np.ndarray:
+        """Displacement of every DOF of the full sector, of all sectors (N, n_full, n_coeff), each in its own frame [m].
+
+        reduced : that the wave is made of, the ports among its outputs; the others as `coordinates`
+        """
+        waves = self.coordinates(balance, displacement, force, omega)
+        every = travelling_wave(reduced, 1)  # whose harmonic j is the wave of index j
+        amplitudes = [
+            np.fft.fft(np.stack([every.reconstruct(q, index) for index, q in enumerate(each)]), axis=0)
+            for each in waves
+        ]
+        return balance.basis.to_real(np.stack(amplitudes, axis=-1))
 
 
 def _no_system(h: int) -> NoReturn:

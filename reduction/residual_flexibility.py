@@ -39,6 +39,7 @@ from tribodyn.reduction.model import ModelInfo, ReducedModel
 
 CLUSTERS = 64  # of pairs, each with a uniform traction for every component
 BLOCK = 16  # right-hand sides solved at once
+ROWS = 4096  # of the shapes that are turned at once
 DEPENDENT = 1e-10  # share of its strain energy that a shape must add to the others to be kept
 POWER_STEPS, POWER_VECTORS = 6, 4  # of the iteration that measures how much flexibility is left out
 
@@ -47,22 +48,28 @@ POWER_STEPS, POWER_VECTORS = 6, 4  # of the iteration that measures how much fle
 class ResidualFlexibility:
     """Static contact flexibility that the coordinates of a reduced model leave out.
 
-    stiffness : (n_contact,) contact springs that are part of K_s [N/m]; matrix : (n_full, n_full) K_s, sparse
+    stiffness : (n_contact,) contact springs that are part of K_s [N/m]; free : (n_full, n_full) sparse, K without them
     B : (n_contact, n_full) sparse contact map; shapes : (n_full, n) V; squares : (n,) Lambda [rad2/s2]
-    mass : (n_full, n_full) sparse
+    mass : (n_full, n_full) sparse; solver : see fem.factor
     """
 
     stiffness: np.ndarray
-    matrix: csr_matrix
+    free: csr_matrix
     B: csr_matrix
     shapes: np.ndarray
     squares: np.ndarray
     mass: csr_matrix
+    solver: str | None = None
+
+    @property
+    def matrix(self) -> csr_matrix:
+        """(n_full, n_full) K_s, made anew: it is as large as K, and only its factor is needed often."""
+        return csr_matrix(stuck_stiffness(self.free, self.B, self.stiffness))
 
     @cached_property
     def factor(self) -> Factor:
         """Of K_s; it does not travel between processes, each makes its own."""
-        return factorise(self.matrix)
+        return factorise(self.matrix, solver=self.solver)
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name != "factor"}
@@ -135,10 +142,12 @@ def residual_flexibility(
     Raises  ValueError where the structure can move rigidly with all contacts stuck
     """
     k = np.ravel(np.asarray(stiffness, float))
-    K_s = stuck_stiffness(csr_matrix(system.stiffness), interface.B, k)
+    K = csr_matrix(system.stiffness)
+    K_s = stuck_stiffness(K, interface.B, k)
     M, B = csr_matrix(system.mass), csr_matrix(interface.B)
     factor = factorise(K_s, solver=solver)
     omega, phi, omitted = fixed_interface_modes(K_s, M, factor, n_modes, cutoff)
+    del K_s
     forces = [np.asarray(v, float) for v in (*system.loads.values(), *system.outputs.values())]
     tractions = B.T @ clustered(interface, k, clusters)
     pushed = csc_matrix(hstack([*(csc_matrix(f[:, None]) for f in forces if f.any()), tractions]))
@@ -160,7 +169,7 @@ def residual_flexibility(
         first_omitted_frequency=omitted / (2 * np.pi),
         stuck_frequency=np.sqrt(squares[:REPORTED_MODES]) / (2 * np.pi),
     )
-    rest = ResidualFlexibility(k, K_s, B, V, squares, M)
+    rest = ResidualFlexibility(k, K, B, V, squares, M, solver)
     rest.__dict__["factor"] = factor
     model = ReducedModel(reduced, replace(interface, B=at_contact), V, info, residual=rest)
     free = linear_modes(model, None, min(REPORTED_MODES, len(squares)))[0]
@@ -221,4 +230,7 @@ def _ritz(
     inertia = basis.T @ inertia @ basis
     nu, y = sla.eigh(0.5 * (inertia + inertia.T))
     nu, y = nu[::-1], y[:, ::-1]
-    return shapes @ (basis @ (y / np.sqrt(nu))), 1.0 / nu
+    turned = basis @ (y / np.sqrt(nu))
+    for at in range(0, len(shapes), ROWS):  # in place: they are the largest array but the factor
+        shapes[at : at + ROWS, : len(nu)] = shapes[at : at + ROWS] @ turned
+    return shapes[:, : len(nu)], 1.0 / nu

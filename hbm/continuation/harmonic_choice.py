@@ -29,6 +29,8 @@ LEAST_VIBRATION_SHARE = 1e-2
 # useful harmonics in a row, the smallest first, after which no more are tried for dropping
 USEFUL_IN_A_ROW = 3
 _WIDE: WeakKeyDictionary[ContactCompliance, ContactCompliance] = WeakKeyDictionary()
+CLIMB = (3, 5, 7, 9)  # highest harmonics that `climb` goes through: each start is near enough for Newton
+FURTHER = 6  # harmonics beyond the kept ones that it looks at, where more than CLIMB are kept
 ALLOWED_SHARE = 0.5  # of the tolerance, that the harmonics left out may use: the estimate sees each on its own
 
 
@@ -134,6 +136,16 @@ def choose(balance: HarmonicBalance, omega: Sequence[float], options: ChoiceOpti
         tuple(trial.x),
         outcome,
     )
+
+
+def climb(top: int) -> list[int]:
+    """Highest harmonics to solve with, one after the other, where `top` is kept, to see what more of them change."""
+    return [h for h in CLIMB if h > top + 1] or [top + FURTHER // 2, top + FURTHER]
+
+
+def highest_looked_at(top: int) -> int:
+    """The highest harmonic of a balance that `climb` stays within."""
+    return max(CLIMB[-1], top + FURTHER)
 
 
 def widened(balance: HarmonicBalance, highest: int) -> HarmonicBalance:

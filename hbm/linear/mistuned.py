@@ -54,7 +54,7 @@ class Alike:
         self.k = np.asarray(springs, float).ravel()
         system, _ = model.per_index(0)
         excitation.check(basis, system.loads)
-        names = sorted({name for _, name in excitation.loads})
+        self.load_names = names = tuple(sorted({name for _, name in excitation.loads}))
         self.outputs = tuple(name for name in system.outputs if name not in ports)
         counts = np.cumsum([0, len(self.k), len(names), len(self.outputs), len(ports)])
         self.contacts, self.loads, self.seen, self.ports = (slice(*pair) for pair in pairwise(counts))
@@ -210,6 +210,11 @@ class MistunedPoint:
         there = np.matmul(H, fft.ifft(force, axis=1)[..., None])[..., 0]
         reaction = self._reaction(there[:, :, self.compliance.alike.ports])
         return np.asarray(fft.fft(there - np.matmul(self._back, reaction[..., None])[..., 0], axis=1))
+
+    def deviating(self, force: np.ndarray) -> np.ndarray:
+        """Forces (n_harmonic, N, r) of the deviating stiffness on its shapes, under forces (n_harmonic, N, n_port)."""
+        moved = self._displaced(force)[:, :, self.compliance.alike.ports]
+        return -self.compliance.deviation[:, None] * moved
 
     def _reaction(self, waves: np.ndarray) -> np.ndarray:
         """Waves of the forces that deviating stiffness adds, from the waves of what sectors alike do (n_h, N, r)."""

@@ -44,6 +44,7 @@ class WearProblem:
     lost_below : contact counts as lost when the preload falls below this share of its first value; the last touch
         of a vibrating contact wears ever more slowly, so that the time until it ends has no limit (see README)
     any_joint : whether a single joint whose preload has fallen below that share ends the run
+    copies : of one contact, one behind the other, whose joints then count by themselves: those of a wheel's sectors
     lost_below_at_rest : the run ends when the preload without the harmonic loads falls to this share of its first
         value, see hbm.wear.preload_at_rest; None: it is not looked at
     """
@@ -55,6 +56,7 @@ class WearProblem:
     lost_below: float = 0.0
     lost_below_at_rest: float | None = None
     any_joint: bool = False
+    copies: int = 1
 
     def __post_init__(self) -> None:
         shares = [duty.share for duty in self.mission]
@@ -249,13 +251,19 @@ def reason_to_stop(
 
 def lost_joint(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) -> str | None:
     """The first joint whose preload has fallen below the share that the problem asks for; None for none."""
-    if not rows:
+    if not rows or "n" not in problem.balance.contact.components or not problem.balance.basis.has_static:
         return None
-    now = problem.balance.preload_by_joint(state.points[0].state)
+    contact, now = problem.balance.contact, state.points[0].state.cycle.force
+    normal = now[:, contact.components.index("n"), 0]
+    size = contact.n_pair // problem.copies
     for name in problem.wearing:
-        first = float(rows[0].normal_force[problem.balance.contact.joint(name).rows].sum())
-        if now[name] < problem.lost_below * first:
-            return name
+        pairs = contact.joint(name).rows
+        first, left = (
+            np.bincount(pairs // size, force[pairs], problem.copies) for force in (rows[0].normal_force, normal)
+        )
+        lost = np.flatnonzero(left < problem.lost_below * first)
+        if len(lost):
+            return f"{name}@{lost[0]}" if problem.copies > 1 else name
     return None
 
 

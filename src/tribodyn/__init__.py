@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from tribodyn.hbm.wear.law import names as wear_laws
     from tribodyn.reduction.foreign import ForeignMatrices as Matrices
     from tribodyn.reduction.foreign import from_arrays, read_matrices
-    from tribodyn.workflows.api.designs import lives, study
+    from tribodyn.workflows.api.designs import lives, optimise, study
     from tribodyn.workflows.api.own_matrices import Balance, Contact, Cycle, Structure, reduce, wear_law
     from tribodyn.workflows.api.scenes import build, load, plan, read_scene, run, run_to_accuracy, scene_names
     from tribodyn.workflows.api.studies import (
@@ -142,6 +142,7 @@ if TYPE_CHECKING:
         trade,
         verify,
     )
+    from tribodyn.workflows.designs.optimum import Optimum
     from tribodyn.workflows.designs.table import StudyTable
     from tribodyn.workflows.lives.lives import Lives
     from tribodyn.workflows.result.result import Result
@@ -161,6 +162,7 @@ _HOME: dict[str, tuple[str, ...]] = {
     "Lives": ("tribodyn.workflows.lives.lives",),
     "Matrices": ("tribodyn.reduction.foreign", "ForeignMatrices"),
     "Model": ("tribodyn.workflows.run.modelling",),
+    "Optimum": ("tribodyn.workflows.designs.optimum",),
     "Posterior": ("tribodyn.workflows.studies.posterior",),
     "Result": ("tribodyn.workflows.result.result",),
     "ResultError": ("tribodyn.workflows.result.store",),
@@ -176,6 +178,7 @@ _HOME: dict[str, tuple[str, ...]] = {
     "continuations": ("tribodyn.hbm.continuation", "names"),
     "from_arrays": ("tribodyn.reduction.foreign",),
     "lives": ("tribodyn.workflows.api.designs",),
+    "optimise": ("tribodyn.workflows.api.designs",),
     "load": ("tribodyn.workflows.api.scenes",),
     "plan": ("tribodyn.workflows.api.scenes",),
     "read_matrices": ("tribodyn.reduction.foreign",),
@@ -336,6 +339,7 @@ __all__ = [
     "Measured",
     "Mistuned",
     "Model",
+    "Optimum",
     "Parameter",
     "Part",
     "PartScene",
@@ -407,6 +411,7 @@ __all__ = [
     "match_modes",
     "mistuned",
     "mistuned_patterns",
+    "optimise",
     "patch_maps",
     "peak_memory",
     "plan",

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 
+@cache  # a study asks for the same ones in every run
 def package_version(name: str) -> str:
     """Version of an installed package; a source tree that is run without being installed has none."""
     try:

@@ -122,3 +122,32 @@ def test_sets_of_corner_nodes_hold_the_nodes_added_between_them():
     np.testing.assert_array_equal(body.node_sets["edge"], np.flatnonzero((z == 0) & (y == 0)))
     assert area(body.mesh, body.mesh.boundaries["ground"]) == pytest.approx(4.0)
     assert "edge" not in body.mesh.boundaries
+
+
+@pytest.mark.parametrize(("version", "binary"), [(4.1, 1), (4.1, 0), (2.2, 0)])
+def test_a_damaged_file_is_read_or_refused_in_one_sentence(tmp_path, version, binary):
+    """Cut anywhere, one bit turned, some bytes lost."""
+    path = tmp_path / "box.msh"
+    with session() as gmsh:
+        gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(3, [1], name="box")
+        gmsh.option.setNumber("Mesh.MeshSizeMin", 0.5)
+        gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        gmsh.option.setNumber("Mesh.Binary", binary)
+        gmsh.model.mesh.generate(3)
+        gmsh.write(str(path))
+    whole, rng = path.read_bytes(), np.random.default_rng(3)
+    refusals = []
+    for place in rng.integers(0, len(whole) - 8, 24):
+        turned = bytearray(whole)
+        turned[place] ^= 1 << int(rng.integers(8))
+        for damaged in (whole[:place], bytes(turned), whole[:place] + whole[place + 3 :]):
+            path.write_bytes(damaged)
+            try:
+                for body in read.read(path).bodies.values():
+                    assert np.isfinite(quality(body.mesh).volume)
+            except ValueError as refusal:
+                refusals.append(str(refusal))
+    assert len(refusals) > 24
+    assert not any("\n" in said for said in refusals)

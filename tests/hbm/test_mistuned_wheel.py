@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from tests.helpers import small_wheel as small
+from tribodyn.fem.wheel import sector_maps
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import SLIPS, ContactParameters
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.linear import recovery
 from tribodyn.hbm.linear import travelling_wave as waves
 from tribodyn.hbm.mistuning import MistunedWheel, spread
 from tribodyn.reduction import mistuning
@@ -127,6 +129,28 @@ def test_friction_and_gap_that_differ_by_blade_are_the_dense_wheel(reduced):
         here = newton.solve(ours, 2 * np.pi * 250, there.state.x, EXACT)
         assert here.converged
         assert apart(tips(ours, ours.outputs(here.state)), tips(dense, dense.outputs(there.state))) < within
+
+
+def test_every_node_moves_as_on_the_dense_wheel(reduced):
+    """The field of the full sector, static and vibrating, of all sectors, slipping."""
+    deviation, n_pair = 0.5 * DIFFERENT, len(springs(reduced))
+    dense = whole(reduced, deviation, np.full(8 * n_pair, 0.3))
+    there = newton.solve_from_rest(dense, 2 * np.pi * 250, EXACT)
+    wheel = on_sector(reduced)
+    ours = wheel.balance(deviation)
+    here = newton.solve(ours, 2 * np.pi * 250, there.state.x, EXACT).state
+    assert (here.cycle.status & SLIPS).any()
+    flat = here.cycle.force.reshape(here.flat.shape)
+    K = np.asarray(reduced.sector.system.stiffness)
+    made_of = mistuning.with_ports(reduced, K, mistuning.all_shapes(K))
+    found = wheel.full_displacement(made_of, ours, here.flat, flat, here.omega)
+    state = there.state
+    q = recovery.coordinates(dense, state.flat, state.cycle.force.reshape(state.flat.shape), state.omega)
+    maps = sector_maps(reduced.sector)
+    expected = np.stack([BASIS.to_real(np.stack([reduced.basis @ (P @ one) for one in q], axis=-1)) for P in maps])
+    assert found.shape == expected.shape
+    for part in (slice(0, 1), slice(1, None)):
+        assert apart(found[..., part], expected[..., part]) < 1e-6
 
 
 def test_sectors_alike_are_the_wave(reduced):

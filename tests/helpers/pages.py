@@ -6,7 +6,7 @@ In a page, a fence
     ```toml name.toml  is a file of that name (so are geo and python with a name)
     ```sh long         is run where slow tests are asked for
     ```sh check        names the check, which is not run by itself
-Other fences are shown only.
+Other fences are shown only. Commands and Python begin in a process that has its packages loaded (tests.helpers.warm).
 """
 
 from __future__ import annotations
@@ -19,15 +19,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.helpers import warm
+
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
 FENCE = re.compile(r"^( *)```([a-z]+)(?: ([\w.]+))?\n(.*?)^ *```", re.M | re.S)
 SHOWN = {"toml", "geo", "python", "json", "text", "yaml", "tree"}
 
-PROGRAM = """#!/bin/sh
+PROGRAM = f"""#!/bin/sh
 export OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
-export VTK_DEFAULT_OPENGL_WINDOW="${VTK_DEFAULT_OPENGL_WINDOW:-vtkEGLRenderWindow}"
-PYTHONPATH="%(source)s" exec "%(python)s" -m tribodyn "$@"
+export VTK_DEFAULT_OPENGL_WINDOW="${{VTK_DEFAULT_OPENGL_WINDOW:-vtkEGLRenderWindow}}"
+PYTHONPATH="{ROOT / "src"}" exec "{sys.executable}" -m tribodyn "$@"
 """
 
 
@@ -67,11 +69,11 @@ def environment(folder: Path) -> dict[str, str]:
     return kept | {"PATH": f"{folder}:/usr/bin:/bin", "MPLBACKEND": "agg"}
 
 
-def prepare(folder: Path) -> Path:
-    """Put a start script into the folder that starts the program of this tree."""
-    program = folder / "tribodyn"
-    program.write_text(PROGRAM % {"source": ROOT / "src", "python": sys.executable})
-    program.chmod(0o755)
+def prepare(folder: Path, program: str = PROGRAM) -> Path:
+    """Put a start script into the folder that starts the program of this tree, by default in a new interpreter."""
+    script = folder / "tribodyn"
+    script.write_text(program)
+    script.chmod(0o755)
     return folder
 
 
@@ -85,16 +87,16 @@ def shell(text: str, folder: Path) -> None:
 
 def python(text: str, folder: Path) -> None:
     """Run Python as pasted."""
-    env = environment(folder) | {"PYTHONPATH": str(ROOT / "src"), "VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
     done = subprocess.run(
-        [sys.executable, "-c", text], cwd=folder, env=env, capture_output=True, text=True, check=False
-    )
+        [folder / "tribodyn", "-c", text],
+        cwd=folder, env=environment(folder), capture_output=True, text=True, check=False,
+    )  # fmt: skip
     assert done.returncode == 0, f"{text}\n{done.stderr}"
 
 
 def follow(page: Path, folder: Path, long: bool = False) -> None:
     """Do what a page says, in its order."""
-    prepare(folder)
+    prepare(folder, warm.program())
     for fence in fences(page):
         if fence.word and fence.language in SHOWN:
             (folder / fence.word).write_text(fence.text)

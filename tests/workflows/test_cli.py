@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import re
@@ -176,6 +177,19 @@ def test_ctrl_c_is_not_lost_while_an_object_is_freed() -> None:
     command = [sys.executable, "-c", CTRL_C_WHILE_AN_OBJECT_IS_FREED]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (exits.INTERRUPTED, "tribodyn: stopped.\n")
+
+
+def test_a_full_disk_is_told_by_name(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    def writes() -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(tmp_path / "a.png"))
+
+    with pytest.raises(SystemExit) as stop:
+        exits.guard(writes)
+    said = capsys.readouterr().err
+    assert stop.value.code == exits.BAD_INPUT
+    assert said.startswith("tribodyn: the disk is full")
+    assert "a.png" in said
+    assert said.count("\n") == 1
 
 
 def curve(peak: int, unstable: range | None = None):

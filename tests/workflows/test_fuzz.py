@@ -16,12 +16,26 @@ TINY = (
 )  # fmt: skip
 
 
-def test_every_run_ends_as_a_run_may() -> None:
-    tried = fuzz.fuzz("beam", TINY, runs=12, seed=1, command=cli.main)
-    assert len(tried) == 12
+def test_every_run_ends_as_a_run_may(tmp_path: Path) -> None:
+    tried = fuzz.fuzz("beam", TINY, values=150, runs=3, seed=1, folder=tmp_path, command=cli.main)
     assert [one for one in tried if not one.good] == []
-    again = fuzz.cases("beam", TINY, runs=12, seed=1)
+    again = fuzz.cases("beam", TINY, 150, seed=1)
     assert {(one.key, one.value) for one in tried} == set(again)
+    of = fuzz.counts(tried)["beam"]
+    assert (of["values"], of["runs"], sum(of["ends"].values())) == (150, 3, 3)
+    assert of[fuzz.REFUSED] + of["scenes"] <= 150
+    assert of["scenes"] > 3
+    assert f"beam: {of['keys']} keys, 150 values: {of[fuzz.REFUSED]} refused when read" in fuzz.as_text(tried)
+
+    def never(words: list[str]) -> None:
+        raise AssertionError(words)
+
+    kept = fuzz.fuzz("beam", TINY, values=150, runs=3, seed=1, folder=tmp_path, command=never)
+    assert [(one.key, one.value, one.end, one.said) for one in kept] == [
+        (one.key, one.value, one.end, one.said) for one in tried
+    ]
+    with pytest.raises(ValueError, match="keeps runs of beam with other changes"):
+        fuzz.fuzz("beam", TINY[1:], values=1, folder=tmp_path, command=never)
 
 
 def test_every_key_is_tried() -> None:
@@ -45,19 +59,31 @@ def test_every_key_is_tried() -> None:
     ],
 )
 def test_a_wrong_end_is_seen(does: str, end: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fuzz, "LATE", 1.0)
     monkeypatch.setattr(fuzz, "cases", lambda *given: [("scene.title", '"abc"')])  # what reading refuses is not run
 
     def instead(arguments: object) -> None:
         exec(does, {})
 
-    (tried,) = fuzz.fuzz("beam", TINY, runs=1, seconds=1.0, command=instead)
+    (tried,) = fuzz.fuzz("beam", TINY, seconds=1.0, command=instead)
     assert tried.end == end
 
 
 def test_what_is_not_finite_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class Summary:
-        def summary(self) -> dict[str, object]:
-            return {"peak_hz": (1.0, float("nan")), "verdict": None}
+        def __init__(self, peak: float, error: float | None) -> None:
+            verdict = {"energy": {"stated": True, "value": 1.0, "error": error}}
+            self.of = {"peak_hz": (1.0, peak), "verdict": verdict}
 
-    monkeypatch.setattr(fuzz.store, "load", lambda path: Summary())
-    assert fuzz._end(0, "", tmp_path) == "not finite: peak_hz"
+        def summary(self) -> dict[str, object]:
+            return self.of
+
+    for peak, error, end in (
+        (2.0, 0.1, "success"),
+        (float("nan"), 0.1, "not finite: peak_hz"),
+        (2.0, None, "success"),
+        (2.0, float("inf"), "not finite: verdict of energy"),
+    ):
+        result = Summary(peak, error)
+        monkeypatch.setattr(fuzz.store, "load", lambda path, result=result: result)
+        assert fuzz._end(0, "", tmp_path) == end

@@ -14,7 +14,7 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.wheel import Mistuning
-from tribodyn.workflows.studies import mistuned_wear, patterns
+from tribodyn.workflows.studies import mistuned_motion, mistuned_wear, patterns
 
 CHANGED = {
     '["400 Hz", "404 Hz"]': '["750 Hz", "880 Hz"]',
@@ -97,6 +97,12 @@ def test_blades_that_differ_wear_by_their_own_work(scene: Path, tmp_path: Path) 
     mistuned_wear.write(found, tmp_path / "wear.csv")
     mistuned_wear.picture(found).savefig(tmp_path / "wear.png")
     assert (tmp_path / "wear.csv").read_text(encoding="utf-8").startswith("cycles,peak_Hz,amplitude_m@0")
+    blades = patterns.Blades.of(scene_file.read(str(scene)))
+    states = mistuned_motion.worn_states(blades, found)
+    tips = np.linalg.norm(np.linalg.norm(states[1].displacement[..., 1:], axis=-1), axis=-1).max(axis=1)
+    assert np.corrcoef(tips, states[1].heights)[0, 1] > 0.9  # who vibrates most does so in the picture too
+    (drawn,) = mistuned_motion.write(blades, states, tmp_path)
+    assert drawn.stat().st_size > 50_000
 
 
 def test_what_cannot_be_is_one_sentence(scene: Path, tmp_path: Path) -> None:

@@ -48,19 +48,22 @@ def until(true: Callable[[], Any]) -> None:
 class Loopback:
     """A scheduler and two workers of dask, each a process of its own, with only the engine between them and a study."""
 
+    host = "127.0.0.1"
+    before: tuple[tuple[str, ...], ...] = ((), ())  # words that start each worker
+
     def __init__(self) -> None:
         with TemporaryDirectory() as folder:
             file = Path(folder) / "scheduler.json"
-            words = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file))
+            words = ("--host", self.host, "--port", "0", "--no-dashboard", "--scheduler-file", str(file))
             self.scheduler = self._start("scheduler", *words)
             until(lambda: file.exists() and file.stat().st_size > 0)
             self.address = str(json.loads(file.read_text())["address"])
         plain = ("--nthreads", "1", "--no-nanny", "--no-dashboard")
-        self.workers = [self._start("worker", self.address, *plain) for _ in range(2)]
+        self.workers = [self._start("worker", self.address, *plain, before=words) for words in self.before]
 
     @staticmethod
-    def _start(kind: str, *words: str) -> subprocess.Popen[bytes]:
-        words = (sys.executable, "-m", f"distributed.cli.dask_{kind}", *words)
+    def _start(kind: str, *words: str, before: tuple[str, ...] = ()) -> subprocess.Popen[bytes]:
+        words = (*before, sys.executable, "-m", f"distributed.cli.dask_{kind}", *words)
         return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
     def kill_worker(self) -> None:
@@ -71,6 +74,47 @@ class Loopback:
         for process in (self.scheduler, *self.workers):
             process.kill()
             process.wait()
+
+
+class TwoHosts(Loopback):
+    """The second worker in a network namespace, as on another host: a virtual cable joins it to all others."""
+
+    host = "10.99.77.1"
+    there, cable = "tribodyn-there", ("tribodyn-a", "tribodyn-b")
+    before = ((), ("ip", "netns", "exec", there))
+
+    def __init__(self) -> None:
+        self._pull()
+        steps = (
+            f"ip netns add {self.there}",
+            f"ip link add {self.cable[0]} type veth peer name {self.cable[1]} netns {self.there}",
+            f"ip addr add {self.host}/24 dev {self.cable[0]}",
+            f"ip link set {self.cable[0]} up",
+            f"ip -n {self.there} addr add 10.99.77.2/24 dev {self.cable[1]}",
+            f"ip -n {self.there} link set {self.cable[1]} up",
+        )
+        for step in steps:
+            try:
+                subprocess.run(step.split(), check=True, capture_output=True)
+            except (OSError, subprocess.CalledProcessError) as trouble:
+                self._pull()
+                pytest.skip(f"no network namespaces here: {trouble}")
+        super().__init__()
+        with pytest.importorskip("distributed").Client(self.address) as client:
+            until(lambda: len(client.scheduler_info()["workers"]) == 2)
+            hosts = sorted(address.split(":")[1] for address in client.scheduler_info()["workers"])
+        assert hosts == ["//10.99.77.1", "//10.99.77.2"]
+
+    def kill_scheduler(self) -> None:
+        super().kill_scheduler()
+        self._pull()
+
+    def _pull(self) -> None:
+        for step in (f"ip link del {self.cable[0]}", f"ip netns del {self.there}"):
+            try:
+                subprocess.run(step.split(), capture_output=True)
+            except OSError:
+                return
 
 
 class InProcess:
@@ -97,7 +141,10 @@ def reference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "here"
 
 
-@pytest.mark.parametrize("kind", [InProcess, pytest.param(Loopback, marks=pytest.mark.slow)])
+OF_PROCESSES = [pytest.param(kind, marks=pytest.mark.slow) for kind in (Loopback, TwoHosts)]
+
+
+@pytest.mark.parametrize("kind", [InProcess, *OF_PROCESSES])
 def test_a_killed_worker_and_a_killed_scheduler_lose_nothing(kind: Any, tmp_path: Path, reference: Path) -> None:
     folder, failures = tmp_path / "there", []
     journal = Journal(folder)

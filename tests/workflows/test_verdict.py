@@ -206,6 +206,28 @@ def test_what_a_library_makes_of_the_end_of_the_seconds_is_the_end_of_the_second
         raise ctypes.ArgumentError("of its own")
 
 
+def test_the_end_of_the_seconds_that_python_drops_comes_again(capfd: pytest.CaptureFixture[str]) -> None:
+    """What is raised while an object is freed, Python prints with a traceback and forgets."""
+
+    class Freed:
+        def __del__(self) -> None:
+            end = process_time() + 0.05
+            while process_time() < end:
+                pass
+
+    def freed() -> None:
+        Freed()
+        end = process_time() + 2.0
+        while process_time() < end:
+            pass
+
+    start = process_time()
+    with pytest.raises(TimeUp), processor_seconds(0.02):
+        freed()
+    assert process_time() - start < 1.0
+    assert capfd.readouterr().err == ""
+
+
 def test_a_verdict_without_seconds_says_what_is_not_known() -> None:
     said = td.run("beam", overrides=(*SMALL, "wear=", "verdict.seconds=1e-3")).summary()["verdict"]
     assert "verdict.seconds are used up" in said["energy"]["reason"]

@@ -26,7 +26,7 @@ LOOK = 5  # harmonics beyond the kept ones that the estimate looks at, at the le
 
 def budget(file: SceneFile, balance: HarmonicBalance, result: Result) -> list[BudgetEntry]:
     """The budget of a result with its response, and with its wear where there is any."""
-    entries = [*_of_reduction(balance, file), *_of_response(balance, result), *_of_wear(file, result)]
+    entries = [*_of_reduction(balance, file), *_of_response(file, balance, result), *_of_wear(file, result)]
     unknown = {entry.source for entry in entries if entry.error is None}
     traded = list(_of_trade(file, [knob for knob in ESTIMATED if knob not in unknown]))
     covered = {entry.source for entry in traded if entry.error is not None}
@@ -64,7 +64,7 @@ def _of_reduction(balance: HarmonicBalance, file: SceneFile) -> Iterator[BudgetE
     yield BudgetEntry("compliance", "displacement", float(balance.compliance.error), "estimate: direct solve")
 
 
-def _of_response(balance: HarmonicBalance, result: Result) -> Iterator[BudgetEntry]:
+def _of_response(file: SceneFile, balance: HarmonicBalance, result: Result) -> Iterator[BudgetEntry]:
     frf = result.response
     if frf is None:
         return
@@ -82,6 +82,8 @@ def _of_response(balance: HarmonicBalance, result: Result) -> Iterator[BudgetEnt
     top = max(balance.basis.harmonics)
     error: float | None = None
     try:
+        if file.scene.verdict.enabled:  # its linear side, the dearest part of a wheel's, then serves here too
+            harmonic_choice.widened(balance, harmonic_choice.highest_looked_at(top))
         wide = harmonic_choice.widened(balance, top + LOOK)
         error = harmonic_choice.estimate(wide, balance.basis.harmonics, omega, x, split=False).error
         how = "estimate: one step with more"

@@ -29,8 +29,6 @@ from tribodyn.workflows.run.references import delta_max, free_deflection
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import Scene
 
-CLIMB = (3, 5, 7, 9)  # highest harmonics that the estimate climbs through: each start is near enough for Newton
-FURTHER = 6  # harmonics beyond the kept ones that it looks at, where more than CLIMB are kept
 # shares of the life at which states are looked at: more of the late ones, where the peak moves fast
 STATES = (0.0, 0.25, 0.5, 0.65, 0.8, 0.9)
 
@@ -159,9 +157,9 @@ def with_more_harmonics(state: State) -> Answers | None:
     """
     top = state.balance.basis.harmonics[-1]
     basis, x, omega = state.balance.basis, state.here.state.x, state.here.state.omega
-    wide = harmonic_choice.widened(state.balance, max(CLIMB[-1], top + FURTHER))
+    wide = harmonic_choice.widened(state.balance, harmonic_choice.highest_looked_at(top))
     answers = None
-    for highest in [h for h in CLIMB if h > top + 1] or [top + FURTHER // 2, top + FURTHER]:
+    for highest in harmonic_choice.climb(top):
         finer = wide.with_harmonics(tuple(h for h in wide.basis.harmonics if h <= highest))
         try:
             point = state.site.next(finer, omega, basis.transfer(x, finer.basis))

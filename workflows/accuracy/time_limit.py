@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
 
 COMPILERS = ("numba", "llvmlite")
 AGAIN = 0.2  # processor seconds after which to look again, where the time was up in a compiler
+SOON = 0.01  # processor seconds after which TimeUp comes again, where it was lost
 
 
 class TimeUp(Exception):
@@ -22,6 +28,7 @@ def processor_seconds(limit: float) -> Iterator[None]:
 
     The timer of a process belongs to its main thread: in another one, and on systems without it, nothing is limited.
     A compiler is not interrupted: a function that is compiled by half could not be called in this process any more.
+    Where Python drops what is raised, while it frees an object or in a callback, TimeUp comes again a moment later.
     Raises  TimeUp, also at once where `limit` is not above 0, and in place of what a library makes of it: ctypes tells
         an exception in the conversion of an argument as an error of the argument
     """
@@ -40,6 +47,13 @@ def processor_seconds(limit: float) -> Iterator[None]:
             raised.append(TimeUp(f"{limit:g} s are used up"))
             raise raised[0]
 
+    def lost(what: UnraisableHookArgs) -> None:
+        if isinstance(what.exc_value, TimeUp):
+            signal.setitimer(signal.ITIMER_PROF, SOON)
+        else:
+            told(what)
+
+    told, sys.unraisablehook = sys.unraisablehook, lost
     before = signal.signal(signal.SIGPROF, up)
     signal.setitimer(signal.ITIMER_PROF, limit)
     try:
@@ -51,6 +65,7 @@ def processor_seconds(limit: float) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
         signal.signal(signal.SIGPROF, before)
+        sys.unraisablehook = told
 
 
 def _compiles(frame: FrameType | None) -> bool:

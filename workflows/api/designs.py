@@ -1,4 +1,4 @@
-"""Studies of many runs from Python, as for the commands `tribodyn study` and `tribodyn lives`."""
+"""Studies of many runs from Python, as for the commands `tribodyn study`, `tribodyn lives` and `tribodyn optimise`."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from tribodyn.workflows.api.scenes import Report, reporter
+from tribodyn.workflows.designs import optimum as designs
 from tribodyn.workflows.designs import study as studies
 from tribodyn.workflows.designs import study_file
+from tribodyn.workflows.designs.optimum import Optimum
 from tribodyn.workflows.designs.study_file import Study
 from tribodyn.workflows.designs.table import StudyTable
 from tribodyn.workflows.lives import lives as distributions
@@ -35,8 +37,7 @@ def study(
     resume : take the runs that the folder holds already, and do the others; retry : and those that failed
     Raises  SceneError, ValueError: the study asks for what cannot be; SolveFailed: the scheduler was lost
     """
-    read = _read(source)
-    place = Path("results") / read.name if folder is None else Path(folder)
+    read, place = _begun(source, folder)
     return studies.run(read, place, reporter(progress), workers, scheduler, resume, retry)
 
 
@@ -56,12 +57,32 @@ def lives(
     rare : a share whose value is wanted too, such as 1e-4
     Raises  SceneError, ValueError: what is asked for cannot be; SolveFailed: no run has the number, a lost scheduler
     """
-    read = _read(source)
-    place = Path("results") / read.name if folder is None else Path(folder)
+    read, place = _begun(source, folder)
     return distributions.run(read, place, reporter(progress), workers, scheduler, resume, rare)
 
 
-def _read(source: str | PathLike[str] | Mapping[str, Any]) -> Study:
+def optimise(
+    source: str | PathLike[str] | Mapping[str, Any],
+    folder: str | PathLike[str] | None = None,
+    *,
+    workers: int | None = None,
+    scheduler: str = "",
+    resume: bool = False,
+    progress: Report = None,
+) -> Optimum:
+    """The best designs over the ranges of a study: least amplitude and longest life, or what its [optimise] says.
+
+    source, folder, workers, scheduler, resume : as of `study`
+    Raises  SceneError, ValueError: what is asked for cannot be; SolveFailed: no run keeps the limits, a lost scheduler
+    """
+    read, place = _begun(source, folder)
+    return designs.run(read, place, reporter(progress), workers, scheduler, resume)
+
+
+def _begun(source: str | PathLike[str] | Mapping[str, Any], folder: str | PathLike[str] | None) -> tuple[Study, Path]:
+    """The study of a file or of its tables, and the folder that it leaves its tables in."""
     if isinstance(source, Mapping):
-        return study_file.parse(source, "study", Path().resolve())
-    return study_file.read(Path(source))
+        read = study_file.parse(source, "study", Path().resolve())
+    else:
+        read = study_file.read(Path(source))
+    return read, Path("results") / read.name if folder is None else Path(folder)

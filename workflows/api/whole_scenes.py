@@ -229,6 +229,7 @@ def scoreboard(
 ) -> list[Row]:
     """Hold verdicts on scenes drawn at random against references that are finer in every knob.
 
+    scenes : how many; 0: none, all rows of the seed that are kept are counted again
     folder : where rows, table and histogram are kept: the same call goes on where it was ended
     seconds : of the processor, that the run of a scene may take, and its reference again
     """
@@ -243,22 +244,26 @@ def scoreboard(
 def fuzz(
     scene: Place,
     *,
+    values: int | None = None,
     runs: int | None = None,
     seed: int = 0,
     seconds: float = 10.0,
     workers: int = 1,
+    folder: Place | None = None,
     overrides: Overrides = (),
     progress: Report = None,
 ) -> list[Tried]:
-    """Give every key of a scene thirty nasty values, one at a time, each in a process of its own.
+    """Give every key of a scene thirty nasty values, one at a time; run what is accepted, each in a process of its own.
 
-    runs : how many pairs of key and value, drawn with `seed`, all by default; seconds : of the processor a run may take
+    values : how many pairs of key and value, runs : how many of the scenes that are accepted, both drawn with `seed`,
+    all by default; seconds : of the processor a run may take; folder : keeps the runs
     """
     from tribodyn.workflows.benchmarks import fuzz as tries
     from tribodyn.workflows.command import main
 
-    say = reporter(progress).say
-    return tries.fuzz(fspath(scene), override_texts(overrides), runs, seed, seconds, workers, say, command=main.main)
+    changed, say = override_texts(overrides), reporter(progress).say
+    place = None if folder is None else Path(folder)
+    return tries.fuzz(fspath(scene), changed, values, runs, seed, seconds, workers, say, place, command=main.main)
 
 
 def inspect(

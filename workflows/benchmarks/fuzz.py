@@ -7,8 +7,11 @@ make the same scene (`1`, `true` for a switch, a value that is the key's default
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 import resource
+import shutil
 import sys
 import time
 import warnings
@@ -19,7 +22,7 @@ from multiprocessing import connection, get_context
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -38,7 +41,9 @@ NASTY = (
 """TOML values, thirty of them."""
 
 ENDS = {0: "success", BAD_INPUT: "refused", FAILED_SOLVE: "failed"}
-GOOD = (*ENDS.values(),)
+REFUSED, ACCEPTED = "refused when read", "accepted when read"  # without a run
+GOOD = (*ENDS.values(), REFUSED, ACCEPTED)
+ROWS = "rows.jsonl"  # of a folder that keeps runs
 LATE = 10.0  # times the limit, of the clock, after which a process that sleeps is killed; what compiling may take
 
 
@@ -53,6 +58,8 @@ class Running:
     since: float
 
 
+Case = tuple[str, str]  # key and value
+Row = TypeVar("Row", "_Meant", "Tried")
 Active = dict[BaseProcess, Running]
 
 
@@ -60,8 +67,9 @@ Active = dict[BaseProcess, Running]
 class Tried:
     """One value of one key.
 
-    end : success, refused or failed (with one sentence), else what is wrong with it; said : the sentence, or what was
-    printed; seconds : of the processor; like : another key=value that makes the same scene and was run, empty for a run
+    end : success, refused or failed (with one sentence), else what is wrong with it; without a run how reading ended
+    said : the sentence, or what was printed; seconds : of the processor
+    like : another key=value that makes the same scene and stands for it, empty where it is the one
     """
 
     scene: str
@@ -96,61 +104,101 @@ def _names(table: dict[str, Any], above: str) -> Iterator[str]:
             yield from _names(value, above if own else f"{above}{name}.")
 
 
-def cases(scene: str, overrides: Sequence[str], runs: int | None = None, seed: int = 0) -> list[tuple[str, str]]:
-    """Pairs of a key and a value, all of them or `runs` drawn at random."""
+def cases(scene: str, overrides: Sequence[str], count: int | None = None, seed: int = 0) -> list[Case]:
+    """Pairs of a key and a value, all of them or some drawn at random."""
     every = [(key, value) for key in keys(scene, overrides) for value in NASTY]
-    if runs is None or runs >= len(every):
+    if count is None or count >= len(every):
         return every
-    chosen = np.random.default_rng(seed).choice(len(every), runs, replace=False)
+    chosen = np.random.default_rng(seed).choice(len(every), count, replace=False)
     return [every[i] for i in sorted(chosen)]
 
 
 def fuzz(
     scene: str,
     overrides: Sequence[str] = (),
+    values: int | None = None,
     runs: int | None = None,
     seed: int = 0,
     seconds: float = 10.0,
     workers: int = 1,
     say: Callable[[str], None] = lambda sentence: None,
+    folder: Path | None = None,
     *,
     command: Callable[[list[str]], None],
 ) -> list[Tried]:
-    """Try nasty values of the keys of a scene, one at a time.
+    """Try nasty values of the keys of a scene, one at a time: all are read, and the scenes that come out of it are run.
 
-    overrides : that make the scene small, so that a run takes a second; runs : how many pairs of key and value, drawn
-    with `seed`, all by default; seconds : of the processor that a run may take
+    overrides : that make the scene small, so that a run takes a second; values : how many pairs of key and value, all
+    by default; runs : how many of the scenes that are accepted, all by default; both are drawn with `seed`
+    seconds : of the processor that a run may take; folder : keeps the runs, those that it holds are not run again
     command : what `tribodyn` does with the words of a command line; it leaves by SystemExit
     Raises  SceneError for a scene that cannot be read, ValueError where processes cannot be forked
     """
     if not hasattr(os, "fork"):
         raise ValueError("this system cannot fork processes, as fuzz does")
+    rows = _Rows(folder, scene, overrides)
+    refused, scenes, unclear = _read_all(scene, overrides, cases(scene, overrides, values, seed), seconds, say, rows)
+    order = np.random.default_rng(seed).permutation(len(scenes))[:runs]
+    drawn = [scenes[i][0] for i in sorted(order)] + unclear
+    missing = [case for case in drawn if case not in rows.run]
+    for one in _runs(scene, tuple(overrides), missing, seconds, workers, command) if missing else ():
+        rows.add(one)
+        if len(rows.run) % 20 == 0 or not one.good:
+            say(f"{scene}: {len(rows.run)} runs of {len(drawn)}, {one.key}={one.value}: {one.end}")
+    found = [*refused, *(rows.run[case] for case in unclear)]
+    for who, *others in scenes:
+        first = rows.run.get(who, Tried(scene, *who, ACCEPTED, "", 0.0))
+        found += [first, *(replace(first, key=k, value=v, like="=".join(who)) for k, v in others)]
+    return sorted(found, key=lambda one: (one.key, NASTY.index(one.value)))
+
+
+def _read_all(
+    scene: str,
+    overrides: Sequence[str],
+    todo: Sequence[Case],
+    seconds: float,
+    say: Callable[[str], None],
+    rows: _Rows,
+) -> tuple[list[Tried], list[list[Case]], list[Case]]:
+    """What reading refuses; the cases of each scene that it accepts; and those where it does neither."""
+    refused, unclear = [], []
+    meaning: dict[str, list[Case]] = {}
+    for number, (key, value) in enumerate(todo):
+        if number % 1000 == 999:
+            say(f"{scene}: {number + 1} of {len(todo)} values are read, {len(meaning)} scenes come out of them")
+        meant = rows.read.get((key, value))
+        if meant is None:
+            meant = rows.add(_read(scene, overrides, key, value, seconds))
+        if meant.refusal:
+            refused.append(Tried(scene, key, value, REFUSED, f"tribodyn: {meant.refusal}", meant.seconds))
+        elif meant.digest:
+            meaning.setdefault(meant.digest, []).append((key, value))
+        else:
+            unclear.append((key, value))
+    return refused, list(meaning.values()), unclear
+
+
+def _runs(
+    scene: str,
+    overrides: tuple[str, ...],
+    todo: Sequence[Case],
+    seconds: float,
+    workers: int,
+    command: Callable[[list[str]], None],
+) -> Iterator[Tried]:
+    """Run cases in processes of their own."""
     factor.pardiso_available()  # loads it
-    todo = cases(scene, overrides, runs, seed)
     fork = get_context("fork")
-    found: list[Tried] = []
     active: Active = {}
-    with TemporaryDirectory() as folder:  # the scene as it is: compiles what is not compiled yet, which takes its time
-        unchanged = fork.Process(target=_run, args=(command, scene, tuple(overrides), Path(folder), LATE * seconds))
-        unchanged.start()
-        unchanged.join(LATE * seconds)
-        unchanged.kill()
-    first: dict[str, tuple[str, str]] = {}  # by the scene that is meant: who runs it
-    same: list[tuple[str, str, tuple[str, str]]] = []
     with TemporaryDirectory() as folder:
+        as_it_is = (command, scene, overrides, Path(folder), LATE * seconds)
+        unchanged = fork.Process(target=_run, args=as_it_is)  # compiles what is not compiled yet, which takes its time
+        unchanged.start()
+        unchanged.join(LATE * LATE * seconds)  # of the clock; its own limit is of the processor
+        unchanged.kill()
         for number, (key, value) in enumerate(todo):
-            if number % 1000 == 999:
-                wrong = sum(not one.good for one in found)
-                say(f"{scene}: {number + 1} of {len(todo)} values, {len(first)} runs, {wrong} wrong ends")
-            meant = _read(scene, (*overrides, f"{key}={value}"), seconds)
-            if meant.refusal:
-                found.append(Tried(scene, key, value, ENDS[BAD_INPUT], f"tribodyn: {meant.refusal}", meant.seconds))
-                continue
-            if meant.text and first.setdefault(meant.text, (key, value)) != (key, value):
-                same.append((key, value, first[meant.text]))
-                continue
             while len(active) >= workers:
-                found += _ended(scene, active, seconds)
+                yield from _ended(scene, active, seconds)
             place = Path(folder) / str(number)
             place.mkdir()
             changed = (*overrides, f"{key}={value}")
@@ -158,36 +206,74 @@ def fuzz(
             process.start()
             active[process] = Running(key, value, place, 0.0, time.monotonic())
         while active:
-            found += _ended(scene, active, seconds)
-    run = {(one.key, one.value): one for one in found}
-    found += [replace(run[who], key=key, value=value, like="=".join(who)) for key, value, who in same]
-    return sorted(found, key=lambda one: (one.key, NASTY.index(one.value)))
+            yield from _ended(scene, active, seconds)
 
 
 @dataclass(frozen=True)
 class _Meant:
-    """What a scene file with a value means: the scene as text, or the sentence that refuses it; both empty if neither.
+    """What a scene with a value means: digest of the scene, or the sentence that refuses it; both empty if neither.
 
     seconds : of the processor
     """
 
-    text: str
+    key: str
+    value: str
+    digest: str
     refusal: str
     seconds: float
 
 
-def _read(scene: str, overrides: tuple[str, ...], seconds: float) -> _Meant:
+class _Rows:
+    """What is known of a scene already; a folder keeps it in a file, whose first line says of which scene."""
+
+    def __init__(self, folder: Path | None, scene: str, overrides: Sequence[str]):
+        self._path = None if folder is None else folder / ROWS
+        self.read: dict[Case, _Meant] = {}
+        self.run: dict[Case, Tried] = {}
+        of = {"scene": scene, "overrides": list(overrides)}
+        if self._path is None:
+            return
+        if not self._path.exists():
+            self._write(of)
+        first, *lines = (json.loads(line) for line in self._path.read_text(encoding="utf-8").splitlines())
+        if first != of:
+            raise ValueError(f"{folder} keeps runs of {first['scene']} with other changes: give another folder")
+        for line in lines:
+            self._take(Tried(**line) if "end" in line else _Meant(**line))
+
+    def add(self, row: Row) -> Row:
+        """Keep a row and give it back."""
+        self._take(row)
+        if self._path is not None:
+            self._write(asdict(row))
+        return row
+
+    def _take(self, row: _Meant | Tried) -> None:
+        if isinstance(row, Tried):
+            self.run[row.key, row.value] = row
+        else:
+            self.read[row.key, row.value] = row
+
+    def _write(self, line: dict[str, Any]) -> None:
+        assert self._path is not None
+        with self._path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(line) + "\n")
+
+
+def _read(scene: str, overrides: Sequence[str], key: str, value: str, seconds: float) -> _Meant:
     """Read a scene; what is no refusal in one line is left for the command to meet again."""
     clock = time.process_time()
+    digest = refusal = ""
     try:
         with warnings.catch_warnings(), processor_seconds(seconds):
             warnings.simplefilter("error")
-            text, refusal = scene_file.read(scene, overrides).scene.model_dump_json(), ""
+            text = scene_file.read(scene, (*overrides, f"{key}={value}")).scene.model_dump_json()
+            digest = hashlib.sha256(text.encode()).hexdigest()
     except scene_file.SceneError as error:
-        text, refusal = "", str(error)
+        refusal = "" if "\n" in str(error) else str(error)
     except Exception:  # a traceback of the command tells more
-        text = refusal = ""
-    return _Meant(text, "" if "\n" in refusal else refusal, time.process_time() - clock)
+        digest = ""
+    return _Meant(key, value, digest, refusal, time.process_time() - clock)
 
 
 def _ended(scene: str, active: Active, seconds: float) -> list[Tried]:
@@ -213,6 +299,7 @@ def _ended(scene: str, active: Active, seconds: float) -> list[Tried]:
         end = _end(process.exitcode, printed, place / "out" / "result.h5")
         lines = [line for line in printed.splitlines() if line.startswith("tribodyn:")] if end in GOOD else [printed]
         found.append(Tried(scene, running.key, running.value, end, "\n".join(lines)[-2000:], spent))
+        shutil.rmtree(place)
     return found
 
 
@@ -247,7 +334,8 @@ def _not_finite(file: Path) -> str:
         if any(isinstance(number, float) and not np.isfinite(number) for number in numbers):
             return name
     for name, said in (summary["verdict"] or {}).items():
-        if said["stated"] and said["value"] is None:
+        error = said["error"]
+        if said["stated"] and (said["value"] is None or not 0 <= (error or 0.0) < np.inf):  # None: it is not known
             return f"verdict of {name}"
     return ""
 
@@ -271,6 +359,36 @@ def _run(
             (place / "spent").write_text(str(time.process_time()))
 
 
-def counts(tried: Sequence[Tried]) -> dict[str, dict[str, int]]:
-    """How often each end came, by scene."""
-    return {scene: dict(Counter(one.end for one in tried if one.scene == scene)) for scene in {t.scene for t in tried}}
+def counts(tried: Sequence[Tried]) -> dict[str, dict[str, Any]]:
+    """Numbers by scene: keys, values, those that reading refuses, scenes that come out of the others, ends of runs."""
+    found = {}
+    for scene in dict.fromkeys(one.scene for one in tried):
+        ours = [one for one in tried if one.scene == scene]
+        own = [one for one in ours if one.end != REFUSED and not one.like]
+        ran = [one for one in own if one.end != ACCEPTED]
+        found[scene] = {
+            "keys": len({one.key for one in ours}),
+            "values": len(ours),
+            REFUSED: sum(one.end == REFUSED for one in ours),
+            "scenes": len(own),
+            "runs": len(ran),
+            "ends": dict(Counter(one.end for one in ran)),
+            "slowest": max((one.seconds for one in ran), default=0.0),
+        }
+    return found
+
+
+def as_text(tried: Sequence[Tried]) -> str:
+    """A line for each scene, and one for each wrong end."""
+    lines = []
+    for scene, of in counts(tried).items():
+        ends = ", ".join(f"{count} {end}" for end, count in sorted(of["ends"].items(), reverse=True))
+        lines.append(
+            f"{scene}: {of['keys']} keys, {of['values']} values: {of[REFUSED]} {REFUSED}, the others make "
+            f"{of['scenes']} scenes; {of['runs']} of these run: {ends or 'none'}; the slowest {of['slowest']:.1f} s"
+        )
+    wrong = [one for one in tried if not one.good and not one.like]
+    lines += [
+        f"{one.scene} {one.key}={one.value}: {one.end} after {one.seconds:.1f} s: {one.said[-300:]}" for one in wrong
+    ]
+    return "\n".join(lines)

@@ -1,4 +1,5 @@
-"""How the cost of a reduction grows with the mesh: the product, plain statements of the same library, and multigrid.
+"""How the cost of a reduction grows with the mesh: the product in three ways, plain statements of the same library,
+and multigrid.
 
 Everything is measured in a process of its own, so that its peak memory is its own; seconds are processor seconds of one
 thread.
@@ -7,13 +8,15 @@ thread.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -24,6 +27,7 @@ from tribodyn.fem.factor import factorise
 from tribodyn.fem.multigrid import rigid_motions
 from tribodyn.fem.part import Part
 from tribodyn.geometry import parts
+from tribodyn.reduction import craig_bampton, residual_flexibility
 from tribodyn.reduction.craig_bampton import master_dofs
 from tribodyn.workflows.run import memory, modelling, part_reduction
 from tribodyn.workflows.scene import scene_file
@@ -34,7 +38,18 @@ SIZES = {  # of the beam, name -> elements along it and through its height; 13 x
 # three posts on a plate, each on a joint of faces that do not match, from four mesh files: elements of the plate along
 # its three axes, and of a post upwards
 ASSEMBLIES = {"assembly": (52, 14, 9, 30)}
+PRODUCTS = {  # ways of the product -> how the scene asks for it
+    "product": (),
+    "single precision": ("reduction.solver=single_precision",),
+    "flexibility": ("reduction.method=residual_flexibility",),
+    "single flexibility": ("reduction.method=residual_flexibility", "reduction.solver=single_precision"),
+}
 WAYS = ("product", "by hand", "multigrid")
+OTHERS = {"1M": ("flexibility", "single flexibility")}  # constraint modes do not fit 24 GB
+STAGES = {  # function of a reduction -> what its seconds are told as
+    "factorise": "factor", "fixed_interface_modes": "modes", "constraint_modes": "constraint modes",
+    "_congruent": "projection", "_ritz": "static shapes",
+}  # fmt: skip
 MODES, COLUMNS = 15, 3  # columns : constraint modes that multigrid is measured on
 
 
@@ -42,7 +57,8 @@ MODES, COLUMNS = 15, 3  # columns : constraint modes that multigrid is measured 
 class FeCost:
     """One size of the mesh, by one way.
 
-    way : "product", "by hand" or "multigrid"; dofs, masters; seconds : stage -> processor seconds; peak_bytes : memory
+    way : of WAYS or PRODUCTS; dofs, masters; seconds : stage -> processor seconds; peak_bytes : memory
+    first_hz : lowest frequency of the reduced model without contact, nan where none was made
     error : of constraint modes by conjugate gradients against a factor's, relative; iterations : of one of them
     """
 
@@ -53,18 +69,24 @@ class FeCost:
     peak_bytes: float
     error: float = 0.0
     iterations: float = 0.0
+    first_hz: float = np.nan
 
 
-def run(sizes: Sequence[str], say: Callable[[str], None]) -> list[FeCost]:
+def run(sizes: Sequence[str], say: Callable[[str], None], ways: Sequence[str] = ()) -> list[FeCost]:
     """Measure sizes by name, each way in a process of its own; an assembly without multigrid.
 
-    Raises  ValueError for a size that is not known
+    ways : those that fit the size by default
+    Raises  ValueError for a size or a way that is not known
     """
+    known = dict.fromkeys([*PRODUCTS, *WAYS])
+    for way in ways:
+        if way not in known:
+            raise ValueError(f'no way "{way}": there are {", ".join(known)}')
     rows = []
     for size in sizes:
         if size not in SIZES | ASSEMBLIES:
             raise ValueError(f'no size "{size}": there are {", ".join(SIZES | ASSEMBLIES)}')
-        for way in WAYS if size in SIZES else WAYS[:2]:
+        for way in ways or (OTHERS.get(size, WAYS) if size in SIZES else WAYS[:2]):
             say(f"{size}{' DOFs' if size in SIZES else ''}, {way}")
             with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as alone:
                 job = alone.submit(measure, SIZES[size], way) if size in SIZES else None
@@ -75,7 +97,8 @@ def run(sizes: Sequence[str], say: Callable[[str], None]) -> list[FeCost]:
 def measure(size: tuple[int, int], way: str, n_patch: int = 13) -> FeCost:
     """One size of the beam by one way, on one thread."""
     changes = [f"geometry.n_length={size[0]}", f"geometry.n_height={size[1]}", f"geometry.n_patch={n_patch}"]
-    return _measured(lambda folder: scene_file.read("beam_thesis", [*changes, f"reduction.modes={MODES}"]), way)
+    changes += [f"reduction.modes={MODES}", *PRODUCTS.get(way, ())]
+    return _measured(lambda folder: scene_file.read("beam_thesis", changes), way)
 
 
 def measure_assembly(size: tuple[int, int, int, int], way: str) -> FeCost:
@@ -99,10 +122,17 @@ def _measured(scene_of: Callable[[Path], scene_file.SceneFile], way: str, files:
             clock = _Clock()
         part = modelling.make_part(scene, mesh, node_sets, file.folder)
         clock("assembly")
-        if way == "product":
-            reduced = part_reduction.reduce(scene, part)
-            clock("reduction")
-            found = FeCost(way, part.system.n_dof, len(reduced.info.master_dofs), clock.seconds, memory.peak())
+        if way in PRODUCTS:
+            with _stages() as of_stages:
+                reduced = part_reduction.reduce(scene, part)
+            clock("rest")
+            clock.seconds["rest"] -= sum(of_stages.values())
+            masters = 0 if reduced.residual is not None else len(reduced.info.master_dofs)
+            frequency = np.zeros(0) if reduced.info.free_frequency is None else reduced.info.free_frequency
+            found = FeCost(
+                way, part.system.n_dof, masters, clock.seconds | of_stages, memory.peak(),
+                first_hz=float(frequency[0]),
+            )  # fmt: skip
         elif way == "by hand":
             found = _by_hand(part, clock)
         else:
@@ -140,6 +170,29 @@ class _Clock:
     def __call__(self, stage: str) -> None:
         now = time.process_time()
         self.seconds[stage], self._last = now - self._last, now
+
+
+@contextmanager
+def _stages() -> Iterator[dict[str, float]]:
+    """Processor seconds that the functions of STAGES take in a reduction meanwhile."""
+    seconds: dict[str, float] = {}
+
+    def timed(function: Any, stage: str) -> Any:
+        def call(*args: Any, **named: Any) -> Any:
+            start = time.process_time()
+            try:
+                return function(*args, **named)
+            finally:
+                seconds[stage] = seconds.get(stage, 0.0) + time.process_time() - start
+
+        return call
+
+    with ExitStack() as patched:
+        for module in (craig_bampton, residual_flexibility):
+            for name, stage in STAGES.items():
+                if hasattr(module, name):
+                    patched.enter_context(patch.object(module, name, timed(getattr(module, name), stage)))
+        yield seconds
 
 
 def _split(part: Part) -> tuple[np.ndarray, np.ndarray]:
@@ -199,8 +252,9 @@ def as_text(rows: Sequence[FeCost]) -> str:
     for row in rows:
         told = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in row.seconds.items())
         more = f", {row.iterations:.0f} iterations, error {row.error:.1e}" if row.way == "multigrid" else ""
+        more += "" if np.isnan(row.first_hz) else f"; first frequency {row.first_hz:.9g} Hz"
         lines.append(
-            f"{row.dofs:9d} DOFs, {row.masters} masters, {row.way:10} {row.peak_bytes / 1e9:6.2f} GB: {told}{more}"
+            f"{row.dofs:9d} DOFs, {row.masters} masters, {row.way:16} {row.peak_bytes / 1e9:6.2f} GB: {told}{more}"
         )
     for way in dict.fromkeys(row.way for row in rows):
         own = [row for row in rows if row.way == way]

@@ -22,6 +22,7 @@ LIST = Path(__file__).with_suffix(".toml")
 ROWS = "rows.jsonl"
 JUDGED = 30  # every so many of the quick cells of extremes
 SECONDS = 20.0  # of the processor, for the tests of one fault, and again for the judge
+UNCOMPILED = 3.0  # times these where nothing is compiled
 PROBED = 90.0  # seconds, for the reference runs
 SOLVED = ("hbm/", "reduction/")  # what extremes looks at; it takes the matrices as they are
 LARGE = 1e-3  # relative change of a result from which on a fault must be seen
@@ -99,7 +100,7 @@ def run(tree: Path, folder: Path, say: Callable[[str], None], seconds: float = S
             if compiled[number] == uncompiled and (fault.file, fault.does) not in done
         ]
         if numbers:
-            _planted(tree, folder, say, seconds, numbers, uncompiled)
+            _planted(tree, folder, say, seconds * (UNCOMPILED if uncompiled else 1.0), numbers, uncompiled)
     rows = {(row.file, row.does): row for row in rows_in(folder)}
     return [rows[fault.file, fault.does] for fault in listed]
 
@@ -131,10 +132,12 @@ def as_markdown(rows: Sequence[Seen]) -> str:
     """What was seen of every fault, as a table, and the counts above it."""
     seen = Counter((bool(row.tests), bool(row.extremes)) for row in rows)
     large = [row for row in rows if row.change > LARGE]
+    failing = sum(row.change == float("inf") for row in large)
     lines = [
         f"{sum(row.caught for row in rows)} of {len(rows)} planted faults are seen: {seen[True, False]} by tests, "
         f"{seen[False, True]} by extremes alone. Of the {len(large)} that change a result of the reference runs by "
-        f"more than 0.1 %, {sum(row.caught for row in large)} are seen.",
+        f"more than 0.1 %, {sum(row.caught for row in large)} are seen; {failing} of these count because such a run "
+        "then fails or does not end.",
         "",
         "| file | fault | largest change | of | seen by |",
         "|---|---|---|---|---|",

@@ -21,6 +21,7 @@ from pathlib import Path
 from time import process_time
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 
@@ -30,6 +31,8 @@ from tribodyn.workflows.benchmarks.planted_faults import Fault, Seen
 Send = Callable[[Any], None]
 ACCESSORS = ("fget", "fset")
 PLAIN = (bool, int, float, str, tuple, list, dict, frozenset, np.ndarray)  # constants of a module that may be replaced
+BY_HAND = "by_hand"  # in the names of the tests that are run first
+COMPILES = 600.0  # processor seconds for these tests where nothing is compiled yet
 DEPTH = 5  # of decorators around a function
 
 
@@ -42,8 +45,13 @@ def serve(tree: Path, folder: Path, seconds: float, wanted: Sequence[int]) -> No
     sys.path.insert(0, str(tree))
     files = list(dict.fromkeys(test for fault in faults for test in rooms[fault.room].tests))
     pytest.main(["--collect-only", "-q", *PYTEST, *files])  # loads everything
+    if not numba.config.DISABLE_JIT:  # what they compile is kept for the children, whose clocks run
+        first = [test for test in files if BY_HAND in test]
+        in_child(partial(_tested, None, tree, first, ()), COMPILES)
     runs = tuple(dict.fromkeys(run for fault in faults for run in rooms[fault.room].runs))
     base = dict(reference_runs.numbers(runs))
+    if failing := [name for name, found in base.items() if found is None]:
+        raise RuntimeError(f"reference runs fail without a fault: {', '.join(failing)}")
     sound: dict[str, bool] = {}  # tests that have failed with a fault: whether they pass without one
     for fault in faults:
         room = rooms[fault.room]
@@ -71,7 +79,7 @@ def judged(
     if not in_child(partial(_planted, fault, tree), seconds):
         raise ValueError(f"{fault.file}: {fault.does}: this cannot be planted, see what is printed")
     clock = os.times()
-    ordered = sorted(tests, key=lambda test: ("by_hand" not in test, Path(fault.file).stem not in test))
+    ordered = sorted(tests, key=lambda test: (BY_HAND not in test, Path(fault.file).stem not in test))
     by_test = _failing(fault, tree, ordered, seconds, sound)
     asked = not by_test and fault.file.startswith(planted_faults.SOLVED)
     by_extremes = next(iter(in_child(partial(_wrong, fault, tree), seconds)), "") if asked else ""
@@ -105,12 +113,10 @@ def _failing(fault: Fault, tree: Path, tests: Sequence[str], seconds: float, sou
     """The first test that fails with the fault, and not without it; "" where none does in the seconds."""
     while True:
         left_out = [f"--deselect={test}" for test, passes in sound.items() if not passes]
-        words = ["-q", "-x", *PYTEST, *left_out, *tests]
-        found = next(iter(in_child(partial(_tested, fault, tree, words), seconds)), "")
+        found = next(iter(in_child(partial(_tested, fault, tree, tests, left_out), seconds)), "")
         if not found or sound.get(found):
             return found
-        words = ["-q", "-x", *PYTEST, found]
-        sound[found] = not in_child(partial(_tested, None, tree, words), 10 * seconds)
+        sound[found] = not in_child(partial(_tested, None, tree, [found], ()), 10 * seconds)
         if sound[found]:
             return found
 
@@ -120,12 +126,15 @@ def _planted(fault: Fault, tree: Path, send: Send) -> None:
     send(True)
 
 
-def _tested(fault: Fault | None, tree: Path, words: list[str], send: Send) -> None:
+def _tested(fault: Fault | None, tree: Path, tests: Sequence[str], words: Sequence[str], send: Send) -> None:
+    """Run tests, each on its own, as pytest would put files into an order of its own, until one fails."""
     if fault is not None:
         plant(fault, tree)
     os.chdir(tree)
     os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
-    pytest.main(words, plugins=[First(send)])
+    for test in tests:
+        if pytest.main(["-q", "-x", *PYTEST, *words, test], plugins=[First(send)]) == pytest.ExitCode.TESTS_FAILED:
+            return
 
 
 def _wrong(fault: Fault, tree: Path, send: Send) -> None:

@@ -104,6 +104,7 @@ def _torn(folder: Path) -> bool:
 def run(scenes: int, seed: int, folder: Path, seconds: float, say: Callable[[str], None]) -> list[Row]:
     """Draw, run, judge and check scenes, those that `folder` holds of this seed left out; all rows of the seed.
 
+    scenes : how many; 0: none, only what `folder` holds
     seconds : of the processor, that the run of a scene may take, and its reference again
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -117,7 +118,7 @@ def run(scenes: int, seed: int, folder: Path, seconds: float, say: Callable[[str
         broken = ", ".join(one.quantity for one in (*row.judged, *row.promise) if one.broken)
         spent = "/".join(f"{one:.0f}" for one in row.seconds)
         say(f"{row.family} {number}: {row.outcome}, {spent} s{f'; BROKEN: {broken}' if broken else ''}")
-    return sorted((row for row in kept if row.number < scenes), key=lambda row: row.number)
+    return sorted((row for row in kept if not scenes or row.number < scenes), key=lambda row: row.number)
 
 
 def measured(number: int, seed: int, seconds: float) -> Row:

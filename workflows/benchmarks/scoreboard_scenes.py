@@ -30,8 +30,10 @@ WORN = 0.5  # share of the scenes that are worn
 LONGER = 30.0  # processor seconds of the verdict on a scene that wears: its late states take more
 # logarithm of the tangential force of the stuck contact over what friction can carry; with little of it wear fades
 # out before the contact is lost
-DRIVE, WEARING = (-0.2, 0.8), (0.6, 1.2)
-BESIDE = ((0.85, 0.95), (1.05, 1.15))  # frequencies at which they wear, over the resonance of the free part
+DRIVE, WEARING = (-0.2, 0.8), (0.4, 1.0)
+# frequencies at which they wear, over the resonance of the free part: half of them well below, where more motions stay
+BESIDE = ((0.4, 0.6), (0.4, 0.6), (0.85, 0.95), (1.05, 1.15))
+DAMPED = 2.0  # times the drawn damping where they wear: with little of it most worn motions are unstable
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ def draw(number: int, seed: int, folder: Path) -> Drawn:
     guess: Table = {"frequency": [1.0, 1e5], "points": 10}
     text = as_toml(table | {"response": table["response"] | guess})
     balance = modelling.build(parse(text, "drawn.toml", (), folder), None, Progress()).balance
-    worn, at = bool(rng.uniform() < WORN), float(rng.uniform(*BESIDE[int(rng.integers(2))]))
+    worn, at = bool(rng.uniform() < WORN), float(rng.uniform(*BESIDE[int(rng.integers(len(BESIDE)))]))
     drive = float(10 ** rng.uniform(*(WEARING if worn else DRIVE)))
     low, high, place, force = _placed(balance, drive, at if worn else None)
     table["response"] |= {"frequency": [low, high], "points": int(rng.choice([30, 50]))}
@@ -68,6 +70,7 @@ def draw(number: int, seed: int, folder: Path) -> Drawn:
     if worn:
         table["wear"] = {"coefficient": "1e4 um3/J", "max_steps": 80, "lost_below": LIFE_SHARE} | _rule(rng)
         table["wear"] |= {"at": {"frequency": place}}
+        table["damping"]["modal"] *= DAMPED
         table["verdict"] = {"seconds": LONGER}
     return Drawn(number, seed, family, as_toml(table))
 
@@ -249,7 +252,7 @@ def _placed(balance: HarmonicBalance, drive: float, at: float | None) -> tuple[f
         raise ValueError("the static load opens the contact, or the vibration does not reach it")
     force = drive * float(carried.sum()) / float(np.hypot(shaken[::2], shaken[1::2]).sum())
     turn = 2 * np.pi
-    return 0.6 * loose / turn, 1.2 * stuck / turn, place / turn, force
+    return min(0.6 * loose, 0.9 * place) / turn, 1.2 * stuck / turn, place / turn, force
 
 
 def as_toml(table: Table) -> str:

@@ -87,5 +87,7 @@ def picture(rows: Sequence[Row]) -> Figure:
         axes.axvline(1.0, color=RED, lw=1.0)
         axes.set(xscale="log", xlabel="stated error over true error", ylabel="promises")
         if len(ratios):
-            axes.set_title(f"{len(ratios)} promises, {int((ratios < 1).sum())} broken, median {np.median(ratios):.2g}")
+            told = f"{len(ratios)} promises, {int((ratios < 1).sum())} broken, median {np.median(ratios):.2g}"
+            exact = sum(one.promised for row in rows for one in row.judged) - len(ratios)
+            axes.set_title(f"{told}; {exact} more are true to rounding" if exact else told)
     return figure

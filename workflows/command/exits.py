@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import sys
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from sys import UnraisableHookArgs
 
 BAD_INPUT, FAILED_SOLVE, INTERRUPTED = 2, 3, 130
+FULL = (errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC))  # Windows has no quota
 READER_LEFT = 128 + 13  # as a shell counts the end by SIGPIPE, which Windows has not
 
 
@@ -43,7 +45,8 @@ def guard(command: Callable[[], object]) -> None:
     except cyclopts.CycloptsError as error:
         _leave(BAD_INPUT, " ".join(str(error).split()))
     except (ValueError, OSError) as error:
-        _leave(BAD_INPUT, str(error))
+        full = isinstance(error, OSError) and error.errno in FULL
+        _leave(BAD_INPUT, f"the disk is full, or no more may be written to it ({error})" if full else str(error))
     except (RuntimeError, MemoryError) as error:
         _leave(FAILED_SOLVE, str(error) or "the memory of this machine is not enough for this scene")
 

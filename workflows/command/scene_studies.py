@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 from tribodyn.workflows.command.words import Changes, Flag, Json, Overrides, aside, make_room, quantity
 
+Films = Annotated[tuple[str, ...], Parameter(name="--format", negative=(), consume_multiple=True)]
 Areas = Annotated[tuple[str, ...], Parameter(name="--area", negative=(), consume_multiple=False)]
 
 
@@ -128,6 +129,8 @@ def mistuning(
     scene: str,
     *,
     wear: int | None = None,
+    show: int | None = None,
+    formats: Films = (),
     workers: int | None = None,
     resume: Flag = False,
     overrides: Overrides = (),
@@ -142,6 +145,10 @@ def mistuning(
         Name of a scene with [wheel] and [mistuning], or a .toml file.
     wear
         Number of a pattern whose wheel wears by the scene's [wear] instead.
+    show
+        Number of a pattern whose wheel is drawn at its highest peak instead, all blades at one instant.
+    formats
+        gif or mp4, or both: a film of the drawn or worn wheel over one cycle.
     workers
         Processes; as many as there are cores by default.
     resume
@@ -151,20 +158,35 @@ def mistuning(
     as_json
         Print JSON for machines.
     """
+    from tribodyn.workflows.pictures.render import RenderingUnavailable
     from tribodyn.workflows.run.progress import Progress, console_progress
     from tribodyn.workflows.scene import scene_file
-    from tribodyn.workflows.studies import mistuned_wear, patterns
+    from tribodyn.workflows.studies import mistuned_motion, mistuned_wear, patterns
 
     make_room(out)
     file = scene_file.read(scene, overrides)
     folder = out or Path("results") / file.name
+    for word, number in (("--wear", wear), ("--show", show)):
+        if number is not None and number < 1:
+            raise ValueError(f"{word} {number}: patterns are counted from 1")
+    if show is not None:
+        blades = patterns.Blades.of(file)
+        state = mistuned_motion.at_peak(blades, show)
+        drawn = mistuned_motion.write(blades, [state], folder, formats)
+        record, said = {"pattern": show, "amplitude_m": state.heights.tolist()}, [state.label]
+        print(json.dumps(record, indent=2) if as_json else "\n".join(map(str, [*said, *drawn])))
+        return
+    drawn = []
     if wear is not None:
-        if wear < 1:
-            raise ValueError(f"--wear {wear}: patterns are counted from 1")
+        blades = patterns.Blades.of(file)
         worn = mistuned_wear.study(
-            file, wear, lambda row: aside(f"{row.cycles:.4g} cycles, {1e6 * row.depth.max():.4g} um")
+            file, wear, lambda row: aside(f"{row.cycles:.4g} cycles, {1e6 * row.depth.max():.4g} um"), blades
         )
         folder.mkdir(parents=True, exist_ok=True)
+        try:
+            drawn = mistuned_motion.write(blades, mistuned_motion.worn_states(blades, worn), folder, formats)
+        except RenderingUnavailable as error:
+            aside(str(error))
         mistuned_wear.write(worn, table := folder / "mistuned_wear.csv")
         mistuned_wear.picture(worn).savefig(drawing := folder / "mistuned_wear.png")
         record, said = worn.record(), worn.lines()
@@ -178,7 +200,7 @@ def mistuning(
     if as_json:
         print(json.dumps(record, indent=2))
         return
-    print(*said, table, *([drawing] if drawing.exists() else []), sep="\n")
+    print(*said, table, *([drawing] if drawing.exists() else []), *drawn, sep="\n")
 
 
 def supports(

@@ -19,6 +19,7 @@ def bench(
     quick: Flag = False,
     scaling: Flag = False,
     fe: Annotated[tuple[str, ...], Parameter(name="--fe", negative=(), consume_multiple=False)] = (),
+    way: Annotated[tuple[str, ...], Parameter(name="--way", negative=(), consume_multiple=False)] = (),
     contact: Annotated[tuple[str, ...], Parameter(name="--contact", negative=(), consume_multiple=False)] = (),
     out: Path = Path("scaling.png"),
     as_json: Json = False,
@@ -34,6 +35,9 @@ def bench(
     fe
         Time and memory of a reduction at "30k", "100k", "300k" or "1M" DOFs instead, beside plain statements of the
         same library and beside multigrid, or of an "assembly" of 200 000 DOFs with three joints; can be repeated.
+    way
+        One way of --fe alone: "product", "by hand", "multigrid", "single precision" (a factor of half the size),
+        "flexibility" (no contact DOFs in the model) or "single flexibility" (both); can be repeated.
     contact
         Set-up, memory and seconds of one response at 0+3 on "500", "3k", "12k" or "48k" contact DOFs instead, with
         residual flexibility and, up to 3k, beside the dense compliance; can be repeated.
@@ -45,7 +49,7 @@ def bench(
     if fe:
         from tribodyn.workflows.benchmarks import large_fe
 
-        costs = large_fe.run(fe, aside)
+        costs = large_fe.run(fe, aside, way)
         print(json.dumps(large_fe.as_records(costs), indent=2) if as_json else large_fe.as_text(costs))
         return
     if contact:

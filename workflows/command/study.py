@@ -1,4 +1,4 @@
-"""The words of the command `tribodyn` that do the many runs of a study, and ask what lives they give."""
+"""The words of the command `tribodyn` that do the many runs of a study: for their table, for lives, for an optimum."""
 
 from __future__ import annotations
 
@@ -121,6 +121,45 @@ def lives(
     print(*troubles(found.table), *found.lines(), folder / "lives.json", folder / "lives.png", sep="\n")
 
 
+def optimise(
+    file: Path,
+    *,
+    workers: int | None = None,
+    scheduler: str = "",
+    out: Path | None = None,
+    resume: Flag = False,
+    as_json: Json = False,
+) -> None:
+    """Look for the best designs: least amplitude and longest life, or other aims, over ranges of any keys.
+
+    Parameters
+    ----------
+    file
+        The .toml file of a study that draws from ranges; its table [optimise] says what is wanted.
+    workers
+        Processes; as many as there are cores by default.
+    scheduler
+        Address of a scheduler of dask.distributed, or "local" for one of its own.
+    out
+        Folder of optimum.json, optimum.png and the study's tables; results/NAME by default.
+    resume
+        Take the runs that the folder holds already, and do the others.
+    as_json
+        Print JSON for machines.
+    """
+    from tribodyn.workflows.designs import optimum
+
+    read, folder, progress = _begun(file, out, as_json)
+    try:
+        found = optimum.run(read, folder, progress, workers, scheduler, resume)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(_stopped("optimise", file, folder)) from None
+    if as_json:
+        print(json.dumps(found.record(), indent=2))
+        return
+    print(*troubles(found.table), *found.lines(), folder / "optimum.json", folder / "optimum.png", sep="\n")
+
+
 def _begun(file: Path, out: Path | None, as_json: bool) -> tuple[Study, Path, Progress]:
     """A study, the folder that it leaves its tables in, and who is told how far it is."""
     from tribodyn.workflows.designs import study_file
@@ -136,4 +175,4 @@ def _stopped(word: str, file: Path, folder: Path) -> str:
     return f"stopped; what was finished is kept in {folder}: resume with {again}"
 
 
-COMMANDS = (study, lives)
+COMMANDS = (study, lives, optimise)

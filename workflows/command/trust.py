@@ -19,7 +19,7 @@ def scoreboard(
     Parameters
     ----------
     scenes
-        How many are drawn.
+        How many are drawn. 0: none, all rows of the seed that are kept are counted again.
     seed
         Of the draw.
     seconds

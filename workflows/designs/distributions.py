@@ -17,6 +17,7 @@ Given = float | str
 # kind -> numbers that it must have, numbers of which one must be there, numbers that it may have
 NUMBERS: dict[str, tuple[set[str], set[str], set[str]]] = {
     "uniform": ({"low", "high"}, set(), set()),
+    "loguniform": ({"low", "high"}, set(), set()),
     "triangular": ({"low", "mode", "high"}, set(), set()),
     "normal": ({"mean"}, {"std", "cov"}, {"low", "high"}),
     "lognormal": ({"median", "cov"}, set(), {"low", "high"}),
@@ -26,7 +27,7 @@ NUMBERS: dict[str, tuple[set[str], set[str], set[str]]] = {
 class Distribution(Table):
     """A distribution as a study gives it; numbers have units, or are in SI."""
 
-    distribution: Literal["uniform", "normal", "lognormal", "triangular"]
+    distribution: Literal["uniform", "loguniform", "normal", "lognormal", "triangular"]
     low: Given | None = None
     """Smallest value; of a normal or lognormal one, where it is truncated."""
     high: Given | None = None
@@ -69,6 +70,10 @@ class Marginal:
                 raise ValueError(f"{name} {getattr(table, name)} is not above 0")
         if table.distribution == "uniform":
             return cls(stats.uniform(n["low"], n["high"] - n["low"]))
+        if table.distribution == "loguniform":
+            if not n["low"] > 0:
+                raise ValueError(f"low {table.low} is not above 0")
+            return cls(stats.loguniform(n["low"], n["high"]), logarithmic=True)
         if table.distribution == "triangular":
             width = n["high"] - n["low"]
             if not n["low"] <= n["mode"] <= n["high"]:
@@ -93,6 +98,11 @@ class Marginal:
         """Quantiles; share : (n,) in (0, 1)."""
         below, upto = self.law.cdf(self.low), self.law.cdf(self.high)
         return np.clip(self.law.ppf(below + share * (upto - below)), self.low, self.high)
+
+    def share(self, values: np.ndarray) -> np.ndarray:
+        """Shares (n,) below values (n,); the inverse of `at`."""
+        below, upto = self.law.cdf(self.low), self.law.cdf(self.high)
+        return np.asarray((self.law.cdf(values) - below) / (upto - below))
 
 
 def _told(given: set[str]) -> str:

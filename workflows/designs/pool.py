@@ -38,18 +38,24 @@ Work = TypeVar("Work", bound=Numbered)
 
 
 def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], Row]) -> Iterator[Row]:
-    """Rows as they come, made by `solve` of a module; a run whose process died ATTEMPTS times is lost."""
+    """Rows as they come, made by `solve` of a module; a run whose process died ATTEMPTS times is lost.
+
+    The death of one process ends the whole pool. Nobody tells which run killed it, so all that were under way are
+    repeated one at a time: a run is lost by a death of its own only.
+    """
     # Gmsh, once used in this process, sets this to the default: a pipe to a dead process would end the study
     if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # as Python begins
     waiting, deaths = deque(tasks), Counter[int]()
     while waiting:
-        pool = ProcessPoolExecutor(min(workers, len(waiting)), get_context("spawn"), _one_thread)
+        alone = deaths[waiting[0].number] > 0
+        limit = 1 if alone else min(workers, len(waiting))
+        pool = ProcessPoolExecutor(limit, get_context("spawn"), _one_thread)
         under_way: dict[Future[Row], Work] = {}
         try:
-            while waiting or under_way:
+            while under_way or (waiting and (deaths[waiting[0].number] > 0) == alone):
                 # no more than there are processes: what is under way when one dies is then known
-                while waiting and len(under_way) < workers:
+                while waiting and len(under_way) < limit and (deaths[waiting[0].number] > 0) == alone:
                     task = waiting.popleft()
                     try:
                         under_way[pool.submit(solve, task)] = task

@@ -57,6 +57,10 @@ class Space:
         share = design.correlated(self.study, inside)
         return np.stack([self._law(key).at(share[:, i]) for i, key in enumerate(self.keys)], axis=1)
 
+    def shares(self, values: np.ndarray) -> np.ndarray:
+        """Points (n, k) of the unit cube that have values (n, k) where nothing is correlated."""
+        return np.stack([self._law(key).share(values[:, i]) for i, key in enumerate(self.keys)], axis=1)
+
     def coordinates(self, values: np.ndarray) -> np.ndarray:
         """Values (n, k) in widths of their distributions from their medians; those of a lognormal one in logarithms."""
         columns = []

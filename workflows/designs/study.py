@@ -9,6 +9,7 @@ from typing import Any
 
 import tomli_w
 
+from tribodyn.hbm.threads import limited
 from tribodyn.workflows.designs import cluster, design, life_picture, parallel_picture, pool, sensitivity_picture
 from tribodyn.workflows.designs.journal import Journal
 from tribodyn.workflows.designs.shared_models import shared
@@ -34,12 +35,14 @@ def run(
     retry: bool = False,
     more: Sequence[dict[str, Any]] = (),
     drawn: bool = True,
+    inside: bool = False,
 ) -> StudyTable:
     """Do the runs of a study, and leave its tables and pictures in a folder.
 
     workers : processes, as many as there are cores by default; scheduler : see cluster.finished, none by default
     resume : take the rows that `folder` holds of the same runs; retry : but those of failed runs
     more : values of runs beyond those of the design; drawn : whether pictures are wanted
+    inside : one worker is this process itself, where few runs are done at a time and starting another would cost more
     Raises  SceneError, ValueError: the study asks for what cannot be; SolveFailed: the scheduler was lost
     """
     if workers is not None and workers < 1:
@@ -69,7 +72,7 @@ def run(
             progress.say(f"{len(left)} runs on {where}, one thread for each run")
         try:
             with progress.track(f"{len(left)} runs") as advance, shared(left, folder, count, scheduler) as (ready, end):
-                for done, row in enumerate(_finished(ready, count, scheduler), 1):
+                for done, row in enumerate(_finished(ready, count, scheduler, inside), 1):
                     journal.add(row)
                     rows[row.run] = row
                     end(row.run)
@@ -101,20 +104,29 @@ def draw(study: Study, found: StudyTable, folder: Path) -> None:
             sensitivity_picture.picture(found.name, told).savefig(folder / "sensitivity.png")
 
 
-def _finished(tasks: Sequence[Task], workers: int, scheduler: str) -> Iterator[Row]:
+def _finished(tasks: Sequence[Task], workers: int, scheduler: str, inside: bool) -> Iterator[Row]:
     if not tasks:
         return iter(())
+    if inside and workers == 1 and not scheduler:
+        return _here(tasks)
     return cluster.finished(tasks, scheduler, workers) if scheduler else pool.finished(tasks, workers, solve)
+
+
+def _here(tasks: Sequence[Task]) -> Iterator[Row]:
+    with limited(1):
+        for task in tasks:
+            yield solve(task)
 
 
 def task_at(study: Study, values: Mapping[str, Any]) -> Task:
     """One run of a study by itself, with a verdict on what it finds."""
     base = scene_file.read(study.scene, always := ("solver.threads=1", *study.settings.set))
-    return Task(1, base.name, base.text, (*always, *_overrides(values)), base.folder)
+    return Task(1, base.name, base.text, (*always, *_overrides(study, values)), base.folder)
 
 
-def _overrides(values: Mapping[str, Any]) -> list[str]:
-    return [f"{key}={tomli_w.dumps({'v': value}).partition('=')[2].strip()}" for key, value in values.items()]
+def _overrides(study: Study, values: Mapping[str, Any]) -> list[str]:
+    every = {**values, **{copy: values[original] for copy, original in study.settings.same.items()}}
+    return [f"{key}={tomli_w.dumps({'v': value}).partition('=')[2].strip()}" for key, value in every.items()]
 
 
 def _tasks(study: Study, varied: Sequence[dict[str, Any]]) -> tuple[list[Task], dict[int, Row]]:
@@ -123,7 +135,7 @@ def _tasks(study: Study, varied: Sequence[dict[str, Any]]) -> tuple[list[Task], 
     base = scene_file.read(study.scene, always)
     tasks, refused = [], {}
     for number, values in enumerate(varied, 1):
-        task = Task(number, base.name, base.text, (*always, *_overrides(values)), base.folder)
+        task = Task(number, base.name, base.text, (*always, *_overrides(study, values)), base.folder)
         try:
             scene = task.scene().scene
         except SceneError as error:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictBool, StrictInt, model_validator
 
-from tribodyn.workflows.designs.distributions import Distribution, Marginal
+from tribodyn.workflows.designs.distributions import Distribution, Given, Marginal, si
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.scene_file import SceneError
@@ -34,6 +34,8 @@ class Settings(Table):
     """Measure the errors of every run, which costs more than most runs do."""
     set: tuple[str, ...] = ()
     """Keys that every run changes, as "section.key=value"."""
+    same: dict[str, str] = Field(default_factory=dict)
+    """Keys that take the value of one that varies, such as those of two contacts that are made alike."""
 
     @model_validator(mode="after")
     def _runs_are_drawn(self) -> Settings:
@@ -83,6 +85,54 @@ class Lives(Table):
         return self
 
 
+class Aim(Table):
+    """One entry of optimise.aims."""
+
+    number: str
+    """Column of the study's table."""
+    want: Literal["low", "high"]
+    """Which of its values are better."""
+
+
+class Limit(Table):
+    """One entry of optimise.limits."""
+
+    number: str
+    """Column of the study's table."""
+    low: Given | None = None
+    """Least value that may be."""
+    high: Given | None = None
+    """Largest value that may be."""
+
+    @model_validator(mode="after")
+    def _has_an_end(self) -> Limit:
+        if self.low is None and self.high is None:
+            raise ValueError(f"a limit of {self.number} needs low or high")
+        for end in (self.low, self.high):
+            if end is not None and si(end) is None:
+                raise ValueError(f'"{end}" is not a number with a unit')
+        return self
+
+
+AIMS = (Aim(number="peak_m_first", want="low"), Aim(number="life_cycles", want="high"))
+
+
+class Optimise(Table):
+    """The table [optimise]: what `tribodyn optimise` asks of the runs."""
+
+    aims: Annotated[tuple[Aim, ...], Field(min_length=1, max_length=3)] = AIMS
+    """What is wanted; of several aims the best trades are looked for."""
+    limits: tuple[Limit, ...] = ()
+    """What a run must keep to."""
+    evaluations: Annotated[StrictInt, Field(ge=8)] = 40
+    """Number of runs, those of the design and those that are added where they promise most."""
+    batch: Annotated[StrictInt, Field(ge=1)] = 2
+    """Runs that are added at a time."""
+    finer: tuple[str, ...] = ()
+    """Keys of the finer settings that the best runs are solved with again, as "section.key=value"; their verdict is
+    asked for by default."""
+
+
 class StudyFile(Table):
     """A study as its file has it."""
 
@@ -90,6 +140,7 @@ class StudyFile(Table):
     vary: dict[str, Any]
     correlations: tuple[Correlation, ...] = ()
     lives: Lives = Lives()
+    optimise: Optimise = Optimise()
 
 
 @dataclass(frozen=True)
@@ -106,6 +157,7 @@ class Study:
     correlations: tuple[Correlation, ...]
     folder: Path
     lives: Lives
+    optimise: Optimise
 
     @property
     def scene(self) -> str:
@@ -131,7 +183,8 @@ def parse(data: Mapping[str, Any], label: str, folder: Path) -> Study:
     leaves = dict(_leaves(file.vary))
     if not leaves:
         raise SceneError(f'{label}: vary is empty, give keys of the scene such as "contact.friction" = [0.3, 0.5]')
-    if any(key.replace(" ", "").startswith("solver.threads") for key in (*leaves, *file.study.set, *file.lives.cheap)):
+    given = (*leaves, *file.study.set, *file.study.same, *file.lives.cheap, *file.optimise.finer)
+    if any(key.replace(" ", "").startswith("solver.threads") for key in given):
         raise SceneError(f"{label}: solver.threads: every run has one thread, say by --workers how many run at a time")
     varied = {key: _read(key, value, file.study.design, label) for key, value in leaves.items()}
     design, lengths = file.study.design, {key: len(v) for key, v in varied.items() if isinstance(v, tuple)}
@@ -144,7 +197,13 @@ def parse(data: Mapping[str, Any], label: str, folder: Path) -> Study:
                 raise SceneError(f'{label}: correlations[{at}]: "{key}" does not vary by a distribution')
         if correlation.keys[0] == correlation.keys[1]:
             raise SceneError(f'{label}: correlations[{at}]: give two keys, not "{correlation.keys[0]}" twice')
-    return Study(Path(label).name.removesuffix(".toml"), file.study, varied, file.correlations, folder, file.lives)
+    for copy, original in file.study.same.items():
+        if original not in varied or copy in varied:
+            raise SceneError(
+                f'{label}: study.same: "{copy}" = "{original}": give a key that does not vary, and one that does'
+            )
+    name = Path(label).name.removesuffix(".toml")
+    return Study(name, file.study, varied, file.correlations, folder, file.lives, file.optimise)
 
 
 def _leaves(table: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 RUN, STATUS, SENTENCE = "run", "status", "sentence"
+LIFE = "life_cycles"
 FEWEST = 5  # complete runs that a correlation is told of
 
 
@@ -46,6 +47,22 @@ class StudyTable:
     def count(self, status: str) -> int:
         """Runs of a status."""
         return int(np.count_nonzero(self.columns[STATUS] == status))
+
+    def bounded(self, number: str) -> tuple[np.ndarray, np.ndarray]:
+        """A number of the runs, nan where there is none; and that of runs where it is a lower bound only.
+
+        Both (n_run,). A life that did not end within its run counts as the cycles that the run came to
+        """
+        lived = number == LIFE and "cycles" in self.columns
+        if number not in self.computed and not lived:
+            raise ValueError(f'{self.name} has no number "{number}": there are {", ".join(self.computed) or "none"}')
+        values = np.asarray(self.columns.get(number, np.full(len(self.columns[RUN]), np.nan)), float)
+        bounds = np.full(len(values), np.nan)
+        if lived:
+            ended = np.asarray(self.columns["cycles"], float)
+            open_ = np.isnan(values) & (ended > 0) & (self.columns[STATUS] == "complete")
+            values, bounds = np.where(open_, ended, values), np.where(open_, ended, bounds)
+        return values, bounds
 
     def influence(self) -> dict[str, dict[str, float]]:
         """Spearman's rank correlation of computed numbers with the keys that vary, over the complete runs.

@@ -26,6 +26,7 @@ from tribodyn.workflows.scene.schema import PartScene
 
 Status = Literal["complete", "failed", "refused", "lost"]
 ENDS = ("peak_hz", "peak_m", "preload_N")  # of which a summary has the first and the last
+UNDRAWN = ("pictures.plots=false", "pictures.renders=false")
 SINGLE = ("energy_J", "depth_max_m", "volume_m3", "cycles", "life_cycles")
 
 
@@ -63,8 +64,8 @@ class Task:
         return content.hexdigest()
 
     def scene(self) -> SceneFile:
-        """The scene of the run; raises SceneError."""
-        return scene_file.parse(self.text, f"{self.name}.toml", self.overrides, self.folder)
+        """The scene of the run, which draws nothing; raises SceneError."""
+        return scene_file.parse(self.text, f"{self.name}.toml", (*UNDRAWN, *self.overrides), self.folder)
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ def solve(task: Task) -> Row:
     with _one_at_a_time:
         _set_up(task)
         try:
-            result = pipeline.run(task.scene(), None, Progress(), build=_model)
+            result = pipeline.run(task.scene(), None, Progress(), build=_model, row_only=True)
         except np.linalg.LinAlgError as error:
             return ended("failed", error)
         except (ValueError, OSError) as error:
@@ -141,6 +142,8 @@ def numbers_of(result: Result) -> dict[str, float]:
         numbers |= {f"{name}_first": first, f"{name}_last": last}
     numbers |= {name: summary[name] for name in SINGLE}
     numbers["peak_at_end"] = summary["peak_at_end"]
+    if result.wear is not None and result.wear.ended.survived:
+        numbers["survives"] = 1.0
     for name in QUANTITIES if summary["verdict"] else ():
         said = summary["verdict"][name]
         numbers |= {f"{name}_error": said["error"], f"{name}_stated": said["stated"]}

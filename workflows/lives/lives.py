@@ -18,7 +18,7 @@ from tribodyn.workflows.designs.sensitivity import Influence, influences
 from tribodyn.workflows.designs.space import Space
 from tribodyn.workflows.designs.study_file import LISTED, Study
 from tribodyn.workflows.designs.surrogate import Surrogate
-from tribodyn.workflows.designs.table import StudyTable
+from tribodyn.workflows.designs.table import LIFE, StudyTable
 from tribodyn.workflows.designs.task import solve
 from tribodyn.workflows.lives import quantiles
 from tribodyn.workflows.lives.quantiles import RARE, Sample
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BATCH = 8  # runs that are added at a time
-LIFE = "life_cycles"
 COLUMNS = {  # of the table -> quantity of a verdict
     "peak_hz_first": "peak_frequency", "peak_m_first": "amplitude", "preload_N_first": "preload",
     "depth_max_m": "depth", LIFE: "life",
@@ -204,7 +203,7 @@ class _Fit:
 
     @classmethod
     def of(cls, space: Space, table: StudyTable, cheap: StudyTable | None, number: str) -> _Fit:
-        values, bounds = _values(table, number)
+        values, bounds = table.bounded(number)
         open_ = np.isfinite(bounds)
         good = np.isfinite(values)
         if not good.any():
@@ -212,29 +211,13 @@ class _Fit:
         logarithmic = bool((values[good] > 0).all())
         below = None
         if cheap is not None:
-            rough, _ = _values(cheap, number)
+            rough, _ = cheap.bounded(number)
             fine = np.isfinite(rough) & ((rough > 0) if logarithmic else True)
             below = space.coordinates(space.points_of(cheap.columns)[fine]), _scaled(rough[fine], logarithmic)
         points = space.coordinates(space.points_of(table.columns)[good])
         surrogate = Surrogate.fitted(points, _scaled(values[good], logarithmic), below)
         bound = float(np.min(bounds, initial=np.inf, where=open_))
         return cls(surrogate, logarithmic, bound, int(open_.sum()), int(good.sum()), 1 - float(np.mean(good)))
-
-
-def _values(table: StudyTable, number: str) -> tuple[np.ndarray, np.ndarray]:
-    """A number of the runs, nan where there is none; and that of runs where it is only a lower bound, nan elsewhere.
-
-    A life that did not end within its run counts as the cycles that the run came to
-    """
-    if number not in table.computed:
-        raise ValueError(f'{table.name} has no number "{number}": there are {", ".join(table.computed) or "none"}')
-    values = np.asarray(table.columns[number], float)
-    bounds = np.full(len(values), np.nan)
-    if number == LIFE and "cycles" in table.columns:
-        ended = np.asarray(table.columns["cycles"], float)
-        open_ = np.isnan(values) & (ended > 0) & (table.columns["status"] == "complete")
-        values, bounds = np.where(open_, ended, values), np.where(open_, ended, bounds)
-    return values, bounds
 
 
 def _scaled(values: np.ndarray, logarithmic: bool) -> np.ndarray:

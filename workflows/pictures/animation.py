@@ -16,6 +16,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from tribodyn.workflows.pictures import film
 from tribodyn.workflows.pictures.film_of_cycle import CycleFilm
 from tribodyn.workflows.pictures.film_of_wear import WearFilm
+from tribodyn.workflows.pictures.mistuned_wheel import MistunedWheelFilm
 from tribodyn.workflows.pictures.render import check
 from tribodyn.workflows.pictures.style import STYLE
 from tribodyn.workflows.result.result import Result
@@ -59,7 +60,7 @@ def write(
     return film.write(drawn(made, dpi), folder / made.name, formats, RATE)
 
 
-def drawn(made: WearFilm | CycleFilm, dpi: int = DPI) -> Iterator[np.ndarray]:
+def drawn(made: WearFilm | CycleFilm | MistunedWheelFilm, dpi: int = DPI) -> Iterator[np.ndarray]:
     """The images (height, width, 3) of a film, all with the layout of the first."""
     with mpl.rc_context(STYLE):
         canvas = FigureCanvasAgg(made.figure)

@@ -6,10 +6,13 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Sequence
 from functools import cache, partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +33,7 @@ from tribodyn.workflows.result.states import State, has_states, shown_states
 
 SYSTEM_LIBRARIES = "libgl1 libegl1 libgomp1"
 PROBE = "import pyvista as pv; view = pv.Plotter(off_screen=True); view.add_mesh(pv.Sphere()); view.screenshot()"
+PATIENCE = 30  # seconds for the picture that is tried
 SMOOTH = 2  # subdivisions of the faces of curved elements
 WIDTH, LEAST = 3.4, 6.0  # inches of a column, and of a picture
 SIZE = (900, 760)  # pixels of a view of the part
@@ -42,6 +46,8 @@ class RenderingUnavailable(RuntimeError):
 
 def check() -> None:
     """Try one picture in a process of its own, because without its libraries VTK kills the process that uses it.
+
+    On Linux that process is a child which need not load pyvista again; this one draws with it next, anyway.
 
     Raises  RenderingUnavailable
     """
@@ -56,11 +62,44 @@ def check() -> None:
 @cache
 def _works(probe: str) -> bool:
     """Whether a program of pyvista comes to its end here."""
+    if sys.platform.startswith("linux") and _works_in_child(probe):
+        return True
     try:
         done = subprocess.run([sys.executable, "-c", probe], capture_output=True, timeout=300, check=False)
     except (OSError, subprocess.TimeoutExpired):
         return False
     return done.returncode == 0
+
+
+def _works_in_child(probe: str) -> bool:
+    """Whether it ends well in a child; that can fail for another reason too: this process has drawn before."""
+    try:
+        import pyvista  # noqa: F401
+
+        pid = os.fork()
+    except (ImportError, OSError):
+        return False
+    if pid == 0:
+        code = 1
+        try:
+            resource = import_module("resource")
+            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+            nowhere = os.open(os.devnull, os.O_RDWR)
+            os.dup2(nowhere, 1)
+            os.dup2(nowhere, 2)
+            exec(probe, {})
+            code = 0
+        finally:
+            os._exit(code)  # nothing that this process would write or remove at its end is written or removed twice
+    ends = time.monotonic() + PATIENCE
+    while time.monotonic() < ends:
+        ended, status = os.waitpid(pid, os.WNOHANG)
+        if ended:
+            return status == 0
+        time.sleep(0.01)
+    os.kill(pid, signal.SIGKILL)
+    os.waitpid(pid, 0)
+    return False
 
 
 def _choose_window() -> None:

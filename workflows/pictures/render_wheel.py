@@ -20,7 +20,7 @@ from tribodyn.hbm.linear.travelling_wave import at_sector
 from tribodyn.workflows.pictures import triad
 from tribodyn.workflows.pictures import view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, scale_bar
-from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot
+from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, shoot
 from tribodyn.workflows.pictures.style import MOTION_MAP, STYLE
 from tribodyn.workflows.result.result import PartMesh, Result
 from tribodyn.workflows.result.states import shown_states
@@ -43,9 +43,20 @@ class Wheel:
         """Points (..., 3) of blade 0 where blade n has them."""
         return points @ np.linalg.matrix_power(self.turn, n).T
 
+    def radius(self, points: np.ndarray) -> float:
+        """Largest distance of points (n, 3) from the axis [m]."""
+        return float(np.linalg.norm(np.cross(points, self.axis), axis=1).max())
+
+    def camera(self, radius: float) -> Camera:
+        """The camera that sees the whole wheel, nearly along its axis."""
+        across = np.cross(self.axis, [0.0, 1.0, 0.0] if abs(self.axis[1]) < 0.9 else [0.0, 0.0, 1.0])
+        aside = np.cross(self.axis, across)
+        corners = 1.15 * radius * np.array([x * across + y * aside for x in (-1, 1) for y in (-1, 1)])
+        return frame(corners, self.axis + 0.25 * across, across, 1.0, 1.0)
+
 
 @dataclass(frozen=True)
-class _Shell:
+class Shell:
     """The surface of some cells of a part, which follows the nodes of the part.
 
     nodes : (n_point,) nodes of the part on the surface; faces : as VTK wants them
@@ -55,7 +66,7 @@ class _Shell:
     faces: np.ndarray
 
     @classmethod
-    def of(cls, part: PartMesh, cells: np.ndarray, cell_type: int) -> _Shell:
+    def of(cls, part: PartMesh, cells: np.ndarray, cell_type: int) -> Shell:
         at_rest = drawing.surface(part.points, cells, cell_type, 0)
         return cls(cKDTree(part.points).query(at_rest.points)[1], np.asarray(at_rest.faces))
 
@@ -80,12 +91,9 @@ def wheel_picture(result: Result, wheel: Wheel, deformation: float | None = None
     import pyvista as pv
 
     states = [state for state in shown_states(result) if state.field is not None]
-    radius = float(np.linalg.norm(np.cross(part.points, wheel.axis), axis=1).max())
-    shell = _Shell.of(part, part.cells, getattr(pv.CellType, part.kind.upper()))
-    across = np.cross(wheel.axis, [0.0, 1.0, 0.0] if abs(wheel.axis[1]) < 0.9 else [0.0, 0.0, 1.0])
-    aside = np.cross(wheel.axis, across)
-    corners = 1.15 * radius * np.array([x * across + y * aside for x in (-1, 1) for y in (-1, 1)])
-    camera = frame(corners, wheel.axis + 0.25 * across, across, 1.0, 1.0)
+    radius = wheel.radius(part.points)
+    shell = Shell.of(part, part.cells, getattr(pv.CellType, part.kind.upper()))
+    camera = wheel.camera(radius)
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         figure = Figure(figsize=(3.4 * len(states) + 0.2, 4.4), layout="constrained")
         for axes, state in zip(np.atleast_1d(figure.subplots(1, len(states))), states, strict=True):

@@ -64,7 +64,8 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
     wanted, system, interface, back = scene.reduction, part.system, part.interface, None
     if without_masters(scene, interface.B.shape[0], len(part.held) > 0):
         springs = joints.contact_stiffness(scene, joints.unreduced(part))
-        return residual_flexibility(system, interface, springs, wanted.modes, wanted.cutoff)
+        own = None if wanted.solver == "direct" else wanted.solver
+        return residual_flexibility(system, interface, springs, wanted.modes, wanted.cutoff, solver=own)
     held = [part.dofs(given.group, given.axis) for given in scene.prescribed.values()]
     if held and len(part.held):
         raise ValueError("prescribed: a part whose turning is held cannot have prescribed nodes; hold it by springs")
@@ -75,9 +76,9 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
     # a shank sees the whole static shape of the faces that it pulls at, which no few modes have
     shanks = [np.flatnonzero(row) for name, row in part.system.outputs.items() if name.startswith(BOLTS)]
     extra = np.concatenate([[], *held, *shanks]).astype(int)
-    how: dict[str, Any] = {}
+    how: dict[str, Any] = {} if wanted.solver == "direct" else {"solver": wanted.solver}
     if wanted.solver == "multigrid":
-        how = {"solver": "multigrid", "shapes": rigid_motions(part.points)[part.free]}
+        how["shapes"] = rigid_motions(part.points)[part.free]
     try:
         reduced = craig_bampton(system, interface, wanted.modes, wanted.cutoff, extra, **how)
     except SingularStiffness:  # a body that no support, joint or load has a master on

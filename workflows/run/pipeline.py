@@ -34,12 +34,15 @@ def run(
     progress: Progress,
     earlier: Result | None = None,
     build: Callable[[SceneFile], modelling.Model] | None = None,
+    row_only: bool = False,
 ) -> Result:
     """Compute everything that a scene asks for, and keep it in `folder`/result.h5 while it grows.
 
     folder : None keeps nothing on disk
     earlier : an unfinished result of the same scene to resume
     build : makes the model, for runs that share what models are made of; from the scene alone by default
+    row_only : without what the row of a study does not tell: linear references, and the error budget where no verdict
+        needs it
     Raises  ValueError: the scene asks for what cannot be, SolveFailed: after what was computed is kept
     """
     scene, clock = file.scene, Clock(earlier)
@@ -51,7 +54,7 @@ def run(
         else:
             chosen = () if earlier is None else earlier.harmonics
             model = modelling.build(file, folder or Path(scratch), progress, chosen)
-        for line in head.lines(file, model):
+        for line in () if progress.silent else head.lines(file, model):
             progress.say(line)
         result = earlier or described(file, model.part, model.balance, model.choice)
         if scene.wears and result.patch is not None:
@@ -64,9 +67,11 @@ def run(
         if result.response is None:
             with progress.track("frequency response") as advance:
                 frf = curve.follow_response(scene, model.balance, advance)
-            with progress.stage("linear references"):
-                low, high = scene.response.references or scene.response.frequency
-                linear = references.linear_references(model.balance, settings.OUTPUT, 2 * np.pi * low, 2 * np.pi * high)
+            linear = None
+            if not row_only:
+                with progress.stage("linear references"):
+                    start, stop = (2 * np.pi * f for f in scene.response.references or scene.response.frequency)
+                    linear = references.linear_references(model.balance, settings.OUTPUT, start, stop)
             result = keep(replace(result, response=frf, references=linear, stage=Stage.RESPONSE))
         check_branch(result.response)
         result = keep(judged(scene, model.balance, result, progress))
@@ -84,8 +89,9 @@ def run(
                 count = scene.wear.responses
                 curves = worn_responses.curves(result, model.balance, count, again, advance)
                 result = keep(replace(result, worn=curves))
-        with progress.stage("error budget"):
-            result = with_budget(file, model.balance, result)
+        if not row_only or scene.verdict.enabled:
+            with progress.stage("error budget"):
+                result = with_budget(file, model.balance, result)
         if scene.verdict.enabled:
             found = verdict.judge(file, model, result, progress, keep.clock.seconds())
             result = replace(result, verdict=found.dumped())

@@ -24,6 +24,11 @@ class Progress:
     def __init__(self, console: Console | None = None, log: Path | None = None):
         self._console, self._log = console, log
 
+    @property
+    def silent(self) -> bool:
+        """Whether what is said is read by nobody."""
+        return self._console is None and self._log is None
+
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """A stage of unknown length."""

@@ -15,6 +15,7 @@ from tribodyn.workflows.scene.schema import MeshScene, Scene
 POINTS = 401
 POINTS_BETWEEN = 41  # beside the resonances themselves
 MODES = 100
+BLOCK = 32  # frequencies solved at once
 RIGID = 1e-6  # of the square of the mean frequency: eigenvalues below are those of motions as a rigid body
 
 
@@ -91,9 +92,11 @@ def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: st
         row = system.outputs[output]
         modal = phi.conj().T @ force
         remainder = row @ sla.cho_solve(factor, force) - (row @ phi) @ (modal / (lam + shift))
-        for i, s in enumerate(1j * h * omega):
-            dynamic = np.diag(lam + s**2) + s * damping
-            amplitudes[i, position] = remainder + (row @ phi) @ np.linalg.solve(dynamic, modal)
+        for start in range(0, len(omega), BLOCK):
+            s = 1j * h * omega[start : start + BLOCK, None, None]
+            dynamic = np.diag(lam) + s**2 * np.eye(len(lam)) + s * damping
+            moved = np.linalg.solve(dynamic, modal[:, None])[..., 0]
+            amplitudes[start : start + BLOCK, position] = remainder + moved @ (row @ phi)
     return amplitude(basis.to_real(amplitudes))
 
 

@@ -11,6 +11,7 @@ import math
 import re
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 
 Dimension = tuple[int, int, int, int, int]  # exponents of kg, m, s, turn, K
 
@@ -38,6 +39,7 @@ UNITS: dict[str, tuple[Fraction, Dimension, str]] = {
 NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*$")
 BEYOND = 1e25  # in SI units: above it products of quantities overflow, and no structure has it
 BELOW = 1e-60  # and what is meant to be zero: its square, or another number over it, leaves the range of numbers
+KEPT = 4096  # texts that were converted: a study reads its scene thousands of times
 FACTOR = re.compile(r"(%|[A-Za-z]+)(?:\^?(-?\d))?$")
 
 
@@ -49,6 +51,7 @@ class Unit:
     dimension: Dimension
 
 
+@lru_cache(maxsize=KEPT)
 def parse_unit(text: str) -> Unit:
     """Read a unit expression such as "N/um", "um3/J", "kg/m^3" or "" (dimensionless).
 
@@ -89,16 +92,22 @@ def to_si(value: object, unit: str) -> float:
     Returns a finite float
     Raises  ValueError: not a number, unknown unit, or another dimension; the message reads after "key: "
     """
-    wanted = parse_unit(unit)
+    if isinstance(value, str):
+        return _text_to_si(value, unit)
+    parse_unit(unit)  # a unit of a file of one's own may be none
     expected = f"expected {_describe(unit)}"
-    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise ValueError(f"{expected}, got {value!r}")
-    if not isinstance(value, str):
-        if not abs(value) < BEYOND:
-            raise ValueError(f"{expected}, got {value}, beyond what a structure has")
-        if 0 < abs(value) < BELOW:
-            raise ValueError(f"{expected}, got {value}: give 0, or more than {BELOW:g}")
-        return float(value)
+    if not abs(value) < BEYOND:
+        raise ValueError(f"{expected}, got {value}, beyond what a structure has")
+    if 0 < abs(value) < BELOW:
+        raise ValueError(f"{expected}, got {value}: give 0, or more than {BELOW:g}")
+    return float(value)
+
+
+@lru_cache(maxsize=KEPT)
+def _text_to_si(value: str, unit: str) -> float:
+    wanted, expected = parse_unit(unit), f"expected {_describe(unit)}"
     match = NUMBER.match(value)
     if match is None:
         raise ValueError(f'{expected}, got "{value}"')

@@ -66,10 +66,16 @@ class MistunedWear:
         }
 
 
-def study(file: SceneFile, number: int, on_row: Callable[[WearRow], None] | None = None) -> MistunedWear:
+def study(
+    file: SceneFile,
+    number: int,
+    on_row: Callable[[WearRow], None] | None = None,
+    blades: Blades | None = None,
+) -> MistunedWear:
     """Wear the wheel of a pattern by the scene's [wear]; a peak that it asks for is that of the blade that has the
     highest one unworn.
 
+    blades : of this file, where they are there already
     Raises  SceneError where the scene lacks [wear] or [mistuning]; SolveFailed
     """
     scene = file.mesh_scene
@@ -77,7 +83,7 @@ def study(file: SceneFile, number: int, on_row: Callable[[WearRow], None] | None
     if scene.wear is None:
         raise SceneError(f"{file.name} has no [wear]: there is nothing to wear the blades by")
     with limited(scene.solver.threads):
-        blades = Blades.of(file)
+        blades = blades or Blades.of(file)
         n = blades.wheel.n_sectors
         pattern = drawn(asked_of(file), n, number)
         balance = blades.balance(pattern)
@@ -88,7 +94,7 @@ def study(file: SceneFile, number: int, on_row: Callable[[WearRow], None] | None
         area = np.tile(one.area, n)
         approach = references.free_deflection(blades.wheel.wave)
         limit = settings.step_limit(scene, approach, one.area)
-        problem = WearProblem(balance, tuple(duties), one.wear, area, one.lost_below, None, any_joint=one.any_joint)
+        problem = WearProblem(balance, tuple(duties), one.wear, area, one.lost_below, None, one.any_joint, n)
         history = wear_run.evolve(problem, scene.wear, limit, scene.wear.max_steps, on_row)
     names = list(balance.compliance.output_names)
     rows = [names.index(f"{OUTPUT}@{k}") for k in range(n)]

@@ -18,12 +18,17 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.fem.constraints import named
+from tribodyn.fem.part import Part
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation.branch import amplitude
-from tribodyn.hbm.continuation.methods import adaptive
-from tribodyn.hbm.continuation.operating_point import OperatingPoint
+from tribodyn.hbm.continuation.methods import adaptive, arc_length
+from tribodyn.hbm.continuation.methods.natural import extrapolate
+from tribodyn.hbm.continuation.operating_point import AtPeak, OperatingPoint
+from tribodyn.hbm.linear.travelling_wave import at_sector
 from tribodyn.hbm.mistuning import MistunedWheel, spread
+from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.threads import limited
 from tribodyn.reduction import mistuning as reduction
@@ -49,9 +54,15 @@ from tribodyn.workflows.studies import wheel as wheels
 
 FURTHEST = 3.0  # standard deviations at which what is drawn is cut off
 TRIED = 3  # peaks of a scan that are refined, the highest first
-NEARLY = 0.9  # of the highest point of a scan, from which on a peak may be the highest
-SHORTEST = 2e-3  # step of a scan, of its range: beyond a jump it continues
+NEARLY = 0.9  # of the highest peak foreseen, from which on a peak may be the highest
+SURE = 3.0  # errors of the heights foreseen, as the first peak has it, by which another must be lower to be left out
+TOO_HIGH = 2.0  # height foreseen over that of the point in it, from which on it is not believed
+LEAST_DOUBT = 5e-3  # of a height foreseen
+SHORTEST, LONGEST = 2e-3, 0.15  # steps of a scan, of its range: beyond a jump it continues
 SCANNED_TO = 1e-4  # residual of the points of a scan
+FOUND_TO = 1e-6  # residual of a peak
+LEVEL = 3e-5  # of the height of a peak, by which a parabola may miss it
+CLOSINGS = 5  # parabolas that are tried
 
 
 @dataclass(frozen=True)
@@ -81,10 +92,13 @@ def whitehead(n_sectors: int) -> float:
 class Blades:
     """The wheel of a scene, ready for any pattern.
 
-    wheel : sectors alike, with the shapes in which they may deviate
+    part : the sector; reduced : its reduction, with the shapes in which sectors may deviate among its outputs
+    wheel : sectors alike, ready to deviate in these
     """
 
     file: SceneFile
+    part: Part
+    reduced: ReducedSector
     wheel: MistunedWheel
 
     @classmethod
@@ -95,15 +109,31 @@ class Blades:
         K = deviating(wheel, asked.body)
         loads = sorted({name for _, name in wheel.wave().excitation.loads})
         shapes = reduction.nominal_shapes(wheel.reduced, wheel.springs, K, asked.families, loads, asked.left_out)
-        wave = replace(wheel, reduced=reduction.with_ports(wheel.reduced, K, shapes)).wave()
+        reduced = reduction.with_ports(wheel.reduced, K, shapes)
+        wave = replace(wheel, reduced=reduced).wave()
         if asked.friction and not any("friction" in joint.parameters.numbers for joint in wave.contact.joints):
             raise SceneError("mistuning.friction: no contact of this scene has friction: leave it out")
-        return cls(file, MistunedWheel(wave, tuple(reduction.port_name(k) for k in range(shapes.shape[1]))))
+        ports = tuple(reduction.port_name(k) for k in range(shapes.shape[1]))
+        return cls(file, wheel.part, reduced, MistunedWheel(wave, ports))
 
     @cached_property
     def alike(self) -> OperatingPoint:
         """The peak of the wheel of sectors alike; raises SolveFailed."""
         return _converged(settings.peak_of(self.file.scene).first(self.wheel.wave), "sectors alike")
+
+    @cached_property
+    def _scanned(self) -> NewtonOptions:
+        return replace(settings.newton_options(self.file.scene), tolerance=SCANNED_TO)
+
+    @cached_property
+    def beginning(self) -> np.ndarray:
+        """(n_pair, n_component, n_coeff) of sectors alike at the lowest frequency, from which every pattern begins."""
+        low, _ = settings.response_range(self.file.scene)
+        one, info = self.wheel.wave, self.wheel.wave.model.info
+        assert info.engine_order is not None
+        x = arc_length.solve_along_load(one, low, self._scanned).state.x
+        n = self.wheel.n_sectors
+        return np.concatenate([at_sector(one.basis, x, info.engine_order, n, k) for k in range(n)])
 
     def balance(self, pattern: Pattern) -> HarmonicBalance:
         """The whole wheel of a pattern."""
@@ -124,9 +154,15 @@ class Blades:
         """
         scene = self.file.scene
         balance, names = self.balance(pattern), [f"{OUTPUT}@{n}" for n in range(self.wheel.n_sectors)]
-        options = replace(settings.newton_options(scene), tolerance=SCANNED_TO)
         low, high = settings.response_range(scene)
-        scan = adaptive.Options(tolerance=asked_of(self.file).tolerance, step=0.02, min_step=SHORTEST, newton=options)
+        scan = adaptive.Options(
+            tolerance=asked_of(self.file).tolerance,
+            step=0.02,
+            max_step=LONGEST,
+            min_step=SHORTEST,
+            newton=self._scanned,
+            guess=self.beginning,
+        )
         branch = adaptive.follow(balance, low, high, scan)
         if branch.ended is not BranchEnd.REACHED:
             raise SolveFailed(f"the frequency response {branch.end}")
@@ -134,13 +170,24 @@ class Blades:
         if heights.argmax() // len(names) in (0, len(heights) - 1):
             raise SolveFailed("the response still rises at an end of response.frequency: extend it")
         best: tuple[OperatingPoint, int] | None = None
-        solves = len(heights)
-        for at, blade in _peaks(heights)[:TRIED]:
-            site = replace(settings.peak_of(scene), output=names[blade])
-            x = branch.contact[at].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
-            found = site.next(balance, float(branch.omega[at]), x)
+        solves, doubt = len(heights), LEAST_DOUBT
+        exact = replace(settings.newton_options(scene), tolerance=max(FOUND_TO, scene.solver.tolerance))
+        for point, blade in _candidates(branch.omega, heights):
+            near = slice(point - 1, point + 2)
+            points = [
+                _Point(*three)
+                for three in zip(branch.omega[near], branch.contact[near], heights[near, blade], strict=True)
+            ]
+            height = _vertex(points)[1]
+            if best is not None and (1 + doubt) * height < best[0].amplitude:
+                continue
+            site = replace(settings.peak_of(scene), output=names[blade], newton=exact)
+            found = _climbed(balance, points, site)
             solves += found.solves
-            if found.solution.converged and (best is None or found.amplitude > best[0].amplitude):
+            if not found.solution.converged:
+                continue
+            doubt = max(doubt, SURE * abs(height / found.amplitude - 1))
+            if best is None or found.amplitude > best[0].amplitude:
                 best = found, blade
         if best is None or best[0].amplitude < (1 - asked_of(self.file).tolerance) * heights.max():
             raise SolveFailed(f"the highest peak, near {_hertz(branch.omega[heights.argmax() // len(names)])}, is lost")
@@ -171,12 +218,63 @@ def deviating(wheel: wheels.Wheel, body: str | None) -> np.ndarray:
     return np.asarray(basis.T @ (wheel.full.system.stiffness[own][:, own] @ basis))
 
 
-def _peaks(heights: np.ndarray) -> list[tuple[int, int]]:
-    """Points and blades of maxima (n_point, N) that may be the highest, the highest first."""
-    inner = heights[1:-1]
-    top = (inner >= heights[:-2]) & (inner >= heights[2:]) & (inner > NEARLY * heights.max())
-    found = [(int(i) + 1, int(n)) for i, n in np.argwhere(top)]
-    return sorted(found, key=lambda at: -heights[at])
+@dataclass(frozen=True)
+class _Point:
+    """Of a response: frequency [rad/s], relative displacement (n_contact, n_coeff) [m] and amplitude of a blade [m]."""
+
+    omega: float
+    x: np.ndarray
+    height: float
+
+
+def _vertex(points: Sequence[_Point]) -> tuple[float, float]:
+    """Frequency [rad/s] and height [m] of the peak through three points whose middle one is the highest.
+
+    Of one resonance 1 / amplitude^2 is a parabola over the frequency
+    """
+    middle = points[1]
+    w = np.array([point.omega - middle.omega for point in points])
+    ratio = np.array([middle.height / max(point.height, 1e-6 * middle.height) for point in points])
+    bend, slope, least = np.polyfit(w, ratio**2, 2)
+    at = float(np.clip(-0.5 * slope / bend, *sorted((w[0], w[2])))) if bend > 0 else 0.0
+    level = least + slope * at + bend * at**2
+    if level < TOO_HIGH**-2:  # no such resonance
+        return middle.omega, middle.height
+    return middle.omega + at, middle.height / float(np.sqrt(level))
+
+
+def _candidates(omega: np.ndarray, heights: np.ndarray) -> list[tuple[int, int]]:
+    """Points and blades of the peaks that may be the highest, the highest foreseen first; at most TRIED.
+
+    omega : (n_point,) [rad/s]; heights : (n_point, N) [m]
+    """
+    inner, none = heights[1:-1], np.empty(0)
+    found = []
+    for i, blade in np.argwhere((inner >= heights[:-2]) & (inner >= heights[2:]) & (inner > 0)):
+        three = [_Point(omega[i + k], none, heights[i + k, blade]) for k in range(3)]
+        found.append((_vertex(three)[1], int(i) + 1, int(blade)))
+    found.sort(reverse=True)
+    return [(point, blade) for height, point, blade in found[:TRIED] if height > NEARLY * found[0][0]]
+
+
+def _climbed(balance: HarmonicBalance, points: list[_Point], site: AtPeak) -> OperatingPoint:
+    """The peak within three points, by parabolas through the nearest ones; by its slope where these do not close in."""
+    solves, start = 0, points[1]
+    shape = (balance.contact.n_pair, -1, balance.basis.n_coeff)
+    for _ in range(CLOSINGS):
+        omega, height = _vertex(points)
+        guess = extrapolate(np.array([p.omega for p in points]), [p.x for p in points], omega)
+        solution = newton.solve(balance, omega, guess.reshape(shape), site.newton)
+        found = OperatingPoint.of(balance, solution, site.output, solves := solves + 1)
+        if not solution.converged:
+            break
+        if abs(height / found.amplitude - 1) < LEVEL:
+            return found
+        ordered = sorted((*points, _Point(omega, solution.state.flat, found.amplitude)), key=lambda p: p.omega)
+        top = min(max(int(np.argmax([p.height for p in ordered])), 1), len(ordered) - 2)
+        points = ordered[top - 1 : top + 2]
+    found = site.next(balance, start.omega, start.x.reshape(shape))
+    return replace(found, solves=found.solves + solves)
 
 
 def _converged(point: OperatingPoint, what: str) -> OperatingPoint:
@@ -212,20 +310,20 @@ _ready: tuple[tuple[object, ...], Blades] | None = None  # of the process
 def solve(task: PatternTask) -> Row:
     """The row of one pattern; whatever goes wrong in it becomes its row."""
     global _ready
-    start = time.perf_counter()
+    start = time.process_time()
     with limited(1):
         try:
             if _ready is None or _ready[0] != task.wheel:
                 file = scene_file.parse(task.text, f"{task.name}.toml", task.overrides, task.folder)
                 _ready = task.wheel, Blades.of(file)
             blades = _ready[1]
-            alike = blades.alike
-            start = time.perf_counter()
+            alike, _ = blades.alike, blades.beginning  # of all patterns
+            start = time.process_time()
             pattern = drawn(asked_of(blades.file), blades.wheel.n_sectors, task.number)
             found, blade = blades.peak(pattern)
         except (ValueError, RuntimeError, np.linalg.LinAlgError, MemoryError) as error:
             status: Status = "refused" if isinstance(error, SceneError) else "failed"
-            return Row(task.number, task.key, status, " ".join(str(error).split()), {}, time.perf_counter() - start)
+            return Row(task.number, task.key, status, " ".join(str(error).split()), {}, time.process_time() - start)
     numbers = {
         "amplification": found.amplitude / alike.amplitude,
         "peak_m": found.amplitude,
@@ -234,7 +332,7 @@ def solve(task: PatternTask) -> Row:
         "peak_alike_m": alike.amplitude,
         "solves": float(found.solves),
     }
-    return Row(task.number, task.key, "complete", "complete", numbers, time.perf_counter() - start)
+    return Row(task.number, task.key, "complete", "complete", numbers, time.process_time() - start)
 
 
 @dataclass(frozen=True)
@@ -290,9 +388,18 @@ class Patterns:
                 f"99 % below {said['p99']:.4f}",
                 f"  largest {said['largest']:.4f}, pattern {said['largest_pattern']}, blade {said['largest_blade']}; "
                 f"no linear wheel passes {said['whitehead']:.4f} (Whitehead 1966)",
-                f"{said['seconds']:.4g} s of solving",
+                f"{said['seconds']:.4g} s of processor",
             ]
         return lines
+
+
+def tasks_of(file: SceneFile, count: int) -> list[PatternTask]:
+    """The patterns 1 to `count` of a scene."""
+    values = [tomllib.loads(file.text), *(one.partition("=")[2].strip(" \"'") for one in file.overrides)]
+    content = repr((__version__, file.text, _but_count(file.overrides), digests(values, file.folder)))
+    return [
+        PatternTask(n, file.name, file.text, file.overrides, file.folder, _key(content, n)) for n in range(1, count + 1)
+    ]
 
 
 def run(
@@ -312,14 +419,9 @@ def run(
         raise SceneError(f"{file.name} has no [wheel]: this study is for a sector of one")
     if workers is not None and workers < 1:
         raise ValueError(f"workers {workers}: give at least 1")
-    values = [tomllib.loads(file.text), *(one.partition("=")[2].strip(" \"'") for one in file.overrides)]
-    content = repr((__version__, file.text, _but_count(file.overrides), digests(values, file.folder)))
     folder.mkdir(parents=True, exist_ok=True)
     with alone_in(folder):
-        tasks = [
-            PatternTask(n, file.name, file.text, file.overrides, file.folder, _key(content, n))
-            for n in range(1, asked.patterns + 1)
-        ]
+        tasks = tasks_of(file, asked.patterns)
         journal = Journal(folder)
         earlier = {key: row for key, row in journal.rows().items() if row.status == "complete"} if resume else {}
         rows = {task.number: earlier[task.key] for task in tasks if task.key in earlier}

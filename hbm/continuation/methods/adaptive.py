@@ -49,6 +49,8 @@ class Options:
     max_points: int = number(default=5000, low=2)
     """Points after which to end."""
     newton: NewtonOptions = field(default_factory=NewtonOptions, kw_only=True)
+    guess: np.ndarray | None = field(default=None, kw_only=True)
+    """(n_pair, n_component, n_coeff) neighbour of the first solution [m]; from rest by default."""
 
     def __post_init__(self) -> None:
         require_limits(self, "adaptive continuation")
@@ -76,7 +78,11 @@ def follow(
     options = options or Options()
     path = parameter.of(problem)
     builder = BranchBuilder(path)
-    first = solve_along_load(*path.place(start), options.newton)
+    first = None
+    if options.guess is not None:
+        first = newton.solve(*path.place(start), options.guess, options.newton)
+    if first is None or not first.converged:
+        first = solve_along_load(*path.place(start), options.newton)
     builder.add(start, first)
     if not first.converged:
         return builder.finish(BranchEnd.ENDED.say(f" {path.say(start)}: {first.outcome}"))

@@ -13,7 +13,7 @@ Source  Keller 1977 (pseudo arc length); step control and kinks ours.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -123,22 +123,20 @@ def follow(
 def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None) -> Solution:
     """Solve at one frequency [rad/s] without a neighbouring solution, also where the curve in the load has folds.
 
-    Newton from rest and its load ramp are tried first; else the contact is stiffened from soft springs, else the curve
-    of solutions over the load is followed
+    Newton from rest and its load ramp are tried first; else the curve of solutions over the load is followed, which
+    leads where a rising load would; where that ends too, the contact is stiffened from soft springs
     Returns a Solution; its outcome is the one from rest where no way leads to the load
     """
     options = options or NewtonOptions()
     first = newton.solve_from_rest(balance, omega, options)
     if first.converged:
         return first
-    stiffened = solve_along_stiffness(balance, omega, options)
-    if stiffened is not None:
-        return stiffened
     ramp = follow(parameter.load(balance, omega), 0.0, balance.load_factor, Options(newton=options))
-    if ramp.parameter[-1] != balance.load_factor:
-        return first
-    last = newton.solve(balance, omega, ramp.contact[-1].reshape(first.state.x.shape), options)
-    return replace(last, outcome=last.outcome if last.converged else first.outcome)
+    if ramp.parameter[-1] == balance.load_factor:
+        last = newton.solve(balance, omega, ramp.contact[-1].reshape(first.state.x.shape), options)
+        if last.converged:
+            return last
+    return solve_along_stiffness(balance, omega, options) or first
 
 
 class _Walk:

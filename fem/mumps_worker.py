@@ -1,0 +1,82 @@
+"""One MPI process of a factorisation by MUMPS, run by a Python that has PETSc: see tribodyn.fem.mumps, which starts it.
+
+It stands alone: that Python needs numpy, mpi4py and petsc4py, and nothing of tribodyn.
+"""
+
+from __future__ import annotations
+
+import glob
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+PLACES = "/usr/lib/petscdir/*/*-real/lib/python3/dist-packages"  # where Debian lays petsc4py
+
+
+def main(folder: Path) -> None:
+    """Factorise the matrix of a folder, then solve what is asked for, line by line, until there is no more."""
+    petsc, comm = _petsc()
+    rank, processes = comm.Get_rank(), comm.Get_size()
+    rows, columns, values = (np.load(folder / f"{name}.npy", mmap_mode="r") for name in ("rows", "columns", "values"))
+    n = len(rows) - 1
+    start, stop = n * rank // processes, n * (rank + 1) // processes
+    own, some = stop - start, slice(int(rows[start]), int(rows[stop]))
+    said = (np.array(a, np.int32) for a in (rows[start : stop + 1] - rows[start], columns[some]))
+    matrix = petsc.Mat().createAIJ(((own, n), (own, n)), csr=(*said, np.array(values[some])), comm=comm)
+    matrix.setOption(petsc.Mat.Option.SYMMETRIC, True)
+    matrix.setOption(petsc.Mat.Option.SPD, (folder / "definite").exists())
+    pc = petsc.PC().create(comm)
+    pc.setOperators(matrix)
+    pc.setType("cholesky")
+    pc.setFactorSolverType("mumps")
+    pc.setUp()
+    factor = pc.getFactorMatrix()
+    trouble = factor.getMumpsInfog(1)
+    version = ".".join(str(number) for number in petsc.Sys.getVersion())
+    _tell(rank, f"trouble {trouble}" if trouble < 0 else f"ready {processes} {version}")
+    while (count := comm.bcast(_asked() if rank == 0 else None)) and trouble >= 0:
+        rhs = np.memmap(folder / "rhs", np.float64, "r", shape=(n, count), order="F")
+        found = np.memmap(folder / "found", np.float64, "r+", shape=(n, count), order="F")
+        shape, part = ((own, n), (None, count)), np.array(rhs[start:stop], order="F")
+        given = petsc.Mat().createDense(shape, array=part, comm=comm)
+        solved = petsc.Mat().createDense(shape, comm=comm)
+        for each in (given, solved):
+            each.setUp()
+            each.assemble()
+        factor.matSolve(given, solved)
+        found[start:stop] = solved.getDenseArray()
+        found.flush()
+        comm.Barrier()
+        given.destroy()
+        solved.destroy()
+        _tell(rank, "solved")
+
+
+def _petsc() -> tuple[Any, Any]:
+    try:
+        import petsc4py
+    except ImportError:
+        sys.path += sorted(glob.glob(PLACES))
+        import petsc4py
+    petsc4py.init([])
+    from mpi4py import MPI
+    from petsc4py import PETSc
+
+    return PETSc, MPI.COMM_WORLD
+
+
+def _asked() -> int:
+    """How many right-hand sides the next line asks for; 0 where there is no more."""
+    line = sys.stdin.readline().split()
+    return int(line[0]) if line else 0
+
+
+def _tell(rank: int, text: str) -> None:
+    if rank == 0:
+        print(text, flush=True)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

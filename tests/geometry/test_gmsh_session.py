@@ -1,0 +1,34 @@
+"""The door to Gmsh: what it writes is whole, or is told."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from tribodyn.geometry.gmsh_session import save, session
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_a_mesh_that_the_disk_does_not_take_whole_is_told(tmp_path: Path, share: float) -> None:
+    """Gmsh says nothing where a disk is full; here its file is cut."""
+    path = tmp_path / "box.msh"
+    with session() as gmsh:
+        gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(3, [1])
+        gmsh.option.setNumber("Mesh.MeshSizeMin", 0.5)
+        gmsh.model.mesh.generate(3)
+
+        def write(name: str) -> None:
+            gmsh.write(name)
+            os.truncate(name, int(share * Path(name).stat().st_size))
+
+        there = SimpleNamespace(option=gmsh.option, write=write)
+        if share == 1.0:
+            save(there, path)
+        else:
+            with pytest.raises(OSError, match=r"box\.msh': is the disk full"):
+                save(there, path)

@@ -1,0 +1,133 @@
+"""Optimisation of designs: closed forms whose best trades are known, and the command on a scene that is linear."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+from scipy.stats import qmc
+
+import tribodyn as td
+from tribodyn.workflows.command import main as cli
+from tribodyn.workflows.designs import study_file
+from tribodyn.workflows.designs.optimum import values_of
+from tribodyn.workflows.designs.proposal import Known, best_trades, propose
+from tribodyn.workflows.designs.table import StudyTable
+from tribodyn.workflows.scene.scene_file import SceneError
+
+pytest.importorskip("sklearn")
+
+LINEAR = {
+    "scene": "beam", "design": "sobol", "runs": 8, "seed": 3,
+    "set": ["geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "reduction.modes=3", "wear=",
+            "harmonics.kept=[0, 1]", "response.points=10", "contact.friction=50"],
+}  # fmt: skip
+FORCE, DAMPING = "loads.harmonic.shake.value", "damping.modal"
+
+
+def searched(aims, excess, count, seed=0):
+    """Runs of functions of the unit square, from eight points on, two at a time."""
+    share = qmc.Sobol(2, seed=seed).random(8)
+    while len(share) < count:
+        known = Known(share, aims(share), excess(share))
+        share = np.vstack([share, propose(known, lambda s: 4 * (s - 0.5), 2, seed)])
+    return Known(share, aims(share), excess(share))
+
+
+def test_best_trades_are_those_that_none_beats() -> None:
+    aims = np.array([[1.0, 3.0], [2.0, 2.0], [3.0, 1.0], [3.0, 3.0], [0.0, 0.0], [2.0, 2.0]])
+    allowed = np.array([True, True, True, True, False, True])
+    assert best_trades(aims, allowed).tolist() == [0, 1, 5, 2]
+
+
+def test_two_aims_come_to_their_known_trade() -> None:
+    """(2x)^2 + (y - 0.3)^2 against (2x - 1)^2 + (y - 0.3)^2: y = 0.3, x from 0 to 0.5, roots that sum to 1.
+
+    Source  Schaffer 1985, with a second variable
+    """
+
+    def aims(s):
+        off = (s[:, 1] - 0.3) ** 2
+        return np.stack([4 * s[:, 0] ** 2 + off, (2 * s[:, 0] - 1) ** 2 + off], axis=1)
+
+    def dominated(rows):
+        """Area between the best trades and (1.2, 1.2)."""
+        f = rows[best_trades(rows, (rows < 1.2).all(axis=1))]
+        return float(np.sum((np.append(f[1:, 0], 1.2) - f[:, 0]) * (1.2 - f[:, 1])))
+
+    found = searched(aims, lambda s: np.zeros((len(s), 0)), 16)
+    whole = 1.2 * 1.2 - 1 / 6
+    assert dominated(found.aims[:8]) < 0.75 * whole
+    assert 0.9 * whole < dominated(found.aims) < whole
+    assert np.sort(np.abs(found.share[8:, 1] - 0.3))[4] < 0.02
+
+
+def test_a_limit_is_kept_and_failed_runs_are_not_followed() -> None:
+    """Least x + y with x y at least 0.25, where x > 0.8 fails: 1 at (0.5, 0.5)."""
+
+    def aims(s):
+        return np.where(s[:, :1] > 0.8, np.nan, s.sum(axis=1, keepdims=True))
+
+    found = searched(aims, lambda s: 0.25 - s.prod(axis=1, keepdims=True), 18)
+    best = found.front[0]
+    assert found.excess[best] <= 0
+    assert found.aims[best, 0] == pytest.approx(1.0, abs=0.03)
+    np.testing.assert_allclose(found.share[best], 0.5, atol=0.15)
+
+
+def tables(**more):
+    vary = {FORCE: {"distribution": "uniform", "low": "10 N", "high": "20 N"},
+            DAMPING: {"distribution": "loguniform", "low": "0.5 %", "high": "2 %"}}  # fmt: skip
+    aim = [{"number": "peak_m_first", "want": "low"}]
+    return {"study": LINEAR, "vary": vary, "optimise": {"aims": aim, "evaluations": 10, **more}}
+
+
+def test_the_linear_scene_comes_to_its_corner_and_resumes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Least amplitude of a linear structure: least force and most damping; the command and Python say the same."""
+    file, folder = tmp_path / "corner.toml", tmp_path / "found"
+    file.write_text(tomli_w.dumps(tables(finer=["harmonics.kept=[0, 1, 2]"])), encoding="utf-8")
+    cli.app(["optimise", str(file), "--workers", "1", "--out", str(folder), "--json"], result_action="return_value")
+    said, rows = json.loads(capsys.readouterr().out), (folder / "rows.jsonl").read_text(encoding="utf-8")
+    assert (folder / "optimum.png").stat().st_size > 5000
+    found = td.optimise(file, folder, workers=1, resume=True)
+    assert found.record() == said == json.loads((folder / "optimum.json").read_text(encoding="utf-8"))
+    assert (folder / "rows.jsonl").read_text(encoding="utf-8") == rows
+    keys, amplitude = found.keys(found.best), found.values(found.best)["peak_m_first"]
+    assert keys[FORCE] == pytest.approx(10.0, rel=0.05)
+    assert keys[DAMPING] == pytest.approx(0.02, rel=0.05)
+    assert amplitude == found.table.columns["peak_m_first"].min()
+    (check,) = found.checked
+    assert check.again["peak_m_first"] == pytest.approx(amplitude, rel=1e-4)
+    assert check.keeps is True
+
+
+def test_a_contact_that_survives_lives_longest() -> None:
+    """So does one that never slips, of which no cycle is known; a run that was stopped counts by its cycles."""
+    columns = {
+        "run": np.arange(1, 5), "status": np.array(["complete"] * 4, dtype=object),
+        "life_cycles": np.array([5e6, np.nan, np.nan, np.nan]), "cycles": np.array([6e6, 2e6, 3e6, 0.0]),
+        "survives": np.array([np.nan, 1.0, np.nan, 1.0]),
+    }  # fmt: skip
+    values, least = values_of(StudyTable("made up", columns, ()), "life_cycles")
+    assert values.tolist() == [5e6, 5e6, 3e6, 5e6]
+    assert least.tolist() == [False, True, True, True]
+
+
+def test_what_cannot_be_is_one_sentence(tmp_path: Path) -> None:
+    def parsed(**changed):
+        return study_file.parse({**tables(), **changed}, "s.toml", tmp_path)
+
+    with pytest.raises(SceneError, match=r"optimise\.aims"):
+        parsed(optimise={"aims": []})
+    with pytest.raises(SceneError, match="needs low or high"):
+        parsed(optimise={"limits": [{"number": "peak_hz_first"}]})
+    with pytest.raises(SceneError, match="give a key that does not vary"):
+        parsed(study={**LINEAR, "same": {"contact.friction": "nothing"}})
+    normal = {"distribution": "normal", "mean": "15 N", "cov": "10 %"}
+    with pytest.raises(SceneError, match="needs a range, give low and high"):
+        td.optimise({**tables(), "vary": {FORCE: normal}}, tmp_path)
+    with pytest.raises(SceneError, match='begins with runs that are drawn, give design = "sobol"'):
+        td.optimise({"study": {"scene": "beam", "design": "grid"}, "vary": {FORCE: ["10 N"]}}, tmp_path)
