@@ -5,7 +5,8 @@ from __future__ import annotations
 import ctypes
 import json
 import signal
-from time import process_time
+from pathlib import Path
+from time import process_time, sleep
 
 import numba
 import numpy as np
@@ -14,11 +15,11 @@ import pytest
 import tribodyn as td
 from tribodyn.hbm.continuation.operating_point import AtFrequency, NoPeak
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
-from tribodyn.workflows.accuracy import probes, statement, time_probe, verdict
+from tribodyn.workflows.accuracy import other_meshes, probes, statement, time_probe, verdict
 from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.accuracy.time_probe import InTime
-from tribodyn.workflows.run import modelling, settings
+from tribodyn.workflows.run import checkpoint, modelling, pipeline, settings
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 
@@ -226,6 +227,93 @@ def test_the_end_of_the_seconds_that_python_drops_comes_again(capfd: pytest.Capt
         freed()
     assert process_time() - start < 1.0
     assert capfd.readouterr().err == ""
+
+
+PLATE = """
+[scene]
+title = "plate"
+[geometry]
+part = "block"
+fixed = ["x_min"]
+length = 0.16906
+width = 0.0843
+height = 0.00603
+n_length = 8
+n_width = 3
+n_height = 1
+pad_start = 0.1481213955124525
+pad_end = 0.16906
+[material]
+young = "210 GPa"
+density = "7860 kg/m3"
+poisson = 0.3
+[contact]
+group = "pad_min"
+t1 = "x"
+vertices_only = true
+tangential_stiffness = 3.78e7
+normal_stiffness = 5.17e7
+friction = 0.12
+[loads.static.press]
+group = "pad_max"
+direction = "-z"
+value = 261.4
+[loads.harmonic.shake]
+group = "pad_max"
+direction = "y"
+value = 0.594
+[response]
+group = "pad_max"
+direction = "y"
+frequency = [2500, 3400]
+points = 10
+[harmonics]
+kept = [0, 1]
+[damping]
+modal = 0.02
+[reduction]
+modes = 5
+[verdict]
+in_time = false
+"""
+
+
+def test_a_contact_of_one_row_of_elements_is_held_against_two_rows(tmp_path: Path) -> None:
+    """Plate 1 of the scoreboard's seed 2718: 1.5 times the elements along it leave its pad a single row.
+
+    Both meshes then agreed on a preload that was off by more than twice what was stated
+    """
+    file = scene_file.parse(PLATE, "plate.toml", folder=tmp_path)
+    said = statement.loaded(pipeline.run(file, None, Progress()).verdict).statements["preload"]
+    fine = other_meshes.refined(file, 2.6)
+    right = probes.unworn(fine, modelling.build(fine, None, Progress()))[0].preload
+    assert said.value is not None
+    assert said.error is not None
+    true = abs(said.value - right) / right
+    assert true > 1e-3
+    assert true < said.error < 3 * true
+
+
+def test_a_verdict_may_take_what_the_processor_has_spent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A run that waits for others is given no more seconds for it."""
+    allowed = list[float]()
+
+    def judge(*run: object) -> statement.Verdict:
+        allowed.append(float(str(run[-1])))
+        return statement.Verdict({}, (), 0.0)
+
+    def build(file: scene_file.SceneFile) -> modelling.Model:
+        sleep(0.5)
+        return modelling.build(file, None, Progress())
+
+    monkeypatch.setattr(verdict, "judge", judge)
+    start = process_time()
+    result = pipeline.run(scene_file.parse(PLATE, "plate.toml", folder=tmp_path), None, Progress(), build=build)
+    facts, spent = result.facts, process_time() - start
+    assert 0 < allowed[0] <= facts.processor_seconds <= spent
+    assert facts.seconds > 0.5 + 0.9 * facts.processor_seconds
+    resumed = checkpoint.Clock(result)
+    assert facts.processor_seconds <= resumed.processor_seconds() < facts.processor_seconds + 0.1
 
 
 def test_a_verdict_without_seconds_says_what_is_not_known() -> None:

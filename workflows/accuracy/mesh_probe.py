@@ -8,6 +8,7 @@ from time import process_time
 
 import numpy as np
 
+from tribodyn.fem.interface import ContactInterface
 from tribodyn.workflows.accuracy import convergence, other_meshes, probes
 from tribodyn.workflows.accuracy.convergence import Difference
 from tribodyn.workflows.accuracy.other_meshes import Other
@@ -15,6 +16,9 @@ from tribodyn.workflows.accuracy.probes import Answers, State
 from tribodyn.workflows.accuracy.statement import QUANTITIES, Contribution
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.run import modelling
+from tribodyn.workflows.run.modelling import Model
+from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 
 MESH = "mesh and contact grid"
@@ -27,15 +31,22 @@ AT_A_PEAK = ("amplitude", "energy")
 ENERGY_OVER_AMPLITUDE = 0.5
 PLATEAU = 1 / 3  # of the error of the amplitude: where it falls by less, the peak of another mesh may lie as well
 ONE_ELEMENT = 4  # pairs of a contact face that a single element covers: too coarse for any order
+FOR_MESHES = 0.9  # of the seconds; the rest is for frequencies beside the peak
+SAME_GRID = 0.95  # size of the contact elements over that of the scene's, above which they are the same
 
 
 @dataclass
 class Seen:
-    """What other meshes have answered: differences by what is changed and by quantity, refusals by what is changed."""
+    """What other meshes have answered.
+
+    differences : by what is changed and by quantity; refused : by what is changed
+    grid_kept : whether the finer one has contact elements as long as the scene's along some direction
+    """
 
     differences: dict[str, dict[str, list[Difference]]] = field(default_factory=dict)
     refused: dict[str, str] = field(default_factory=dict)
     said: list[str] = field(default_factory=list)
+    grid_kept: bool = False
 
 
 @dataclass(frozen=True)
@@ -52,10 +63,11 @@ class Probe:
 
     def of_mesh(self, file: SceneFile) -> Iterator[Contribution]:
         """On a coarser and a finer mesh; where the finer one is too large or fails, on coarser ones."""
-        facts, end, seen = self.result.facts, process_time() + self.seconds, Seen()
+        facts, seen, start = self.result.facts, Seen(), process_time()
+        end = start + FOR_MESHES * self.seconds
         both = other_meshes.around(file, facts.full_dofs, facts.unknowns)
         self._solve(both, seen, end)
-        if "a finer mesh" not in seen.said:
+        if other_meshes.A_FINER_MESH not in seen.said:
             try:
                 more = other_meshes.coarser(file, facts.full_dofs)
             except ValueError as refusal:
@@ -63,8 +75,8 @@ class Probe:
             seen.refused.clear()
             self._solve([other for other in more if not (both and other.file == both[0].file)], seen, end)
         contact = self.first.balance.contact
-        fine_enough = contact.n_pair > ONE_ELEMENT * len(contact.joints)
-        return self._contributions(MESH, seen, fine_enough, beside=True)
+        fine_enough = contact.n_pair > ONE_ELEMENT * len(contact.joints) and not seen.grid_kept
+        return self._contributions(MESH, seen, fine_enough, start + self.seconds)
 
     def of_modes(self, other: Other) -> Iterator[Contribution]:
         """With more modes."""
@@ -78,27 +90,46 @@ class Probe:
         for other in others:
             try:
                 with processor_seconds(end - process_time()):
-                    there, deepest = probes.unworn(other.file, self.result.harmonics, folded)
+                    taken, model = self._built(other, seen)
+                    there, deepest = probes.unworn(taken.file, model, folded)
             except (TimeUp, ValueError, RuntimeError) as refusal:
                 why = self.skipped if isinstance(refusal, TimeUp) else f"{other.how}: {refusal}"
                 seen.refused[other.along] = why
                 continue
-            seen.said.append(other.how)
+            seen.said.append(taken.how)
             of = seen.differences.setdefault(other.along, {})
             pairs = {name: (a, b) for name, a, b in compared(there, ours)}
             if self.result.wear_steps:
                 reach = self.result.facts.delta_max_m
                 pairs["depth"] = (deepest, np.nan if reach is None else reach)
             for name, (a, b) in pairs.items():
-                of.setdefault(name, []).append(convergence.difference(other.size, a, b))
+                of.setdefault(name, []).append(convergence.difference(taken.size, a, b))
+
+    def _built(self, other: Other, seen: Seen) -> tuple[Other, Model]:
+        """The model of another mesh; of the one instead, where this one leaves the contact grid in a direction.
+
+        A pad of one row of elements may keep it on a mesh of 1.5 times as many: what its pressure is off by is then
+        the same on both, and their difference says nothing of it
+        """
+        model = modelling.build(other.file, None, Progress(), self.result.harmonics)
+        if other.how == other_meshes.A_FINER_MESH and self._keeps_grid(model):
+            if other.instead is not None:
+                return self._built(other.instead, seen)
+            seen.grid_kept = True
+        return other, model
+
+    def _keeps_grid(self, model: Model) -> bool:
+        """Whether contact elements of a finer mesh are as long as the scene's own along t1 or t2."""
+        own, theirs = (element_lengths(balance.model.interface) for balance in (self.first.balance, model.balance))
+        return bool((theirs > SAME_GRID * own).any())
 
     def _contributions(
-        self, source: str, seen: Seen, fine_enough: bool = True, beside: bool = False
+        self, source: str, seen: Seen, fine_enough: bool = True, beside: float | None = None
     ) -> Iterator[Contribution]:
         """What is seen, as errors.
 
-        fine_enough : whether the scene's own mesh may have an order; beside : whether frequencies beside a peak are
-        looked at
+        fine_enough : whether the scene's own mesh may have an order; beside : processor time until which frequencies
+        beside a peak are looked at, None looks at none
         Errors of different kinds are added: they are of different directions, and their signs are not known.
 
         One mesh of several that change the same is enough where the others have no solution or the seconds are used up
@@ -114,9 +145,8 @@ class Probe:
                 errors[name] = errors.get(name, 0.0) + convergence.bound(differences, settled)
         for name in AT_A_PEAK:
             errors[name] = max(errors[name], errors["peak_frequency"])
-        errors["energy"] = max(
-            errors["energy"], ENERGY_OVER_AMPLITUDE * errors["amplitude"], self._on_a_plateau(errors) if beside else 0.0
-        )
+        plateau = 0.0 if beside is None else self._on_a_plateau(errors, beside)
+        errors["energy"] = max(plateau, errors["energy"], ENERGY_OVER_AMPLITUDE * errors["amplitude"])
         if "depth" in errors:  # wear passes a depth in cycles that are inverse to the energy
             errors["life"] = errors["depth"] + errors["energy"]
         worn = self.result.wear
@@ -128,15 +158,32 @@ class Probe:
                 )
             elif np.isfinite(error):
                 yield Contribution(source, name, error, how)
+            elif not np.isfinite(errors["energy"]) and name in ("energy", "life"):
+                yield Contribution(source, name, None, self.skipped)
             else:
                 yield Contribution(source, name, None, "the free body does not say how deep the contact can wear")
 
-    def _on_a_plateau(self, errors: dict[str, float]) -> float:
-        """Error of the energy where a flat top of the response leaves open where its peak lies."""
+    def _on_a_plateau(self, errors: dict[str, float], end: float) -> float:
+        """Error of the energy where a flat top of the response leaves open where its peak lies; inf if it takes longer.
+
+        end : processor time
+        """
         try:
-            return probes.energy_beside(self.first, errors["peak_frequency"], PLATEAU * errors["amplitude"])
+            with processor_seconds(end - process_time()):
+                return probes.energy_beside(self.first, errors["peak_frequency"], PLATEAU * errors["amplitude"])
+        except TimeUp:
+            return np.inf
         except (ValueError, RuntimeError):
             return 0.0
+
+
+def element_lengths(interface: ContactInterface) -> np.ndarray:
+    """(2,) mean extent [m] of the contact's faces along t1 and t2, nan where it has none."""
+    if not len(interface.faces):
+        return np.full(2, np.nan)
+    tangents = interface.frames[interface.faces[:, 0], :2]
+    along = np.einsum("fkj,fcj->fkc", interface.points[interface.faces], tangents)
+    return np.asarray(np.ptp(along, axis=1).mean(axis=0))
 
 
 def compared(a: Answers, b: Answers) -> Iterator[tuple[str, float, float]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +17,11 @@ from tribodyn.workflows.scene.schema import PartScene
 from tribodyn.workflows.scene.structure import Body, StructureScene
 
 FINER = 3 / 2  # elements along every edge over those of the scene
+STILL_FINER = 2.0  # the same, where with FINER a row of contact elements stays a single one
 COARSER = (2 / 3, 1 / 2)
 MOST_FINER = (100_000, 3000)  # DOFs of a finer mesh that a verdict solves, and unknowns of its balance
 MOST_HALVED = 200_000  # DOFs of a mesh of halved elements that a verdict solves
+A_FINER_MESH = "a finer mesh"
 HALF = 0.5  # size of halved elements
 TWICE_AS_MANY = 0.25  # of twice as many modes, whose error falls with the square of their number
 
@@ -36,12 +38,15 @@ class Other:
 
     size : element size over that of the scene, or what stands for it: the error is taken to grow with it
     how : what it is; along : what of the discretisation it changes: errors of one kind are the same error seen twice
+    instead : a finer mesh to take where this one leaves the contact grid as it is in a direction; None where there is
+        none or it is too large
     """
 
     file: SceneFile
     size: float
     how: str
     along: str
+    instead: Other | None = None
 
 
 def around(file: SceneFile, n_dof: int, unknowns: int) -> list[Other]:
@@ -49,12 +54,20 @@ def around(file: SceneFile, n_dof: int, unknowns: int) -> list[Other]:
 
     n_dof, unknowns : of the scene's own mesh and of a balance solve on it
     """
-    if FINER**3 * n_dof > MOST_FINER[0] or FINER**2 * unknowns > MOST_FINER[1]:
+    if not _affordable(FINER, n_dof, unknowns):
         return []
     try:
-        return [_remeshed(file, COARSER[0], "a coarser mesh"), _remeshed(file, FINER, "a finer mesh")]
+        coarser_one, finer = _remeshed(file, COARSER[0], "a coarser mesh"), _remeshed(file, FINER, A_FINER_MESH)
+        if _affordable(STILL_FINER, n_dof, unknowns):
+            finer = replace(finer, instead=_remeshed(file, STILL_FINER, A_FINER_MESH))
+        return [coarser_one, finer]
     except ValueError:
         return []
+
+
+def _affordable(share: float, n_dof: int, unknowns: int) -> bool:
+    """Whether a verdict solves a mesh with a share of the elements along every edge."""
+    return share**3 * n_dof <= MOST_FINER[0] and share**2 * unknowns <= MOST_FINER[1]
 
 
 def coarser(file: SceneFile, n_dof: int) -> list[Other]:
@@ -88,7 +101,7 @@ def refined(file: SceneFile, share: float) -> SceneFile:
     Unchanged where it has no mesh
     """
     try:
-        return _remeshed(file, share, "a finer mesh").file
+        return _remeshed(file, share, A_FINER_MESH).file
     except Given:
         return file.changed(*_halved(_meshed(file)))
     except ValueError:

@@ -24,7 +24,6 @@ from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import curve, modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import delta_max, free_deflection
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import Scene
@@ -174,17 +173,12 @@ def with_more_harmonics(state: State) -> Answers | None:
     return answers
 
 
-def unworn(other: SceneFile, harmonics: tuple[int, ...], folded: bool = False) -> tuple[Answers, float]:
-    """Answers of the unworn contact of a scene on another mesh, and its delta_max [m].
+def unworn(file: SceneFile, model: modelling.Model, folded: bool = False) -> tuple[Answers, float]:
+    """Answers of the unworn contact of a model, and its delta_max [m], nan where nothing wears.
 
     folded : whether the scene's answers are those of the highest point of a curve that turns back
     Raises  ValueError where it has no peak; RuntimeError where it has no solution
     """
-    return unworn_of(other, modelling.build(other, None, Progress(), harmonics), folded)
-
-
-def unworn_of(file: SceneFile, model: modelling.Model, folded: bool = False) -> tuple[Answers, float]:
-    """Answers of the unworn contact of a model, and its delta_max [m], nan where nothing wears; raises as `unworn`."""
     scene, balance = file.scene, model.balance
     site: Site | OnCurve = OnCurve(scene) if folded else scene_peak(file)
     load = 1.0

@@ -45,7 +45,7 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spe
     """Measure the errors of a finished result on its own scene and state what may be stated.
 
     The scene's [verdict] says which measurements are made and limits their processor seconds
-    spent : seconds that the run has taken, which limit the measurements where the scene does not
+    spent : processor seconds that the run has taken, which limit the measurements where the scene does not
     """
     wanted, clock = file.scene.verdict, process_time()
     allowed = wanted.limit(spent)

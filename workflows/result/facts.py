@@ -51,7 +51,7 @@ class Facts:
 
     full_dofs, model_dofs : before and after the reduction; contact_pairs; unknowns : of a balance solve
     harmonics : kept ones; free_hz : (n,) natural frequencies with the contact absent [Hz]
-    seconds : of computing, interrupted runs included
+    seconds, processor_seconds : of computing, interrupted runs included: on the wall, and of the processor
     compliance_error : relative, of the dynamic compliance of the contact
     elements, nodes, scaled_jacobian : of the mesh, the last is the smallest one, 1 is best
     retained_modes, first_omitted_hz, factorisation : of a reduction by Craig and Bampton
@@ -69,6 +69,7 @@ class Facts:
     harmonics: tuple[int, ...] = ()
     free_hz: np.ndarray = field(default_factory=lambda: np.zeros(0))
     seconds: float = 0.0
+    processor_seconds: float = 0.0
     compliance_error: float | None = None
     elements: int | None = None
     nodes: int | None = None

@@ -14,6 +14,7 @@ from filelock import FileLock, Timeout
 
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.workflows.result import store
+from tribodyn.workflows.result.facts import Facts
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.content import digests
@@ -22,15 +23,19 @@ from tribodyn.workflows.scene.schema import Scene
 
 
 class Clock:
-    """Seconds of computing, those of an interrupted run included."""
+    """Seconds of computing, those of an interrupted run included: on the wall, and of the processor."""
 
     def __init__(self, earlier: Result | None):
-        self._before = 0.0 if earlier is None else earlier.facts.seconds
-        self._start = time.perf_counter()
+        self._before = Facts() if earlier is None else earlier.facts
+        self._start, self._processor = time.perf_counter(), time.process_time()
 
     def seconds(self) -> float:
         """Seconds so far."""
-        return self._before + time.perf_counter() - self._start
+        return self._before.seconds + time.perf_counter() - self._start
+
+    def processor_seconds(self) -> float:
+        """Seconds of the processor so far, of all threads; of a machine that does other work, too, the same."""
+        return self._before.processor_seconds + time.process_time() - self._processor
 
 
 @contextmanager
@@ -61,7 +66,9 @@ class Keeper:
 
     def __call__(self, result: Result) -> Result:
         """Write a result with the seconds it took, and give it back."""
-        timed = replace(result, facts=replace(result.facts, seconds=self.clock.seconds()))
+        clock = self.clock
+        facts = replace(result.facts, seconds=clock.seconds(), processor_seconds=clock.processor_seconds())
+        timed = replace(result, facts=facts)
         if self.path is not None:
             store.save(self.path, timed)
         return timed

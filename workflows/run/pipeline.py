@@ -93,7 +93,7 @@ def run(
             with progress.stage("error budget"):
                 result = with_budget(file, model.balance, result)
         if scene.verdict.enabled:
-            found = verdict.judge(file, model, result, progress, keep.clock.seconds())
+            found = verdict.judge(file, model, result, progress, keep.clock.processor_seconds())
             result = replace(result, verdict=found.dumped())
         return keep(replace(result, stage=Stage.COMPLETE))
 

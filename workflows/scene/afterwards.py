@@ -38,7 +38,7 @@ class VerdictOptions(Table):
     """Judge the result when the run is done."""
     seconds: Annotated[Number, Field(gt=0)] | None = None
     """Processor seconds that the measurements may take together; what they do not reach is not known. By default as
-    long as the run itself took, but 10 s at least and 60 s at most."""
+    many as the run itself took, but 10 at least and 60 at most."""
     mesh: StrictBool = True
     """Solve the unworn contact on other meshes, and with more modes."""
     in_time: StrictBool | None = None
@@ -46,5 +46,5 @@ class VerdictOptions(Table):
     components and the seconds last."""
 
     def limit(self, spent: float) -> float:
-        """Processor seconds that the measurements may take after a run that took `spent` [s]."""
+        """Processor seconds that the measurements may take after a run that took `spent` of them."""
         return self.seconds or min(max(spent, VERDICT_SECONDS[0]), VERDICT_SECONDS[1])
