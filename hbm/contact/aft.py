@@ -308,8 +308,11 @@ def _record(step, x, p, phi, weight, s, ds, force, jac, status):
             _chain(dsx, dss, phi[j], memory_ds, before)
         if m > 0:
             product = weight @ slope
+            n = len(weight)  # element by element: an assignment of slices takes numba seconds to compile
             for c in range(n_comp):
-                jac[i, c * len(weight) : (c + 1) * len(weight)] = product[:, c * m : (c + 1) * m]
+                for a in range(n):
+                    for b in range(m):
+                        jac[i, c * n + a, b] = product[a, c * m + b]
 
 
 @numba.njit(cache=True)
@@ -317,9 +320,10 @@ def _chain(dsx, dss, phi, ds, before):
     """ds <- dss ds + dsx phi, over the columns of ds; those beyond the coefficients carry dss alone."""
     n_state, n_comp = dsx.shape
     n_coeff = phi.size
-    before[:] = ds
     for r in range(n_state):
-        ds[r] = 0.0
+        for b in range(ds.shape[1]):
+            before[r, b], ds[r, b] = ds[r, b], 0.0
+    for r in range(n_state):
         for q in range(n_state):
             if dss[r, q] != 0.0:
                 for b in range(ds.shape[1]):

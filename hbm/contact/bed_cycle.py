@@ -188,11 +188,18 @@ def _sum(x, k, touch, dk, dg, ratio, mu, sliders, active, phi, product, single, 
             )
             # the deepest spring is the last to let go: only where it opens the pair does
             status[i] |= bits if q == SPRINGS - 1 else bits & ~SEPARATES
-            force[i] += f
+            share = dk[i, q] / k[i, q] if k[i, q] > 0.0 else 0.0
+            for c in range(n_comp):  # in loops: sums of arrays take numba seconds to compile
+                for j in range(n_time):
+                    force[i, c, j] += f[c, j]
             if not want:
                 continue
-            jac[i] += own
-            weighted[i] += (dk[i, q] / k[i, q] if k[i, q] > 0.0 else 0.0) * f
+            for a in range(m):
+                for b in range(m):
+                    jac[i, a, b] += own[a, b]
+            for c in range(n_comp):
+                for j in range(n_time):
+                    weighted[i, c, j] += share * f[c, j]
             for c in range(n_comp):
                 for a in range(n_coeff):
                     column[i, c, a] -= dg[i, q] * own[c * n_coeff + a, still]

@@ -54,8 +54,10 @@ def cycle(
     grid = _grid(basis.dynamic)
     n = grid.shape[1] // 5  # told, as there may be no pair
     x_grid, load_grid = (full @ grid).reshape(n_pair, n_comp, 5, n), (load @ grid).reshape(n_pair, 5, n)
-    k, hs = parameters.stiffness, np.asarray(basis.dynamic, np.int64)
-    mu = parameters.numbers.get("friction", np.zeros(n_pair))
+    # of one layout, as numba compiles the kernel for each that it meets
+    k, memory = np.ascontiguousarray(parameters.stiffness), np.ascontiguousarray(memory)
+    mu = np.ascontiguousarray(parameters.numbers.get("friction", np.zeros(n_pair)))
+    hs = np.asarray(basis.dynamic, np.int64)
     force = np.zeros_like(full)
     jac = np.zeros((n_pair, n_comp * n_coeff, n_comp * n_coeff)) if jacobian else np.zeros((0, 0, 0))
     status = np.zeros(n_pair, np.int64)
@@ -238,7 +240,8 @@ def _cannot_slip(kt, mu, w, u, load, hs):
 def _edges(r, u, load, u_grid, load_grid, contact, closed, n_contact, hs, edges, touching):
     """Angles between which the contact keeps its state and both walls are monotone; returns the number of intervals."""
     n = n_contact
-    edges[:n] = contact[:n]
+    for j in range(n):
+        edges[j] = contact[j]
     turning = np.zeros(u.size)
     for side in (-1.0, 1.0):
         for q in range(1, u.size, 2):
@@ -338,6 +341,14 @@ def _span(start, stop, span):
 
 
 @numba.njit(cache=True)
+def _add(factor, span, table):
+    """table += factor span; in the short form numba takes seconds to compile."""
+    for a in range(span.shape[0]):
+        for b in range(span.shape[1]):
+            table[a, b] += factor * span[a, b]
+
+
+@numba.njit(cache=True)
 def _products(table, hs, out):
     """Fourier coefficients a of basis function b over the spans summed in the table: (m, m)."""
     C, S = table  # of cos n t and of sin n t
@@ -371,7 +382,7 @@ def _normal(load, contact, closed, n_contact, hs, span, table, force, slope):
         for j in range(n_contact):
             if closed[j]:
                 _span(contact[j], contact[j + 1], span)
-                table[0] += span
+                _add(1.0, span, table[0])
         _products(table[0], hs, out)
     for a in range(len(out)):
         force[a] = 0.0
@@ -393,9 +404,9 @@ def _tangential(kt, mu, u, load, segments, n_segment, hs, span, table, force, sl
         for s in range(n_segment):
             _span(segments[s, 0], segments[s, 1], span)
             if segments[s, 2] == STICK:
-                table[0] += span
+                _add(1.0, span, table[0])
             else:
-                table[1] += segments[s, 2] * span
+                _add(segments[s, 2], span, table[1])
         _products(table[0], hs, slope[0])
         _products(table[1], hs, slope[1])
     for a in range(m):

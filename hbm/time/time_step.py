@@ -86,6 +86,14 @@ class Record(NamedTuple):
 
 
 @numba.njit(cache=True)
+def put(values, to):
+    """Copy a contiguous array; to assign one array to a slice of another takes numba seconds to compile."""
+    a, b = values.ravel(), to.ravel()
+    for i in range(b.size):
+        b[i] = a[i]
+
+
+@numba.njit(cache=True)
 def room(c, n_state):
     """Work space of one pair: f, memory, df/dx after `advance`; the other three slopes of the law; two for a touch."""
     return (
@@ -154,16 +162,24 @@ def clear(J, dfs, dsx, dss):
 def slopes_of(touched, work, D):
     """Derivative D of (f, memory) with respect to (x1, memory before, x0), of what `advance` left in `work`."""
     _, _, J, dfs, dsx, dss, _, before = work
-    c, n_state = dfs.shape
+    c = J.shape[0]
     D[:] = 0.0
-    D[:c, :c] = J
-    D[c:, :c] = dsx
+    add(J, D, 0, 0)
+    add(dsx, D, c, 0)
     if not touched:
-        D[:c, c : c + n_state] = dfs
-        D[c:, c : c + n_state] = dss
+        add(dfs, D, 0, c)
+        add(dss, D, c, c)
         return
-    D[:c, c:] = np.dot(dfs, np.ascontiguousarray(before[:, c:]))
-    D[c:] += np.dot(dss, before)
+    add(np.dot(dfs, np.ascontiguousarray(before[:, c:])), D, 0, c)
+    add(np.dot(dss, before), D, c, 0)
+
+
+@numba.njit(cache=True)
+def add(M, D, row, column):
+    """Add the matrix M to a larger one, from a row and a column of that on."""
+    for a in range(M.shape[0]):
+        for b in range(M.shape[1]):
+            D[row + a, column + b] += M[a, b]
 
 
 @numba.njit(cache=True)
@@ -247,7 +263,7 @@ def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, near, backward,
                 x[i, a] = b[a]
             continue
         if bits[i] == SEPARATES:
-            x[i] = b
+            put(b, x[i])
         bits[i] = solve_pair(
             step, x0[i], was_open[i], x[i], s[i], contact.p[i], contact.gap[i], normal, own, b, 0.1 * near, work, M, r
         )
@@ -318,8 +334,8 @@ def residual(step, contact, x_free, x0, was_open, s, x, f, work, bits, J):
         bits[i] = abs(
             advance(step, x0[i], was_open[i], x[i], s[i], contact.p[i], contact.gap[i], contact.normal, work, False)
         )
-        f[i] = work[0]
-        J[i] = work[2]
+        put(work[0], f[i])
+        put(work[2], J[i])
     return x.ravel() - x_free + times(contact.A, f)
 
 
@@ -352,7 +368,7 @@ def chord(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inver
         move = -np.dot(inverse, r)
         r_before = r
         x += move.reshape(x.shape)
-    x[:] = start
+    put(start, x)
     return -1, scale
 
 
@@ -370,19 +386,19 @@ def newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inve
         scale = max(scale, np.abs(x).max())
         error = np.abs(r).max()
         if error <= TOLERANCE * scale:
-            inverse[:] = np.linalg.inv(full)
+            put(np.linalg.inv(full), inverse)
             return bits, SWEEPS + it + 1, scale
         if error >= best and length > SHORTEST:  # a kink lies on the way: go less far
             length *= 0.5
         else:
             best, length = error, 1.0
-            x_best[:] = x
+            put(x, x_best)
             full = np.eye(n_pair * c)
             for i in range(n_pair):
                 o = i * c
-                full[:, o : o + c] += np.dot(np.ascontiguousarray(A[o : o + c].T), np.ascontiguousarray(J[i]))
+                add(np.dot(np.ascontiguousarray(A[o : o + c].T), np.ascontiguousarray(J[i])), full, 0, o)
             direction = np.linalg.solve(full, r)
-        x[:] = x_best - length * direction.reshape(x.shape)
+        put(x_best - length * direction.reshape(x.shape), x)
     return bits, -1, scale
 
 
@@ -428,16 +444,18 @@ def march(step, contact, linear, moving, record):
                 work,
                 chained,
             )
-            memory[i] = work[1]
+            put(work[1], memory[i])
             if chained:
                 slopes_of(now < 0, work, record.slopes[j, i])
             bits[i] = abs(now)
             record.bits[i] |= bits[i]
-        f_before[:] = f
-        x[:], f[:] = x_new, f_new
-        z[:] = z_free - np.dot(linear.Q, 0.5 * np.dot(f.ravel(), linear.U))
-        record.x[j], record.f[j] = x, f
-        record.y[j] = linear.output_rest[j] + np.dot(of_z, z) + np.dot(of_f, f.ravel())
+        put(f, f_before)
+        put(x_new, x)
+        put(f_new, f)
+        put(z_free - np.dot(linear.Q, 0.5 * np.dot(f.ravel(), linear.U)), z)
+        put(x, record.x[j])
+        put(f, record.f[j])
+        put(linear.output_rest[j] + np.dot(of_z, z) + np.dot(of_f, f.ravel()), record.y[j])
         speed = max(speed, np.sqrt(np.sum(z[m:] ** 2)))
     return -1, spent, speed
 
@@ -459,9 +477,9 @@ def along(step, before, xs, contact, memory, bits, forces):
                     step, x0, was_open, xs[j, i], memory[i], contact.p[i], contact.gap[i], contact.normal, work, False
                 )
             )
-            memory[i] = work[1]
+            put(work[1], memory[i])
             if forces.shape[0] > 0:
-                forces[j, i] = work[0]
+                put(work[0], forces[j, i])
 
 
 @numba.njit(cache=True)

@@ -24,6 +24,8 @@ import types
 from functools import cache
 from pathlib import Path
 
+from tests.helpers import compiled
+
 ROOT = Path(__file__).parents[2]
 LOADED = ("matplotlib.pyplot", "pyvista", "gmsh", "skfem", "PIL.Image", "scipy.stats", "scipy.interpolate")
 LEFT_OUT = ("tribodyn.workflows.benchmarks", "tribodyn.workflows.cases")
@@ -99,6 +101,7 @@ def load() -> None:
             importlib.import_module(module.name)
     for word in LOADED:
         importlib.import_module(word)
+    compiled.small_run()  # what a first run alone does, such as reading the kernels from disk
 
 
 def answer(asks: socket.socket) -> None:

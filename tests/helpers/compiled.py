@@ -1,0 +1,33 @@
+"""Compile the kernels that most tests need, which numba then keeps on disk.
+
+Two test processes that begin together would each compile them. `python -m tests.helpers.compiled` is run by
+`./tribodyn check` beside the build of the documentation.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import tribodyn as td
+
+SMALL: dict[str, Any] = {
+    "geometry.n_patch": 3,
+    "geometry.n_length": 3,
+    "geometry.n_height": 1,
+    "reduction.modes": 4,
+    "harmonics.kept": [0, 1],
+    "response.points": 6,
+    "loads.harmonic.shake.value": "1 kN",
+    "wear": None,
+    "verdict.enabled": False,
+}
+
+
+def small_run(**more: Any) -> td.Result:
+    """A response of the beam on the coarsest mesh, which keeps no file."""
+    return td.run("beam", overrides=SMALL | more)
+
+
+if __name__ == "__main__":
+    td.verify(small_run(), at=700.0)  # transitions located, and time integration
+    small_run(**{"harmonics.transitions": "sampled"})
