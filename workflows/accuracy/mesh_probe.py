@@ -39,14 +39,22 @@ SAME_GRID = 0.95  # size of the contact elements over that of the scene's, above
 class Seen:
     """What other meshes have answered.
 
-    differences : by what is changed and by quantity; refused : by what is changed
+    differences : by what is changed and by quantity; wider : the same with more harmonics, where they were found
+    refused : by what is changed
     grid_kept : whether the finer one has contact elements as long as the scene's along some direction
     """
 
     differences: dict[str, dict[str, list[Difference]]] = field(default_factory=dict)
+    wider: dict[str, dict[str, list[Difference]]] = field(default_factory=dict)
     refused: dict[str, str] = field(default_factory=dict)
     said: list[str] = field(default_factory=list)
     grid_kept: bool = False
+
+    def best(self) -> Iterator[dict[str, list[Difference]]]:
+        """Differences by quantity, of one change after the other: with more harmonics where all meshes have them."""
+        for along, plain in self.differences.items():
+            wide = self.wider.get(along, {})
+            yield wide if all(len(wide.get(name, ())) == len(found) for name, found in plain.items()) else plain
 
 
 @dataclass(frozen=True)
@@ -54,12 +62,16 @@ class Probe:
     """The unworn state that other meshes are compared with.
 
     seconds : of the processor, for all of a source; skipped : the sentence where they are used up
+    more_harmonics : whether meshes are compared with more harmonics than the scene's. Where those change an answer,
+        they may change another one on another mesh, as where a resonance of a higher harmonic is near: the error of the
+        scene's is at most the sum of what they change in it and of the mesh's error with them
     """
 
     result: Result
     first: State
     seconds: float
     skipped: str
+    more_harmonics: bool = False
 
     def of_mesh(self, file: SceneFile) -> Iterator[Contribution]:
         """On a coarser and a finer mesh; where the finer one is too large or fails, on coarser ones."""
@@ -85,25 +97,39 @@ class Probe:
         return self._contributions("modes", seen)
 
     def _solve(self, others: Sequence[Other], seen: Seen, end: float) -> None:
-        ours = Answers.of(self.first.balance, self.first.here)
+        ours, wide = self.first.answers, None
         folded = isinstance(self.first.site, probes.OnCurve)
         for other in others:
             try:
                 with processor_seconds(end - process_time()):
+                    if self.more_harmonics and wide is None and not folded:
+                        wide = _with_more_harmonics(self.first)
                     taken, model = self._built(other, seen)
-                    there, deepest = probes.unworn(taken.file, model, folded)
+                    there = probes.unworn(taken.file, model, folded)
+                    theirs = None if wide is None else _with_more_harmonics(there)
+                    deepest = probes.deepest(taken.file, model)
             except (TimeUp, ValueError, RuntimeError) as refusal:
                 why = self.skipped if isinstance(refusal, TimeUp) else f"{other.how}: {refusal}"
                 seen.refused[other.along] = why
                 continue
             seen.said.append(taken.how)
-            of = seen.differences.setdefault(other.along, {})
-            pairs = {name: (a, b) for name, a, b in compared(there, ours)}
-            if self.result.wear_steps:
-                reach = self.result.facts.delta_max_m
-                pairs["depth"] = (deepest, np.nan if reach is None else reach)
-            for name, (a, b) in pairs.items():
-                of.setdefault(name, []).append(convergence.difference(taken.size, a, b))
+            self._add(seen.differences.setdefault(other.along, {}), taken.size, there.answers, ours, deepest)
+            if theirs is not None and wide is not None:
+                self._add(seen.wider.setdefault(other.along, {}), taken.size, theirs, wide, deepest)
+
+    def _add(
+        self, to: dict[str, list[Difference]], size: float, theirs: Answers, ours: Answers, deepest: float
+    ) -> None:
+        """Add the differences to a mesh of a size.
+
+        deepest : delta_max there [m]
+        """
+        pairs = {name: (a, b) for name, a, b in compared(theirs, ours)}
+        if self.result.wear_steps:
+            reach = self.result.facts.delta_max_m
+            pairs["depth"] = (deepest, np.nan if reach is None else reach)
+        for name, (a, b) in pairs.items():
+            to.setdefault(name, []).append(convergence.difference(size, a, b))
 
     def _built(self, other: Other, seen: Seen) -> tuple[Other, Model]:
         """The model of another mesh; of the one instead, where this one leaves the contact grid in a direction.
@@ -139,7 +165,7 @@ class Probe:
             yield from unknown(source, lacking[0])
             return
         how, errors = ", ".join(dict.fromkeys(seen.said)), dict[str, float]()
-        for of in seen.differences.values():
+        for of in seen.best():
             settled = fine_enough and convergence.has_settled([one for name in ANSWERS for one in of[name]])
             for name, differences in of.items():
                 errors[name] = errors.get(name, 0.0) + convergence.bound(differences, settled)
@@ -175,6 +201,14 @@ class Probe:
             return np.inf
         except (ValueError, RuntimeError):
             return 0.0
+
+
+def _with_more_harmonics(state: State) -> Answers | None:
+    """What a state answers with the first harmonics beyond its own, None where that is not found."""
+    try:
+        return probes.with_more_harmonics(state, 1)
+    except (ValueError, RuntimeError):
+        return None
 
 
 def element_lengths(interface: ContactInterface) -> np.ndarray:

@@ -64,6 +64,11 @@ class State:
     site: Site | OnCurve
     here: OperatingPoint
 
+    @property
+    def answers(self) -> Answers:
+        """What it says."""
+        return Answers.of(self.balance, self.here)
+
 
 @dataclass(frozen=True)
 class OnCurve:
@@ -149,16 +154,17 @@ def _at_response_peak(site: Site, balance: HarmonicBalance, result: Result) -> S
     return State(None, 0.0, np.zeros(len(x)), balance, site, point) if point.solution.converged else None
 
 
-def with_more_harmonics(state: State) -> Answers | None:
+def with_more_harmonics(state: State, steps: int | None = None) -> Answers | None:
     """The same state with more and more harmonics, its place followed, as far as it is found within the seconds.
 
+    steps : how many times more of them are taken, None: as often as `harmonic_choice.climb` says
     None where it is lost at once
     """
     top = state.balance.basis.harmonics[-1]
     basis, x, omega = state.balance.basis, state.here.state.x, state.here.state.omega
     wide = harmonic_choice.widened(state.balance, harmonic_choice.highest_looked_at(top))
     answers = None
-    for highest in harmonic_choice.climb(top):
+    for highest in harmonic_choice.climb(top)[:steps]:
         finer = wide.with_harmonics(tuple(h for h in wide.basis.harmonics if h <= highest))
         try:
             point = state.site.next(finer, omega, basis.transfer(x, finer.basis))
@@ -173,24 +179,30 @@ def with_more_harmonics(state: State) -> Answers | None:
     return answers
 
 
-def unworn(file: SceneFile, model: modelling.Model, folded: bool = False) -> tuple[Answers, float]:
-    """Answers of the unworn contact of a model, and its delta_max [m], nan where nothing wears.
+def unworn(file: SceneFile, model: modelling.Model, folded: bool = False) -> State:
+    """The unworn contact of a model.
 
     folded : whether the scene's answers are those of the highest point of a curve that turns back
     Raises  ValueError where it has no peak; RuntimeError where it has no solution
     """
-    scene, balance = file.scene, model.balance
+    scene = file.scene
     site: Site | OnCurve = OnCurve(scene) if folded else scene_peak(file)
     load = 1.0
     if scene.wear is not None:
         duty = settings.mission(scene)[0]
         site, load = duty.site, duty.load
-    point = site.first(balance.with_load(load))
+    balance = model.balance.with_load(load)
+    point = site.first(balance)
     if not point.solution.converged:
         raise RuntimeError(f"{point.solution.outcome}")
-    area = balance.model.interface.area
-    deepest = delta_max(scene, free_deflection(balance), area) if scene.wear is not None else float("nan")
-    return Answers.of(balance.with_load(load), point), deepest
+    return State(None, 0.0, np.zeros(balance.contact.n_pair), balance, site, point)
+
+
+def deepest(file: SceneFile, model: modelling.Model) -> float:
+    """delta_max [m] of a model, nan where nothing wears."""
+    if file.scene.wear is None:
+        return float("nan")
+    return delta_max(file.scene, free_deflection(model.balance), model.balance.model.interface.area)
 
 
 def energy_beside(state: State, reach: float, drop: float) -> float:

@@ -104,7 +104,7 @@ def solved(file: SceneFile, seconds: float, elements: float = ELEMENTS) -> tuple
     try:
         with processor_seconds(seconds), threads.limited(1):
             model = modelling.build(fine, None, Progress())
-            there, _ = probes.unworn(fine, model)
+            there = probes.unworn(fine, model).answers
         values |= {name: value for name, value, _ in mesh_probe.compared(there, there)}
         if fine.scene.wears:
             what = "the reference of its wear"

@@ -39,6 +39,8 @@ LEAST_OWN_ERROR = 1e-3  # of a time integration: how far it is from periodic add
 AT_A_GIVEN_FREQUENCY = ("peak_frequency",)  # a motion at a given frequency tells nothing about it
 OF_WEAR = ("depth", "life")  # belong to all states: where a worn motion does not stay, the contact may survive
 RESPONSE = ("amplitude", "energy", "preload")
+OF_FIRST = ("peak_frequency", *RESPONSE)
+MOVED = 0.01  # of a quantity of the first state by more harmonics, above which other meshes are solved with them, too
 
 
 def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spent: float) -> Verdict:
@@ -68,6 +70,9 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spe
         finer = list(probes.each(seen, probes.with_more_harmonics, MOST * left()))
         lost = f"lost with more harmonics, or beyond the {allowed:.3g} s of verdict.seconds"
         parts += _of_harmonics(result, seen, finer, values["life"], lost)
+    moved = any(
+        (part.error or 0.0) > MOVED for part in parts if part.source == "harmonics" and part.quantity in OF_FIRST
+    )
     more_modes = with_more_modes(file) if wanted.mesh and seen else None  # another model, too
     if more_modes is not None:
         with progress.stage("verdict: modes"):
@@ -78,7 +83,7 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spe
         elif not seen:
             parts += mesh_probe.unknown(MESH, "no state was solved")
         else:
-            parts += Probe(result, seen[0], FOR_MESH * left(), skipped).of_mesh(file)
+            parts += Probe(result, seen[0], FOR_MESH * left(), skipped, moved).of_mesh(file)
     with progress.stage("verdict: time integration"):
         checked = time_probe.check(seen, wanted.in_time, left(), skipped)
     statements = {name: _statement(name, values[name], parts, checked, result) for name in QUANTITIES}
