@@ -1,11 +1,13 @@
-"""Run a scene in a fresh interpreter and tell as JSON what it imported, factorised, allocated and stored.
+"""Run scenes and tell as JSON what each imported, factorised, allocated and stored.
 
-python -m tests.helpers.run_probe SCENE [section.key=value ...]
+python -m tests.helpers.run_probe reads lines [SCENE, [section.key=value ...]] and answers each with a line. A scene
+runs in a child of an interpreter that has imported nothing but this file.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import sys
 import tempfile
 from pathlib import Path
@@ -20,7 +22,7 @@ from tribodyn.workflows.scene import scene_file
 OPTIONAL = ("gmsh", "pyvista", "vtk", "matplotlib", "surfalize", "cyclopts")
 
 
-def main() -> None:
+def tell(scene: str, overrides: list[str]) -> None:
     """Run and tell."""
     factorised, models = [], []
 
@@ -36,7 +38,7 @@ def main() -> None:
     build = modelling.build
     modelling.build = lambda *arguments: models.append(build(*arguments)) or models[-1]
     with tempfile.TemporaryDirectory() as folder:
-        result = pipeline.run(scene_file.read(sys.argv[1], sys.argv[2:]), Path(folder), Progress())
+        result = pipeline.run(scene_file.read(scene, overrides), Path(folder), Progress())
         arrays: dict[str, tuple[int, ...]] = {}
         with h5py.File(Path(folder) / "result.h5") as file:
             file.visititems(lambda name, item: arrays.update({name: getattr(item, "shape", None)}) and None)
@@ -59,8 +61,13 @@ def main() -> None:
         "modes": balance.model.info.n_modes,
         "delta_max": result.facts.delta_max_m,
     }
-    print(json.dumps(told))
+    print(json.dumps(told), flush=True)
 
 
 if __name__ == "__main__":
-    main()
+    for line in sys.stdin:
+        if (child := os.fork()) == 0:
+            tell(*json.loads(line))
+            sys.exit()
+        if os.waitpid(child, 0)[1]:
+            sys.exit(1)

@@ -1,6 +1,6 @@
 """Only what a scene asks for: unknowns, stored arrays, factorisations, systems and imports of every scene, counted.
 
-Every scene runs once in an interpreter of its own, on a mesh file, shortened where its length is not what counts.
+Every scene runs once in a process of its own, on a mesh file, shortened where its length is not what counts.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -72,16 +73,26 @@ def on_a_mesh_file(name: str, overrides: tuple[str, ...], folder: Path) -> list[
     return [f"geometry={{{mesh}, fixed_axes = {{{axes}}}{turning}}}", *(t for t in overrides if t not in geometry)]
 
 
+@pytest.fixture(scope="module")
+def probe() -> Iterator[subprocess.Popen[str]]:
+    command = [sys.executable, "-m", "tests.helpers.run_probe"]
+    with subprocess.Popen(command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        yield process
+
+
 @pytest.fixture(scope="module", params=RUNS)
-def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], dict]:
+def run(
+    request: pytest.FixtureRequest, probe: subprocess.Popen[str], tmp_path_factory: pytest.TempPathFactory
+) -> tuple[dict[str, Any], dict]:
     """What a run told and what is expected of it."""
     overrides, expected = RUNS[request.param]
     name = request.param.split(",")[0]
     arguments = on_a_mesh_file(name, overrides, tmp_path_factory.mktemp(name))
-    command = [sys.executable, "-m", "tests.helpers.run_probe", name, *arguments, "verdict.enabled=false"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.splitlines()[-1]), expected
+    asks, says = probe.stdin, probe.stdout
+    assert asks is not None
+    assert says is not None
+    print(json.dumps([name, [*arguments, "verdict.enabled=false"]]), file=asks, flush=True)
+    return json.loads(says.readline()), expected
 
 
 def test_a_run_models_and_keeps_what_its_scene_asks_for(run: tuple[dict[str, Any], dict]) -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.helpers.command import leave
 from tests.helpers.killed_runs import go_on
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.workflows.pictures import plots
@@ -37,7 +38,7 @@ SMALL = [
     "wear.lost_below=0",
     "verdict.enabled=false",
 ]
-COMMAND = [sys.executable, "-m", "tribodyn", "run", "beam", "--no-pictures"]
+SMALLER = [*SMALL, "geometry.n_patch=3", "response.points=10"]
 
 
 @pytest.fixture(scope="module")
@@ -45,10 +46,13 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Result:
     return pipeline.run(read("beam", SMALL), tmp_path_factory.mktemp("run"), Progress())
 
 
+def words(folder: Path, *arguments: str) -> list[str]:
+    overrides = [word for override in SMALLER for word in ("--set", override)]
+    return ["run", "beam", "--no-pictures", "--out", str(folder), *overrides, *arguments]
+
+
 def start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
-    smaller = [*SMALL, "geometry.n_patch=3", "response.points=10"]
-    overrides = [word for override in smaller for word in ("--set", override)]
-    command = [*COMMAND, "--out", str(folder), *overrides, *arguments]
+    command = [sys.executable, "-m", "tribodyn", *words(folder, *arguments)]
     return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
@@ -137,17 +141,14 @@ def test_transitions_are_located_where_every_law_can(tmp_path: Path) -> None:
 
 
 def test_killed_runs_resume_to_the_same_bits(tmp_path: Path) -> None:
-    undisturbed = start(tmp_path / "whole")
-    undisturbed.communicate()
-    whole = store.load(tmp_path / "whole" / "result.h5")
+    whole = pipeline.run(read("beam", SMALLER), tmp_path / "whole", Progress())
     assert whole.wear is not None
-    path, total = tmp_path / "result.h5", len(whole.wear.cycles)
-    for count in (1, total // 2):
-        process = start(tmp_path, "--resume")
-        wait_for_rows(process, path, count)
-        process.send_signal(signal.SIGKILL)
-        process.communicate()
-        assert store.load(path).state.startswith(("unfinished", "complete"))
+    path = tmp_path / "result.h5"
+    process = start(tmp_path)
+    wait_for_rows(process, path, len(whole.wear.cycles) // 2)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    assert store.load(path).state.startswith(("unfinished", "complete"))
     process = start(tmp_path, "--resume")
     _, err = process.communicate()
     assert process.returncode == 0, err
@@ -174,9 +175,9 @@ def test_a_run_killed_again_and_again_at_its_last_row_keeps_one_of_it(
 
 @pytest.mark.parametrize("rule", ["thesis", "error_controlled"])
 def test_ten_kills_at_random_moments_change_no_bit(rule: str, tmp_path: Path) -> None:
-    overrides = (*SMALL, f"wear.rule={rule}", "wear.step=40 %", "wear.tolerance=0.2", "wear.lost_below=0.01")
+    overrides = (*SMALLER, f"wear.rule={rule}", "wear.step=40 %", "wear.tolerance=0.2", "wear.lost_below=0.01")
     server = multiprocessing.get_context("forkserver")
-    server.set_forkserver_preload(["tests.helpers.killed_runs"])
+    server.set_forkserver_preload(["tests.helpers.killed_runs", "tests.helpers.warmed"])
     undisturbed = server.Process(target=go_on, args=(tmp_path, overrides))
     undisturbed.start()
     undisturbed.join()
@@ -224,21 +225,21 @@ def test_ctrl_c_keeps_what_was_computed_and_says_where(tmp_path: Path) -> None:
     assert len(wear.cycles) >= 2
 
 
-def test_a_failed_solve_says_where_and_leaves_with_3(tmp_path: Path) -> None:
-    process = start(tmp_path, "--set", "solver.tolerance=1e-50")
-    _, err = process.communicate()
-    assert process.returncode == 3
+def test_a_failed_solve_says_where_and_leaves_with_3(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, err = leave(words(tmp_path, "--set", "solver.tolerance=1e-50"), capsys)
+    assert code == 3
     assert err.count("\n") == 1
     assert "ended at 380 Hz" in err
     assert store.load(tmp_path / "result.h5").response is not None
 
 
-def test_resuming_another_scene_is_refused(finished: Result, tmp_path: Path) -> None:
+def test_resuming_another_scene_is_refused(
+    finished: Result, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     store.save(tmp_path / "result.h5", finished)
     sizes = ("--set", "geometry.n_patch=5", "--set", "response.points=25")
-    process = start(tmp_path, "--resume", *sizes, "--set", "contact.friction=0.4")
-    _, err = process.communicate()
-    assert process.returncode == 2
+    code, _, err = leave(words(tmp_path, "--resume", *sizes, "--set", "contact.friction=0.4"), capsys)
+    assert code == 2
     assert "contact.friction differs" in err
 
 

@@ -16,7 +16,7 @@ SMALL = (
     "geometry.n_length=4",
     "geometry.n_height=1",
     "reduction.modes=4",
-    "response.points=40",
+    "response.points=12",
     "harmonics.samples=32",
 )
 
