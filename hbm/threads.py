@@ -6,6 +6,7 @@ that was measured. So each entry of the solver is `single`, however it is called
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -28,9 +29,15 @@ def _controller() -> ThreadpoolController:
     return ThreadpoolController()
 
 
+def usable(count: int) -> int:
+    """As many of `count` threads as there are processors: more would wait for each other, a million for ever."""
+    return min(count, os.cpu_count() or 1)
+
+
 @contextmanager
 def limited(count: int) -> Iterator[None]:
-    """So many BLAS threads within the context, also in what is `single` there."""
+    """So many BLAS threads within the context, also in what is `single` there, but not more than `usable`."""
+    count = usable(count)
     before = _limit.set(count)
     try:
         with _controller().limit(limits=count):

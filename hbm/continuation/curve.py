@@ -16,6 +16,9 @@ from tribodyn.hbm.outcome import CONVERGED
 KINK_ANGLE = 0.75  # turn between neighbouring points beyond which they lie on either side of a kink [rad]
 FOLD_NEWTON_SHARE = 1e-3  # of Newton's tolerance elsewhere: near a fold the state goes as the root of the parameter
 FOLD_TRIALS = 80
+# Change of the parameter from trial to trial, over the tolerance, at which it rests: a trial goes at least 0.02 of the
+# way to the other end, and rounding may turn the tangent there for ever.
+AT_REST = 0.01
 FOLD_TANGENT_ACCURACY = 1e-10  # relative; the sign of their frequency part says where the fold is
 # A step whose cubic has less than this share of the parameter that its ends have may hide two folds: contact makes the
 # slope change by pieces, which a cubic rounds off.
@@ -202,7 +205,8 @@ def locate_fold(path: Parameter, segment: Segment, options: NewtonOptions, toler
         ends = [replace(p, tangent=_sharp_tangent(path, p, metric, tight)) for p in (segment.start, segment.end)]
         if ends[0].tangent.p * ends[1].tangent.p >= 0:  # one end is the fold, up to the accuracy of its tangent before
             return replace(min(ends, key=lambda end: abs(end.tangent.p)), fold=True)
-        segment, weight, corner = Segment(ends[0], ends[1], metric), [1.0, 1.0], np.inf
+        segment, weight, corner, last = Segment(ends[0], ends[1], metric), [1.0, 1.0], np.inf, np.inf
+        rests = 0
         for _ in range(FOLD_TRIALS):
             before, corner = corner, _corner_value(segment)
             settled = abs(corner - before) <= 0.1 * tolerance * abs(corner)
@@ -218,7 +222,10 @@ def locate_fold(path: Parameter, segment: Segment, options: NewtonOptions, toler
                 segment, weight = Segment(segment.start, point, metric), [0.5 * weight[0], 1.0]
             steepest = max(abs(segment.start.tangent.p), abs(segment.end.tangent.p))
             slope = abs(tangent.p) if segment.angle < KINK_ANGLE else steepest
+            rests, last = rests + 1 if abs(value - last) <= AT_REST * tolerance * abs(value) else 0, value
             if settled or slope * segment.length <= tolerance * abs(value) or segment.length < 1e-13:
+                return point
+            if rests == 2:  # once it may be as high on either side of the fold
                 return point
     except BorderFailed:
         return None

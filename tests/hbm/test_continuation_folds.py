@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from tests.helpers.continuation_models import Duffing, Lifting
-from tribodyn.hbm.continuation import parameter
+from tribodyn.hbm.continuation import curve, parameter
+from tribodyn.hbm.continuation.bordered import Direction, Metric
 from tribodyn.hbm.continuation.folds import FoldOptions, track_fold
 from tribodyn.hbm.continuation.methods import arc_length
+from tribodyn.hbm.newton import NewtonOptions
 
 
 @pytest.fixture(scope="module")
@@ -86,3 +88,34 @@ def test_it_refuses_what_has_no_fold(duffing_branch):
     few = track_fold(path, 1.0, 0.1, branch.omega[i], branch.contact[i].reshape(1, 1, -1), FoldOptions(max_points=3))
     assert str(few.end).endswith("3 points were allowed")
     assert len(few.omega) == 3
+
+
+def test_a_fold_whose_points_rounding_holds_in_place_is_found_in_few_solves(duffing_branch, monkeypatch):
+    """Solves that are accurate to 3e-3 only: the tangent of each has the same sign, however often it is asked."""
+    exact, found, solves = curve.bordered.correct, [], []
+
+    def rounded(path, guess, border, metric, options):
+        solves.append(guess.p)
+        for point, solution in found:
+            if metric.norm(guess - point) < 3e-3:
+                return solution, point.p
+        solution, value = exact(path, guess, border, metric, options)
+        found.append((Direction(solution.state.flat, value), solution))
+        return solution, value
+
+    balance = Duffing().balance()
+    i = duffing_branch.folds[0]
+    place = [Direction(duffing_branch.contact[j].reshape(1, -1), duffing_branch.omega[j]) for j in (i - 1, i + 1)]
+    metric = Metric(float(np.linalg.norm(place[0].x)), 1.0)
+    along = metric.unit(place[1] - place[0])
+    path, newton = parameter.of(balance), NewtonOptions()
+    ends = []
+    for at in place:
+        solution, value = exact(path, at, along, metric, newton)
+        tangent = curve.bordered.tangent(path, value, solution.state, along, metric, newton, 1e-6)
+        ends.append(curve.CurvePoint.of(value, solution, tangent))
+    monkeypatch.setattr(curve.bordered, "correct", rounded)
+    fold = curve.locate_fold(path, curve.Segment(*ends, metric), newton, 1e-9)
+    assert fold is not None
+    assert len(solves) < 20
+    np.testing.assert_allclose(fold.value, duffing_branch.omega[i], rtol=1e-7)

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from tribodyn.workflows.benchmarks import fuzz
+from tribodyn.workflows.accuracy.statement import Statement, Verdict
+from tribodyn.workflows.api import scenes
+from tribodyn.workflows.benchmarks import fuzz, fuzz_result, fuzz_runs
 from tribodyn.workflows.command import main as cli
+from tribodyn.workflows.result import store
 
 TINY = (
     "harmonics.kept=[0, 1]",
@@ -59,31 +65,46 @@ def test_every_key_is_tried() -> None:
     ],
 )
 def test_a_wrong_end_is_seen(does: str, end: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fuzz, "LATE", 1.0)
+    monkeypatch.setattr(fuzz_runs, "LATE", 1.0)
     monkeypatch.setattr(fuzz, "cases", lambda *given: [("scene.title", '"abc"')])  # what reading refuses is not run
 
-    def instead(arguments: object) -> None:
+    def instead(words: list[str]) -> None:
+        if 'scene.title="abc"' not in words:
+            print("tribodyn: no.", file=sys.stderr)
+            raise SystemExit(2)
         exec(does, {})
 
     (tried,) = fuzz.fuzz("beam", TINY, seconds=1.0, command=instead)
     assert tried.end == end
 
 
-def test_what_is_not_finite_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    class Summary:
-        def __init__(self, peak: float, error: float | None) -> None:
-            verdict = {"energy": {"stated": True, "value": 1.0, "error": error}}
-            self.of = {"peak_hz": (1.0, peak), "verdict": verdict}
+def test_a_scene_that_does_not_end_well_as_it_is_is_no_scene_to_fuzz() -> None:
+    def fails(words: list[str]) -> None:
+        raise KeyError(words)
 
-        def summary(self) -> dict[str, object]:
-            return self.of
+    with pytest.raises(RuntimeError, match="beam as it is does not end well"):
+        fuzz.fuzz("beam", TINY, values=40, runs=1, command=fails)
 
-    for peak, error, end in (
-        (2.0, 0.1, "success"),
-        (float("nan"), 0.1, "not finite: peak_hz"),
-        (2.0, None, "success"),
-        (2.0, float("inf"), "not finite: verdict of energy"),
-    ):
-        result = Summary(peak, error)
-        monkeypatch.setattr(fuzz.store, "load", lambda path, result=result: result)
-        assert fuzz._end(0, "", tmp_path) == end
+
+def test_a_wrong_number_in_a_result_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    result = scenes.run("beam", overrides=TINY)
+    wear = result.wear
+    assert wear is not None
+    told = {"depth": Statement(1.0, 0.1, "mesh", True, "all measured")}
+
+    def end(**changes: object) -> str:
+        store.save(tmp_path / "changed.h5", replace(result, **changes))
+        return fuzz_result.wrong(tmp_path / "changed.h5")
+
+    def verdict(**changes: object) -> str:
+        return end(verdict=Verdict({"depth": replace(told["depth"], **changes)}, (), 0.0).dumped())
+
+    assert end() == verdict() == verdict(error=None) == ""
+    assert end(wear=replace(wear, depth=np.full_like(wear.depth, np.inf))) == "not finite: wear.depth"
+    assert end(facts=replace(result.facts, delta_max_m=float("nan"))) == "not finite: facts.delta_max_m"
+    assert verdict(value=None) == "verdict: depth is stated without a value"
+    assert verdict(value=float("nan")) == "verdict: depth is no number"
+    assert verdict(value=-1.0) == "verdict: depth is negative"
+    assert verdict(error=float("inf")) == "verdict: depth has an error that is no number"
+    assert verdict(error=0.6) == "verdict: depth is stated with an error above 50%"
+    assert verdict(stated=False, reason="") == "verdict: depth is not stated, for no reason"

@@ -44,7 +44,7 @@ from tribodyn.workflows.studies.tracking import Track
 if TYPE_CHECKING:  # what takes long to import is imported where it is needed
     from tribodyn.workflows.benchmarks.bench import Timing
     from tribodyn.workflows.benchmarks.extremes import Trial
-    from tribodyn.workflows.benchmarks.fuzz import Tried
+    from tribodyn.workflows.benchmarks.fuzz_runs import Tried
     from tribodyn.workflows.benchmarks.planted_faults import Seen
     from tribodyn.workflows.benchmarks.scaling import SizeCost
     from tribodyn.workflows.benchmarks.scoreboard import Row

@@ -1,8 +1,7 @@
 """Nasty values for every key of a scene: each run ends well, is refused, or fails with a sentence, and in time.
 
-Every run is the command `tribodyn run` in a process of its own, forked from one that has loaded everything. A limit of
-its processor seconds kills what does not end. A value that reading the scene refuses needs no run, and of several that
-make the same scene (`1`, `true` for a switch, a value that is the key's default) one is run.
+A value that reading the scene refuses needs no run, and of several that make the same scene (`1`, `true` for a switch,
+a value that is the key's default) one is run.
 """
 
 from __future__ import annotations
@@ -10,27 +9,18 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import resource
-import shutil
-import sys
 import time
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
-from multiprocessing import connection, get_context
-from multiprocessing.process import BaseProcess
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 import numpy as np
 
-from tribodyn.fem import factor
 from tribodyn.workflows.accuracy.time_limit import processor_seconds
-from tribodyn.workflows.command.exits import BAD_INPUT, FAILED_SOLVE
-from tribodyn.workflows.result import store
-from tribodyn.workflows.run import pipeline  # noqa: F401  # loaded once, before the processes are forked
+from tribodyn.workflows.benchmarks.fuzz_runs import ACCEPTED, REFUSED, Case, Command, Runs, Tried
 from tribodyn.workflows.scene import scene_file
 
 NASTY = (
@@ -40,54 +30,9 @@ NASTY = (
 )  # fmt: skip
 """TOML values, thirty of them."""
 
-ENDS = {0: "success", BAD_INPUT: "refused", FAILED_SOLVE: "failed"}
-REFUSED, ACCEPTED = "refused when read", "accepted when read"  # without a run
-GOOD = (*ENDS.values(), REFUSED, ACCEPTED)
 ROWS = "rows.jsonl"  # of a folder that keeps runs
-LATE = 10.0  # times the limit, of the clock, after which a process that sleeps is killed; what compiling may take
 
-
-@dataclass
-class Running:
-    """What a process tries; place : its folder; worked : its processor seconds so far; since : when it last worked."""
-
-    key: str
-    value: str
-    place: Path
-    worked: float
-    since: float
-
-
-Case = tuple[str, str]  # key and value
 Row = TypeVar("Row", "_Meant", "Tried")
-Active = dict[BaseProcess, Running]
-
-
-@dataclass(frozen=True)
-class Tried:
-    """One value of one key.
-
-    end : success, refused or failed (with one sentence), else what is wrong with it; without a run how reading ended
-    said : the sentence, or what was printed; seconds : of the processor
-    like : another key=value that makes the same scene and stands for it, empty where it is the one
-    """
-
-    scene: str
-    key: str
-    value: str
-    end: str
-    said: str
-    seconds: float
-    like: str = ""
-
-    @property
-    def good(self) -> bool:
-        """Whether the run ended as a run may."""
-        return self.end in GOOD
-
-    def record(self) -> dict[str, Any]:
-        """Plain data."""
-        return asdict(self)
 
 
 def keys(scene: str, overrides: Sequence[str] = ()) -> list[str]:
@@ -124,15 +69,17 @@ def fuzz(
     say: Callable[[str], None] = lambda sentence: None,
     folder: Path | None = None,
     *,
-    command: Callable[[list[str]], None],
+    command: Command,
 ) -> list[Tried]:
     """Try nasty values of the keys of a scene, one at a time: all are read, and the scenes that come out of it are run.
 
     overrides : that make the scene small, so that a run takes a second; values : how many pairs of key and value, all
     by default; runs : how many of the scenes that are accepted, all by default; both are drawn with `seed`
-    seconds : of the processor that a run may take; folder : keeps the runs, those that it holds are not run again
+    seconds : of the processor that a run may take
+    folder : keeps the runs; those that it holds are not run again, unless they ended wrong
     command : what `tribodyn` does with the words of a command line; it leaves by SystemExit
-    Raises  SceneError for a scene that cannot be read, ValueError where processes cannot be forked
+    Raises  SceneError for a scene that cannot be read, ValueError where processes cannot be forked, RuntimeError where
+        the scene as it is does not end well
     """
     if not hasattr(os, "fork"):
         raise ValueError("this system cannot fork processes, as fuzz does")
@@ -140,11 +87,12 @@ def fuzz(
     refused, scenes, unclear = _read_all(scene, overrides, cases(scene, overrides, values, seed), seconds, say, rows)
     order = np.random.default_rng(seed).permutation(len(scenes))[:runs]
     drawn = [scenes[i][0] for i in sorted(order)] + unclear
-    missing = [case for case in drawn if case not in rows.run]
-    for one in _runs(scene, tuple(overrides), missing, seconds, workers, command) if missing else ():
+    missing = [case for case in drawn if case not in rows.run or not rows.run[case].good]
+    runner = Runs(scene, tuple(overrides), seconds, workers, command)
+    for left, one in zip(reversed(range(len(missing))), runner.of(missing) if missing else (), strict=True):
         rows.add(one)
-        if len(rows.run) % 20 == 0 or not one.good:
-            say(f"{scene}: {len(rows.run)} runs of {len(drawn)}, {one.key}={one.value}: {one.end}")
+        if left % 20 == 0 or not one.good:
+            say(f"{scene}: {len(drawn) - left} runs of {len(drawn)}, {one.key}={one.value}: {one.end}")
     found = [*refused, *(rows.run[case] for case in unclear)]
     for who, *others in scenes:
         first = rows.run.get(who, Tried(scene, *who, ACCEPTED, "", 0.0))
@@ -167,7 +115,7 @@ def _read_all(
         if number % 1000 == 999:
             say(f"{scene}: {number + 1} of {len(todo)} values are read, {len(meaning)} scenes come out of them")
         meant = rows.read.get((key, value))
-        if meant is None:
+        if meant is None or not (meant.refusal or meant.digest):
             meant = rows.add(_read(scene, overrides, key, value, seconds))
         if meant.refusal:
             refused.append(Tried(scene, key, value, REFUSED, f"tribodyn: {meant.refusal}", meant.seconds))
@@ -176,37 +124,6 @@ def _read_all(
         else:
             unclear.append((key, value))
     return refused, list(meaning.values()), unclear
-
-
-def _runs(
-    scene: str,
-    overrides: tuple[str, ...],
-    todo: Sequence[Case],
-    seconds: float,
-    workers: int,
-    command: Callable[[list[str]], None],
-) -> Iterator[Tried]:
-    """Run cases in processes of their own."""
-    factor.pardiso_available()  # loads it
-    fork = get_context("fork")
-    active: Active = {}
-    with TemporaryDirectory() as folder:
-        as_it_is = (command, scene, overrides, Path(folder), LATE * seconds)
-        unchanged = fork.Process(target=_run, args=as_it_is)  # compiles what is not compiled yet, which takes its time
-        unchanged.start()
-        unchanged.join(LATE * LATE * seconds)  # of the clock; its own limit is of the processor
-        unchanged.kill()
-        for number, (key, value) in enumerate(todo):
-            while len(active) >= workers:
-                yield from _ended(scene, active, seconds)
-            place = Path(folder) / str(number)
-            place.mkdir()
-            changed = (*overrides, f"{key}={value}")
-            process: BaseProcess = fork.Process(target=_run, args=(command, scene, changed, place, seconds))
-            process.start()
-            active[process] = Running(key, value, place, 0.0, time.monotonic())
-        while active:
-            yield from _ended(scene, active, seconds)
 
 
 @dataclass(frozen=True)
@@ -274,89 +191,6 @@ def _read(scene: str, overrides: Sequence[str], key: str, value: str, seconds: f
     except Exception:  # a traceback of the command tells more
         digest = ""
     return _Meant(key, value, digest, refusal, time.process_time() - clock)
-
-
-def _ended(scene: str, active: Active, seconds: float) -> list[Tried]:
-    """Wait for a process to end; those that have are taken from `active`, those that sleep too long are killed.
-
-    A busy machine makes a run late, not wrong: only the clock of a process that does not work runs.
-    """
-    connection.wait([process.sentinel for process in active], timeout=1.0)
-    found = []
-    for process, running in list(active.items()):
-        if (worked := _worked(process.pid)) > running.worked:
-            running.worked, running.since = worked, time.monotonic()
-        if process.is_alive() and time.monotonic() - running.since > LATE * seconds:
-            process.kill()
-            process.join()
-        if process.is_alive():
-            continue
-        process.join()
-        del active[process]
-        place = running.place
-        printed = (place / "printed").read_text(errors="replace") if (place / "printed").exists() else ""
-        spent = float((place / "spent").read_text()) if (place / "spent").exists() else seconds
-        end = _end(process.exitcode, printed, place / "out" / "result.h5")
-        lines = [line for line in printed.splitlines() if line.startswith("tribodyn:")] if end in GOOD else [printed]
-        found.append(Tried(scene, running.key, running.value, end, "\n".join(lines)[-2000:], spent))
-        shutil.rmtree(place)
-    return found
-
-
-def _worked(pid: int | None) -> float:
-    """Processor seconds of a process, 0 where the system does not tell (Linux does, in /proc)."""
-    try:
-        told = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        return 0.0
-    return (int(told[11]) + int(told[12])) / os.sysconf("SC_CLK_TCK")
-
-
-def _end(code: int | None, printed: str, file: Path) -> str:
-    if code is not None and code < 0:
-        return "too long" if "Fatal" not in printed else f"killed by signal {-code}"
-    if "Traceback" in printed or code not in ENDS:
-        return "traceback"
-    if "Warning" in printed:
-        return "a warning of a library"
-    if code == 0 and (what := _not_finite(file)):
-        return f"not finite: {what}"
-    if code and sum(line.startswith("tribodyn:") for line in printed.splitlines()) != 1:
-        return "no sentence"
-    return ENDS[code]
-
-
-def _not_finite(file: Path) -> str:
-    """A number of the result that is none, or a verdict that states nothing as something."""
-    summary = store.load(file).summary()
-    for name, value in summary.items():
-        numbers = value if isinstance(value, (list, tuple)) else [value]
-        if any(isinstance(number, float) and not np.isfinite(number) for number in numbers):
-            return name
-    for name, said in (summary["verdict"] or {}).items():
-        error = said["error"]
-        if said["stated"] and (said["value"] is None or not 0 <= (error or 0.0) < np.inf):  # None: it is not known
-            return f"verdict of {name}"
-    return ""
-
-
-def _run(
-    command: Callable[[list[str]], None], scene: str, overrides: tuple[str, ...], place: Path, seconds: float
-) -> None:
-    """The command in this process, which ends with its exit code."""
-    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
-    resource.setrlimit(resource.RLIMIT_CPU, (int(np.ceil(seconds)), hard))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    with (place / "printed").open("w") as printed:
-        os.dup2(printed.fileno(), 1)
-        os.dup2(printed.fileno(), 2)
-        sys.stdout = sys.stderr = printed
-        words = ["run", scene, "--no-pictures", "--out", str(place / "out")]
-        try:
-            command([*words, *(word for text in overrides for word in ("--set", text))])
-        finally:
-            printed.flush()
-            (place / "spent").write_text(str(time.process_time()))
 
 
 def counts(tried: Sequence[Tried]) -> dict[str, dict[str, Any]]:

@@ -40,7 +40,7 @@ def fuzz(
     workers
         Runs at a time.
     out
-        Folder that keeps the runs: the same command goes on where it was ended.
+        Folder that keeps the runs: the same command goes on where it was ended, and runs again what ended wrong.
     as_json
         Print JSON for machines.
     """

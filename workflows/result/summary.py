@@ -38,17 +38,22 @@ def summary(result: Result) -> dict[str, Any]:
     verdict : quantity -> value, error, dominated_by, stated, reason, see workflows.accuracy.statement; None without
     error_budget : what each discretisation contributes, see result.facts.BudgetEntry
     """
-    numbers: dict[str, Any] = {"state": result.state, "finished": result.finished}
-    numbers |= {"seconds": result.facts.seconds, "wear_steps": result.wear_steps}
-    numbers |= _wear(result) | _peak(result) | _stable_peak(result)
+    return {name: plain(value) for name, value in numbers(result).items()}
+
+
+def numbers(result: Result) -> dict[str, Any]:
+    """What `summary` tells, with nan and inf where they are."""
+    found: dict[str, Any] = {"state": result.state, "finished": result.finished}
+    found |= {"seconds": result.facts.seconds, "wear_steps": result.wear_steps}
+    found |= _wear(result) | _peak(result) | _stable_peak(result)
     for name in ("full_dofs", "model_dofs", "contact_pairs", "unknowns", "delta_max_m"):
-        numbers[name] = getattr(result.facts, name)
-    numbers |= _curve(result)
-    numbers["joints"] = by_joint(result)
-    numbers["free_hz"] = result.facts.free_hz.tolist()
-    numbers["error_budget"] = [vars(entry) for entry in result.budget]
-    numbers["verdict"] = statement.record(result.verdict)
-    return {name: plain(value) for name, value in numbers.items()}
+        found[name] = getattr(result.facts, name)
+    found |= _curve(result)
+    found["joints"] = by_joint(result)
+    found["free_hz"] = result.facts.free_hz.tolist()
+    found["error_budget"] = [vars(entry) for entry in result.budget]
+    found["verdict"] = statement.record(result.verdict)
+    return found
 
 
 def by_joint(result: Result) -> dict[str, dict[str, Any]]:

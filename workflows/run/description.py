@@ -16,6 +16,7 @@ from tribodyn.geometry import mesh as mesh_reader
 from tribodyn.geometry.numbering import REFERENCE_POINTS, permutation
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
+from tribodyn.hbm.threads import usable
 from tribodyn.version import package_version
 from tribodyn.workflows.result.facts import Around, Facts, Stage
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
@@ -87,7 +88,7 @@ def provenance(file: SceneFile) -> dict[str, str]:
         "python": platform.python_version(),
         "platform": platform.platform(),
         "seed": str(SEED),
-        "threads": str(file.scene.solver.threads),
+        "threads": str(usable(file.scene.solver.threads)),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
     }
 

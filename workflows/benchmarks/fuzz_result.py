@@ -1,0 +1,80 @@
+"""What is wrong with the result of a nasty scene: a number that is none, a verdict that says what cannot be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from math import isclose
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tribodyn.workflows.accuracy import statement
+from tribodyn.workflows.accuracy.statement import LARGEST, Verdict
+from tribodyn.workflows.result import store, summary
+from tribodyn.workflows.result.result import Result
+
+MAY_LACK = (
+    "patch.free_deflection", "stability.growth", "worn.omega", "worn.amplitude", "wear.preload_at_rest",
+    "bounds.amplitude_low", "bounds.amplitude_high", "bounds.energy_low", "bounds.energy_high",
+)  # fmt: skip
+"""Arrays of a result that have nan where there is no number, as their classes say."""
+
+MAY_BE_NEGATIVE = ("preload",)  # of a contact that is glued
+
+
+def wrong(file: Path) -> str:
+    """What is wrong with a result file, empty where nothing is."""
+    result = store.load(file)
+    for name, value in _numbers(result):
+        if name not in MAY_LACK and not np.isfinite(value).all():
+            return f"not finite: {name}"
+    verdict = statement.loaded(result.verdict) if result.verdict else None
+    return "" if verdict is None else _of_verdict(verdict, summary.numbers(result))
+
+
+def _numbers(result: Result) -> Iterator[tuple[str, Any]]:
+    """Names and values of all real or complex numbers of a result, its arrays, its facts and its summary."""
+    parts = {item.name: getattr(result, item.name) for item in fields(result)}
+    for part, of in parts.items():
+        if is_dataclass(of):
+            for item in fields(of):
+                yield from _within(f"{part}.{item.name}", getattr(of, item.name))
+    summed = summary.numbers(result)
+    del summed["verdict"], summed["error_budget"]  # inf is there "nobody knows"
+    yield from _within("summary", summed)
+
+
+def _within(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, dict):
+        for key, one in value.items():
+            yield from _within(f"{name}.{key}", one)
+    elif isinstance(value, (list, tuple)):
+        for one in value:
+            yield from _within(name, one)
+    elif isinstance(value, (float, complex)) or (isinstance(value, np.ndarray) and value.dtype.kind in "fc"):
+        yield name, value
+
+
+def _of_verdict(verdict: Verdict, summed: dict[str, Any]) -> str:
+    """What a verdict says that cannot be, or that the summary of its result contradicts."""
+    frequency = summed["peak_hz"][0] if summed["wear_steps"] else None
+    told = {"life": None if summed["joints"] else summed["life_cycles"], "peak_frequency": frequency}
+    for name, said in verdict.statements.items():
+        value, error = said.value, said.error
+        other = told.get(name)
+        same = value is None or other is None or isclose(value, other, rel_tol=0.01)
+        trouble = (
+            (said.stated and value is None, "is stated without a value"),
+            (not said.stated and not said.reason, "is not stated, for no reason"),
+            (value is not None and not np.isfinite(value), "is no number"),
+            (value is not None and value < 0 and name not in MAY_BE_NEGATIVE, "is negative"),
+            (error is not None and not 0 <= error < np.inf, "has an error that is no number"),
+            (said.stated and error is not None and error > LARGEST, f"is stated with an error above {LARGEST:.0%}"),
+            (not same, "is not what the summary tells"),
+        )
+        for found, what in trouble:
+            if found:
+                return f"verdict: {name} {what}"
+    return ""
