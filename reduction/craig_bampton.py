@@ -25,6 +25,7 @@ from tribodyn.reduction.truncation import frequency_error
 POINT_LOAD = 30  # a load or output on more DOFs than this is distributed: projected, but it makes no masters
 BLOCK = 128  # right-hand sides solved at once
 REPORTED_MODES = 10
+FEW_SLAVES = 400  # all of whose modes may be kept
 
 
 def craig_bampton(
@@ -135,7 +136,9 @@ def fixed_interface_modes(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Modes with the masters held: omega (k,) [rad/s], phi (n_slave, k), and the first omega left out (inf for none).
 
-    Raises  ValueError where not exactly one of n_modes, cutoff is given, or more modes are asked than there are
+    Raises  ValueError where not exactly one of n_modes, cutoff is given, more modes are asked than there are, or the
+        cutoff is beyond what the mesh resolves: more modes than half of the slaves. How many there will be is foretold
+        as for a bar in bending, whose number of modes rises as the root of frequency; elsewhere it rises faster
     """
     n_slave = K_ss.shape[0]
     if (n_modes is None) == (cutoff is None):
@@ -147,6 +150,12 @@ def fixed_interface_modes(
         omega, phi = modes(K_ss, M_ss, min(wanted + 1, n_slave), factor=factor)
         if cutoff is None or omega[-1] > 2 * np.pi * cutoff or len(omega) == n_slave:
             break
+        expected = len(omega) * np.sqrt(2 * np.pi * cutoff / max(omega[-1], 1e-300))
+        if n_slave > FEW_SLAVES and 2 * expected > n_slave:
+            raise ValueError(
+                f"the cutoff of the reduction, {cutoff:g} Hz, is beyond what the mesh resolves: mode {len(omega)} of "
+                f"{n_slave} has {omega[-1] / (2 * np.pi):.3g} Hz; lower reduction.cutoff, or look at the material"
+            )
         wanted *= 2
     kept = wanted if cutoff is None else int(np.sum(omega <= 2 * np.pi * cutoff))
     return omega[:kept], phi[:, :kept], float(omega[kept]) if kept < len(omega) else np.inf

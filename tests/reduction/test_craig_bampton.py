@@ -110,6 +110,10 @@ def test_cutoff_keeps_the_modes_below_it(part, model):
     assert several.info.n_modes > 15
     assert several.info.first_omitted_frequency > 2 * omitted
     assert craig_bampton(part.system, part.interface, cutoff=1.0).info.n_modes == 0
+    with pytest.raises(
+        ValueError, match=r"beyond what the mesh resolves: mode 17 of \d+ has .* Hz; lower reduction.cutoff"
+    ):
+        craig_bampton(part.system, part.interface, cutoff=1e9)
     for both in ({}, {"n_modes": 3, "cutoff": 1e3}):
         with pytest.raises(ValueError, match="one of the two"):
             craig_bampton(part.system, part.interface, **both)

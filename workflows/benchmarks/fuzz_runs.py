@@ -99,16 +99,16 @@ class Runs:
         tells.close()
         try:
             while True:
-                yield told.recv()
+                one = told.recv()
+                if isinstance(one, str):
+                    raise RuntimeError(f"{self.scene} as it is does not end well: {one}; try it with tribodyn run")
+                yield one
         except EOFError:
             warm.join()
         finally:
             warm.terminate()
         if warm.exitcode:
-            raise RuntimeError(
-                f"{self.scene} as it is does not end well within {LATE * self.seconds:g} s of the processor, or prints "
-                "a warning of a library: try it with tribodyn run and the same --set"
-            )
+            raise RuntimeError(f"{self.scene} as it is does not end within {LATE * self.seconds:g} s of the processor")
 
     def _warm(self, tells: connection.Connection, todo: Sequence[Case]) -> None:
         """Run the scene as it is in this process, then fork one for each case."""
@@ -117,8 +117,9 @@ class Runs:
             before = resource.getrlimit(resource.RLIMIT_CPU)
             code = self._run(self.overrides, folder, LATE * self.seconds)  # compiles what is not compiled yet
             resource.setrlimit(resource.RLIMIT_CPU, before)
-            if _end(code, folder) not in GOOD:
-                raise SystemExit(1)
+            if (end := _end(code, folder)) not in GOOD:
+                tells.send(end)
+                return
             shutil.rmtree(folder / "out", ignore_errors=True)
             for one in self._forked(folder, todo):
                 tells.send(one)

@@ -66,7 +66,8 @@ def described(
         pairs |= {name: own for name, own in reduced.info.joints.items() if name in pairs}
         facts = replace(facts, joints=json.dumps({name: [own.start, own.stop] for name, own in pairs.items()}))
     if file.scene.wear is not None:
-        facts = replace(facts, delta_max_m=delta_max(file.scene, free, i.area), wear_split=file.scene.wear.split)
+        depth = delta_max(file.scene, free, i.area)  # none where nothing holds the part without its contact
+        facts = replace(facts, delta_max_m=depth if np.isfinite(depth) else None, wear_split=file.scene.wear.split)
     if isinstance(file.scene, MeshScene) and (wheel := file.scene.wheel) is not None:
         facts = replace(facts, around=Around(wheel.sectors, wheel.engine_order, np.array(wheel.axis)))
     if choice is not None:
