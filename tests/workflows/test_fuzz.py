@@ -18,7 +18,7 @@ from tribodyn.workflows.result import store
 TINY = (
     "harmonics.kept=[0, 1]",
     "geometry.n_patch=3", "geometry.n_length=2", "geometry.n_height=1", "reduction.modes=3", "response.points=6",
-    "wear.max_steps=1", "verdict.enabled=false",
+    "wear.max_steps=1", "verdict.seconds=0.2",
 )  # fmt: skip
 
 
