@@ -24,6 +24,7 @@ from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.threads import single
 
 LINEAR_ACCURACY = 1e-3  # of the linear solves behind the estimate, which is of first order itself
+WIDE_ERROR = 1e-5  # of the compliance at the highest harmonic of a wide balance; it falls with a power of the harmonic
 # an output that vibrates less than this share of the largest vibration is measured against that share
 LEAST_VIBRATION_SHARE = 1e-2
 # useful harmonics in a row, the smallest first, after which no more are tried for dropping
@@ -163,7 +164,7 @@ def widened(balance: HarmonicBalance, highest: int) -> HarmonicBalance:
         springs = own.k
     known = _WIDE.get(own)
     if known is None or known.basis.harmonics[-1] < top or not np.array_equal(known.k, springs):
-        known = _WIDE[own] = ContactCompliance(balance.model, springs, basis, excitation, balance.omega_max)
+        known = _WIDE[own] = ContactCompliance(balance.model, springs, basis, excitation, balance.omega_max, WIDE_ERROR)
     return replace(balance, basis=basis, excitation=excitation, compliance=known.restricted(basis), at_rest=None)
 
 

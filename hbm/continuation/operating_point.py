@@ -248,6 +248,8 @@ class AtPeak:
         while solves < 60:
             side = float(np.sign(here.slope))
             if uphill is not None and other is not None:
+                if abs(uphill.omega - other.omega) <= resolution:  # as about a kink, where no slope vanishes
+                    break
                 target = _zero(uphill, other)
             elif before is None:
                 target = here.omega + (here.distance if abs(here.distance) < 20 * stride else side * stride)

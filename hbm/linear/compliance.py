@@ -17,7 +17,7 @@ import numpy as np
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import all_harmonics
-from tribodyn.hbm.linear.expansion import Expansion, UnbalancedLoad
+from tribodyn.hbm.linear.expansion import WANTED_ERROR, Expansion, UnbalancedLoad
 from tribodyn.hbm.linear.ritz_expansion import RitzExpansion
 from tribodyn.reduction.model import ReducedModel
 
@@ -32,10 +32,17 @@ class ContactCompliance:
     model : reduced model; stiffness : (n_pair, n_component) stuck springs [N/m], of a model with residual flexibility
         those that this was made with
     excitation : loads whose names are ports; omega_max : largest excitation frequency that will be asked for [rad/s]
+    wanted : relative error of dense compliances at the highest harmonic of it that is small enough
     """
 
     def __init__(
-        self, model: ReducedModel, stiffness: np.ndarray, basis: HarmonicBasis, excitation: Excitation, omega_max: float
+        self,
+        model: ReducedModel,
+        stiffness: np.ndarray,
+        basis: HarmonicBasis,
+        excitation: Excitation,
+        omega_max: float,
+        wanted: float = WANTED_ERROR,
     ):
         self.basis = basis
         self.k = np.asarray(stiffness, float).ravel()
@@ -61,7 +68,7 @@ class ContactCompliance:
                 ritz = RitzExpansion(system, np.asarray(b), self.k, ports, s_max, model.residual)
                 self.groups.append((ritz, positions))
                 continue
-            self.groups.append((Expansion(system, np.asarray(b), self.k, ports, s_max), positions))
+            self.groups.append((Expansion(system, np.asarray(b), self.k, ports, s_max, wanted), positions))
             if mirrored:
                 self.groups.append((self.groups[-1][0].mirrored(), mirrored))
             if basis.has_static and 0 in positions:

@@ -65,7 +65,7 @@ class Expansion:
 
     system : dense, b : (n_contact, n) contact map, stiffness : (n_contact,) stuck contact springs [N/m]
     ports : (n_port, n) rows; contact rows first
-    s_max : largest h w that will be asked for [rad/s]
+    s_max : largest h w that will be asked for [rad/s]; wanted : relative error there that is small enough
     w0 : (n_port, n_port) W_0; b : (n_port, m) modes; e : (order - 2, n_port, m) W_k C Phi s_max^(k+1) at the ports,
         all three views of `columns` = [w0, b, e_0, ...]
     w0_single, b_single : those of the contacts in single precision
@@ -77,7 +77,13 @@ class Expansion:
     """
 
     def __init__(
-        self, system: SecondOrderSystem, b: np.ndarray, stiffness: np.ndarray, ports: np.ndarray, s_max: float
+        self,
+        system: SecondOrderSystem,
+        b: np.ndarray,
+        stiffness: np.ndarray,
+        ports: np.ndarray,
+        s_max: float,
+        wanted: float = WANTED_ERROR,
     ):
         self.n_port, self._n_contact = len(ports), len(b)
         self.s_unit = s_max or 1.0
@@ -136,7 +142,7 @@ class Expansion:
             moved = self.at(s).apply(np.eye(N_PROBE), slice(0, N_PROBE))[N_PROBE:]
             error = float(np.abs(moved - exact[few]).max() / np.abs(exact).max())
             # near a resonance rounding of the direct solve itself is what remains: more modes would not help
-            if error <= WANTED_ERROR or 0.5 * before < error < ROUNDING:
+            if error <= wanted or 0.5 * before < error < ROUNDING:
                 break
             before = error
         else:

@@ -9,12 +9,14 @@ from time import process_time
 import numpy as np
 
 from tribodyn.fem.interface import ContactInterface
+from tribodyn.hbm.wear.even_wear import depth_to_loss
 from tribodyn.workflows.accuracy import convergence, other_meshes, probes
 from tribodyn.workflows.accuracy.convergence import Difference
 from tribodyn.workflows.accuracy.other_meshes import Other
 from tribodyn.workflows.accuracy.probes import Answers, State
 from tribodyn.workflows.accuracy.statement import QUANTITIES, Contribution
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
+from tribodyn.workflows.result import summary
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.modelling import Model
@@ -96,6 +98,11 @@ class Probe:
         self._solve([other], seen, process_time() + self.seconds)
         return self._contributions("modes", seen)
 
+    @property
+    def _joint(self) -> str | None:
+        """The joint whose life is the life of the run, None where that is of the whole contact."""
+        return summary.first_lost(self.result)
+
     def _solve(self, others: Sequence[Other], seen: Seen, end: float) -> None:
         ours, wide = self.first.answers, None
         folded = isinstance(self.first.site, probes.OnCurve)
@@ -107,7 +114,7 @@ class Probe:
                     taken, model = self._built(other, seen)
                     there = probes.unworn(taken.file, model, folded)
                     theirs = None if wide is None else _with_more_harmonics(there)
-                    deepest = probes.deepest(taken.file, model)
+                    deepest = probes.deepest(taken.file, there, self._joint)
             except (TimeUp, ValueError, RuntimeError) as refusal:
                 why = self.skipped if isinstance(refusal, TimeUp) else f"{other.how}: {refusal}"
                 seen.refused[other.along] = why
@@ -122,12 +129,14 @@ class Probe:
     ) -> None:
         """Add the differences to a mesh of a size.
 
-        deepest : delta_max there [m]
+        deepest : how deep the contact may wear there [m]
         """
         pairs = {name: (a, b) for name, a, b in compared(theirs, ours)}
         if self.result.wear_steps:
             reach = self.result.facts.delta_max_m
-            pairs["depth"] = (deepest, np.nan if reach is None else reach)
+            if reach is None:
+                reach = depth_to_loss(self.first.balance, self.first.here.state, self._joint)
+            pairs["depth"] = (deepest, reach)
         for name, (a, b) in pairs.items():
             to.setdefault(name, []).append(convergence.difference(size, a, b))
 
@@ -187,7 +196,7 @@ class Probe:
             elif not np.isfinite(errors["energy"]) and name in ("energy", "life"):
                 yield Contribution(source, name, None, self.skipped)
             else:
-                yield Contribution(source, name, None, "the free body does not say how deep the contact can wear")
+                yield Contribution(source, name, None, "no preload says how deep the contact can wear")
 
     def _on_a_plateau(self, errors: dict[str, float], end: float) -> float:
         """Error of the energy where a flat top of the response leaves open where its peak lies; inf if it takes longer.

@@ -19,6 +19,7 @@ from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak, NoPea
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.wear.even_wear import depth_to_loss
 from tribodyn.hbm.wear.history import LIFE_SHARE
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.result.result import Result
@@ -198,11 +199,17 @@ def unworn(file: SceneFile, model: modelling.Model, folded: bool = False) -> Sta
     return State(None, 0.0, np.zeros(balance.contact.n_pair), balance, site, point)
 
 
-def deepest(file: SceneFile, model: modelling.Model) -> float:
-    """delta_max [m] of a model, nan where nothing wears."""
+def deepest(file: SceneFile, unworn: State, joint: str | None) -> float:
+    """How deep an unworn contact may wear [m], nan where nothing wears.
+
+    That is delta_max; where the part is loose without its contact the depth that takes the preload of a joint, of all
+    joints without a name
+    """
     if file.scene.wear is None:
         return float("nan")
-    return delta_max(file.scene, free_deflection(model.balance), model.balance.model.interface.area)
+    balance = unworn.balance
+    found = delta_max(file.scene, free_deflection(balance), balance.model.interface.area)
+    return depth_to_loss(balance, unworn.here.state, joint) if np.isnan(found) else found
 
 
 def energy_beside(state: State, reach: float, drop: float) -> float:

@@ -85,8 +85,21 @@ def life(result: Result) -> float | None:
         return None
     if _told_of_wear(result).get("lost_of") != "any":
         return cycles_to_preload(result.wear)
-    lives = [joint.get("life_cycles") for joint in by_joint(result).values()]
-    return min((one for one in lives if one is not None), default=None)
+    return min(_lives(result).values(), default=None)
+
+
+def first_lost(result: Result) -> str | None:
+    """The joint whose life is that of a run with `wear.lost_of` "any"; None where none has ended, or all count."""
+    if result.wear is None or _told_of_wear(result).get("lost_of") != "any":
+        return None
+    lives = _lives(result)
+    return min(lives, key=lives.__getitem__, default=None)
+
+
+def _lives(result: Result) -> dict[str, float]:
+    """Cycles of the joints that have lost their preload."""
+    lives = {name: joint.get("life_cycles") for name, joint in by_joint(result).items()}
+    return {name: life for name, life in lives.items() if life is not None}
 
 
 def _told_of_wear(result: Result) -> dict[str, Any]:

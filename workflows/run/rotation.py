@@ -19,8 +19,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.recovery import full_displacement
-from tribodyn.reduction.craig_bampton import POINT_LOAD
-from tribodyn.reduction.cyclic import reduce_sector, travelling_wave
+from tribodyn.reduction.craig_bampton import POINT_LOAD, craig_bampton
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ModelInfo, ReducedModel
 from tribodyn.workflows.run import joints, part_reduction
@@ -84,12 +83,18 @@ def stuck_at_rest(scene: MeshScene, sector: Sector) -> np.ndarray:
 
 
 def at_rest(scene: MeshScene, sector: Sector) -> np.ndarray:
-    """Displacement (n_free,) [m] under the static loads of the scene, the contact settled; the same in every sector."""
+    """Displacement (n_free,) [m] under the static loads of the scene, the contact settled; the same in every sector.
+
+    Sectors that move alike need no masters on their seams, as waves of other indices do
+    """
+    system, B = at_index(sector, 0)
+    still = replace(system, gyroscopic=None)
+    interface = replace(sector.interface, B=csr_matrix(B))
     try:
-        reduced = reduce_sector(sector, n_modes=0, attached=distributed(scene, sector))
+        model = craig_bampton(still, interface, n_modes=0, attached=distributed(scene, sector))
     except SingularStiffness:
         raise StaticDivergence(UNSTABLE) from None
-    model = travelling_wave(reduced, 0)
+    model = replace(model, info=replace(model.info, joints=dict(sector.joints)))
     static = Excitation.of(static_loads(scene))
     basis = HarmonicBasis((0, 1), FEW_SAMPLES)
     made = joints.make_joints(scene, model)
@@ -98,7 +103,8 @@ def at_rest(scene: MeshScene, sector: Sector) -> np.ndarray:
     if not solved.converged:
         raise ValueError(f"the contacts do not settle under the static loads: {solved.outcome}")
     state = solved.state
-    return full_displacement(balance, state.flat, state.cycle.force.reshape(state.flat.shape), AT_REST)[:, 0]
+    moved = full_displacement(balance, state.flat, state.cycle.force.reshape(state.flat.shape), AT_REST)[:, 0]
+    return np.asarray(seam_map(sector, 0) @ moved)
 
 
 def distributed(scene: MeshScene, sector: Sector) -> list[str]:

@@ -19,13 +19,12 @@ from matplotlib.figure import Figure
 
 from tribodyn.fem.constraints import named
 from tribodyn.fem.part import Part
-from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.continuation import highest_peak
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.continuation.methods import adaptive, arc_length
-from tribodyn.hbm.continuation.methods.natural import extrapolate
-from tribodyn.hbm.continuation.operating_point import AtPeak, OperatingPoint
+from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.linear.travelling_wave import at_sector
 from tribodyn.hbm.mistuning import MistunedWheel, spread
 from tribodyn.hbm.newton import NewtonOptions
@@ -53,16 +52,9 @@ from tribodyn.workflows.scene.words import unknown_key
 from tribodyn.workflows.studies import wheel as wheels
 
 FURTHEST = 3.0  # standard deviations at which what is drawn is cut off
-TRIED = 3  # peaks of a scan that are refined, the highest first
-NEARLY = 0.9  # of the highest peak foreseen, from which on a peak may be the highest
-SURE = 3.0  # errors of the heights foreseen, as the first peak has it, by which another must be lower to be left out
-TOO_HIGH = 2.0  # height foreseen over that of the point in it, from which on it is not believed
-LEAST_DOUBT = 5e-3  # of a height foreseen
 SHORTEST, LONGEST = 2e-3, 0.15  # steps of a scan, of its range: beyond a jump it continues
 SCANNED_TO = 1e-4  # residual of the points of a scan
 FOUND_TO = 1e-6  # residual of a peak
-LEVEL = 3e-5  # of the height of a peak, by which a parabola may miss it
-CLOSINGS = 5  # parabolas that are tried
 
 
 @dataclass(frozen=True)
@@ -169,29 +161,12 @@ class Blades:
         heights = amplitude(branch.response[:, [branch.output_names.index(name) for name in names]])
         if heights.argmax() // len(names) in (0, len(heights) - 1):
             raise SolveFailed("the response still rises at an end of response.frequency: extend it")
-        best: tuple[OperatingPoint, int] | None = None
-        solves, doubt = len(heights), LEAST_DOUBT
         exact = replace(settings.newton_options(scene), tolerance=max(FOUND_TO, scene.solver.tolerance))
-        for point, blade in _candidates(branch.omega, heights):
-            near = slice(point - 1, point + 2)
-            points = [
-                _Point(*three)
-                for three in zip(branch.omega[near], branch.contact[near], heights[near, blade], strict=True)
-            ]
-            height = _vertex(points)[1]
-            if best is not None and (1 + doubt) * height < best[0].amplitude:
-                continue
-            site = replace(settings.peak_of(scene), output=names[blade], newton=exact)
-            found = _climbed(balance, points, site)
-            solves += found.solves
-            if not found.solution.converged:
-                continue
-            doubt = max(doubt, SURE * abs(height / found.amplitude - 1))
-            if best is None or found.amplitude > best[0].amplitude:
-                best = found, blade
-        if best is None or best[0].amplitude < (1 - asked_of(self.file).tolerance) * heights.max():
+        site = replace(settings.peak_of(scene), newton=exact)
+        best, blade = highest_peak.highest(balance, branch, names, site)
+        if best is None or best.amplitude < (1 - asked_of(self.file).tolerance) * heights.max():
             raise SolveFailed(f"the highest peak, near {_hertz(branch.omega[heights.argmax() // len(names)])}, is lost")
-        return replace(best[0], solves=solves), best[1]
+        return best, blade
 
 
 def asked_of(file: SceneFile) -> Mistuning:
@@ -216,65 +191,6 @@ def deviating(wheel: wheels.Wheel, body: str | None) -> np.ndarray:
     own = np.flatnonzero(np.repeat(nodes, 3)[wheel.part.free])
     basis = reduced.basis[own]
     return np.asarray(basis.T @ (wheel.full.system.stiffness[own][:, own] @ basis))
-
-
-@dataclass(frozen=True)
-class _Point:
-    """Of a response: frequency [rad/s], relative displacement (n_contact, n_coeff) [m] and amplitude of a blade [m]."""
-
-    omega: float
-    x: np.ndarray
-    height: float
-
-
-def _vertex(points: Sequence[_Point]) -> tuple[float, float]:
-    """Frequency [rad/s] and height [m] of the peak through three points whose middle one is the highest.
-
-    Of one resonance 1 / amplitude^2 is a parabola over the frequency
-    """
-    middle = points[1]
-    w = np.array([point.omega - middle.omega for point in points])
-    ratio = np.array([middle.height / max(point.height, 1e-6 * middle.height) for point in points])
-    bend, slope, least = np.polyfit(w, ratio**2, 2)
-    at = float(np.clip(-0.5 * slope / bend, *sorted((w[0], w[2])))) if bend > 0 else 0.0
-    level = least + slope * at + bend * at**2
-    if level < TOO_HIGH**-2:  # no such resonance
-        return middle.omega, middle.height
-    return middle.omega + at, middle.height / float(np.sqrt(level))
-
-
-def _candidates(omega: np.ndarray, heights: np.ndarray) -> list[tuple[int, int]]:
-    """Points and blades of the peaks that may be the highest, the highest foreseen first; at most TRIED.
-
-    omega : (n_point,) [rad/s]; heights : (n_point, N) [m]
-    """
-    inner, none = heights[1:-1], np.empty(0)
-    found = []
-    for i, blade in np.argwhere((inner >= heights[:-2]) & (inner >= heights[2:]) & (inner > 0)):
-        three = [_Point(omega[i + k], none, heights[i + k, blade]) for k in range(3)]
-        found.append((_vertex(three)[1], int(i) + 1, int(blade)))
-    found.sort(reverse=True)
-    return [(point, blade) for height, point, blade in found[:TRIED] if height > NEARLY * found[0][0]]
-
-
-def _climbed(balance: HarmonicBalance, points: list[_Point], site: AtPeak) -> OperatingPoint:
-    """The peak within three points, by parabolas through the nearest ones; by its slope where these do not close in."""
-    solves, start = 0, points[1]
-    shape = (balance.contact.n_pair, -1, balance.basis.n_coeff)
-    for _ in range(CLOSINGS):
-        omega, height = _vertex(points)
-        guess = extrapolate(np.array([p.omega for p in points]), [p.x for p in points], omega)
-        solution = newton.solve(balance, omega, guess.reshape(shape), site.newton)
-        found = OperatingPoint.of(balance, solution, site.output, solves := solves + 1)
-        if not solution.converged:
-            break
-        if abs(height / found.amplitude - 1) < LEVEL:
-            return found
-        ordered = sorted((*points, _Point(omega, solution.state.flat, found.amplitude)), key=lambda p: p.omega)
-        top = min(max(int(np.argmax([p.height for p in ordered])), 1), len(ordered) - 2)
-        points = ordered[top - 1 : top + 2]
-    found = site.next(balance, start.omega, start.x.reshape(shape))
-    return replace(found, solves=found.solves + solves)
 
 
 def _converged(point: OperatingPoint, what: str) -> OperatingPoint:

@@ -1,0 +1,51 @@
+"""The highest peak of several outputs, from the points of a scan."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.helpers.pressed_body import balance_of, pressed_body
+from tribodyn.hbm.continuation import highest_peak
+from tribodyn.hbm.continuation.highest_peak import Sample
+from tribodyn.hbm.continuation.methods import adaptive
+from tribodyn.hbm.continuation.operating_point import AtPeak
+
+
+def resonance(omega: np.ndarray, at: float, width: float, height: float) -> np.ndarray:
+    """Amplitude of a single resonance."""
+    return height * width / np.hypot(omega - at, width)
+
+
+def test_one_resonance_is_a_parabola() -> None:
+    omega = np.array([990.0, 1001.5, 1004.0])
+    points = [Sample(w, np.empty(0), h) for w, h in zip(omega, resonance(omega, 1000.0, 3.0, 2e-3), strict=True)]
+    assert highest_peak.vertex(points) == pytest.approx((1000.0, 2e-3), rel=1e-9)
+
+
+def test_points_that_are_no_resonance_are_taken_as_they_are() -> None:
+    points = [Sample(w, np.empty(0), h) for w, h in ((990.0, 1e-6), (1000.0, 1.0), (1020.0, 0.999))]
+    assert highest_peak.vertex(points) == (1000.0, 1.0)
+
+
+def test_the_higher_of_two_outputs_comes_first_and_a_low_one_not_at_all() -> None:
+    omega = np.linspace(900.0, 1100.0, 41)
+    heights = np.stack([resonance(omega, at, 8.0, high) for at, high in ((951.0, 1.0), (1003.0, 1.06), (1060.0, 0.5))])
+    found = highest_peak.candidates(omega, heights.T)
+    assert [(abs(omega[point] - at) < 5.0, output) for (point, output), at in zip(found, (1003, 951), strict=True)] == [
+        (True, 1),
+        (True, 0),
+    ]
+
+
+def test_the_peak_is_the_one_that_its_slope_finds() -> None:
+    balance, site = balance_of(pressed_body(), (0, 1)), AtPeak("tip", 300.0, 700.0)
+    branch = adaptive.follow(balance, site.start, site.stop, adaptive.Options(tolerance=0.03, newton=site.newton))
+    found, which = highest_peak.highest(balance, branch, [site.output], replace(site, output="none"))
+    exact = site.first(balance)
+    assert found is not None
+    assert which == 0
+    assert found.amplitude == pytest.approx(exact.amplitude, rel=1e-4)
+    assert found.state.omega == pytest.approx(exact.state.omega, rel=1e-3)
