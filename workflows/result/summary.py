@@ -24,7 +24,7 @@ def summary(result: Result) -> dict[str, Any]:
     cycles : vibration cycles so far; separated_cycles : the same if the last touch has ended, else None
     first_lift_cycles, first_loss_cycles : until a closed pair first opens in the cycle, until a pair touches no more
     surface_volumes_m3 : worn off the scene's own part or first face, and off the other one
-    life_cycles : until the preload had fallen to LIFE_SHARE of its first value, None if it has not
+    life_cycles : until the preload had fallen to LIFE_SHARE of its first value, None if it has not; see `life`
     energy_J, volume_m3 : friction work and worn volume, accumulated
     wear_steps, hbm_solves : steps taken and balance solves spent on wear
     peak_hz, peak_m, preload_N : [first, last] of the wear run, or the peak of the response curve without one
@@ -130,7 +130,7 @@ def _wear(result: Result) -> dict[str, Any]:
         "depth_mean_m": float(depth @ patch.area / patch.area.sum()),
         "cycles": cycles,
         "separated_cycles": cycles if result.contact_lost else None,
-        "life_cycles": cycles_to_preload(wear),
+        "life_cycles": life(result),
         "energy_J": float(wear.work.sum()),
         "volume_m3": volume,
         "hbm_solves": int(wear.solves.sum()),
@@ -245,7 +245,9 @@ def lines(result: Result) -> list[tuple[str, str]]:
         deepest, mean = 1e3 * numbers["depth_max_m"], 1e3 * numbers["depth_mean_m"]
         life = "contact not lost" if numbers["separated_cycles"] is None else "contact lost"
         if numbers["life_cycles"] is not None:
-            life += f"; life until {100 * LIFE_SHARE:g} % of the preload: {numbers['life_cycles']:.4g}"
+            joint = first_lost(result)
+            lost = f"{100 * LIFE_SHARE:g} % of the preload" if joint is None else f"that of {joint} was lost"
+            life += f"; life until {lost}: {numbers['life_cycles']:.4g}"
         happened = [("first opening", numbers["first_lift_cycles"]), ("first pair lost", numbers["first_loss_cycles"])]
         shown += [(name, f"after {count:.4g} cycles") for name, count in happened if count is not None]
         shown += [
