@@ -29,7 +29,7 @@ SMALL = (
     "response.points=30",
     "harmonics.samples=64",
 )
-NO_WEAR = (*SMALL, "wear=")
+NO_WEAR = (*SMALL, "wear=", "verdict.enabled=false")
 TRADED = ("modes", "samples", "newton", "points")
 
 

@@ -32,7 +32,8 @@ from tribodyn.workflows.scene.scene_file import parse, read
 
 
 def test_a_scene_of_matrices_runs_to_wear_and_pictures(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = leave(["run", str(folder / "own.toml"), "--out", str(folder / "out")], capsys)
+    short = ["--set", "verdict.seconds=1"]
+    code, out, err = leave(["run", str(folder / "own.toml"), "--out", str(folder / "out"), *short], capsys)
     assert code == 0, err
     assert "18 DOFs, as they came" in out
     assert (folder / "out" / "pictures" / "frf.png").is_file()
@@ -83,6 +84,7 @@ def test_the_scene_is_the_same_as_the_documented_python(folder: Path, monkeypatc
         "response.points=60",
         "wear.max_steps=5",
         "harmonics.transitions=located",
+        "verdict.enabled=false",
     ]
     result = pipeline.run(read("own.toml", overrides), folder, Progress())
     assert result.response is not None
