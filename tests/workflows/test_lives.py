@@ -120,6 +120,25 @@ def test_the_claimed_confidence_is_kept_on_planted_problems() -> None:
     assert error < 0.05
 
 
+def test_counting_holds_a_quantile_beside_a_jump_that_the_surrogate_smooths() -> None:
+    inside = {"surrogate": 0, "counted": 0}
+    for seed in range(8):
+        of, log_life = planted(seed)
+
+        def jumps(x: np.ndarray, smooth: Any = log_life) -> np.ndarray:
+            return np.asarray(smooth(x) + 2.0 * (np.log(x) @ [1.0, 0.5, -0.7, 0.3] > 0))
+
+        points = of.values(design.qmc.Sobol(4, seed=np.random.default_rng(seed)).random(64))
+        surrogate = Surrogate.fitted(of.coordinates(points), jumps(points))
+        sample = Sample.of(of, surrogate)
+        truth = float(np.quantile(jumps(of.draw(15, seed=99)[0]), 0.5))
+        low, high = np.quantile(quantiles.drawn(sample, surrogate, 0.5), [0.05, 0.95])
+        inside["surrogate"] += low <= truth <= high
+        low, high = quantiles.counted(sample, *surrogate.runs, 0.5, 0.9)
+        inside["counted"] += low <= truth <= high
+    assert inside["counted"] >= 7 > inside["surrogate"]
+
+
 @pytest.mark.slow
 def test_the_claimed_confidence_is_kept_on_fifty_planted_problems() -> None:
     share, error = covered(range(50), 48)

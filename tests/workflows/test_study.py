@@ -227,16 +227,29 @@ def test_the_command_resumes_a_study_that_was_killed(
     journal = Journal(tmp_path / "out")
     while not journal.rows() and process.poll() is None:
         time.sleep(0.02)
+    own = [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
     process.kill()
     process.wait()
     before = journal.rows()
     assert before
+    assert own
+    until = time.monotonic() + 60
+    while any(_runs(pid) for pid in own):
+        assert time.monotonic() < until  # none waits for ever for a study that is gone
+        time.sleep(0.05)
     code, out, _ = leave([*words, "--resume", "--json"], capsys)
     assert code == 0
     assert json.loads(out)["runs"] == {"complete": 2, "failed": 0, "refused": 2, "lost": 0}
     after = journal.rows()
     assert all(after[key].seconds == row.seconds for key, row in before.items())
     assert (tmp_path / "out" / "study.csv").read_bytes() == (done / "study.csv").read_bytes()
+
+
+def _runs(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
 
 
 def test_processes_share_what_is_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

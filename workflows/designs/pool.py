@@ -9,7 +9,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from typing import Protocol, TypeVar
 
 from threadpoolctl import threadpool_limits
@@ -50,7 +50,7 @@ def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], Row]) 
     while waiting:
         alone = deaths[waiting[0].number] > 0
         limit = 1 if alone else min(workers, len(waiting))
-        pool = ProcessPoolExecutor(limit, get_context("spawn"), _one_thread)
+        pool = ProcessPoolExecutor(limit, get_context("spawn"), _begin)
         under_way: dict[Future[Row], Work] = {}
         try:
             while under_way or (waiting and (deaths[waiting[0].number] > 0) == alone):
@@ -79,9 +79,18 @@ def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], Row]) 
             _stop(pool)
 
 
-def _one_thread() -> None:
-    """In every process of the pool: processes and threads do not multiply."""
+def _begin() -> None:
+    """In every process of the pool: processes and threads do not multiply, and none outlives the study."""
     threadpool_limits(1)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """A study that is killed cannot end its processes: they would wait for its next task for ever."""
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _stop(pool: ProcessPoolExecutor) -> None:

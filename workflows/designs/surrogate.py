@@ -41,7 +41,7 @@ class Level:
         """Fit to coordinates (n, k) of order 1 and values (n,).
 
         Raises  ValueError where the runs are fewer than FEWEST or scikit-learn is not there
-        Source  Rasmussen and Williams 2006, eq. 2.23, 2.24, 5.12 (leaving out); trend as a linear kernel, section 2.7
+        Source  Rasmussen and Williams 2006, eq. 2.23, 2.24; trend as a linear kernel, section 2.7
         """
         if len(values) < FEWEST:
             raise ValueError(f"{len(values)} runs have a value, a surrogate needs {FEWEST} at least")
@@ -57,12 +57,15 @@ class Level:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # a length at its bound: what does not matter
             regression.fit(points, (values - middle) / width)
-        inverse = sla.cho_solve((regression.L_, True), np.eye(len(values)))
-        spread = 1 / np.diag(inverse)
-        missed = regression.alpha_ * spread  # by which the others miss each run
+        spread, missed = _leaving_out(regression)
         stretch = max(1.0, float(np.sqrt(np.mean(missed**2 / spread))))
         explained = 1 - float(np.mean(missed**2))
         return cls(regression, points, values, middle, width, stretch, explained)
+
+    @property
+    def left_out(self) -> np.ndarray:
+        """(n,) what the others say of each run."""
+        return self.values - self.width * _leaving_out(self.regression)[1]
 
     def with_run(self, point: np.ndarray, value: float) -> Level:
         """The same process with one run more, nothing fitted again."""
@@ -133,8 +136,14 @@ class Surrogate:
         last = self.levels[-1]
         if len(self.levels) == 1:
             return last.explained
-        whole = last.values + self.levels[0].mean(last.points)
-        return 1 - (1 - last.explained) * float(np.var(last.values) / np.var(whole))
+        return 1 - (1 - last.explained) * float(np.var(last.values) / np.var(self.runs[0]))
+
+    @property
+    def runs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Values of the full runs (n,), and what the others say of each of them (n,)."""
+        last = self.levels[-1]
+        below = np.asarray(sum((level.mean(last.points) for level in self.levels[:-1]), start=np.zeros(1)))
+        return last.values + below, last.left_out + below
 
     def mean(self, points: np.ndarray) -> np.ndarray:
         """Expected values (n,)."""
@@ -153,6 +162,15 @@ class Surrogate:
         """With one full run more, nothing fitted again."""
         below = sum(float(level.mean(point[None])[0]) for level in self.levels[:-1])
         return Surrogate((*self.levels[:-1], self.levels[-1].with_run(point, value - below)))
+
+
+def _leaving_out(regression: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Variance of each run by the others (n,), and by how much they miss it (n,), in the scale of the regression.
+
+    Source  Rasmussen and Williams 2006, eq. 5.12
+    """
+    spread = 1 / np.diag(sla.cho_solve((regression.L_, True), np.eye(len(regression.alpha_))))
+    return spread, regression.alpha_ * spread
 
 
 def _library() -> tuple[Any, Any]:

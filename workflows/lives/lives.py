@@ -158,7 +158,7 @@ def run(
     added: list[dict[str, Any]] = []
     while True:
         table = studies.run(study, *ends, resume or bool(added), more=added, drawn=False)
-        found = _Fit.of(space, table, cheap, wanted.number)
+        found = _Fit.of(space, table, cheap, wanted.number, study.settings.runs or 0, shares[0])
         sample = Sample.of(space, found.surrogate, shares[0] < RARE)
         half = _half_width(found, sample, shares[0], wanted.confidence)
         done = len(table.columns["run"])
@@ -179,16 +179,36 @@ def run(
 class _Fit:
     """A surrogate of a number.
 
+    drawn : (n,) whether a run was drawn from the distribution, not added where it says most about a quantile
+    asked : the share that runs were added for; None where none were
     logarithmic : of its logarithm; open : runs of which only a lower bound is known, bound : the lowest of them
     failed : share of runs without
     """
 
     surrogate: Surrogate
+    drawn: np.ndarray
+    asked: float | None
     logarithmic: bool
     bound: float
     open: int
     runs: int
     failed: float
+
+    def ends(
+        self, sample: Sample, share: float, at: float, draws: np.ndarray, confidence: float
+    ) -> tuple[float, float]:
+        """Ends of the quantile of a share: the outer ones by the surrogate and by counting runs.
+
+        Where runs were added about a quantile, the surrogate's ends stand alone: those runs have shown it how the
+        number varies there, and counting would take hundreds of drawn runs to be as sure.
+        at : the share among runs that have the number; draws : of the quantile, by the surrogate
+        """
+        low, high = np.quantile(draws, [0.5 - confidence / 2, 0.5 + confidence / 2])
+        if share == self.asked:
+            return float(low), float(high)
+        values, said = (each[self.drawn] for each in self.surrogate.runs)
+        fewest, most = quantiles.counted(sample, values, said, at, confidence)
+        return float(min(low, fewest)), float(max(high, most))
 
     def at_least(self, share: float, high: float, confidence: float) -> bool:
         """Whether a quantile may belong to values of which only a lower bound is known.
@@ -202,7 +222,9 @@ class _Fit:
         return bool(high >= self.bound or share >= 1 - most)
 
     @classmethod
-    def of(cls, space: Space, table: StudyTable, cheap: StudyTable | None, number: str) -> _Fit:
+    def of(
+        cls, space: Space, table: StudyTable, cheap: StudyTable | None, number: str, drawn: int, asked: float
+    ) -> _Fit:
         values, bounds = table.bounded(number)
         open_ = np.isfinite(bounds)
         good = np.isfinite(values)
@@ -217,7 +239,11 @@ class _Fit:
         points = space.coordinates(space.points_of(table.columns)[good])
         surrogate = Surrogate.fitted(points, _scaled(values[good], logarithmic), below)
         bound = float(np.min(bounds, initial=np.inf, where=open_))
-        return cls(surrogate, logarithmic, bound, int(open_.sum()), int(good.sum()), 1 - float(np.mean(good)))
+        own = table.columns["run"][good] <= drawn
+        added = None if own.all() else asked
+        return cls(
+            surrogate, own, added, logarithmic, bound, int(open_.sum()), int(good.sum()), 1 - float(np.mean(good))
+        )
 
 
 def _scaled(values: np.ndarray, logarithmic: bool) -> np.ndarray:
@@ -233,15 +259,10 @@ def _cheap(study: Study) -> Study:
 
 def _half_width(found: _Fit, sample: Sample, share: float, confidence: float) -> float:
     """Half the confidence interval of a quantile, relative."""
-    low, high = _ends(quantiles.drawn(sample, found.surrogate, share), confidence)
+    low, high = found.ends(sample, share, share, quantiles.drawn(sample, found.surrogate, share), confidence)
     if found.logarithmic:
         return float(np.exp(0.5 * (high - low)) - 1)
     return float(0.5 * (high - low) / max(abs(sample.quantile(share)), 1e-300))
-
-
-def _ends(draws: np.ndarray, confidence: float) -> tuple[float, float]:
-    low, high = np.quantile(draws, [0.5 - confidence / 2, 0.5 + confidence / 2])
-    return float(low), float(high)
 
 
 def _model_error(
@@ -295,8 +316,13 @@ def _quantile(found: _Fit, sample: Sample, share: float, confidence: float, erro
     """One quantile; runs that are missing may all lie below it or all above it."""
     fewest = max((share - found.failed) / (1 - found.failed), 0.0)
     most = min(share / (1 - found.failed), 1.0)
-    each = [_shifted(quantiles.drawn(sample, found.surrogate, at), error, found.logarithmic) for at in (fewest, most)]
-    ends = [_ends(draws, confidence)[0] for draws in each[0]], [_ends(draws, confidence)[1] for draws in each[1]]
+    ends = []
+    for at, side in ((fewest, 0), (most, 1)):
+        draws = quantiles.drawn(sample, found.surrogate, at)
+        end = found.ends(sample, share, at, draws, confidence)[side]
+        shares = 0.5 - confidence / 2, 0.5 + confidence / 2
+        moved = np.quantile(_shifted(draws, error, found.logarithmic), shares[side]) - np.quantile(draws, shares[side])
+        ends.append((end, end + float(moved)))
     back = np.exp if found.logarithmic else float
     (own_low, all_low), (own_high, all_high) = ([float(back(end)) for end in side] for side in ends)
     if fewest == 0 and found.failed:
@@ -307,13 +333,13 @@ def _quantile(found: _Fit, sample: Sample, share: float, confidence: float, erro
     return Quantile(share, value, own_low, own_high, all_low, all_high, least)
 
 
-def _shifted(draws: np.ndarray, error: float | None, logarithmic: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Draws of a quantile without and with the model's own error: one unknown factor for all of them.
+def _shifted(draws: np.ndarray, error: float | None, logarithmic: bool) -> np.ndarray:
+    """Draws of a quantile with the model's own error as well: one unknown factor for all of them.
 
     Its size is evenly distributed, as a verdict's error is a sum of parts without their signs: between 1 - error and
     1 + error, or, where draws are logarithms, between 1 and 1 + error or the reciprocal of that, which stays positive
     """
     if not error:
-        return draws, draws
+        return draws
     off = np.random.default_rng(1).uniform(-1, 1, len(draws))
-    return draws, draws + (np.sign(off) * np.log1p(error * np.abs(off)) if logarithmic else error * off * np.abs(draws))
+    return draws + (np.sign(off) * np.log1p(error * np.abs(off)) if logarithmic else error * off * np.abs(draws))

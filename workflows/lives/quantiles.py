@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from tribodyn.workflows.designs.space import Space
 from tribodyn.workflows.designs.surrogate import Surrogate
@@ -15,6 +16,7 @@ WIDE = 1.6  # how much wider
 DRAWS = 300  # functions that the surrogate may stand for
 ZONE = 4.0  # standard deviations: points further than this from a quantile lie on their side for sure
 MOST = 1000  # points whose values are drawn jointly
+GRID = 1024  # values among which ends are looked for
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,32 @@ def drawn(sample: Sample, surrogate: Surrogate, share: float, draws: int = DRAWS
         order = np.argsort(row)
         found[i] = offset + weighted_quantile(row[order], weight[order] / weight.sum(), own)
     return found
+
+
+def counted(
+    sample: Sample, values: np.ndarray, said: np.ndarray, share: float, confidence: float
+) -> tuple[float, float]:
+    """Ends of a quantile that hold however the runs depend on the points, also where they jump.
+
+    A surrogate smooths a jump, and is then surer of a quantile beside it than it may be. So the share below a value is
+    what the surrogate says, corrected by the runs of the design: by those of them that lie below it less those that
+    the others put there. The ends are the next values to either side whose corrected share is not as wanted, by the
+    scatter of that count.
+
+    values, said : (n,) runs drawn from the distribution, and what the others say of each; none were added on purpose
+    Source  Angelopoulos et al. 2023, doi 10.1126/science.adi6000: prediction-powered quantiles
+    """
+    thinned = sample.mean[:: max(len(sample.mean) // GRID, 1)]
+    at = np.unique(np.concatenate([thinned, values, said]))
+    off = np.subtract(values[:, None] <= at, said[:, None] <= at, dtype=float)  # runs x values
+    below = np.interp(at, sample.mean, np.cumsum(sample.weight)) + off.mean(axis=0)
+    width = stats.norm.ppf(0.5 + confidence / 2) * off.std(axis=0, ddof=1) / np.sqrt(len(values))
+    low = high = int(np.argmax(below >= share))
+    while low > 0 and below[low] + width[low] >= share:
+        low -= 1
+    while high < len(at) - 1 and below[high] - width[high] <= share:
+        high += 1
+    return float(at[low]), float(at[high])
 
 
 def next_runs(sample: Sample, surrogate: Surrogate, share: float, count: int) -> np.ndarray:
