@@ -23,6 +23,14 @@ FOLD_TANGENT_ACCURACY = 1e-10  # relative; the sign of their frequency part says
 # A step whose cubic has less than this share of the parameter that its ends have may hide two folds: contact makes the
 # slope change by pieces, which a cubic rounds off.
 NEARLY_FOLDS = 0.5
+# Slant of a step, the angle between its chord and the mean of its tangents, up to which it needs no check [rad]: the
+# slant of a smooth curve falls with the square of the step, and few steps have more.
+LARGEST_SLANT = 0.03
+# A tangent that turns past a fold and back past its partner turns by at least the angles that both ends have to a fold.
+# A step whose ends differ by more than that over this factor may hide such a pair.
+FOLD_TURN = 1.2
+# Step below which no pair of folds is looked for: there a fold is a kink, or the solutions are not that accurate.
+SHORT_STEP = 1e-4
 TURN_AT_FOLD = 0.35  # of the tangent, in a step over a fold, beyond which it may have passed three [rad]
 
 
@@ -121,6 +129,16 @@ class Segment:
             return False
         extreme = slopes[0] - b * b / (4 * a)
         return bool(extreme * np.sign(slopes[0]) < NEARLY_FOLDS * np.min(np.abs(slopes)))
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether the ends alone do not tell the curve between: it may leave its branch, or turn back twice."""
+        if self.slant > LARGEST_SLANT:
+            return True
+        if self.turns or self.length < SHORT_STEP:
+            return False
+        to_fold = sum(np.arcsin(min(abs(end.tangent.p) / self.metric.width, 1.0)) for end in (self.start, self.end))
+        return bool(to_fold < FOLD_TURN * self.angle)
 
     @property
     def distance_to_fold(self) -> float:

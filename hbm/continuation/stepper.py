@@ -9,7 +9,7 @@ import numpy as np
 
 from tribodyn.hbm.continuation import bordered
 from tribodyn.hbm.continuation.bordered import BorderFailed, Direction, Metric
-from tribodyn.hbm.continuation.curve import KINK_ANGLE, CurvePoint, Segment, locate_fold
+from tribodyn.hbm.continuation.curve import KINK_ANGLE, SHORT_STEP, CurvePoint, Segment, locate_fold
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.newton import Solution
 
@@ -21,10 +21,7 @@ LEAST_LENGTH_RATIO = 0.8  # the characteristic length falls to this share per po
 LARGEST_MISS = 0.35
 CORNER_STEP = 0.1  # longest step in which a corner is looked for
 TANGENT_ACCURACY = 1e-6  # relative; a tangent here only predicts, and the prediction is off by far more
-# Slant of a step, the angle between its chord and the mean of its tangents, up to which it needs no check [rad]: the
-# slant of a smooth curve falls with the square of the step, and few steps have more.
-LARGEST_SLANT = 0.03
-MAX_HALVINGS = 6  # of a step that is checked: a jump of LARGEST_SLANT has shown itself after four
+MAX_HALVINGS = 6  # of a step that is in doubt: a jump of the least doubtful slant has shown itself after four
 # Step beyond the place where the tangents of the last two points foresee a fold, in distances to it: a step that lands
 # behind that fold finds it, a longer one may land behind its partner too and see neither.
 FOLD_REACH = 2.0
@@ -92,16 +89,17 @@ class Stepper:
         self._step = self._cap = max(0.25 * segment.length, self._options.min_step)
 
     def advance(self) -> list[Segment]:
-        """The next point of the curve, as one segment or two with a fold between; none where the walk is stuck."""
+        """The curve to the next point in segments that end at its folds; none where the walk is stuck."""
         step = self._step
         while step >= self._options.min_step:
             trial = self._straight(step)
             if step <= CORNER_STEP and (trial is None or trial.angle > KINK_ANGLE):
                 trial = self._round_corner(step, trial) or trial
-            if trial is not None and self._fits(trial, step):
-                parts = self._split(trial, careful=step > 0.1 * self._step)
+            pieces = None if trial is None else self._fitting(trial, step)
+            if trial is not None and pieces is not None:
+                parts = self._split(pieces, careful=step > max(0.1 * self._step, SHORT_STEP))
                 if parts is not None:
-                    self._accept(trial, step)
+                    self._accept(trial, pieces[-1], step)
                     return parts
             step *= 0.5 if trial is not None else 0.25
         return []
@@ -122,42 +120,45 @@ class Stepper:
         tangent = self._tangent(value, solution, here.tangent) or self._metric.unit(moved)
         return Segment(here, CurvePoint.of(value, solution, tangent), self._metric)
 
-    def _fits(self, trial: Segment, step: float) -> bool:
-        """Whether a step is short for the curve, or turns at a corner whose legs are straight and meet."""
+    def _fitting(self, trial: Segment, step: float) -> list[Segment] | None:
+        """The pieces of a step that is short for the curve, or turns at a corner whose legs are straight and meet."""
         stray = self._metric.norm(trial.end.place - self._ahead(step))
         if trial.angle <= KINK_ANGLE and stray <= LARGEST_MISS * step:
-            if self._same_branch(trial):
-                return True
-            self.trouble = f"the curve jumps to another branch at every step down to {step:.1e}"
-            return False
+            pieces = self._pieces(trial, MAX_HALVINGS)
+            if pieces is None:
+                self.trouble = f"the curve jumps to another branch at every step down to {step:.1e}"
+            return pieces
         self.trouble = f"the curve turns sharply, or jumps, at every step down to {step:.1e}"
         if trial.angle < LARGEST_MISS:
-            return False
+            return None
         first, second, miss = trial.corner
         if min(first, second) < -0.02 * step or first + second > 2 * step or miss > 0.05 * trial.length:
-            return False
-        return self._is_straight(trial.start, 0.95 * first) and self._is_straight(trial.end, -0.95 * second)
+            return None
+        straight = self._is_straight(trial.start, 0.95 * first) and self._is_straight(trial.end, -0.95 * second)
+        return [trial] if straight else None
 
-    def _same_branch(self, trial: Segment) -> bool:
-        """Whether both ends of a step lie on one branch, not on two that run side by side.
+    def _pieces(self, part: Segment, halvings: int) -> list[Segment] | None:
+        """The step, cut by points between where its ends leave a doubt; None where it leaves its branch.
 
-        Where the chord is not along the tangents the step is halved, again and again in the half that is worse. On a
-        smooth curve the slant falls with the square of the length. At a kink it stays below half of the turn. Across
-        the gap between two branches it grows as the length falls.
+        On a smooth curve the slant falls with the square of the length. At a kink it stays below half of the turn.
+        Across the gap between two branches that run side by side it grows as the length falls.
         """
-        for _ in range(MAX_HALVINGS):
-            if trial.slant <= LARGEST_SLANT:
-                return True
-            if trial.slant > 0.5 * KINK_ANGLE:
-                return False
-            solution, value = bordered.correct(self._path, trial.at(0.5), trial.along, trial.metric, self._newton)
-            tangent = self._tangent(value, solution, trial.along) if solution.converged else None
-            if tangent is None:
-                return False
-            middle = CurvePoint.of(value, solution, tangent)
-            halves = Segment(trial.start, middle, trial.metric), Segment(middle, trial.end, trial.metric)
-            trial = max(halves, key=lambda half: half.slant)
-        return True
+        if halvings == 0 or not part.doubtful:
+            return [part]
+        if part.slant > 0.5 * KINK_ANGLE:
+            return None
+        solution, value = bordered.correct(self._path, part.at(0.5), part.along, part.metric, self._newton)
+        tangent = self._tangent(value, solution, part.along) if solution.converged else None
+        if tangent is None:
+            return None
+        middle = CurvePoint.of(value, solution, tangent)
+        pieces: list[Segment] = []
+        for half in (Segment(part.start, middle, part.metric), Segment(middle, part.end, part.metric)):
+            found = self._pieces(half, halvings - 1)
+            if found is None:
+                return None
+            pieces += found
+        return pieces
 
     def arrives(self, part: Segment, value: float, solution: Solution) -> bool:
         """Whether a solution at a value within a part of the walk belongs to its branch."""
@@ -165,7 +166,9 @@ class Stepper:
         if tangent is None:
             return True
         way = Segment(part.start, CurvePoint.of(value, solution, tangent), part.metric)
-        return way.length < self._options.min_step or way.angle > KINK_ANGLE or self._same_branch(way)
+        if way.length < self._options.min_step or way.angle > KINK_ANGLE:
+            return True
+        return self._pieces(way, MAX_HALVINGS) is not None
 
     def _is_straight(self, point: CurvePoint, step: float) -> bool:
         """Whether the curve keeps the tangent of a point over a step, as a leg of a corner does."""
@@ -208,33 +211,37 @@ class Stepper:
             return []
         return [leg, leg * -1.0]
 
-    def _split(self, segment: Segment, careful: bool) -> list[Segment] | None:
-        """The segment, cut at its fold; None where it seems to hide two folds or its fold is not found.
+    def _split(self, pieces: list[Segment], careful: bool) -> list[Segment] | None:
+        """The step, cut at the folds of its pieces; None where one seems to hide two folds or its fold is not found.
 
-        Where not careful such a segment is taken as it is.
+        Where not careful such a piece is taken as it is.
         """
-        if careful and segment.hides_folds:
-            return None
-        if not segment.turns:
-            return [segment]
-        fold = locate_fold(self._path, segment, self._options.newton, self._options.fold_tolerance)
-        if fold is None:
-            return None if careful else [segment]
-        return [Segment(segment.start, fold, self._metric), Segment(fold, segment.end, self._metric)]
+        start, parts = pieces[0].start, []
+        for piece in pieces:
+            if careful and piece.hides_folds:
+                return None
+            if not piece.turns:
+                continue
+            fold = locate_fold(self._path, piece, self._options.newton, self._options.fold_tolerance)
+            if fold is not None:
+                parts.append(Segment(start, fold, piece.metric))
+                start = fold
+            elif careful:
+                return None
+        return [*parts, Segment(start, pieces[-1].end, pieces[-1].metric)]
 
-    def _accept(self, segment: Segment, step: float) -> None:
+    def _accept(self, segment: Segment, last: Segment, step: float) -> None:
         o = self._options
         assert segment.end.solution is not None
         self.segments.append(segment.bare())
-        before, after = segment.start.tangent, segment.end.tangent
         self._metric = self._measure(segment.end.place.x)
-        self._here = replace(segment.end, tangent=self._metric.unit(after))
+        self._here = replace(segment.end, tangent=self._metric.unit(segment.end.tangent))
         factor = 2.0 ** np.clip((o.newton_target - segment.end.solution.steps) / 2, -1, 2)
         if segment.angle > KINK_ANGLE:
             self._bend = None
         else:
-            self._bend = (after - before) * (1.0 / segment.length)
+            self._bend = (last.end.tangent - last.start.tangent) * (1.0 / last.length)
             factor = min(factor, max(0.5, o.angle / max(segment.angle, 1e-9)))
         self._cap = min(o.max_step, CAP_GROWTH * self._cap)
-        longest = max(min(self._cap, FOLD_REACH * segment.distance_to_fold), o.min_step)
+        longest = max(min(self._cap, max(FOLD_REACH * last.distance_to_fold, SHORT_STEP)), o.min_step)
         self._step = float(np.clip(step * factor, o.min_step, longest))

@@ -13,6 +13,7 @@ from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.workflows.benchmarks import branches
 
+FOLDS_OF_168 = (209.0526659, 209.0735379, 214.7464873, 214.7524408)  # [rad/s], as the way down finds them
 FOLDS_OF_18 = (182.3982312, 182.3994060)  # [rad/s], as the way up finds them; 6e-6 of the frequency apart
 
 
@@ -27,7 +28,7 @@ def test_curves_that_slip_lift_and_fold_are_followed_both_ways(capsys: pytest.Ca
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("number", "folds"), [(39, 8), (95, 18)])
+@pytest.mark.parametrize(("number", "folds"), [(29, 12), (39, 8), (43, 6), (53, 6), (95, 18), (137, 24)])
 def test_no_pair_of_folds_is_stepped_over(number: int, folds: int) -> None:
     row = branches.judged(number)
     assert (row.outcome, row.folds) == (branches.FOLLOWED, folds), row.reason
@@ -43,6 +44,12 @@ def test_two_folds_close_together_are_not_stepped_over() -> None:
     given = branches.problem(18)
     down = arc_length.follow(given.balance, given.high, given.low)
     assert np.sort(down.omega[list(down.folds)]) == pytest.approx(FOLDS_OF_18, rel=1e-8)
+
+
+def test_two_folds_within_one_step_are_both_found() -> None:
+    given = branches.problem(168)
+    up = arc_length.follow(given.balance, given.low, given.high)
+    assert np.sort(up.omega[list(up.folds)]) == pytest.approx(FOLDS_OF_168, rel=1e-8)
 
 
 def test_the_judge_sees_points_off_the_curve_lost_folds_and_gaps() -> None:
