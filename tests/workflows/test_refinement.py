@@ -17,7 +17,7 @@ from tribodyn.workflows.command import main
 TINY = (
     "harmonics.kept=[0, 1]",
     "geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "reduction.modes=5", "response.points=20",
-    "harmonics.samples=64", "pictures.renders=false",
+    "harmonics.samples=64", "pictures.renders=false", "verdict.in_time=false",
 )  # fmt: skip
 
 

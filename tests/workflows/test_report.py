@@ -161,7 +161,12 @@ SMALL = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", SMALL)
+LIKE_OTHERS = ("leaf_seal", "rig")  # a part and its contacts, as the beam and the pressed halves of test_scene_brb
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in LIKE_OTHERS else name for name in SMALL]
+)
 def test_the_report_of_each_case_is_clicked_zoomed_and_turned(
     name: str, chromium: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
