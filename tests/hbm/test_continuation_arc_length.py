@@ -20,6 +20,7 @@ from tribodyn.hbm.continuation.bordered import Direction, Metric
 from tribodyn.hbm.continuation.methods import arc_length, natural
 from tribodyn.hbm.continuation.methods.arc_length import Options
 from tribodyn.hbm.continuation.parameter import Parameter
+from tribodyn.hbm.continuation.stepper import Stepper
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 
@@ -292,3 +293,20 @@ def test_a_gap_in_the_curve_is_stepped_over_and_named(monkeypatch):
     assert calls[5] is not calls[4]  # a new walk from behind the gap
     assert np.all(np.diff(branch.omega[:7]) > 0)
     np.testing.assert_allclose(np.sort(branch.omega[list(branch.folds)]), duffing.folds(), rtol=1e-8)
+
+
+def test_a_walk_that_always_lands_astray_with_steps_that_do_not_get_shorter_ends(monkeypatch):
+    """As behind a corner far away: going back shortens nothing there, and went on for ever."""
+    went_back = []
+
+    def same_again(stepper, index):
+        went_back.append(index)
+        assert len(went_back) < 100
+        stepper._here = stepper.segments[index].start
+        del stepper.segments[index:]
+
+    monkeypatch.setattr(Stepper, "arrives", lambda *given: False)
+    monkeypatch.setattr(Stepper, "rewind", same_again)
+    branch = arc_length.follow(Duffing().balance(), 0.5, 0.6)
+    assert went_back
+    assert str(branch.end).endswith("the curve jumps to another branch there")

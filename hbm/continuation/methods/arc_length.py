@@ -34,6 +34,7 @@ from tribodyn.hbm.threads import single
 GAP_STEPS = 10 ** np.arange(-6.0, -2.5)
 MAX_GAPS = 20  # a curve with more is none
 MAX_REWINDS = 4  # times that a walk which came back onto its own way goes back, to four times shorter steps
+MAX_LANDINGS = 20  # times that it goes back from a bound where it lands astray; steps of a corner need not get shorter
 
 
 @dataclass(frozen=True)
@@ -157,7 +158,7 @@ class _Walk:
         self._first: CurvePoint | None = None
         self._size = float(np.linalg.norm(builder.x[0]))
         self._rows = [1]  # points in the branch before each segment
-        self._rewinds = 0
+        self._rewinds = self._landings = 0
         self._jumps: list[float] = []
 
     @property
@@ -212,7 +213,8 @@ class _Walk:
         guess = flat.reshape(balance.contact.n_pair, -1, flat.shape[-1])
         last = newton.solve(balance, omega, guess, self._options.newton)
         astray = last.converged and not self._stepper.arrives(part, bound, last)
-        if astray and part.length > self._options.min_step:
+        if astray and part.length > self._options.min_step and self._landings < MAX_LANDINGS:
+            self._landings += 1
             self._rewind(len(self._stepper.segments) - 1)
             return None
         self._builder.add(bound, last)
