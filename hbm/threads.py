@@ -30,8 +30,9 @@ def _controller() -> ThreadpoolController:
 
 
 def usable(count: int) -> int:
-    """As many of `count` threads as there are processors: more would wait for each other, a million for ever."""
-    return min(count, os.cpu_count() or 1)
+    """As many of `count` threads as this process has processors: more wait for each other, a million for ever."""
+    ours = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()  # Linux alone has it
+    return min(count, ours or 1)
 
 
 @contextmanager

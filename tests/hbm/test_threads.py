@@ -61,7 +61,7 @@ def test_an_entry_called_from_python_takes_one_thread_and_gives_the_others_back(
 
 
 def test_who_asks_for_two_threads_has_two_and_the_limit_ends_with_its_context(monkeypatch):
-    monkeypatch.setattr(threads.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(threads.os, "sched_getaffinity", lambda process: {0, 1}, raising=False)
     inside = threads.single(counts)
     with threadpool_limits(1, "blas"):
         with threads.limited(1_000_000):  # which would never end
