@@ -25,6 +25,7 @@ from tribodyn.workflows.command.exits import BAD_INPUT, FAILED_SOLVE
 
 ENDS = {0: "success", BAD_INPUT: "refused", FAILED_SOLVE: "failed"}
 REFUSED, ACCEPTED = "refused when read", "accepted when read"  # without a run
+WARNED = "a warning of a library"
 GOOD = (*ENDS.values(), REFUSED, ACCEPTED)
 LATE = 10.0  # times the limit, of the clock, after which a process that sleeps is killed; what compiling may take
 PRINTED, SPENT, RESULT = "printed", "spent", "out/result.h5"  # in the folder of a run
@@ -158,9 +159,8 @@ class Runs:
             place = running.place
             end, printed = _end(process.exitcode, place), _told(place)
             spent = float((place / SPENT).read_text()) if (place / SPENT).exists() else self.seconds
-            lines = (
-                [line for line in printed.splitlines() if line.startswith("tribodyn:")] if end in GOOD else [printed]
-            )
+            mark = "tribodyn:" if end in GOOD else "Warning" if end == WARNED else ""
+            lines = [line for line in printed.splitlines() if mark in line]
             found.append(Tried(self.scene, running.key, running.value, end, "\n".join(lines)[-2000:], spent))
             shutil.rmtree(place)
         return found
@@ -232,7 +232,7 @@ def _end(code: int | None, place: Path) -> str:
     if "Traceback" in printed or code not in ENDS:
         return "traceback"
     if "Warning" in printed:
-        return "a warning of a library"
+        return WARNED
     if code == 0 and (what := fuzz_result.wrong(place / RESULT)):
         return what
     if code and sum(line.startswith("tribodyn:") for line in printed.splitlines()) != 1:
