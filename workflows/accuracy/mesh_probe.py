@@ -13,7 +13,7 @@ from tribodyn.hbm.wear.even_wear import depth_to_loss
 from tribodyn.workflows.accuracy import convergence, other_meshes, probes
 from tribodyn.workflows.accuracy.convergence import Difference
 from tribodyn.workflows.accuracy.other_meshes import Other
-from tribodyn.workflows.accuracy.probes import Answers, State
+from tribodyn.workflows.accuracy.probes import Answers, State, relative
 from tribodyn.workflows.accuracy.statement import QUANTITIES, Contribution
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.result import summary
@@ -41,22 +41,16 @@ SAME_GRID = 0.95  # size of the contact elements over that of the scene's, above
 class Seen:
     """What other meshes have answered.
 
-    differences : by what is changed and by quantity; wider : the same with more harmonics, where they were found
-    refused : by what is changed
+    differences : by what is changed and by quantity; refused : by what is changed
+    moved : by quantity, relative changes that more harmonics make on the other meshes
     grid_kept : whether the finer one has contact elements as long as the scene's along some direction
     """
 
     differences: dict[str, dict[str, list[Difference]]] = field(default_factory=dict)
-    wider: dict[str, dict[str, list[Difference]]] = field(default_factory=dict)
     refused: dict[str, str] = field(default_factory=dict)
     said: list[str] = field(default_factory=list)
     grid_kept: bool = False
-
-    def best(self) -> Iterator[dict[str, list[Difference]]]:
-        """Differences by quantity, of one change after the other: with more harmonics where all meshes have them."""
-        for along, plain in self.differences.items():
-            wide = self.wider.get(along, {})
-            yield wide if all(len(wide.get(name, ())) == len(found) for name, found in plain.items()) else plain
+    moved: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -64,9 +58,9 @@ class Probe:
     """The unworn state that other meshes are compared with.
 
     seconds : of the processor, for all of a source; skipped : the sentence where they are used up
-    more_harmonics : whether meshes are compared with more harmonics than the scene's. Where those change an answer,
-        they may change another one on another mesh, as where a resonance of a higher harmonic is near: the error of the
-        scene's is at most the sum of what they change in it and of the mesh's error with them
+    more_harmonics : whether to look at what they change on a finer mesh, too. Where a resonance of a higher harmonic is
+        near it may be more than on the scene's own: the error is at most the sum of the mesh's, with the harmonics of
+        the scene, and of what more of them change on a mesh without error
     """
 
     result: Result
@@ -104,41 +98,29 @@ class Probe:
         return summary.first_lost(self.result)
 
     def _solve(self, others: Sequence[Other], seen: Seen, end: float) -> None:
-        ours, wide = self.first.answers, None
-        folded = isinstance(self.first.site, probes.OnCurve)
+        ours, folded = self.first.answers, isinstance(self.first.site, probes.OnCurve)
         for other in others:
             try:
                 with processor_seconds(end - process_time()):
-                    if self.more_harmonics and wide is None and not folded:
-                        wide = _with_more_harmonics(self.first)
                     taken, model = self._built(other, seen)
                     there = probes.unworn(taken.file, model, folded)
-                    theirs = None if wide is None else _with_more_harmonics(there)
                     deepest = probes.deepest(taken.file, there, self._joint)
             except (TimeUp, ValueError, RuntimeError) as refusal:
                 why = self.skipped if isinstance(refusal, TimeUp) else f"{other.how}: {refusal}"
                 seen.refused[other.along] = why
                 continue
             seen.said.append(taken.how)
-            self._add(seen.differences.setdefault(other.along, {}), taken.size, there.answers, ours, deepest)
-            if theirs is not None and wide is not None:
-                self._add(seen.wider.setdefault(other.along, {}), taken.size, theirs, wide, deepest)
-
-    def _add(
-        self, to: dict[str, list[Difference]], size: float, theirs: Answers, ours: Answers, deepest: float
-    ) -> None:
-        """Add the differences to a mesh of a size.
-
-        deepest : how deep the contact may wear there [m]
-        """
-        pairs = {name: (a, b) for name, a, b in compared(theirs, ours)}
-        if self.result.wear_steps:
-            reach = self.result.facts.delta_max_m
-            if reach is None:
-                reach = depth_to_loss(self.first.balance, self.first.here.state, self._joint)
-            pairs["depth"] = (deepest, reach)
-        for name, (a, b) in pairs.items():
-            to.setdefault(name, []).append(convergence.difference(size, a, b))
+            of = seen.differences.setdefault(other.along, {})
+            pairs = {name: (a, b) for name, a, b in compared(there.answers, ours)}
+            if self.result.wear_steps:
+                reach = self.result.facts.delta_max_m
+                if reach is None:
+                    reach = depth_to_loss(self.first.balance, self.first.here.state, self._joint)
+                pairs["depth"] = (deepest, reach)
+            for name, (a, b) in pairs.items():
+                of.setdefault(name, []).append(convergence.difference(taken.size, a, b))
+            if self.more_harmonics and taken.size < 1 and not folded:
+                seen.moved = moved_by_more_harmonics(there, end - process_time())
 
     def _built(self, other: Other, seen: Seen) -> tuple[Other, Model]:
         """The model of another mesh; of the one instead, where this one leaves the contact grid in a direction.
@@ -174,10 +156,14 @@ class Probe:
             yield from unknown(source, lacking[0])
             return
         how, errors = ", ".join(dict.fromkeys(seen.said)), dict[str, float]()
-        for of in seen.best():
+        for of in seen.differences.values():
             settled = fine_enough and convergence.has_settled([one for name in ANSWERS for one in of[name]])
             for name, differences in of.items():
                 errors[name] = errors.get(name, 0.0) + convergence.bound(differences, settled)
+        if seen.moved and beside is not None:
+            own = moved_by_more_harmonics(self.first, beside - process_time())
+            for name, moved in seen.moved.items():
+                errors[name] += max(moved - own.get(name, 0.0), 0.0)
         for name in AT_A_PEAK:
             errors[name] = max(errors[name], errors["peak_frequency"])
         plateau = 0.0 if beside is None else self._on_a_plateau(errors, beside)
@@ -212,12 +198,14 @@ class Probe:
             return 0.0
 
 
-def _with_more_harmonics(state: State) -> Answers | None:
-    """What a state answers with the first harmonics beyond its own, None where that is not found."""
+def moved_by_more_harmonics(state: State, seconds: float) -> dict[str, float]:
+    """Relative change of every answer by the first harmonics beyond those of a state; empty where that is not found."""
     try:
-        return probes.with_more_harmonics(state, 1)
-    except (ValueError, RuntimeError):
-        return None
+        with processor_seconds(seconds):
+            finer = probes.with_more_harmonics(state, 1)
+    except (TimeUp, ValueError, RuntimeError):
+        return {}
+    return {} if finer is None else {name: relative(a, b) for name, a, b in compared(state.answers, finer)}
 
 
 def element_lengths(interface: ContactInterface) -> np.ndarray:

@@ -27,7 +27,7 @@ WIDEST = 4.0  # highest over lowest frequency of a response
 STEEL = {"young": "210 GPa", "density": "7860 kg/m3", "poisson": 0.3}
 MODES = 6  # stuck modes that the resonance is looked for in
 WORN = 0.5  # share of the scenes that are worn
-LONGER = 30.0  # processor seconds of the verdict on a scene that wears: its late states take more
+LONGER = 30.0  # processor seconds of the verdict on wheels, on rigs, and on what wears: its late states take more
 # logarithm of the tangential force of the stuck contact over what friction can carry; with little of it wear fades
 # out before the contact is lost
 DRIVE, WEARING = (-0.2, 0.8), (0.4, 1.0)
@@ -35,7 +35,8 @@ DRIVE, WEARING = (-0.2, 0.8), (0.4, 1.0)
 BESIDE = ((0.4, 0.6), (0.4, 0.6), (0.85, 0.95), (1.05, 1.15))
 TOPS = (1, 1, 2, 3, 3, 5)  # highest harmonic kept
 HIGHEST = {"wheel": 3, "rig": 3}  # the same, at most: with more their reference takes minutes
-DAMPED = 2.0  # times the drawn damping where they wear: with little of it most worn motions are unstable
+# times the drawn damping where they wear, and of rigs: with little of it most such motions are unstable
+DAMPED = 2.0
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,9 @@ def draw(number: int, seed: int, folder: Path) -> Drawn:
     if worn:
         table["wear"] = {"coefficient": "1e4 um3/J", "max_steps": 80, "lost_below": LIFE_SHARE} | _rule(rng)
         table["wear"] |= {"at": {"frequency": place}}
+    if worn or family == "rig":
         table["damping"]["modal"] *= DAMPED
+    if worn or family in HIGHEST:
         table["verdict"] = {"seconds": LONGER}
     return Drawn(number, seed, family, as_toml(table))
 
@@ -172,7 +175,7 @@ def _wheel(rng: np.random.Generator) -> Table:
     order = int(rng.integers(1, max(2, min(sectors // 2, 6))))
     hub = sectors * 0.3 / 40 * float(rng.uniform(0.9, 1.3)) + 0.02
     sizes = _lengths(rng, span=(0.16, 0.24), root_thickness=(0.016, 0.022), tip_thickness=(0.011, 0.015))
-    counts = {"n_along": 2, "n_up": 2, "n_span": int(rng.integers(3, 6)), "n_side": 1}
+    counts = {"n_along": int(rng.choice([2, 3])), "n_up": 2, "n_span": int(rng.integers(4, 6)), "n_side": 1}
     couple = float(10 ** rng.uniform(4.0, 4.8))
     return {
         "geometry": {
