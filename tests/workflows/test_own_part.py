@@ -36,12 +36,12 @@ def test_the_example_runs_from_its_drawing_to_its_worn_surface(folder: Path) -> 
 GRIDS = """
 [converge.mesh]
 sizes = [1, 1.33, 2]
-set = [['geometry.mesh="arm_16.msh"'], ['geometry.mesh="arm_12.msh"'], ['geometry.mesh="arm_8.msh"']]
+set = [['geometry.mesh="arm_20.msh"'], ['geometry.mesh="arm_15.msh"'], ['geometry.mesh="arm_10.msh"']]
 """
 
 
 def test_a_study_beside_the_scene_is_found(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for size in (16, 12, 8):
+    for size in (20, 15, 10):
         mesh_drawing(folder / "arm.geo", folder / f"arm_{size}.msh", {"size": 1e-3 * size})
     (folder / "arm.study.toml").write_text(GRIDS)
     words = ["converge", str(folder / "arm.toml"), "--set", "response.points=20", "--json", "--out", str(folder)]
