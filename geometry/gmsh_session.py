@@ -30,6 +30,8 @@ def session() -> Iterator[Any]:
             f"gmsh cannot be loaded ({error}): install its system libraries with "
             f"'apt-get install --no-install-recommends {SYSTEM_LIBRARIES}', or start tribodyn through ./tribodyn."
         ) from error
+    if gmsh.isInitialized():  # a limit of time has cut a session off before it could end
+        gmsh.finalize()
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.restoreDefaults()  # else options of an earlier session of this process stay

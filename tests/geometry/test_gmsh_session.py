@@ -32,3 +32,12 @@ def test_a_mesh_that_the_disk_does_not_take_whole_is_told(tmp_path: Path, share:
         else:
             with pytest.raises(OSError, match=r"box\.msh': is the disk full"):
                 save(there, path)
+
+
+def test_a_session_that_was_cut_off_before_it_could_end_is_ended_first(capfd):
+    gmsh = pytest.importorskip("gmsh")
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    with session() as again:
+        assert again.model.getEntities() == []
+    assert "already" not in (told := "".join(capfd.readouterr())).replace("aleady", "already"), told
+    assert not gmsh.isInitialized()
