@@ -20,13 +20,12 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.linear.compliance import ContactCompliance
+from tribodyn.hbm.linear.expansion import WANTED_ERROR
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.threads import single
 
 LINEAR_ACCURACY = 1e-3  # of the linear solves behind the estimate, which is of first order itself
-# Of the compliance at the highest harmonic of a wide balance, as Newton's tolerance: with 1e-6 a sweep of the beam with
-# more harmonics jumped elsewhere, and the error of its life was not known.
-WIDE_ERROR = 1e-8
+ROUGH = 1e-5  # error of the compliance at the highest harmonic that estimates at single states may have
 # an output that vibrates less than this share of the largest vibration is measured against that share
 LEAST_VIBRATION_SHARE = 1e-2
 # useful harmonics in a row, the smallest first, after which no more are tried for dropping
@@ -151,10 +150,12 @@ def highest_looked_at(top: int) -> int:
     return max(CLIMB[-1], top + FURTHER)
 
 
-def widened(balance: HarmonicBalance, highest: int) -> HarmonicBalance:
+def widened(balance: HarmonicBalance, highest: int, error: float = WANTED_ERROR) -> HarmonicBalance:
     """The problem with all harmonics to half as many again as `highest`, for estimates; raises ValueError.
 
     The linear side is kept as long as that of the balance: problems that differ in contact, wear or load share it
+    error : of the compliance at the highest harmonic. ROUGH does not serve to follow a response: with 1e-6 a sweep of
+        the beam jumped elsewhere
     """
     top = highest + (highest + 1) // 2
     basis = replace(balance.basis, harmonics=tuple(range(top + 1)))
@@ -165,8 +166,9 @@ def widened(balance: HarmonicBalance, highest: int) -> HarmonicBalance:
     if balance.model.residual is not None:
         springs = own.k
     known = _WIDE.get(own)
-    if known is None or known.basis.harmonics[-1] < top or not np.array_equal(known.k, springs):
-        known = _WIDE[own] = ContactCompliance(balance.model, springs, basis, excitation, balance.omega_max, WIDE_ERROR)
+    serves = known is not None and known.basis.harmonics[-1] >= top and known.wanted <= error
+    if known is None or not serves or not np.array_equal(known.k, springs):
+        known = _WIDE[own] = ContactCompliance(balance.model, springs, basis, excitation, balance.omega_max, error)
     return replace(balance, basis=basis, excitation=excitation, compliance=known.restricted(basis), at_rest=None)
 
 

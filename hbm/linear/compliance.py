@@ -44,7 +44,7 @@ class ContactCompliance:
         omega_max: float,
         wanted: float = WANTED_ERROR,
     ):
-        self.basis = basis
+        self.basis, self.wanted = basis, wanted
         self.k = np.asarray(stiffness, float).ravel()
         self.n_contact = len(self.k)
         system, _ = model.at_harmonic(basis.harmonics[-1])

@@ -83,8 +83,8 @@ def _of_response(file: SceneFile, balance: HarmonicBalance, result: Result) -> I
     error: float | None = None
     try:
         if file.scene.verdict.enabled:  # its linear side, the dearest part of a wheel's, then serves here too
-            harmonic_choice.widened(balance, harmonic_choice.highest_looked_at(top))
-        wide = harmonic_choice.widened(balance, top + LOOK)
+            harmonic_choice.widened(balance, harmonic_choice.highest_looked_at(top), harmonic_choice.ROUGH)
+        wide = harmonic_choice.widened(balance, top + LOOK, harmonic_choice.ROUGH)
         error = harmonic_choice.estimate(wide, balance.basis.harmonics, omega, x, split=False).error
         how = "estimate: one step with more"
     except ValueError as refusal:

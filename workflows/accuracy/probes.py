@@ -163,7 +163,7 @@ def with_more_harmonics(state: State, steps: int | None = None) -> Answers | Non
     """
     top = state.balance.basis.harmonics[-1]
     basis, x, omega = state.balance.basis, state.here.state.x, state.here.state.omega
-    wide = harmonic_choice.widened(state.balance, harmonic_choice.highest_looked_at(top))
+    wide = harmonic_choice.widened(state.balance, harmonic_choice.highest_looked_at(top), harmonic_choice.ROUGH)
     answers = None
     for highest in harmonic_choice.climb(top)[:steps]:
         finer = wide.with_harmonics(tuple(h for h in wide.basis.harmonics if h <= highest))
