@@ -20,7 +20,6 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.linear.compliance import ContactCompliance
-from tribodyn.hbm.linear.expansion import WANTED_ERROR
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.threads import single
 
@@ -150,12 +149,12 @@ def highest_looked_at(top: int) -> int:
     return max(CLIMB[-1], top + FURTHER)
 
 
-def widened(balance: HarmonicBalance, highest: int, error: float = WANTED_ERROR) -> HarmonicBalance:
+def widened(balance: HarmonicBalance, highest: int, error: float | None = None) -> HarmonicBalance:
     """The problem with all harmonics to half as many again as `highest`, for estimates; raises ValueError.
 
     The linear side is kept as long as that of the balance: problems that differ in contact, wear or load share it
-    error : of the compliance at the highest harmonic. ROUGH does not serve to follow a response: with 1e-6 a sweep of
-        the beam jumped elsewhere
+    error : of the compliance at the highest harmonic, None: as a run needs it. ROUGH does not serve to follow a
+        response: with 1e-6 a sweep of the beam jumped elsewhere
     """
     top = highest + (highest + 1) // 2
     basis = replace(balance.basis, harmonics=tuple(range(top + 1)))
@@ -166,7 +165,7 @@ def widened(balance: HarmonicBalance, highest: int, error: float = WANTED_ERROR)
     if balance.model.residual is not None:
         springs = own.k
     known = _WIDE.get(own)
-    serves = known is not None and known.basis.harmonics[-1] >= top and known.wanted <= error
+    serves = known is not None and known.basis.harmonics[-1] >= top and (known.wanted or 0.0) <= (error or 0.0)
     if known is None or not serves or not np.array_equal(known.k, springs):
         known = _WIDE[own] = ContactCompliance(balance.model, springs, basis, excitation, balance.omega_max, error)
     return replace(balance, basis=basis, excitation=excitation, compliance=known.restricted(basis), at_rest=None)

@@ -17,7 +17,7 @@ import numpy as np
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import all_harmonics
-from tribodyn.hbm.linear.expansion import WANTED_ERROR, Expansion, UnbalancedLoad
+from tribodyn.hbm.linear.expansion import Expansion, UnbalancedLoad
 from tribodyn.hbm.linear.ritz_expansion import RitzExpansion
 from tribodyn.reduction.model import ReducedModel
 
@@ -32,7 +32,8 @@ class ContactCompliance:
     model : reduced model; stiffness : (n_pair, n_component) stuck springs [N/m], of a model with residual flexibility
         those that this was made with
     excitation : loads whose names are ports; omega_max : largest excitation frequency that will be asked for [rad/s]
-    wanted : relative error of dense compliances at the highest harmonic of it that is small enough
+    wanted : relative error of dense compliances at the highest harmonic of it that is small enough; None: as a run
+        needs it
     """
 
     def __init__(
@@ -42,7 +43,7 @@ class ContactCompliance:
         basis: HarmonicBasis,
         excitation: Excitation,
         omega_max: float,
-        wanted: float = WANTED_ERROR,
+        wanted: float | None = None,
     ):
         self.basis, self.wanted = basis, wanted
         self.k = np.asarray(stiffness, float).ravel()

@@ -65,7 +65,8 @@ class Expansion:
 
     system : dense, b : (n_contact, n) contact map, stiffness : (n_contact,) stuck contact springs [N/m]
     ports : (n_port, n) rows; contact rows first
-    s_max : largest h w that will be asked for [rad/s]; wanted : relative error there that is small enough
+    s_max : largest h w that will be asked for [rad/s]; wanted : relative error there that is small enough, None for
+        WANTED_ERROR
     w0 : (n_port, n_port) W_0; b : (n_port, m) modes; e : (order - 2, n_port, m) W_k C Phi s_max^(k+1) at the ports,
         all three views of `columns` = [w0, b, e_0, ...]
     w0_single, b_single : those of the contacts in single precision
@@ -83,8 +84,9 @@ class Expansion:
         stiffness: np.ndarray,
         ports: np.ndarray,
         s_max: float,
-        wanted: float = WANTED_ERROR,
+        wanted: float | None = None,
     ):
+        wanted = WANTED_ERROR if wanted is None else wanted
         self.n_port, self._n_contact = len(ports), len(b)
         self.s_unit = s_max or 1.0
         mass = np.asarray(system.mass)

@@ -45,7 +45,9 @@ def test_two_folds_meet_in_a_cusp_and_the_line_goes_round_it(duffing_branch):
     line = track_fold(parameter.load(duffing.balance(), 2.0), 1.0, 0.01, branch.omega[i], x)
     assert str(line.end) == "turned back to load factor 1"
     assert len(line.cusps) == 1
-    assert high <= line.parameter.min() < 1.05 * high
+    assert (
+        0.999 * high <= line.parameter.min() < 1.05 * high
+    )  # two folds nearer than its points escape the grid of `folds`
     np.testing.assert_allclose(line.omega[-1], branch.omega[other], rtol=1e-8)
 
 

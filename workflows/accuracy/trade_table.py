@@ -131,7 +131,7 @@ def said_by(file: SceneFile) -> dict[str, Any]:
     or a key its meaning, KEY_VERSION goes up.
     """
     said: dict[str, Any] = file.scene.model_dump(
-        mode="json", exclude_defaults=True, exclude={"scene": True, "pictures": True, "solver": True}
+        mode="json", exclude_defaults=True, exclude={"scene": True, "pictures": True, "solver": True, "verdict": True}
     )
     own = {text.partition("=")[0] for k in study_of(file).knobs for s in k.settings for text in s.overrides}
     for key in {*KNOB_KEYS, *own}:
