@@ -139,7 +139,7 @@ def scene(tmp_path: Path) -> Path:
     for name, body in files.items():
         (tmp_path / f"{name}.py").write_text(body)
     (tmp_path / "mine.study.toml").write_text(STUDY)
-    (tmp_path / "mine.toml").write_text(text + "\n[verdict]\nenabled = false\n")
+    (tmp_path / "mine.toml").write_text(text.replace("[verdict]", "[verdict]\nenabled = false"))
     return tmp_path / "mine.toml"
 
 
