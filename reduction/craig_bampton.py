@@ -78,8 +78,7 @@ def craig_bampton(
     mass[n_m:, n_m:] = np.eye(len(omega))
     turning = None
     if system.gyroscopic is not None:
-        turning = basis.T @ (system.gyroscopic @ basis)
-        turning = (turning - turning.T) / 2
+        turning = _congruent(basis, system.gyroscopic, -1.0)
 
     reduced = SecondOrderSystem(
         mass,
@@ -187,13 +186,15 @@ def with_static_shapes(
     return omega, phi
 
 
-def _congruent(basis: np.ndarray, matrix: Any) -> np.ndarray:
-    """basis^T A basis (k, k) of a sparse symmetric A (n, n), block by block: no second array as large as the basis."""
+def _congruent(basis: np.ndarray, matrix: Any, sign: float = 1.0) -> np.ndarray:
+    """basis^T A basis (k, k) of a sparse A (n, n) with A^T = sign A, block by block: no second array as large as the
+    basis.
+    """
     product = np.empty((basis.shape[1],) * 2)
     for block in _blocks(basis.shape[1]):
         product[: block.stop, block] = basis[:, : block.stop].T @ (matrix @ basis[:, block])
-        product[block, : block.start] = product[: block.start, block].T
-    return _symmetric(product)
+        product[block, : block.start] = sign * product[: block.start, block].T
+    return (product + sign * product.T) / 2
 
 
 def _blocks(n: int) -> list[slice]:

@@ -28,6 +28,9 @@ from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ModelInfo, ReducedModel
 
 ROUNDING = 1e-9  # of the rows of a contact map
+MANY = 1000  # coordinates of a wave from which on its damping and compliance cost more than `stuck_ritz`
+RITZ_MODES = 192  # as many as the compliance is expanded in at the most
+DEPENDENT = 1e-10  # share of its strain energy that a static shape must add to the others to be kept
 
 
 @dataclass(frozen=True)
@@ -87,15 +90,20 @@ def nodal_diameters(
     return np.array(found)
 
 
-def travelling_wave(reduced: ReducedSector, engine_order: int, cutoff: float | None = None) -> ReducedModel:
+def travelling_wave(
+    reduced: ReducedSector, engine_order: int, cutoff: float | None = None, springs: np.ndarray | None = None
+) -> ReducedModel:
     """The model of one sector under a wave of this engine order: harmonic h sees the index h EO modulo N.
 
     cutoff : highest frequency [Hz] of the modes that then stand for seam, left shroud and fixed-interface modes (3.20);
         None keeps all these coordinates
-    Returns the model whose system and interface are those of harmonic 1; coordinates are the relative displacements,
-        then accessories, then the rest; `reconstruct` takes the harmonic. One object serves all harmonics of one index
+    springs : (n_pair, n_component) contact springs [N/m]; where they are given, more than MANY coordinates are replaced
+        by those of `stuck_ritz`
+    Returns the model whose system and interface are those of harmonic 1; coordinates, but for those of `stuck_ritz`,
+        are the relative displacements, then accessories, then the rest; `reconstruct` takes the harmonic. One object
+        serves all harmonics of one index
     """
-    wave = _Wave(reduced, engine_order, _Indices(reduced, cutoff))
+    wave = _Wave(reduced, engine_order, _Indices(reduced, cutoff, springs))
     system, B = wave.model(1)
     info = replace(_shared_info(reduced), engine_order=engine_order)
     try:
@@ -132,23 +140,39 @@ def _shared_info(reduced: ReducedSector) -> ModelInfo:
 class _Indices:
     """Small system, contact map and way back T (q = T z) of each harmonic index, each made once."""
 
-    def __init__(self, reduced: ReducedSector, cutoff: float | None):
+    def __init__(self, reduced: ReducedSector, cutoff: float | None, springs: np.ndarray | None = None):
         self._sector = reduced.sector
         self._cutoff = cutoff
+        self._springs = springs
         self._made: dict[int, tuple[SecondOrderSystem, np.ndarray, np.ndarray]] = {}
 
     def __call__(self, index: int) -> tuple[SecondOrderSystem, np.ndarray, np.ndarray]:
         if index not in self._made:
-            once, of_row = distinct(self._sector)
-            if self._cutoff is None and not node_to_node(once):
-                self._made[index] = *at_index(self._sector, index), seam_map(self._sector, index).toarray()
-                return self._made[index]
-            T, n_masters = relative_map(once, index)
-            if self._cutoff is not None:
-                T = T @ condensation(projected(self._sector.system, T), n_masters, self._cutoff)
-            system = projected(self._sector.system, T)
-            self._made[index] = system, np.eye(len(once.left), system.n_dof)[of_row], T
+            self._made[index] = self._small(*self._whole(index))
         return self._made[index]
+
+    def _whole(self, index: int) -> tuple[SecondOrderSystem, np.ndarray, np.ndarray]:
+        """The same with all coordinates of the sector, or with those of (3.20) where a cutoff is given."""
+        once, of_row = distinct(self._sector)
+        if self._cutoff is None and not node_to_node(once):
+            return *at_index(self._sector, index), seam_map(self._sector, index).toarray()
+        T, n_masters = relative_map(once, index)
+        if self._cutoff is not None:
+            T = T @ condensation(projected(self._sector.system, T), n_masters, self._cutoff)
+        system = projected(self._sector.system, T)
+        return system, np.eye(len(once.left), system.n_dof)[of_row], T
+
+    def _small(
+        self, system: SecondOrderSystem, B: np.ndarray, T: np.ndarray
+    ) -> tuple[SecondOrderSystem, np.ndarray, np.ndarray]:
+        """The same in fewer coordinates where there are many."""
+        if self._springs is None or system.n_dof <= MANY:
+            return system, B, T
+        try:
+            V = stuck_ritz(system, B, self._springs)
+        except np.linalg.LinAlgError:  # it can move with its contacts stuck, which the compliance says better
+            return system, B, T
+        return projected(system, V), B @ V, T @ V
 
 
 @dataclass(frozen=True)
@@ -217,6 +241,33 @@ def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:
     ahead = np.conj(sector.phase(index))
     follow = N + ahead * right.conj().T @ (left @ N)
     return S @ np.concatenate([right.conj().T, follow], axis=1), len(right) + len(accessories)
+
+
+def stuck_ritz(system: SecondOrderSystem, B: np.ndarray, springs: np.ndarray) -> np.ndarray:
+    """Basis (n, m) of a dense system: modes with its contact stuck, and its static shapes under a unit force on every
+    contact row, under every load and under every output.
+
+    B : (n_contact, n) contact map; springs : (n_pair, n_component) [N/m]
+    Statics are exact, and what is left out of the motion of the contact falls with the fourth power of the frequency
+    over that of the first mode left out
+    Raises  LinAlgError where the system can move with its contact stuck, or is unstable then
+    Source  method of Rayleigh and Ritz; the shapes are those of `reduction.residual_flexibility`
+    """
+    K = stuck_stiffness(system.stiffness, B, springs)
+    K = (K + K.conj().T) / 2
+    n = len(K)
+    factor = sla.cho_factor(K)
+    nu, phi = sla.eigh(system.mass, K, subset_by_index=(max(n - RITZ_MODES, 0), n - 1))  # of unit energy
+    forces = np.column_stack(
+        [B.conj().T, *(v for v in system.loads.values()), *(np.conj(v) for v in system.outputs.values())]
+    )
+    shapes = sla.cho_solve(factor, forces)
+    size = np.einsum("ij,ij->j", forces.conj(), shapes).real
+    forces, shapes = (a[:, size > 0] / np.sqrt(size[size > 0]) for a in (forces, shapes))
+    shapes = shapes - phi @ (phi.conj().T @ forces)
+    energy, turn = sla.eigh(shapes.conj().T @ (K @ shapes))
+    kept = energy > DEPENDENT
+    return np.concatenate([phi / np.sqrt(nu), (shapes @ turn[:, kept]) / np.sqrt(energy[kept])], axis=1)
 
 
 def condensation(system: SecondOrderSystem, n_masters: int, cutoff: float) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import eigh
+from scipy.linalg.blas import dsyrk, zherk
 
 from tribodyn.fem.system import SecondOrderSystem
 
@@ -20,8 +21,10 @@ def modal_damping(system: SecondOrderSystem, ratio: float) -> np.ndarray:
     values, phi = eigh(system.stiffness, system.mass)
     # below this an eigenvalue is rounding of a rigid-body mode
     values[values < len(values) * np.finfo(float).eps * values[-1]] = 0.0
-    weighted = system.mass @ phi
-    return (weighted * (2 * ratio * np.sqrt(values))) @ weighted.conj().T
+    weighted = (system.mass @ phi) * np.sqrt(2 * ratio * np.sqrt(values))
+    multiply = zherk if np.iscomplexobj(weighted) else dsyrk
+    upper = np.triu(multiply(1.0, weighted))
+    return upper + np.triu(upper, 1).conj().T
 
 
 def rayleigh(system: SecondOrderSystem, alpha: float, beta: float) -> np.ndarray:

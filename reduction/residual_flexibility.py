@@ -32,6 +32,7 @@ from threadpoolctl import threadpool_limits
 
 from tribodyn.fem.factor import Factor, factorise
 from tribodyn.fem.interface import ContactInterface
+from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction.craig_bampton import REPORTED_MODES, fixed_interface_modes
 from tribodyn.reduction.linear import linear_modes, stuck_stiffness
@@ -172,8 +173,11 @@ def residual_flexibility(
     rest = ResidualFlexibility(k, K, B, V, squares, M, solver)
     rest.__dict__["factor"] = factor
     model = ReducedModel(reduced, replace(interface, B=at_contact), V, info, residual=rest)
-    free = linear_modes(model, None, min(REPORTED_MODES, len(squares)))[0]
-    return replace(model, info=replace(info, free_frequency=free))
+    try:
+        free_frequency = linear_modes(model, None, min(REPORTED_MODES, len(squares)))[0]
+    except StaticDivergence:  # rotation carries away what only the contact holds
+        return model
+    return replace(model, info=replace(info, free_frequency=free_frequency))
 
 
 def clustered(interface: ContactInterface, weight: np.ndarray, clusters: int) -> csr_matrix:

@@ -13,7 +13,7 @@ from tribodyn.fem.hermitian import hermitian_modes
 from tribodyn.fem.part import Contact
 from tribodyn.reduction import cyclic as waves
 from tribodyn.reduction.damping import modal_damping
-from tribodyn.reduction.linear import linear_modes, system_modes
+from tribodyn.reduction.linear import linear_modes, stuck_stiffness, system_modes
 from tribodyn.reduction.store import load, save
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies import wheel as wheels
@@ -134,6 +134,34 @@ def test_condensed_coordinates_keep_statics_exact_and_frequencies_near(reduced):
             assert B @ full_answer == pytest.approx(B_small @ small_answer, rel=1e-6, abs=1e-15)
         exact = hermitian_modes(a.stiffness, a.mass, 3)[0]
         assert hermitian_modes(b.stiffness, b.mass, 3)[0] == pytest.approx(exact, rel=5e-3)
+
+
+def test_stuck_ritz_shapes_keep_statics_exact_and_the_contact_near(reduced, monkeypatch):
+    """Contacts, loads and outputs of a wave in few coordinates, against all of them; above the first mode, too."""
+    k = reduced.sector.interface.stiffness(*small.STIFFNESS)
+    fine = waves.travelling_wave(reduced, 3)
+    monkeypatch.setattr(waves, "MANY", 0)
+    monkeypatch.setattr(waves, "RITZ_MODES", 12)
+    coarse = waves.travelling_wave(reduced, 3, springs=k)
+
+    def response(model, h, hertz):
+        system, B = model.at_harmonic(h)
+        dynamic = stuck_stiffness(system.stiffness, B, k) - (2 * np.pi * hertz) ** 2 * system.mass
+        ports = np.concatenate([B, np.array(list(system.outputs.values()))])
+        return ports @ np.linalg.solve(dynamic, np.column_stack([B.conj().T, *system.loads.values()]))
+
+    first = linear_modes(fine, k, 1)[0][0]
+    for h in (0, 1, 2):
+        assert coarse.at_harmonic(h)[0].n_dof < fine.at_harmonic(h)[0].n_dof
+        for hertz, bound in ((0.0, 1e-9), (1.1 * first, 1e-5)):
+            exact = response(fine, h, hertz)
+            assert np.abs(response(coarse, h, hertz) - exact).max() < bound * np.abs(exact).max()
+    q = np.random.default_rng(0).normal(size=coarse.at_harmonic(1)[0].n_dof)
+    B, basis = np.asarray(reduced.sector.interface.B), reduced.basis
+    assert coarse.reconstruct(q).shape == (len(basis),)
+    slid = B - np.conj(reduced.sector.phase(3)) * reduced.sector.left
+    inside, *_ = np.linalg.lstsq(basis, coarse.reconstruct(q), rcond=None)
+    assert slid @ inside == pytest.approx(coarse.at_harmonic(1)[1] @ q, abs=1e-9 * np.abs(q).max())
 
 
 def test_shared_nodes_of_contact_and_seam_are_one_sentence(reduced):

@@ -221,7 +221,9 @@ def plain_model(scene: MeshScene, part: Part) -> ReducedModel:
     """The same, not damped and with nothing prescribed; of a wheel one wave of it."""
     if scene.wheel is not None:
         small = sector.reduced(scene, sector.sector(scene, part))
-        return travelling_wave(small, scene.wheel.engine_order)
+        contact = ReducedModel(small.sector.system, small.sector.interface, info=small.info)
+        springs = joints.contact_stiffness(scene, contact)
+        return travelling_wave(small, scene.wheel.engine_order, springs=springs)
     reduced = hold(part_reduction.reduce(scene, part), part.held)
     return replace(reduced, info=replace(reduced.info, joints=dict(part.joints)))
 

@@ -19,9 +19,10 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.recovery import full_displacement
-from tribodyn.reduction.craig_bampton import POINT_LOAD, craig_bampton
+from tribodyn.reduction.craig_bampton import POINT_LOAD
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ModelInfo, ReducedModel
+from tribodyn.reduction.residual_flexibility import residual_flexibility
 from tribodyn.workflows.run import joints, part_reduction
 from tribodyn.workflows.scene.schema import MeshScene
 
@@ -85,20 +86,22 @@ def stuck_at_rest(scene: MeshScene, sector: Sector) -> np.ndarray:
 def at_rest(scene: MeshScene, sector: Sector) -> np.ndarray:
     """Displacement (n_free,) [m] under the static loads of the scene, the contact settled; the same in every sector.
 
-    Sectors that move alike need no masters on their seams, as waves of other indices do
+    Sectors that move alike need no masters on their seams, as waves of other indices do, and statics no masters on the
+    contact: a traction on every pair makes them exact
     """
     system, B = at_index(sector, 0)
-    still = replace(system, gyroscopic=None)
+    static = static_loads(scene)
+    still = replace(system, gyroscopic=None, loads={name: system.loads[name] for name in static}, outputs={})
     interface = replace(sector.interface, B=csr_matrix(B))
+    springs = joints.contact_stiffness(scene, ReducedModel(still, interface, info=ModelInfo(joints=sector.joints)))
     try:
-        model = craig_bampton(still, interface, n_modes=0, attached=distributed(scene, sector))
+        model = residual_flexibility(still, interface, springs, n_modes=1, clusters=interface.n_pair)
     except SingularStiffness:
         raise StaticDivergence(UNSTABLE) from None
     model = replace(model, info=replace(model.info, joints=dict(sector.joints)))
-    static = Excitation.of(static_loads(scene))
     basis = HarmonicBasis((0, 1), FEW_SAMPLES)
     made = joints.make_joints(scene, model)
-    balance = HarmonicBalance.of(model, made, basis, static, AT_REST)
+    balance = HarmonicBalance.of(model, made, basis, Excitation.of(static), AT_REST)
     solved = newton.solve_from_rest(balance, AT_REST, newton.NewtonOptions(tolerance=SETTLED))
     if not solved.converged:
         raise ValueError(f"the contacts do not settle under the static loads: {solved.outcome}")
