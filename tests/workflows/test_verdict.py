@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import json
 import signal
+from dataclasses import replace
 from pathlib import Path
 from time import process_time, sleep
 
@@ -15,7 +16,8 @@ import pytest
 import tribodyn as td
 from tribodyn.hbm.continuation.operating_point import AtFrequency, NoPeak
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
-from tribodyn.workflows.accuracy import other_meshes, probes, statement, time_probe, verdict
+from tribodyn.hbm.wear.history import WearHistory
+from tribodyn.workflows.accuracy import mesh_probe, other_meshes, probes, statement, time_probe, verdict
 from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.accuracy.time_probe import InTime
@@ -70,6 +72,32 @@ def test_the_coarser_mesh_tells_the_error_of_this_one(small: td.Result) -> None:
     true = abs(small.summary()["peak_hz"][0] / finer.summary()["peak_hz"][0] - 1)
     assert mesh.error is not None
     assert true < 1.5 * mesh.error < 15 * true
+
+
+def test_a_life_that_the_unworn_state_does_not_tell_is_worn_out_on_the_other_meshes(
+    small: td.Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Lives 2 % longer on a mesh of 1.5 times the size and 1 % shorter on one of 2/3; without seconds, the first."""
+    file = scene_file.read("beam", SMALL)
+    coarse, fine = (other_meshes.Other(file, size, how, "most edges") for size, how in ((1.5, "a"), (2 / 3, "b")))
+    seen = mesh_probe.Seen(models=[(fine, None), (coarse, None)])
+    probe = mesh_probe.Probe(small, None, 10.0, "")
+    lives = [1.02, 0.99]
+    assert small.wear is not None
+
+    def wear(*_: object) -> WearHistory:
+        if not lives:
+            raise TimeUp
+        return replace(small.wear, cycles=lives.pop(0) * small.wear.cycles)
+
+    monkeypatch.setattr(mesh_probe.wear_run, "worn_out", wear)
+    found = probe._worn_out(seen, True, process_time() + 10)
+    fine_part, coarse_part = 0.01 / 0.99 / (1 - 4 / 9), 0.02 * (2 / 3) / (5 / 3) / 0.5
+    assert found["life"] == pytest.approx(1.35 * (fine_part + coarse_part), rel=1e-6)
+    assert found["depth"] == 0.0
+    lives[:] = [1.02]
+    assert probe._worn_out(seen, True, process_time() + 10)["life"] == pytest.approx(0.04)
+    assert probe._worn_out(seen, True, process_time() + 10) == {}
 
 
 def test_a_part_that_nobody_measured_leaves_the_error_unknown() -> None:

@@ -9,11 +9,10 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm.continuation.operating_point import AtFrequency, OperatingPoint
-from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
+from tribodyn.hbm.wear.history import WearHistory, cycles_to_preload
 from tribodyn.workflows.accuracy.trade_table import ANSWERED, QUANTITIES
 from tribodyn.workflows.run import curve, memory, modelling, pipeline, settings, wear_run
 from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.run.references import free_deflection
 from tribodyn.workflows.scene.scene_file import SceneFile
 
 
@@ -60,7 +59,7 @@ def measure(file: SceneFile, wears: bool = True, refined: bool = True) -> Measur
                 values["energy_J"] = float(energy.sum()) or None  # a contact without friction has no error in energy
                 values["preload_N"] = balance.preload(point.state) or None
             if wears and file.scene.wears:
-                worn = wear(file, model)
+                worn = wear_run.worn_out(file, model)
                 life = cycles_to_preload(worn)
                 if life is None:
                     outcome = str(worn.end)
@@ -72,15 +71,6 @@ def measure(file: SceneFile, wears: bool = True, refined: bool = True) -> Measur
     spent, needed = process_time() - clock, memory.peak()
     flat = (interface.points - interface.points.mean(axis=0)) @ interface.frames.mean(axis=0)[:2].T
     return Measured(values, flat, interface.area, depth, energy, spent, needed, outcome)
-
-
-def wear(file: SceneFile, model: modelling.Model, left: float = LIFE_SHARE) -> WearHistory:
-    """Wear by the scene's rule until a share `left` of the preload is left."""
-    wanted, balance = file.scene.wear, model.balance
-    assert wanted is not None
-    problem = wear_run.wear_problem(file.scene, file.folder, balance, left)
-    limit = settings.step_limit(file.scene, free_deflection(balance), problem.area)
-    return wear_run.evolve(problem, wanted, limit, wanted.max_steps)
 
 
 def depth_at(worn: WearHistory, cycles: float) -> np.ndarray:

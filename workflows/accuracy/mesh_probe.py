@@ -10,18 +10,20 @@ import numpy as np
 
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.hbm.wear.even_wear import depth_to_loss
+from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload, cycles_to_share
 from tribodyn.workflows.accuracy import convergence, other_meshes, probes
 from tribodyn.workflows.accuracy.convergence import Difference
 from tribodyn.workflows.accuracy.other_meshes import Other
 from tribodyn.workflows.accuracy.probes import Answers, State, relative
-from tribodyn.workflows.accuracy.statement import QUANTITIES, Contribution
+from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.result import summary
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.run import modelling
+from tribodyn.workflows.run import modelling, wear_run
 from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.wear import Wear
 
 MESH = "mesh and contact grid"
 ANSWERS = ("peak_frequency", "amplitude", "energy", "preload")
@@ -44,6 +46,7 @@ class Seen:
     differences : by what is changed and by quantity; refused : by what is changed
     moved : by quantity, relative changes that more harmonics make on the other meshes
     grid_kept : whether the finer one has contact elements as long as the scene's along some direction
+    models : of the meshes that have answered
     """
 
     differences: dict[str, dict[str, list[Difference]]] = field(default_factory=dict)
@@ -51,6 +54,7 @@ class Seen:
     said: list[str] = field(default_factory=list)
     grid_kept: bool = False
     moved: dict[str, float] = field(default_factory=dict)
+    models: list[tuple[Other, Model]] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -110,6 +114,7 @@ class Probe:
                 seen.refused[other.along] = why
                 continue
             seen.said.append(taken.how)
+            seen.models.append((taken, model))
             of = seen.differences.setdefault(other.along, {})
             pairs = {name: (a, b) for name, a, b in compared(there.answers, ours)}
             if self.result.wear_steps:
@@ -156,6 +161,7 @@ class Probe:
             yield from unknown(source, lacking[0])
             return
         how, errors = ", ".join(dict.fromkeys(seen.said)), dict[str, float]()
+        settled = fine_enough
         for of in seen.differences.values():
             settled = fine_enough and convergence.has_settled([one for name in ANSWERS for one in of[name]])
             for name, differences in of.items():
@@ -170,6 +176,8 @@ class Probe:
         errors["energy"] = max(plateau, errors["energy"], ENERGY_OVER_AMPLITUDE * errors["amplitude"])
         if "depth" in errors:  # wear passes a depth in cycles that are inverse to the energy
             errors["life"] = errors["depth"] + errors["energy"]
+            if errors["life"] > LARGEST and beside is not None and summary.life(self.result):
+                errors |= self._worn_out(seen, settled, beside)
         worn = self.result.wear
         survives = worn is not None and worn.ended.survived
         for name, error in errors.items():
@@ -184,6 +192,31 @@ class Probe:
             else:
                 yield Contribution(source, name, None, "no preload says how deep the contact can wear")
 
+    def _worn_out(self, seen: Seen, settled: bool, end: float) -> dict[str, float]:
+        """Errors of depth and life from wear to its end on the other meshes; none where it does not come there.
+
+        settled : of the unworn state; end : processor time
+        For a life of which the unworn state says nothing: pressures that differ at first wear even
+        """
+        own = {"depth": float(self.result.depth_after(-1).max()), "life": summary.life(self.result)}
+        found: dict[str, list[Difference]] = {}
+        for other, model in sorted(seen.models, key=lambda one: -one[0].size):  # the coarser one is the cheaper one
+            wear = other.file.scene.wear
+            assert wear is not None
+            try:
+                with processor_seconds(end - process_time()):
+                    worn = wear_run.worn_out(other.file, model, wear.lost_below)
+            except (TimeUp, ValueError, RuntimeError):
+                continue
+            life = life_on(worn, model, wear)
+            if worn.ended.failed or life is None:
+                return {}
+            there = {"depth": float((worn.depth[-1] + worn.worn[-1]).max()), "life": life}
+            for name, value in there.items():
+                found.setdefault(name, []).append(convergence.difference(other.size, value, own[name] or 0.0))
+        settled = settled and convergence.has_settled([one for of in found.values() for one in of])
+        return {name: convergence.bound(differences, settled) for name, differences in found.items()}
+
     def _on_a_plateau(self, errors: dict[str, float], end: float) -> float:
         """Error of the energy where a flat top of the response leaves open where its peak lies; inf if it takes longer.
 
@@ -196,6 +229,16 @@ class Probe:
             return np.inf
         except (ValueError, RuntimeError):
             return 0.0
+
+
+def life_on(worn: WearHistory, model: Model, wear: Wear) -> float | None:
+    """Life [cycles] of a run on another mesh as `summary.life` has that of a result; None where it has not ended."""
+    if wear.lost_of != "any":
+        return cycles_to_preload(worn)
+    share = wear.lost_below or LIFE_SHARE
+    forces = (worn.normal_force[:, pairs].sum(axis=1) for pairs in model.reduced.info.joints.values())
+    lives = [cycles_to_share(worn.cycles, force, share) for force in forces]
+    return min((life for life in lives if life is not None), default=None)
 
 
 def moved_by_more_harmonics(state: State, seconds: float) -> dict[str, float]:

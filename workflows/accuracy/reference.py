@@ -12,15 +12,14 @@ from typing import Any
 
 from tribodyn.hbm import threads
 from tribodyn.hbm.continuation.operating_point import NoPeak
-from tribodyn.hbm.wear.history import WearHistory, cycles_to_preload
+from tribodyn.hbm.wear.history import cycles_to_preload
 from tribodyn.workflows.accuracy import mesh_probe, other_meshes, probes
 from tribodyn.workflows.accuracy.refinement import Promise
 from tribodyn.workflows.accuracy.statement import NAMES, QUANTITIES, UNITS, loaded
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.run import modelling, settings, wear_run
+from tribodyn.workflows.run import modelling, wear_run
 from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.run.references import free_deflection
 from tribodyn.workflows.scene.scene_file import SceneFile
 
 ELEMENTS = 2.6  # of the reference along every edge, over those of the scene: three where that has one
@@ -106,11 +105,12 @@ def solved(file: SceneFile, seconds: float, elements: float = ELEMENTS) -> tuple
             model = modelling.build(fine, None, Progress())
             there = probes.unworn(fine, model).answers
         values |= {name: value for name, value, _ in mesh_probe.compared(there, there)}
-        if fine.scene.wears:
+        wear = fine.scene.wear
+        if fine.scene.wears and wear is not None:
             what = "the reference of its wear"
             fine = finer(file, min(elements, OF_WORN))
             with processor_seconds(seconds), threads.limited(1):
-                worn = _worn(fine, modelling.build(fine, None, Progress()))
+                worn = wear_run.worn_out(fine, modelling.build(fine, None, Progress()), wear.lost_below)
             if worn.ended.failed:
                 raise RuntimeError(str(worn.end))
             values["depth"] = float((worn.depth[-1] + worn.worn[-1]).max())
@@ -120,14 +120,6 @@ def solved(file: SceneFile, seconds: float, elements: float = ELEMENTS) -> tuple
     except (NoPeak, ValueError, RuntimeError) as refusal:
         return values, f"{'measured, ' * (what != 'its reference')}{what} is refused: {refusal}"
     return values, MEASURED
-
-
-def _worn(file: SceneFile, model: modelling.Model) -> WearHistory:
-    wear = file.scene.wear
-    assert wear is not None
-    problem = wear_run.wear_problem(file.scene, file.folder, model.balance, wear.lost_below)
-    limit = settings.step_limit(file.scene, free_deflection(model.balance), problem.area)
-    return wear_run.evolve(problem, wear, limit, wear.max_steps)
 
 
 def finer(file: SceneFile, elements: float = ELEMENTS) -> SceneFile:

@@ -12,7 +12,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import Duty, WearProblem
-from tribodyn.hbm.wear.history import WearHistory, WearRow, history, rows_to_resume
+from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, WearRow, history, rows_to_resume
 from tribodyn.hbm.wear.law import JointWear
 from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.result import Result
@@ -54,6 +54,15 @@ def wear_down(
         keep(replace(result, stage=Stage.FAILED))
         raise SolveFailed(f"wear step {len(worn.cycles)}: {worn.end}")
     return result
+
+
+def worn_out(file: SceneFile, model: Model, left: float = LIFE_SHARE) -> WearHistory:
+    """Wear by the scene's rule until a share `left` of the preload is left, of which nothing is kept."""
+    wanted, balance = file.scene.wear, model.balance
+    assert wanted is not None
+    problem = wear_problem(file.scene, file.folder, balance, left)
+    limit = settings.step_limit(file.scene, references.free_deflection(balance), problem.area)
+    return evolve(problem, wanted, limit, wanted.max_steps)
 
 
 def wear_problem(

@@ -19,9 +19,8 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
 from tribodyn.reduction.linear import linear_modes
-from tribodyn.workflows.accuracy import measure
 from tribodyn.workflows.designs.distributions import Distribution, Marginal
-from tribodyn.workflows.run import joints, modelling, settings
+from tribodyn.workflows.run import joints, modelling, settings, wear_run
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
@@ -306,7 +305,7 @@ class Answers:
         if self.file.scene.wear is None:
             raise SceneError("a life or its work is measured, but the scene has no [wear]")
         if known.left not in self._runs:
-            self._runs[known.left] = measure.wear(self.file, self.model, known.left)
+            self._runs[known.left] = wear_run.worn_out(self.file, self.model, known.left)
         run = self._runs[known.left]
         life = cycles_to_preload(run, known.left)
         if life is None:
