@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import json
 import signal
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from time import process_time, sleep
@@ -14,6 +15,8 @@ import numpy as np
 import pytest
 
 import tribodyn as td
+from tests.helpers import foreign_files
+from tribodyn.geometry.sources import msh
 from tribodyn.hbm.continuation.operating_point import AtFrequency, NoPeak
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.wear.history import WearHistory
@@ -255,6 +258,30 @@ def test_the_end_of_the_seconds_that_python_drops_comes_again(capfd: pytest.Capt
         freed()
     assert process_time() - start < 1.0
     assert capfd.readouterr().err == ""
+
+
+def test_the_end_of_the_seconds_that_a_library_catches_comes_again() -> None:
+    def caught() -> None:
+        with suppress(BaseException):
+            _spin()
+        end = process_time() + 2.0
+        while process_time() < end:
+            pass
+
+    start = process_time()
+    with pytest.raises(TimeUp), processor_seconds(0.02):
+        caught()
+    assert process_time() - start < 1.0
+
+
+def test_a_mesh_that_is_read_when_the_seconds_end_is_not_read_in_another_way(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    foreign_files.bricks(tmp_path)
+    monkeypatch.setattr(msh.meshio.gmsh, "read", lambda path: _spin())
+    monkeypatch.setattr(msh, "through_gmsh", lambda path: pytest.fail("read in another way"))
+    with pytest.raises(TimeUp), processor_seconds(0.02):
+        msh.read(tmp_path / "bricks.msh")
 
 
 PLATE = """

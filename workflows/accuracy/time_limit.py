@@ -14,12 +14,11 @@ if TYPE_CHECKING:
     from sys import UnraisableHookArgs
 
 COMPILERS = ("numba", "llvmlite")
-AGAIN = 0.2  # processor seconds after which to look again, where the time was up in a compiler
-SOON = 0.01  # processor seconds after which TimeUp comes again, where it was lost
+AGAIN = 0.2  # processor seconds after which TimeUp comes again where the body goes on: longer than any clearing up
 
 
-class TimeUp(Exception):
-    """The processor seconds are used up; no RuntimeError, which a solver may answer by trying another way."""
+class TimeUp(BaseException):
+    """The processor seconds are used up; no Exception, of which many readers and solvers try another way."""
 
 
 @contextmanager
@@ -28,7 +27,8 @@ def processor_seconds(limit: float) -> Iterator[None]:
 
     The timer of a process belongs to its main thread: in another one, and on systems without it, nothing is limited.
     A compiler is not interrupted: a function that is compiled by half could not be called in this process any more.
-    Where Python drops what is raised, while it frees an object or in a callback, TimeUp comes again a moment later.
+    TimeUp comes again a moment later where the body goes on: Python drops what is raised while it frees an object or
+    in a callback, and a library may catch whatever comes.
     Raises  TimeUp, also at once where `limit` is not above 0, and in place of what a library makes of it: ctypes tells
         an exception in the conversion of an argument as an error of the argument
     """
@@ -38,29 +38,27 @@ def processor_seconds(limit: float) -> Iterator[None]:
         yield
         return
 
-    raised: list[TimeUp] = []
+    end = TimeUp(f"{limit:g} s are used up")
+    raised = False
 
     def up(number: int, frame: FrameType | None) -> None:
-        if _compiles(frame):
-            signal.setitimer(signal.ITIMER_PROF, AGAIN)
-        else:
-            raised.append(TimeUp(f"{limit:g} s are used up"))
-            raise raised[0]
+        nonlocal raised
+        if not _compiles(frame):
+            raised = True
+            raise end
 
     def lost(what: UnraisableHookArgs) -> None:
-        if isinstance(what.exc_value, TimeUp):
-            signal.setitimer(signal.ITIMER_PROF, SOON)
-        else:
+        if what.exc_value is not end:
             told(what)
 
     told, sys.unraisablehook = sys.unraisablehook, lost
     before = signal.signal(signal.SIGPROF, up)
-    signal.setitimer(signal.ITIMER_PROF, limit)
+    signal.setitimer(signal.ITIMER_PROF, limit, AGAIN)
     try:
         yield
     except Exception as made_of_it:
-        if raised and made_of_it is not raised[0]:
-            raise raised[0] from made_of_it
+        if raised:
+            raise end from made_of_it
         raise
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from tribodyn.workflows.accuracy.time_limit import processor_seconds
+from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.benchmarks.fuzz_runs import ACCEPTED, REFUSED, Case, Command, Runs, Tried
 from tribodyn.workflows.scene import scene_file
 
@@ -188,7 +188,7 @@ def _read(scene: str, overrides: Sequence[str], key: str, value: str, seconds: f
             digest = hashlib.sha256(text.encode()).hexdigest()
     except scene_file.SceneError as error:
         refusal = "" if "\n" in str(error) else str(error)
-    except Exception:  # a traceback of the command tells more
+    except (Exception, TimeUp):  # what the command prints tells more
         digest = ""
     return _Meant(key, value, digest, refusal, time.process_time() - clock)
 
