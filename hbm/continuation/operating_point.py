@@ -136,10 +136,13 @@ class AtPeak:
     def first(self, balance: HarmonicBalance) -> OperatingPoint:
         """Scan the range, points dense where the response bends, then refine its highest maximum.
 
+        Where no maximum that may be the highest can be refined, as at a fold, none of the lower ones is taken for it
         Raises  NoPeak where no maximum lies inside the range: an end of it is no resonance
         """
         branch = self._scan(balance)
-        return self._highest(balance, branch, self._maxima(branch))
+        maxima = self._maxima(branch)
+        height = branch.amplitude(self.output)[maxima]
+        return self._highest(balance, branch, maxima[height >= (1 - SCAN_MISSES) * height[0]])
 
     def _scan(self, balance: HarmonicBalance) -> Branch:
         step = min(1 / self.n_scan, COARSEST)

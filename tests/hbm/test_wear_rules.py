@@ -375,6 +375,26 @@ def test_a_point_beside_failed_solves_is_no_peak(problem: WearProblem, monkeypat
     assert "where it still rises" in str(stopped.solution.outcome)
 
 
+def test_no_lower_peak_is_taken_for_one_that_is_not_refined(
+    problem: WearProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rig 41 of the scoreboard's seed 16180: its peak was a fold, and one a fifteenth as high was taken for it."""
+    site = AtPeak("tip", 250.0, 1200.0)
+    highest, solve = site.first(problem.balance), newton.solve
+
+    def ends(balance: HarmonicBalance, omega: float, x: np.ndarray, *rest: object) -> newton.Solution:
+        found = solve(balance, omega, x, *rest)
+        near = abs(omega / highest.state.omega - 1) < 0.004
+        return replace(found, outcome=SolveEnd.NO_DESCENT.say(" 1")) if near else found
+
+    branch = site._scan(problem.balance)
+    monkeypatch.setattr(AtPeak, "_scan", lambda *given: branch)
+    monkeypatch.setattr(newton, "solve", ends)
+    found = site.first(problem.balance)
+    assert not found.solution.converged
+    assert found.amplitude > 0.7 * highest.amplitude
+
+
 LEAP_DEPTH, SECOND = 2e-5, 520.0  # depth [m] from which on a second place is the higher one, and its frequency [rad/s]
 
 

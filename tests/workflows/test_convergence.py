@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tribodyn.workflows.accuracy.convergence import (
+    RESULTANT,
     SAFETY,
     UNSETTLED,
     Difference,
@@ -69,3 +70,10 @@ def test_one_side_alone_is_of_first_order() -> None:
     assert bound([Difference(1.5, 0.01), Difference(2.0, 0.01)]) == pytest.approx(0.02)
     assert difference(0.5, 0.0, 0.0).change == 0.0
     assert difference(0.5, 0.0, 2.0).change == 1.0
+
+
+@pytest.mark.parametrize(("order", "times"), [(1, 1.1), (2, 2.0)])
+def test_a_resultant_force_is_bounded_from_first_order_on(order: int, times: float) -> None:
+    """With sizes 1.5 and 2/3 half of the coarser mesh counts 0.8 times a first-order error, 1.5 a second-order one."""
+    found = bound(seen(lambda h: 10 + 1e-4 * h**order), coarser_counts=RESULTANT)
+    assert found == pytest.approx(times * 1e-5, rel=0.03)

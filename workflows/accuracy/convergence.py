@@ -13,6 +13,9 @@ from dataclasses import dataclass
 
 SAFETY = 1.35  # of a bound from two meshes: it covers orders from 0.75 on, of corners and borders of contacts
 UNSETTLED = 2.0  # times as much where the meshes are too coarse for any order
+# weight of the coarser mesh in the error of a resultant force, which settles at second order, where the whole weight
+# stands for 2.7 times the error: with half of it an error of second order counts twice, one of first order 1.1 times
+RESULTANT = 0.5
 SETTLED = 0.2  # relative difference to another mesh above which a quantity has not begun to settle
 
 
@@ -32,10 +35,11 @@ def difference(size: float, other: float, own: float) -> Difference:
     return Difference(size, (other - own) / abs(finer))
 
 
-def bound(seen: Sequence[Difference], settled: bool = True) -> float:
+def bound(seen: Sequence[Difference], settled: bool = True, coarser_counts: float = 1.0) -> float:
     """Relative error of the scene's own answer, from its differences to others that change the same.
 
     seen : at least one; settled : whether the meshes are fine enough for an order
+    coarser_counts : weight of the coarser mesh beside a finer one, RESULTANT for a force
     With a finer and a coarser mesh, of sizes s and t: SAFETY (|f| / (1 - s^2) + |c| s / (1 + s) / (t - 1)) of both
     differences. The first term is an error of second order, as the finer mesh tells it; the second makes the sum SAFETY
     times an error of first order, too. No order is observed: edges with a single element cannot be made coarser, and
@@ -51,7 +55,7 @@ def bound(seen: Sequence[Difference], settled: bool = True) -> float:
     coarse = min(coarser, key=lambda one: one.size)
     second = abs(fine.change) / (1 - fine.size**2)
     rest = abs(coarse.change) * fine.size / (1 + fine.size) / (coarse.size - 1)
-    return SAFETY * (1.0 if settled else UNSETTLED) * (second + rest)
+    return SAFETY * (1.0 if settled else UNSETTLED) * (second + coarser_counts * rest)
 
 
 def has_settled(differences: Sequence[Difference]) -> bool:

@@ -31,6 +31,7 @@ from tribodyn.workflows.scene.schema import Scene
 
 # shares of the life at which states are looked at: more of the late ones, where the peak moves fast
 STATES = (0.0, 0.25, 0.5, 0.65, 0.8, 0.9)
+FOR_FIRST = 0.75  # of the seconds for more harmonics, to the unworn state: all but depth and life are its own
 
 
 @dataclass(frozen=True)
@@ -155,7 +156,20 @@ def _at_response_peak(site: Site, balance: HarmonicBalance, result: Result) -> S
     return State(None, 0.0, np.zeros(len(x)), balance, site, point) if point.solution.converged else None
 
 
-def with_more_harmonics(state: State, steps: int | None = None) -> Answers | None:
+@dataclass(frozen=True)
+class Climbed:
+    """Answers with more and more harmonics, as far as they were found.
+
+    answers : with the most; before : with the most but one, None where there is but one
+    cut : why there are no more, empty where all were found
+    """
+
+    answers: Answers
+    before: Answers | None
+    cut: str
+
+
+def with_more_harmonics(state: State, steps: int | None = None) -> Climbed | None:
     """The same state with more and more harmonics, its place followed, as far as it is found within the seconds.
 
     steps : how many times more of them are taken, None: as often as `harmonic_choice.climb` says
@@ -164,20 +178,23 @@ def with_more_harmonics(state: State, steps: int | None = None) -> Answers | Non
     top = state.balance.basis.harmonics[-1]
     basis, x, omega = state.balance.basis, state.here.state.x, state.here.state.omega
     wide = harmonic_choice.widened(state.balance, harmonic_choice.highest_looked_at(top), harmonic_choice.ROUGH)
-    answers = None
+    found: list[Answers] = []
+    cut = ""
     for highest in harmonic_choice.climb(top)[:steps]:
         finer = wide.with_harmonics(tuple(h for h in wide.basis.harmonics if h <= highest))
         try:
             point = state.site.next(finer, omega, basis.transfer(x, finer.basis))
             if not point.solution.converged:  # no solution is near: the place is looked for as at the start
                 point = state.site.first(finer)
-        except (TimeUp, NoPeak):
-            return answers
+        except (TimeUp, NoPeak) as reason:
+            cut = f"harmonics 0 to {highest}: {'beyond the seconds' if isinstance(reason, TimeUp) else reason}"
+            break
         if not point.solution.converged:
-            return answers
+            cut = f"harmonics 0 to {highest}: {point.solution.outcome}"
+            break
         basis, x, omega = finer.basis, point.state.x, point.state.omega
-        answers = Answers.of(finer, point)
-    return answers
+        found.append(Answers.of(finer, point))
+    return Climbed(found[-1], found[-2] if len(found) > 1 else None, cut) if found else None
 
 
 def unworn(file: SceneFile, model: modelling.Model, folded: bool = False) -> State:
@@ -256,15 +273,15 @@ def relative(ours: float, theirs: float) -> float:
     return abs(ours - theirs) / abs(theirs)
 
 
-def each(seen: list[State], look: Callable[[State], Answers | None], seconds: float) -> Iterator[Answers | None]:
+def each(seen: list[State], look: Callable[[State], Climbed | None], seconds: float) -> Iterator[Climbed | None]:
     """What a look says of every state; None where it fails, or the processor seconds for all of them are spent."""
     end = process_time() + seconds
     for done, state in enumerate(seen):
         try:
-            left = end - process_time()  # half of it for the first state: all quantities but depth and life are its own
-            share = 0.5 if not done and len(seen) > 1 else 1 / (len(seen) - done)
+            left = end - process_time()
+            share = FOR_FIRST if not done and len(seen) > 1 else 1 / (len(seen) - done)
             with processor_seconds(share * left):
-                answers = look(state)
-            yield answers
+                found = look(state)
+            yield found
         except (ValueError, RuntimeError, TimeUp):
             yield None

@@ -12,14 +12,14 @@ from time import process_time
 
 import numpy as np
 
-from tribodyn.hbm.continuation.operating_point import NoPeak
+from tribodyn.hbm.continuation.operating_point import AtFrequency, NoPeak
 from tribodyn.hbm.outcome import SolveEnd
 from tribodyn.hbm.wear.error_controlled_rule import jumps
 from tribodyn.hbm.wear.history import LIFE_SHARE
-from tribodyn.workflows.accuracy import jump_probe, mesh_probe, probes, time_probe
+from tribodyn.workflows.accuracy import jump_probe, mesh_probe, motion_probe, probes, time_probe
 from tribodyn.workflows.accuracy.mesh_probe import MESH, Probe
 from tribodyn.workflows.accuracy.other_meshes import with_more_modes
-from tribodyn.workflows.accuracy.probes import Answers, State, relative
+from tribodyn.workflows.accuracy.probes import Answers, Climbed, State, relative
 from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution, Statement, Verdict
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.accuracy.time_probe import MULTIPLIERS, Checked, InTime
@@ -32,6 +32,7 @@ from tribodyn.workflows.scene.scene_file import SceneFile
 
 MOST = 0.5  # of the seconds, for more harmonics, which matter most; a mesh needs what is left
 FOR_JUMP = 0.5  # of the seconds, for the instant of a jump to another peak, where there is one
+FOR_MOTIONS = 0.25  # of the seconds that are left then, for other motions at a given frequency
 HALF = 0.5  # of the seconds that are left, for one measurement of several
 FOR_MESH = 0.75  # of the seconds that are left then
 CONTRADICTION = 3.0  # times the estimated error, from which on time integration contradicts the balance
@@ -67,12 +68,15 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spe
     with progress.stage("verdict: jump"):
         parts += _of_jump(file, model, result, values["life"], FOR_JUMP * left(), skipped)
     with progress.stage("verdict: harmonics"):
-        finer = list(probes.each(seen, probes.with_more_harmonics, MOST * left()))
+        climbed = list(probes.each(seen, probes.with_more_harmonics, MOST * left()))
         lost = f"lost with more harmonics, or beyond the {allowed:.3g} s of verdict.seconds"
-        parts += _of_harmonics(result, seen, finer, values["life"], lost)
+        parts += _of_harmonics(result, seen, climbed, values["life"], lost)
     moved = any(
         (part.error or 0.0) > MOVED for part in parts if part.source == "harmonics" and part.quantity in OF_FIRST
     )
+    if seen:
+        with progress.stage("verdict: other motions"):
+            parts += motion_probe.contributions(seen[0], FOR_MOTIONS * left(), skipped)
     more_modes = with_more_modes(file) if wanted.mesh and seen else None  # another model, too
     if more_modes is not None:
         with progress.stage("verdict: modes"):
@@ -117,20 +121,30 @@ def _of_budget(result: Result) -> Iterator[Contribution]:
 
 
 def _of_harmonics(
-    result: Result, seen: Sequence[State], finer: Sequence[Answers | None], life: float | None, lost: str
+    result: Result, seen: Sequence[State], climbed: Sequence[Climbed | None], life: float | None, lost: str
 ) -> Iterator[Contribution]:
-    """The first state, and energies of all states carried to life, with more harmonics."""
+    """The first state, and energies of all states carried to life, with more harmonics.
+
+    Where the first state is lost on the way, what the last of them changed is added: changes that fall by half from one
+    to the next sum to it. One change alone tells nothing of those to come
+    """
     if not seen:
         yield from mesh_probe.unknown("harmonics", "no state was solved")
         return
-    first = finer[0]
+    first = climbed[0]
     if first is None:
         yield from mesh_probe.unknown("harmonics", lost)
         return
-    ours = Answers.of(seen[0].balance, seen[0].here)
-    how = "more harmonics at the same states"
-    for quantity, a, b in mesh_probe.compared(ours, first):
-        yield Contribution("harmonics", quantity, relative(a, b), how)
+    ours, how = seen[0].answers, "more harmonics at the same states"
+    before = first.before or first.answers
+    changes = {name: relative(a, b) for name, a, b in mesh_probe.compared(before, first.answers)}
+    for quantity, a, b in mesh_probe.compared(ours, first.answers):
+        further = changes[quantity] if first.cut else 0.0
+        yield Contribution("harmonics", quantity, relative(a, b) + further, how)
+    if first.cut and first.before is None:
+        given = AT_A_GIVEN_FREQUENCY if isinstance(seen[0].site, AtFrequency) else ()
+        yield from (one for one in mesh_probe.unknown("harmonics", first.cut) if one.quantity not in given)
+    finer = [None if one is None else one.answers for one in climbed]
     if life is not None:
         error = probes.carried_to_life(list(seen), list(finer), life)
         yield Contribution("harmonics", "life", error, how if error is not None else lost)
