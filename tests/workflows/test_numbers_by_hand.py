@@ -162,7 +162,8 @@ def test_the_total_error_is_the_sum_of_its_parts() -> None:
 
 def test_life_is_off_by_depth_and_energy_together(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mesh_probe.convergence, "has_settled", lambda differences: True)
-    monkeypatch.setattr(mesh_probe.convergence, "bound", lambda differences, settled: differences[0])
+    monkeypatch.setattr(mesh_probe.convergence, "bound", lambda differences, *given: differences[0])
+    monkeypatch.setattr(mesh_probe.convergence, "steepens", lambda differences: False)
     found = {name: [0.0] for name in ("peak_frequency", "amplitude", "preload")} | {"energy": [0.2], "depth": [0.05]}
     probe = mesh_probe.Probe(SimpleNamespace(wear=None), None, 1.0, "")
     said = probe._contributions("mesh", mesh_probe.Seen({"elements": found}))
@@ -172,7 +173,8 @@ def test_life_is_off_by_depth_and_energy_together(monkeypatch: pytest.MonkeyPatc
 def test_the_energy_is_not_known_better_than_half_the_amplitude(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two meshes agree on it by chance: 0.6 % between them, 14 % in the amplitude (beam 12 of seed 2026)."""
     monkeypatch.setattr(mesh_probe.convergence, "has_settled", lambda differences: True)
-    monkeypatch.setattr(mesh_probe.convergence, "bound", lambda differences, settled: differences[0])
+    monkeypatch.setattr(mesh_probe.convergence, "bound", lambda differences, *given: differences[0])
+    monkeypatch.setattr(mesh_probe.convergence, "steepens", lambda differences: False)
     found = {"peak_frequency": [0.0], "amplitude": [0.14], "preload": [0.0], "energy": [0.006]}
     probe = mesh_probe.Probe(SimpleNamespace(wear=None), None, 1.0, "")
     said = probe._contributions("mesh", mesh_probe.Seen({"elements": found}))

@@ -26,9 +26,13 @@ def rows() -> list[Row]:
 def test_what_is_stated_of_untuned_scenes_holds(rows: list[Row]) -> None:
     for row in rows:
         assert row.outcome == "measured"
-        assert {one.quantity for one in row.judged if one.promised} >= {"preload"}
+        assert {one.quantity for one in row.judged if one.promised} >= {"peak_frequency", "amplitude"}
         assert [one.quantity for one in row.judged if one.broken] == []
         assert {part["source"] for part in row.contributions} >= {"harmonics", "mesh and contact grid", "modes"}
+    single, several = (next(one for one in row.judged if one.quantity == "preload") for row in rows)
+    assert single.error is None  # a single element on its contact face
+    assert "a single element" in single.reason
+    assert several.promised
 
 
 def test_what_more_harmonics_change_on_a_finer_mesh_is_added() -> None:

@@ -16,6 +16,7 @@ UNSETTLED = 2.0  # times as much where the meshes are too coarse for any order
 # weight of the coarser mesh in the error of a resultant force, which settles at second order, where the whole weight
 # stands for 2.7 times the error: with half of it an error of second order counts twice, one of first order 1.1 times
 RESULTANT = 0.5
+STEEPER = 1.4  # times as much where an answer changes faster with finer elements than with coarser ones
 SETTLED = 0.2  # relative difference to another mesh above which a quantity has not begun to settle
 
 
@@ -61,3 +62,10 @@ def bound(seen: Sequence[Difference], settled: bool = True, coarser_counts: floa
 def has_settled(differences: Sequence[Difference]) -> bool:
     """Whether no quantity differs so much from that on another mesh that nothing can be said of its order."""
     return all(abs(one.change) <= SETTLED for one in differences)
+
+
+def steepens(seen: Sequence[Difference]) -> bool:
+    """Whether a finer mesh changes an answer by more, for its size, than a coarser one does: no order shows."""
+    finer = [abs(one.change) / (1 - one.size) for one in seen if one.size < 1]
+    coarser = [abs(one.change) / (one.size - 1) for one in seen if one.size > 1]
+    return bool(finer and coarser) and max(finer) > max(coarser)

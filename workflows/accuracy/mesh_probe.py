@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import process_time
 
 import numpy as np
 
 from tribodyn.fem.interface import ContactInterface
+from tribodyn.hbm.continuation import harmonic_choice
 from tribodyn.hbm.wear.even_wear import depth_to_loss
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload, cycles_to_share
 from tribodyn.workflows.accuracy import convergence, other_meshes, probes
@@ -36,6 +37,7 @@ ENERGY_OVER_AMPLITUDE = 0.5
 PLATEAU = 1 / 3  # of the error of the amplitude: where it falls by less, the peak of another mesh may lie as well
 ONE_ELEMENT = 4  # pairs of a contact face that a single element covers: too coarse for any order
 FOR_MESHES = 0.9  # of the seconds; the rest is for frequencies beside the peak
+RICH = 5  # highest harmonic, at the least, that a mesh of twice the elements is solved with
 SAME_GRID = 0.95  # size of the contact elements over that of the scene's, above which they are the same
 
 
@@ -86,6 +88,9 @@ class Probe:
                 return unknown(MESH, str(refusal))
             seen.refused.clear()
             self._solve([other for other in more if not (both and other.file == both[0].file)], seen, end)
+        if both and both[1].instead is not None and not isinstance(self.first.site, probes.OnCurve):
+            for name, moved in self._moved_on(both[1].instead.file, end - process_time()).items():
+                seen.moved[name] = max(moved, seen.moved.get(name, 0.0))
         fine_enough = not self._single_element and not seen.grid_kept
         return self._contributions(MESH, seen, fine_enough, start + self.seconds)
 
@@ -145,6 +150,24 @@ class Probe:
             seen.grid_kept = True
         return other, model
 
+    def _moved_on(self, file: SceneFile, seconds: float) -> dict[str, float]:
+        """Relative changes that more harmonics make on a mesh of twice the elements, each peak looked for anew.
+
+        Where a harmonic of the vibration meets a higher mode on a finer mesh alone, it may make another peak there.
+        Empty where that takes longer or finds nothing
+        """
+        own = self.first.balance.basis.harmonics
+        top = max(RICH, harmonic_choice.climb(own[-1])[0])
+        try:
+            with processor_seconds(seconds):
+                rich = file.changed(f"harmonics.kept={list(range(top + 1))}")
+                model = modelling.build(rich, None, Progress())
+                narrow = replace(model, balance=model.balance.with_harmonics(own))
+                ours, theirs = probes.unworn(file, narrow).answers, probes.unworn(rich, model).answers
+        except (TimeUp, ValueError, RuntimeError):
+            return {}
+        return {name: relative(a, b) for name, a, b in compared(ours, theirs)}
+
     def _keeps_grid(self, model: Model) -> bool:
         """Whether contact elements of a finer mesh are as long as the scene's own along t1 or t2."""
         own, theirs = (element_lengths(balance.model.interface) for balance in (self.first.balance, model.balance))
@@ -171,8 +194,9 @@ class Probe:
             settled = fine_enough and convergence.has_settled([one for name in ANSWERS for one in of[name]])
             for name, differences in of.items():
                 weight = convergence.RESULTANT if name == "preload" else 1.0
-                errors[name] = errors.get(name, 0.0) + convergence.bound(differences, settled, weight)
-        if seen.moved and beside is not None:
+                steep = convergence.STEEPER if name in AT_A_PEAK and convergence.steepens(differences) else 1.0
+                errors[name] = errors.get(name, 0.0) + steep * convergence.bound(differences, settled, weight)
+        if max(seen.moved.values(), default=0.0) > 0 and beside is not None:
             own = moved_by_more_harmonics(self.first, beside - process_time())
             for name, moved in seen.moved.items():
                 errors[name] += max(moved - own.get(name, 0.0), 0.0)
