@@ -31,6 +31,8 @@ ANSWERS = ("peak_frequency", "amplitude", "energy", "preload")
 # no better known than the frequency of the peak they belong to: its stiffness limits the motion, too, as in
 # F / (2 zeta m omega^2); differences that cancel between two meshes say nothing of a third
 AT_A_PEAK = ("amplitude", "energy")
+STEEPENING = ("amplitude", "energy", "preload")  # that may change faster on finer meshes than other ones tell
+LEAST = 1e-4  # error of what a mesh changes at all, below which none is stated: forces at corners of contacts creep on
 # least error of the energy over that of the amplitude: what slips is what moves, and the friction work is the work of
 # the drive, which goes with the amplitude; where both differ otherwise on two meshes, that is taken for chance
 ENERGY_OVER_AMPLITUDE = 0.5
@@ -194,12 +196,14 @@ class Probe:
             settled = fine_enough and convergence.has_settled([one for name in ANSWERS for one in of[name]])
             for name, differences in of.items():
                 weight = convergence.RESULTANT if name == "preload" else 1.0
-                steep = convergence.STEEPER if name in AT_A_PEAK and convergence.steepens(differences) else 1.0
+                steep = convergence.STEEPER if name in STEEPENING and convergence.steepens(differences) else 1.0
                 errors[name] = errors.get(name, 0.0) + steep * convergence.bound(differences, settled, weight)
         if max(seen.moved.values(), default=0.0) > 0 and beside is not None:
             own = moved_by_more_harmonics(self.first, beside - process_time())
             for name, moved in seen.moved.items():
                 errors[name] += max(moved - own.get(name, 0.0), 0.0)
+        if source == MESH:
+            errors |= {name: max(error, LEAST) for name, error in errors.items() if error > 0}
         for name in AT_A_PEAK:
             errors[name] = max(errors[name], errors["peak_frequency"])
         plateau = 0.0 if beside is None else self._on_a_plateau(errors, beside)
