@@ -40,6 +40,7 @@ PLATEAU = 1 / 3  # of the error of the amplitude: where it falls by less, the pe
 ONE_ELEMENT = 4  # pairs of a contact face that a single element covers: too coarse for any order
 FOR_MESHES = 0.9  # of the seconds; the rest is for frequencies beside the peak
 RICH = 5  # highest harmonic, at the least, that a mesh of twice the elements is solved with
+MOST_RICH = 6000  # unknowns of that balance, at most
 SAME_GRID = 0.95  # size of the contact elements over that of the scene's, above which they are the same
 
 
@@ -156,10 +157,12 @@ class Probe:
         """Relative changes that more harmonics make on a mesh of twice the elements, each peak looked for anew.
 
         Where a harmonic of the vibration meets a higher mode on a finer mesh alone, it may make another peak there.
-        Empty where that takes longer or finds nothing
+        Empty where it is too large, takes longer, or finds nothing
         """
         own = self.first.balance.basis.harmonics
         top = max(RICH, harmonic_choice.climb(own[-1])[0])
+        if other_meshes.STILL_FINER**2 * self.first.balance.contact.stiffness.size * (2 * top + 1) > MOST_RICH:
+            return {}
         try:
             with processor_seconds(seconds):
                 rich = file.changed(f"harmonics.kept={list(range(top + 1))}")
