@@ -14,6 +14,7 @@ from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.part import Part
 from tribodyn.fem.prestress import spin_softening
 from tribodyn.hbm import newton
+from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.linear.recovery import full_displacement
 from tribodyn.hbm.threads import limited
@@ -58,7 +59,7 @@ def study(file: SceneFile) -> list[BodyForces]:
         part, balance = model.part, model.balance.with_load(0.0)
         assert part is not None
         omega = 2 * np.pi * settings.response_range(scene)[0]
-        solved = newton.solve_from_rest(balance, omega, newton.NewtonOptions(tolerance=TOLERANCE))
+        solved = arc_length.solve_along_load(balance, omega, newton.NewtonOptions(tolerance=TOLERANCE))
         if not solved.converged:
             raise SolveFailed(f"the contact does not settle under the static loads: {solved.outcome}")
         force = solved.state.cycle.force

@@ -24,6 +24,7 @@ from tribodyn.hbm.continuation import parameter
 from tribodyn.hbm.continuation.branch import Branch, BranchBuilder
 from tribodyn.hbm.continuation.curve import CurvePoint, Segment
 from tribodyn.hbm.continuation.parameter import Parameter
+from tribodyn.hbm.continuation.sliding import solve_along_friction
 from tribodyn.hbm.continuation.stepper import Stepper
 from tribodyn.hbm.continuation.stiffening import solve_along_stiffness
 from tribodyn.hbm.newton import NewtonOptions, Solution
@@ -100,13 +101,10 @@ def follow(
     bounds = options.bounds or (min(start, stop), max(start, stop))
     if not bounds[0] <= start <= bounds[1]:
         raise ValueError(f"the start, {path.say(start)}, lies outside of the bounds of the continuation")
-    place = path.place(start)
     if options.guess is not None:
-        first = newton.solve(*place, options.guess, options.newton)
-    elif path.name == parameter.LOAD:
-        first = newton.solve_from_rest(*place, options.newton)
+        first = newton.solve(*path.place(start), options.guess, options.newton)
     else:
-        first = solve_along_load(*place, options.newton)
+        first = first_on(path, start, options.newton)
     builder = BranchBuilder(path)
     builder.add(start, first)
     if not first.converged:
@@ -120,12 +118,22 @@ def follow(
     return builder.finish(end.kind.say(end.detail + walk.gaps))
 
 
+def first_on(path: Parameter, value: float, options: NewtonOptions) -> Solution:
+    """The first point of a path, without a neighbouring one: from rest, by other ways where that fails.
+
+    On a path over the load these ways would be the path itself
+    """
+    solve = newton.solve_from_rest if path.name == parameter.LOAD else solve_along_load
+    return solve(*path.place(value), options)
+
+
 @single
 def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None) -> Solution:
     """Solve at one frequency [rad/s] without a neighbouring solution, also where the curve in the load has folds.
 
     Newton from rest and its load ramp are tried first; else the curve of solutions over the load is followed, which
-    leads where a rising load would; where that ends too, the contact is stiffened from soft springs
+    leads where a rising load would; where that ends too, friction falls from where all closed pairs stick, and then the
+    contact is stiffened from soft springs
     Returns a Solution; its outcome is the one from rest where no way leads to the load
     """
     options = options or NewtonOptions()
@@ -137,7 +145,8 @@ def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOpti
         last = newton.solve(balance, omega, ramp.contact[-1].reshape(first.state.x.shape), options)
         if last.converged:
             return last
-    return solve_along_stiffness(balance, omega, options) or first
+    found = solve_along_friction(balance, omega, options) or solve_along_stiffness(balance, omega, options)
+    return found or first
 
 
 class _Walk:

@@ -61,7 +61,7 @@ def follow(
     options = options or Options()
     path = parameter.of(problem)
     builder = BranchBuilder(path)
-    solution = newton.solve_from_rest(*path.place(start), options.newton)
+    solution = arc_length.first_on(path, start, options.newton)
     builder.add(start, solution)
     wanted = np.linspace(start, stop, options.n_points)[1:]
     for done, value in enumerate(wanted, start=1):
