@@ -91,6 +91,11 @@ class Parameters:
         ):
             if getattr(self, name) > largest:
                 raise ValueError(f"geometry.{name} is {getattr(self, name)}: keep it within {what}, {largest:.4g} m")
+        if self.free_length > checks.MOST * self.longest:
+            raise ValueError(
+                f"geometry.longest is {self.longest}: the free length of {self.free_length:g} m takes more than "
+                f"{checks.MOST} such elements; give at least {self.free_length / checks.MOST:.4g} m"
+            )
         if self.slot_length <= SPECIMEN_SIDE:
             raise ValueError(f"geometry.slot_length is {self.slot_length}: the lower specimen needs {SPECIMEN_SIDE} m")
         if self.root_length >= self.column_length:

@@ -98,6 +98,7 @@ def test_impossible_shapes_are_refused_in_one_sentence():
         ({"slot_height": 0.058}, "geometry.height less 5 mm"),
         ({"protrusion": 0.038}, "geometry.slot_height less 1 mm"),
         ({"root_length": 0.1}, "keep it below column_length"),
+        ({"free_length": 1e6}, "takes more than 2000 such elements; give at least 500 m"),
         ({"n_contact_width": 10}, "give an odd number of nodes"),
     ):
         with pytest.raises(ValueError, match=message) as caught:
