@@ -15,8 +15,8 @@ elimination of the contact is ours
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -143,28 +143,35 @@ def stability(
 
 @single
 def mark(
-    problem: HarmonicBalance | Parameter, branch: Branch, method: str = "hill", n_modes: int | None = None
+    problem: HarmonicBalance | Parameter,
+    branch: Branch,
+    method: str = "hill",
+    n_modes: int | None = None,
+    on_point: Callable[[int, int], None] | None = None,
 ) -> BranchStability:
     """Stability of every converged point of a branch, and the bifurcations between neighbouring points.
 
     problem : what the branch was followed with: the balance, or the parameter it was stepped in
+    on_point : called with points done and points in all
     """
     path = parameter.of(problem)
     if path.name != branch.parameter_name:
         raise ValueError(f"the branch was followed in the {branch.parameter_name}, not in the {path.name}")
     found: list[Stability | None] = []
-    for value, flat, outcome in zip(branch.parameter, branch.contact, branch.outcome, strict=True):
-        if outcome != CONVERGED:
-            found.append(None)
-            continue
-        balance, omega = path.place(value)
-        state = balance.evaluate(omega, flat.reshape(balance.contact.n_pair, -1, flat.shape[1]))
-        found.append(stability(balance, state, method, n_modes))
     changes = []
-    for i, (before, after) in enumerate(pairwise(found)):
-        if before is not None and after is not None and before.n_unstable != after.n_unstable:
-            ends = [Direction(branch.contact[j], float(branch.parameter[j])) for j in (i, i + 1)]
-            changes.append(_locate(path, i, (before, after), (ends[0], ends[1]), method, n_modes))
+    for i, (value, flat, outcome) in enumerate(zip(branch.parameter, branch.contact, branch.outcome, strict=True)):
+        now = None
+        if outcome == CONVERGED:
+            balance, omega = path.place(value)
+            state = balance.evaluate(omega, flat.reshape(balance.contact.n_pair, -1, flat.shape[1]))
+            now = stability(balance, state, method, n_modes)
+        before = found[-1] if found else None
+        if before is not None and now is not None and before.n_unstable != now.n_unstable:
+            ends = [Direction(branch.contact[j], float(branch.parameter[j])) for j in (i - 1, i)]
+            changes.append(_locate(path, i - 1, (before, now), (ends[0], ends[1]), method, n_modes))
+        found.append(now)
+        if on_point is not None:
+            on_point(i + 1, len(branch.outcome))
     return BranchStability(
         stable=np.array([s is not None and s.stable for s in found]),
         leading=np.array([np.nan if s is None else s.exponents[0] for s in found], complex),

@@ -108,16 +108,19 @@ def _once(
 
     (lambda - i s, d - s EO) with harmonics renumbered by s is the same perturbation as (lambda, d), for whole s
     """
-    chosen: list[int] = []
+    chosen, count = np.empty(min(wanted, len(values)), int), 0
     for i in np.argsort(np.abs(centre), kind="stable"):
-        shift = np.round((values[chosen] - values[i]).imag)
-        same = np.abs(values[chosen] - values[i] - 1j * shift) < COPY_DISTANCE
-        same &= (shift != 0) & ((diameters[chosen] - diameters[i] - shift * order) % n_sectors == 0)
-        if not np.any(same & (np.abs(centre[i] - centre[chosen] - shift) < SAME_CENTRE)):
-            chosen.append(int(i))
-        if len(chosen) == wanted:
+        before = chosen[:count]
+        away = values[before] - values[i]
+        shift = np.round(away.imag)
+        same = np.abs(away - 1j * shift) < COPY_DISTANCE
+        same &= (shift != 0) & ((diameters[before] - diameters[i] - shift * order) % n_sectors == 0)
+        if not np.any(same & (np.abs(centre[i] - centre[before] - shift) < SAME_CENTRE)):
+            chosen[count] = i
+            count += 1
+        if count == wanted:
             break
-    return np.array(chosen)
+    return chosen[:count]
 
 
 def of_exponentials(slope: np.ndarray) -> np.ndarray:

@@ -52,9 +52,9 @@ def choose_harmonics(
     return choice
 
 
-def stability_of(balance: HarmonicBalance, branch: Branch) -> CurveStability:
+def stability_of(balance: HarmonicBalance, branch: Branch, advance: Callable[[float, str], None]) -> CurveStability:
     """Stability of every point of a curve by Hill's method, and its bifurcations."""
-    found = exponents.mark(balance, branch)
+    found = exponents.mark(balance, branch, on_point=lambda done, of: advance(done / of, ""))
     return CurveStability(
         found.stable,
         found.leading.real,

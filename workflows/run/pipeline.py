@@ -103,8 +103,8 @@ def judged(scene: Scene, balance: HarmonicBalance, result: Result, progress: Pro
     frf = result.response
     assert frf is not None
     if scene.response.stability and result.stability is None:
-        with progress.stage("stability"):
-            result = replace(result, stability=curve.stability_of(balance, frf))
+        with progress.track("stability") as advance:
+            result = replace(result, stability=curve.stability_of(balance, frf, advance))
     if scene.response.bounds and result.bounds is None:
         with progress.track("bounds of residual shear") as advance:
             bounds = curve.shear_bounds(balance, frf, settings.OUTPUT, settings.newton_options(scene), advance)
