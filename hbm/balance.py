@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+import scipy.linalg as sla
 
 from tribodyn.hbm.contact.joint import Contact, Joint
 from tribodyn.hbm.contact.law import STICKS, ContactCycle
@@ -25,6 +26,7 @@ from tribodyn.reduction.model import ReducedModel
 
 ROUNDING = 1e-13  # of the work that a pair's force and motion could do at most
 NEARLY_ALL = 0.03  # share of the flexibility that products may leave out and still find Newton's directions alone
+FACTORED = 256  # size of a coarse part from which on its factors cost less than its inverse, for the few products made
 INNER, INNER_PRODUCTS = 0.05, 60  # residual and products of a direction within a direction, where they leave out more
 
 
@@ -327,7 +329,7 @@ class Linearisation:
         if self._coarse_inverse is None:
             return d
         u, inverse = self._coarse_inverse
-        return d + u @ (inverse @ (u.T @ self.g_slope(d)).ravel()).reshape(u.shape[1], -1)
+        return d + u @ inverse((u.T @ self.g_slope(d)).ravel()).reshape(u.shape[1], -1)
 
     @cached_property
     def _block_inverse(self) -> np.ndarray | None:
@@ -348,15 +350,18 @@ class Linearisation:
             return None
 
     @cached_property
-    def _coarse_inverse(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """U and (I - A U^T D U)^-1 A; None where there is no coarse part or it is singular."""
+    def _coarse_inverse(self) -> tuple[np.ndarray, Callable[[np.ndarray], np.ndarray]] | None:
+        """U and the product with (I - A U^T D U)^-1 A; None where there is no coarse part or it is singular."""
         if self.coarse is None:
             return None
         u, a, matrix = self.coarse
-        try:
-            return u, np.linalg.solve(matrix, a)
-        except np.linalg.LinAlgError:
-            return None
+        if len(a) < FACTORED:
+            try:
+                return u, np.linalg.solve(matrix, a).__matmul__
+            except np.linalg.LinAlgError:
+                return None
+        lower_upper, pivots, zero = sla.lapack.dgetrf(matrix)
+        return (u, lambda v: sla.lu_solve((lower_upper, pivots), a @ v, check_finite=False)) if zero == 0 else None
 
     @cached_property
     def coarse(self) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
@@ -433,9 +438,26 @@ class Linearisation:
         return d
 
     def dense(self) -> np.ndarray:
-        """The Jacobian as a matrix (n_contact * n_coeff, same), column by column; for checks and as fallback."""
-        n = self._shape[0] * self._shape[1]
-        point = self._point
-        eye = np.eye(n).reshape(n, *self._shape)
-        columns = [(e - point.apply(self.departure_slope(e))).ravel() for e in eye]
-        return np.stack(columns, axis=1)
+        """The Jacobian as a matrix (n_contact * n_coeff, same); for checks and as fallback.
+
+        G couples no harmonics, and a sine is a cosine turned: one product for each active row finds all its columns.
+        """
+        n, m = self._shape
+        full = np.eye(n * m)
+        if len(self.active) == 0:
+            return full
+        n_comp, s = n // self._n_pair, m % 2  # the constant, where it is kept, comes first
+        columns = full.reshape(n, m, self._n_pair, n_comp * m)
+        slope = self._dg.reshape(-1, m, n_comp * m)
+        unit = np.zeros(m)
+        unit[:s] = unit[s::2] = 1.0
+        for row, pushed in zip(self.rows, slope, strict=True):
+            g = np.zeros(self._shape)
+            g[row] = unit
+            moved = self._point.apply(g)[..., None]
+            cosine, sine = moved[:, s::2], moved[:, s + 1 :: 2]  # a unit of sine moves by -sine and cosine
+            block = columns[:, :, row // n_comp]
+            block[:, :s] -= moved[:, :s] * pushed[:s]
+            block[:, s::2] -= cosine * pushed[s::2] - sine * pushed[s + 1 :: 2]
+            block[:, s + 1 :: 2] -= sine * pushed[s::2] + cosine * pushed[s + 1 :: 2]
+        return full

@@ -94,8 +94,10 @@ def solve(
     precondition = _coarse_inverse(linear, column, row) if len(rows) else None
     y, spent, reached = gmres(product, right, tolerance, max_products, precondition)
     if not reached <= max(10 * tolerance, 0.5):  # stalled: the direct way
-        matrix = np.stack([product(e) for e in np.eye(len(right))], axis=1)
-        spent += len(right)
+        active = (rows[:, None] * shape[1] + np.arange(shape[1])).ravel()
+        inner = linear.dense()[np.ix_(active, active)]
+        matrix = np.block([[inner, column[:, None]], [row]])
+        spent += len(rows)
         try:
             y = np.linalg.solve(matrix, right)
         except np.linalg.LinAlgError:

@@ -6,6 +6,7 @@ needed once a neighbouring peak is known.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,11 +25,16 @@ COARSEST = 0.05  # longest step of the first search, share of its range
 # highest harmonic of the search for higher peaks: contacts that lift bend a curve of many harmonics so much that a scan
 # of it takes longer than a wear step, and a peak that is found is solved with all of them
 SCANNED = 3
+# the same below the tracked peak, where a sweep arrives first: a contact that lifts drives higher modes by harmonics of
+# the load, and a superharmonic resonance may be the first to overtake
+SCANNED_BELOW = 7
 # amplitude over that of the tracked peak, from which on another one has overtaken it: what fewer harmonics miss of a
 # peak is less, and a peak that emerges passes this at once
 OVERTAKES = 1.2
 APART = 1e-3  # relative distance of frequencies from which on two peaks are two
 NEAR = 1e-3  # relative distance to the peak within which a point beside failed solves is taken for it
+REACH = 2.0  # half widths between the points beside a maximum of a scan, by which its peak may lie outside them
+ASTRAY = 0.05  # of its frequency, by which a peak may move with more harmonics
 TRIED = 3  # maxima of a scan that are refined in turn, the highest first
 
 
@@ -136,15 +142,57 @@ class AtPeak:
     def first(self, balance: HarmonicBalance) -> OperatingPoint:
         """Scan the range, points dense where the response bends, then refine its highest maximum.
 
+        The scan has few harmonics where the balance has more, unless what it finds is no peak with all of them.
         Where no maximum that may be the highest can be refined, as at a fold, none of the lower ones is taken for it
         Raises  NoPeak where no maximum lies inside the range: an end of it is no resonance
         """
+        few = self._few(balance, self.scanned)
+        if few.basis != balance.basis:
+            branch = self._scan(few)
+            with suppress(NoPeak):
+                scanned = self._highest(few, branch, self._candidates(branch))
+                found = self._raised(few, balance, scanned)
+                if found.solution.converged:
+                    return replace(found, solves=found.solves + scanned.solves)
         branch = self._scan(balance)
+        return self._highest(balance, branch, self._candidates(branch))
+
+    def _candidates(self, branch: Branch) -> np.ndarray:
+        """Maxima of a branch that may be its highest."""
         maxima = self._maxima(branch)
         height = branch.amplitude(self.output)[maxima]
-        return self._highest(balance, branch, maxima[height >= (1 - SCAN_MISSES) * height[0]])
+        return maxima[height >= (1 - SCAN_MISSES) * height[0]]
 
-    def _scan(self, balance: HarmonicBalance) -> Branch:
+    def _few(self, balance: HarmonicBalance, highest: int) -> HarmonicBalance:
+        """The balance with its harmonics up to one, and those that the loads need."""
+        needed = max((h for h, _ in balance.excitation.loads), default=0)
+        kept = tuple(h for h in balance.basis.harmonics if h <= max(highest, needed))
+        return balance if kept == balance.basis.harmonics else balance.with_harmonics(kept)
+
+    def _raised(
+        self, few: HarmonicBalance, balance: HarmonicBalance, scanned: OperatingPoint, far_enough: bool = False
+    ) -> OperatingPoint:
+        """A peak that few harmonics found with all those of the balance, twice as many at a time.
+
+        far_enough : where no solution with more is found, that with the most harmonics counts, the others at zero
+        """
+        known, point = few, replace(scanned, solves=0)
+        while True:
+            kept = balance.basis.harmonics[: 2 * len(known.basis.harmonics)]
+            more = balance if kept == balance.basis.harmonics else balance.with_harmonics(kept)
+            x, omega = _carried(known, point, more), point.state.omega
+            found = self.next(more, omega, x)
+            if not found.solution.converged or abs(found.state.omega - omega) > ASTRAY * omega:
+                found = self._at(more, omega, x, found.solves)
+            found = replace(found, solves=found.solves + point.solves)
+            if far_enough and not found.solution.converged:
+                state = balance.evaluate(omega, _carried(known, point, balance))
+                return OperatingPoint.of(balance, replace(point.solution, state=state), self.output, found.solves)
+            if more is balance or not found.solution.converged:
+                return found
+            known, point = more, found
+
+    def _scan(self, balance: HarmonicBalance, load_paths: bool = True) -> Branch:
         step = min(1 / self.n_scan, COARSEST)
         scan = adaptive.Options(
             tolerance=SCAN_TOLERANCE,
@@ -152,21 +200,35 @@ class AtPeak:
             max_step=min(5 * step, COARSEST),
             min_step=1e-3 * step,
             newton=self.newton,
+            load_paths=load_paths,
         )
         return adaptive.follow(balance, self.start, self.stop, scan)
 
-    def _highest(self, balance: HarmonicBalance, branch: Branch, maxima: np.ndarray) -> OperatingPoint:
-        """The first of a branch's maxima that can be refined; its solves count those of the branch."""
+    def _highest(
+        self, balance: HarmonicBalance, branch: Branch, maxima: np.ndarray, bounded: bool = False
+    ) -> OperatingPoint:
+        """The first of a branch's maxima that can be refined; its solves count those of the branch.
+
+        bounded : refined between the points beside it, or little outside them
+        """
         solves = len(branch.omega)
         for best in maxima[:TRIED]:
-            contact = branch.contact[best]
-            x = contact.reshape(balance.contact.n_pair, len(balance.contact.components), balance.basis.n_coeff)
-            width = float(np.ptp(branch.omega[best - 1 : best + 2])) / 2
-            found = self._refine(balance, branch.omega[best], x, 0.5 * width)
+            beside = branch.omega[best - 1 : best + 2]
+            width = float(np.ptp(beside)) / 2
+            within = float(beside.min()) - REACH * width, float(beside.max()) + REACH * width
+            x = _point(balance, branch, best)
+            found = self._refine(balance, branch.omega[best], x, 0.5 * width, within if bounded else (0.0, np.inf))
             solves += found.solves
             if found.solution.converged:
                 break
         return replace(found, solves=solves)
+
+    def _at(self, balance: HarmonicBalance, omega: float, x: np.ndarray, solves: int) -> OperatingPoint:
+        """The solution at one frequency beside x; solves : spent before."""
+        return OperatingPoint.of(balance, newton.solve(balance, omega, x, self.newton), self.output, solves + 1)
+
+    def _contains(self, omega: float) -> bool:
+        return min(self.start, self.stop) <= omega <= max(self.start, self.stop)
 
     @single
     def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
@@ -178,13 +240,28 @@ class AtPeak:
         """The higher peak that a sweep with rising frequency meets, None where the tracked one is the highest.
 
         point : the tracked peak
-        Returns the peak and the balance solves spent, those of a sweep without any peak apart
+        Returns the peak and the balance solves spent, those of a sweep without any peak apart. Where pairs hammer and
+        no solution with all harmonics is found beside that with fewer, the peak has fewer, and zeros in the others
         """
         if OVERTAKES * point.amplitude >= self.highest * balance.load_factor:
             return None, 0
-        needed = max((h for h, _ in balance.excitation.loads), default=0)
-        few = balance.with_harmonics(tuple(h for h in balance.basis.harmonics if h <= max(self.scanned, needed)))
-        branch = self._scan(few)
+        few, more = self._few(balance, self.scanned), self._few(balance, SCANNED_BELOW)
+        found, solves = self._higher(few, balance, point, False)
+        if found is None and more.basis != few.basis:
+            ends = sorted((self.start, self.stop))
+            below = replace(self, start=ends[0], stop=min(point.state.omega, ends[1]))
+            found, further = below._higher(more, balance, point, True)
+            solves += further
+        return found, solves
+
+    def _higher(
+        self, few: HarmonicBalance, balance: HarmonicBalance, point: OperatingPoint, hammers: bool
+    ) -> tuple[OperatingPoint | None, int]:
+        """The same by one sweep with few harmonics.
+
+        hammers : the response may have micro-folds, so that jumps are many and slopes tell little about where a peak is
+        """
+        branch = self._scan(few, load_paths=not hammers)
         try:
             maxima = self._maxima(branch)
         except NoPeak:
@@ -192,18 +269,20 @@ class AtPeak:
         might = branch.amplitude(self.output)[maxima] > (1 - SCAN_MISSES) * OVERTAKES * point.amplitude
         if not might.any():
             return None, len(branch.omega)
-        scanned = self._highest(few, branch, maxima[might])
+        scanned = self._highest(few, branch, maxima[might], hammers)
+        if hammers and not scanned.solution.converged:  # no slope vanishes: the highest point of the sweep
+            best = maxima[might][0]
+            scanned = self._at(few, branch.omega[best], _point(few, branch, best), scanned.solves)
         if not self._is_higher(scanned, point):
             return None, scanned.solves
-        x = few.basis.transfer(scanned.state.flat, balance.basis).reshape(point.state.x.shape)
-        found = self.next(balance, scanned.state.omega, x)
+        found = self._raised(few, balance, scanned, far_enough=True)
         return found if self._is_higher(found, point) else None, found.solves + scanned.solves
 
     def _is_higher(self, found: OperatingPoint, point: OperatingPoint) -> bool:
         omega = found.state.omega
-        inside = min(self.start, self.stop) <= omega <= max(self.start, self.stop)
         apart = abs(omega - point.state.omega) > APART * point.state.omega
-        return inside and apart and found.solution.converged and found.amplitude > OVERTAKES * point.amplitude
+        higher = found.amplitude > OVERTAKES * point.amplitude
+        return self._contains(omega) and apart and found.solution.converged and higher
 
     @single
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
@@ -234,7 +313,14 @@ class AtPeak:
             f"{which} end at {end:.5g} Hz; extend response.frequency beyond it, or name a frequency in wear.at"
         )
 
-    def _refine(self, balance: HarmonicBalance, omega: float, x: np.ndarray, stride: float) -> OperatingPoint:
+    def _refine(
+        self,
+        balance: HarmonicBalance,
+        omega: float,
+        x: np.ndarray,
+        stride: float,
+        within: tuple[float, float] = (0.0, np.inf),
+    ) -> OperatingPoint:
         def solve(w: float, guess: np.ndarray) -> _Slope:
             solution = newton.solve(balance, w, guess, self.newton)
             return _Slope.of(balance, solution, self.output)
@@ -260,7 +346,7 @@ class AtPeak:
                 reach = abs(here.omega - before.omega)
                 guess = (_zero(before, here) - here.omega) * side
                 target = here.omega + side * (min(guess, 8 * reach) if guess > 0 else 3 * reach)
-            target = float(np.clip(target, 1e-3 * omega, balance.omega_max))
+            target = float(np.clip(target, max(1e-3 * omega, within[0]), min(balance.omega_max, within[1])))
             if abs(target - best.omega) <= resolution:
                 break
             there = solve(target, here.predict(target))
@@ -300,6 +386,16 @@ class AtPeak:
             )
             found = replace(found, outcome=lost)
         return OperatingPoint.of(balance, found, self.output, solves)
+
+
+def _point(balance: HarmonicBalance, branch: Branch, i: int) -> np.ndarray:
+    """x of a point of a branch."""
+    return branch.contact[i].reshape(balance.contact.n_pair, len(balance.contact.components), balance.basis.n_coeff)
+
+
+def _carried(known: HarmonicBalance, point: OperatingPoint, to: HarmonicBalance) -> np.ndarray:
+    """x of a point of one balance in the harmonics of another."""
+    return known.basis.transfer(point.state.x, to.basis)
 
 
 def _range(branch: Branch) -> str:

@@ -129,6 +129,10 @@ def test_friction_and_gap_that_differ_by_blade_are_the_dense_wheel(reduced):
         here = newton.solve(ours, 2 * np.pi * 250, there.state.x, EXACT)
         assert here.converged
         assert apart(tips(ours, ours.outputs(here.state)), tips(dense, dense.outputs(there.state))) < within
+        linear = ours.linearise(here.state)
+        d = np.random.default_rng(0).normal(size=here.state.flat.shape)
+        moved = d - ours.at(here.state.omega).apply(linear.departure_slope(d))
+        assert apart(linear.dense() @ d.ravel(), moved.ravel()) < 1e-10
 
 
 def test_every_node_moves_as_on_the_dense_wheel(reduced):

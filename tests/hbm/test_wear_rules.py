@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.helpers.pressed_body import N_PAIR, wear_problem
+from tests.helpers.pressed_body import N_PAIR, balance_of, pressed_body, wear_problem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import SEPARATES
@@ -73,8 +73,10 @@ def test_wear_inside_the_balance_has_the_derivative_of_finite_differences(proble
     assert depth.max() > 1e-5
     direction = np.random.default_rng(1).normal(size=x.shape) * 1e-6 * np.abs(x).max()
     fore, back = (wearing.evaluate(omega, x + sign * direction).residual for sign in (1, -1))
-    exact = wearing.linearise(solution.state).product(direction.reshape(-1, x.shape[2]))
+    linear = wearing.linearise(solution.state)
+    exact = linear.product(direction.reshape(-1, x.shape[2]))
     assert np.abs((fore - back) / 2 - exact).max() < 1e-5 * np.abs(exact).max()
+    assert np.abs((fore - back).ravel() / 2 - linear.dense() @ direction.ravel()).max() < 1e-5 * np.abs(exact).max()
 
 
 def test_error_controlled_rule_converges_with_its_tolerance(problem: WearProblem, fine: WearHistory) -> None:
@@ -252,6 +254,39 @@ def test_error_controlled_steps_get_over_the_end_of_a_branch(problem: WearProble
     assert problem.area @ worn.depth[-1] == pytest.approx(1e-9 * worn.work.sum(), rel=1e-12)
     plain = error_controlled_rule.evolve(problem, tolerance)
     assert life(worn) == pytest.approx(life(plain), rel=0.02)
+
+
+def test_fewer_harmonics_carry_wear_where_no_solution_with_all_follows() -> None:
+    """With eight harmonics no solution is found while the deepest pair is between 1e-5 and 6e-5 m, with four it is."""
+    tolerance = error_controlled_rule.Tolerance(0.1, 2e-4)
+    whole = wear_problem(balance=balance_of(pressed_body(), tuple(range(8))))
+    gap = whole.balance.contact.gap
+
+    def gone(balance: HarmonicBalance) -> bool:
+        return len(balance.basis.harmonics) == 8 and 1e-5 < (balance.contact.gap - gap).max() < 6e-5
+
+    class Missing(AtFrequency):
+        def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
+            found = super().next(balance, omega, x)
+            return replace(found, solution=replace(found.solution, outcome="gone")) if gone(balance) else found
+
+        def correct(self, balance: HarmonicBalance, state: State) -> Correction:
+            return Correction(state.omega if gone(balance) else 0.0, np.zeros_like(state.x), 0)
+
+    lacking = replace(whole, mission=(Duty(Missing("tip", 420.0)),))
+    worn = error_controlled_rule.evolve(lacking, tolerance)
+    moves = np.any(worn.displacement[:, :, 7:] != 0, axis=(1, 2))
+    deepest = worn.depth.max(axis=1)
+    few = np.flatnonzero(~moves)
+    assert np.all(few == np.arange(few[0], few[-1] + 1))
+    assert deepest[few[0]] <= 1e-5 < deepest[few[0] + 1]
+    assert deepest[few[-1]] < 6e-5 <= deepest[few[-1] + 1]
+    assert np.all(worn.plan[:-1, 0] > 0)  # implicit steps throughout
+    assert "with harmonics up to 3" in str(worn.end)
+    assert life(worn) == pytest.approx(life(error_controlled_rule.evolve(whole, tolerance)), rel=0.02)
+    begun = error_controlled_rule.evolve(lacking, tolerance, int(few[0]) + 2)
+    again = error_controlled_rule.evolve(lacking, tolerance, resume=begun)
+    assert np.array_equal(again.depth, worn.depth)
 
 
 def test_a_step_behind_which_no_solution_is_found_is_followed_by_a_longer_one(problem: WearProblem) -> None:

@@ -51,6 +51,8 @@ class Options:
     newton: NewtonOptions = field(default_factory=NewtonOptions, kw_only=True)
     guess: np.ndarray | None = field(default=None, kw_only=True)
     """(n_pair, n_component, n_coeff) neighbour of the first solution [m]; from rest by default."""
+    load_paths: bool = field(default=True, kw_only=True)
+    """Whether a jump that Newton does not make is made along the load, which takes as long as many points."""
 
     def __post_init__(self) -> None:
         require_limits(self, "adaptive continuation")
@@ -169,7 +171,7 @@ class _Sweep:
             value = here + min(step, (self._stop - here) / self._span) * self._span
             place = self._path.place(value)
             solution = newton.solve(*place, self._builder.x[-1], self._options.newton)
-            if not solution.converged:
+            if not solution.converged and self._options.load_paths:
                 solution = solve_along_load(*place, self._options.newton)
             if solution.converged:
                 self._ahead = [a for a in self._ahead if abs(a[0] - here) > abs(value - here)]
