@@ -17,7 +17,14 @@ from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.threads import single
 
 FRICTION = "friction"  # what laws call their coefficient
-DECADES = 3  # of friction above its own
+STARTS = (3.0, 2.5, 2.0, 1.5, 1.0, 0.5)  # decimal logarithms of friction over its own, tried in turn
+    3.0,
+    2.5,
+    2.0,
+    1.5,
+    1.0,
+    0.5,
+)  # decimal logarithms of friction over its own: where pairs open that stick, less
 SHORTEST = 0.02  # step of the decimal logarithm of friction
 GROWTH = 1.6  # of a step after one that converged
 MOST_STEPS = 400  # of Newton on the whole way
@@ -28,8 +35,12 @@ def solve_along_friction(balance: HarmonicBalance, omega: float, options: Newton
     """A solution at one frequency [rad/s], None where no law has a coefficient of friction or there is no way to it."""
     if not any(FRICTION in joint.parameters.numbers for joint in balance.contact.joints):
         return None
-    x, level, stride, left, products = balance.stuck(omega), float(DECADES), 1.0, MOST_STEPS, 0
-    found = newton.solve(_with_friction(balance, level), omega, x, options)
+    x, stride, left, products = balance.stuck(omega), 1.0, MOST_STEPS, 0
+    for level in STARTS:
+        found = newton.solve(_with_friction(balance, level), omega, x, options)
+        if found.converged:
+            break
+        left, products = left - found.steps, products + found.products
     while found.converged:
         left, products = left - found.steps, products + found.products
         if level == 0.0:

@@ -16,7 +16,7 @@ from tribodyn.fem.part import Part
 from tribodyn.fem.prestress import UNSTABLE, check_stability, coriolis, geometric_stiffness, spin_softening
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation.methods import arc_length
+from tribodyn.hbm.continuation.sliding import solve_along_friction
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.recovery import full_displacement
@@ -103,7 +103,10 @@ def at_rest(scene: MeshScene, sector: Sector) -> np.ndarray:
     basis = HarmonicBasis((0, 1), FEW_SAMPLES)
     made = joints.make_joints(scene, model)
     balance = HarmonicBalance.of(model, made, basis, Excitation.of(static), AT_REST)
-    solved = arc_length.solve_along_load(balance, AT_REST, newton.NewtonOptions(tolerance=SETTLED))
+    options = newton.NewtonOptions(tolerance=SETTLED)
+    solved = newton.solve_from_rest(balance, AT_REST, options)
+    if not solved.converged:
+        solved = solve_along_friction(balance, AT_REST, options) or solved
     if not solved.converged:
         raise ValueError(f"the contacts do not settle under the static loads: {solved.outcome}")
     state = solved.state
