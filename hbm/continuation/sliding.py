@@ -18,13 +18,6 @@ from tribodyn.hbm.threads import single
 
 FRICTION = "friction"  # what laws call their coefficient
 STARTS = (3.0, 2.5, 2.0, 1.5, 1.0, 0.5)  # decimal logarithms of friction over its own, tried in turn
-    3.0,
-    2.5,
-    2.0,
-    1.5,
-    1.0,
-    0.5,
-)  # decimal logarithms of friction over its own: where pairs open that stick, less
 SHORTEST = 0.02  # step of the decimal logarithm of friction
 GROWTH = 1.6  # of a step after one that converged
 MOST_STEPS = 400  # of Newton on the whole way
