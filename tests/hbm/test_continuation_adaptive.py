@@ -59,6 +59,18 @@ def test_a_sweep_jumps_at_the_fold_and_says_so():
         assert np.abs(duffing.defect(branch.omega, amplitude)).max() < 1e-5
 
 
+def test_a_rough_response_is_not_crawled_along():
+    """Loads that differ by a fifth; a point a little further than the shortest step is taken, too."""
+    balance = Duffing().balance()
+
+    def shaken(value: float):
+        return balance.with_load(1 + 0.2 * np.random.default_rng(int(1e12 * value)).uniform())
+
+    branch = adaptive.follow(parameter.Parameter("place", shaken, 0.3), 0.0, 1.0, Options(min_step=2.5e-5))
+    assert branch.parameter[-1] == 1.0
+    assert 200 < len(branch.parameter) < 800
+
+
 def test_it_steps_other_parameters_and_ends_in_words():
     balance = Duffing().balance()
     branch = adaptive.follow(parameter.load(balance, 1.0), 0.0, 2.0)

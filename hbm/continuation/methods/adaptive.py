@@ -31,6 +31,10 @@ LEAST_ERROR_SHARE = 0.3
 # Error estimate in the shortest step, over the tolerance, beyond which the response has jumped: a step that is shorter
 # than the first by thousands of times cannot be that wrong on one and the same curve.
 JUMP_ERROR = 1e3
+TAKEN = 1.2  # steps ahead within which a point that was solved before, or the stop, is taken for the next one
+# Points in the shortest step that miss the tolerance: a response with so many of them is rough however close they lie,
+# as where pairs come to rest anew at every point, and the shortest step is doubled.
+CRAWLED = 50
 REJECTED_ERROR = 2.0  # error estimate, over the tolerance, that takes a step back; one solve is worth a factor of two
 
 
@@ -127,7 +131,7 @@ class _Sweep:
     ):
         self._path, self._options, self._builder, self._stop = path, options, builder, stop
         self._span = stop - start
-        self._step = options.step
+        self._step, self._shortest, self._crawled = options.step, options.min_step, 0
         self._ahead: list[tuple[float, Solution]] = []  # the nearest last
         self._clean = 0  # first point after the last jump
         self._response = [self._outputs(start, first)]
@@ -154,13 +158,16 @@ class _Sweep:
             response = self._outputs(value, solution)
             error = self._error(value, response)
             step = abs((value - here) / self._span)
-            if error > REJECTED_ERROR and step > 1.001 * self._options.min_step:
+            if error > REJECTED_ERROR and step > TAKEN * self._shortest:
                 self._ahead.append((value, solution))
-                self._step = max(step * self._factor(error), self._options.min_step)
+                self._step = max(step * self._factor(error), self._shortest)
                 continue
+            self._crawled += error > REJECTED_ERROR
+            if self._crawled == CRAWLED:
+                self._crawled, self._shortest = 0, min(2 * self._shortest, self._options.max_step)
             self._accept(value, solution, response, jumped=error > JUMP_ERROR)
             if error <= JUMP_ERROR:
-                self._step = float(np.clip(step * self._factor(error), self._options.min_step, self._options.max_step))
+                self._step = float(np.clip(step * self._factor(error), self._shortest, self._options.max_step))
             return ""
 
     def _jump(self, here: float) -> bool:
@@ -185,9 +192,9 @@ class _Sweep:
     def _solve(self, here: float) -> tuple[float, Solution]:
         """The next point: the stop or one solved ahead where it is near, else one solved anew."""
         value = here + self._step * self._span
-        if self._ahead and abs(self._ahead[-1][0] - here) <= 1.2 * abs(value - here):
+        if self._ahead and abs(self._ahead[-1][0] - here) <= TAKEN * abs(value - here):
             return self._ahead.pop()
-        if abs(self._stop - here) <= 1.2 * abs(value - here):
+        if abs(self._stop - here) <= TAKEN * abs(value - here):
             value = self._stop
         known = max(self._clean, len(self._builder.value) - EXTRAPOLATION_DEGREE - 1)
         guess = extrapolate(np.array(self._builder.value[known:]), self._builder.x[known:], value)
