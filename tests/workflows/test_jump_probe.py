@@ -32,7 +32,8 @@ def test_a_jump_is_a_step_without_a_plan_to_another_frequency() -> None:
 
 
 @pytest.mark.parametrize(
-    ("first_overtaken", "moved"), [(-0.04, 0.05 * 0.75), (-0.01, 0.025 * 0.75), (0.03, 0.05 * 0.75), (0.2, None)]
+    ("first_overtaken", "moved"),
+    [(-0.04, 0.05 * 0.75), (-0.01, 0.025 * 0.75), (0.03, 0.05 * 0.75), (0.25, 0.3 * 0.75), (0.5, None)],
 )
 def test_the_change_of_life_is_bounded_from_the_side_on_which_the_answer_changes(
     first_overtaken: float, moved: float | None, monkeypatch: pytest.MonkeyPatch

@@ -13,13 +13,13 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import harmonic_choice
-from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak, Site
+from tribodyn.hbm.continuation.operating_point import SCANNED_BELOW, AtFrequency, AtPeak, Site
 from tribodyn.hbm.wear.error_controlled_rule import jumps
 from tribodyn.hbm.wear.evolution import Duty
 from tribodyn.hbm.wear.history import WearHistory
 
-MORE = 2  # harmonics beyond the kept ones
-SHARES = (0.025, 0.05, 0.1)  # of the life, on the side of the instant where the answer is to change
+MORE = 2  # harmonics beyond the kept ones, and up to those that a sweep below the tracked peak has at the least
+SHARES = (0.025, 0.05, 0.1, 0.2, 0.3, 0.4)  # of the life, on the side of the instant where the answer is to change
 
 
 def life_moved(balance: HarmonicBalance, wear: WearHistory, duty: Duty, life: float) -> float | None:
@@ -50,7 +50,7 @@ def _sweep_with_more(
 
     None where the tracked peak itself is not found
     """
-    top = balance.basis.harmonics[-1] + MORE
+    top = max(balance.basis.harmonics[-1] + MORE, SCANNED_BELOW)
     wide = harmonic_choice.widened(balance, top)
     wide = wide.with_harmonics(tuple(h for h in wide.basis.harmonics if h <= top)).with_load(duty.load)
     kept = balance.basis.transfer(wear.displacement[row], wide.basis)
