@@ -20,7 +20,9 @@ from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import Outcome, SolveEnd, WearEnd
 from tribodyn.hbm.threads import single
+from tribodyn.hbm.wear import fewer_harmonics
 from tribodyn.hbm.wear.evolution import (
+    LARGEST_SHIFT,
     WearProblem,
     WearState,
     assess,
@@ -49,10 +51,9 @@ LEAST_PRELOAD_SHARE = 1e-4
 EXPLICIT_STEPS = 0.01 * 3.0 ** np.arange(5)
 OVERTAKING_ACCURACY = 0.5  # share of the tolerance, of the cycles, within which a jump to another peak is located
 LOOKED_AT = 0.97  # ratio of preloads, counted from the first, at which higher peaks are looked for
-LARGEST_SHIFT = 0.1  # of a frequency in one step: a peak that moves further is another one,
-UNEXPECTED = 4.0  # unless it moves less than so many times as far as the step before leads to expect
+# a peak that moves further than LARGEST_SHIFT, unless less than so many times as far as the step before leads to expect
+UNEXPECTED = 4.0
 SHIFTED = WearEnd.NO_STEP.say(f": the tracked peak moves by more than {LARGEST_SHIFT:.0%} in the shortest step")
-LEAST_HARMONIC = 3  # up to which harmonics are kept where no solution with more follows
 MAX_CORRECTIONS = 12  # solves of a stage
 GAIN_ACCURACY = 1e-9  # of the depth, for laws whose depth per work is not constant
 
@@ -106,7 +107,7 @@ def evolve(
             on_row(rows[-1])
         if reason:
             break
-    return history(rows, end.kind.say(end.detail + _jumps(rows) + _with_fewer_said(problem.balance.basis, rows)))
+    return history(rows, end.kind.say(end.detail + _jumps(rows) + fewer_harmonics.told(problem.balance.basis, rows)))
 
 
 def jumps(rows: Sequence[WearRow]) -> list[int]:
@@ -124,20 +125,6 @@ def _jumps(rows: Sequence[WearRow]) -> str:
     )
 
 
-def _with_fewer_said(basis: HarmonicBasis, rows: Sequence[WearRow]) -> str:
-    """What to say of rows that no solution with all harmonics was found for; empty where there are none."""
-    tops = [top_harmonic(basis, list(row.duty_displacement)) for row in rows]
-    few = [i for i, top in enumerate(tops) if top < basis.harmonics[-1]]
-    if not few:
-        return ""
-    first, last = rows[few[0]].cycles, rows[min(few[-1] + 1, len(rows) - 1)].cycles
-    share = sum(rows[i].cycles_in_step for i in few) / rows[-1].cycles if rows[-1].cycles else 1.0
-    return (
-        f"; {share:.0%} of the cycles, from {first:.3g} to {last:.3g}, with harmonics up to "
-        f"{min(tops[i] for i in few)} at least, where no periodic motion with all of them follows"
-    )
-
-
 @dataclass(frozen=True)
 class _Taken:
     """A step: its row, and the state after it, or why there is none."""
@@ -152,19 +139,19 @@ def _step(whole: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequ
 
     Where no solution with all harmonics follows, fewer are taken until the step succeeds; each step tries more again.
     """
-    problem, state = settled(whole, state)
+    problem, state = fewer_harmonics.settled(whole, state)
     taken = None
     while taken is None:
         taken = _step_of(problem, tolerance, state, rows, whole.balance.basis)
-        fewer = with_fewer(problem)
+        fewer = fewer_harmonics.with_fewer(problem)
         if taken is None and fewer is not None:
-            problem, state = fewer, carried(fewer, state)
+            problem, state = fewer, fewer_harmonics.carried(fewer, state)
     if problem is whole:
         return taken
     row = taken.row
-    here = replace(carried(whole, state), solves=row.solves, preload_at_rest=row.preload_at_rest)
+    here = replace(fewer_harmonics.carried(whole, state), solves=row.solves, preload_at_rest=row.preload_at_rest)
     row = row_of(whole, here, row.cycles_in_step, row.worn, row.work, row.step_error, row.plan)
-    return replace(taken, row=row, after=taken.after and carried(whole, taken.after))
+    return replace(taken, row=row, after=taken.after and fewer_harmonics.carried(whole, taken.after))
 
 
 def _step_of(
@@ -174,7 +161,7 @@ def _step_of(
 
     basis : of the rows
     """
-    last = with_fewer(problem) is None
+    last = fewer_harmonics.with_fewer(problem) is None
     smallest = 1e-9 * tolerance.scale / float(state.rate.max())
     leap = EXPLICIT_STEPS[0] * tolerance.share * tolerance.scale / float(state.rate.max())
     stride = 10 * leap
@@ -182,7 +169,7 @@ def _step_of(
     if rows and rows[-1].plan[0] > 0:
         stride, slopes = float(rows[-1].plan[0]), rows[-1].plan[1:]
         top = problem.balance.basis.harmonics[-1]
-        if top_harmonic(basis, list(rows[-1].duty_displacement)) == top:
+        if fewer_harmonics.top_harmonic(basis, list(rows[-1].duty_displacement)) == top:
             omega = np.array([point.state.omega for point in state.points])
             drift = (omega - rows[-1].duty_omega) / (state.cycles - rows[-1].cycles)
     target = _event(problem, state, rows)
@@ -239,82 +226,6 @@ def _step_of(
         second, plan = worn_state(problem, second.depth, second.cycles, higher, 0), np.zeros(1 + len(slopes))
     row = row_of(problem, replace(state, solves=solves), stride, worn, work, error, plan)
     return _Taken(row, replace(second, solves=0))
-
-
-def settled(whole: WearProblem, state: WearState) -> tuple[WearProblem, WearState]:
-    """The problem with as many harmonics as a solution near a state is found with, and the state in it.
-
-    A state that was solved with fewer harmonics than the problem has carries zeros in the others.
-    """
-    harmonics = whole.balance.basis.harmonics
-    count = 1 + harmonics.index(_top(whole, state))
-    if count == len(harmonics):
-        return whole, state
-    problem = with_harmonics(whole, harmonics[:count])
-    state = carried(problem, state)
-    while problem is not whole:
-        more = with_harmonics(whole, harmonics[: 2 * len(problem.balance.basis.harmonics)])
-        points, solves = [], state.solves
-        for duty, point in zip(more.mission, carried(more, state).points, strict=True):
-            balance = more.in_duty(duty, state.depth)
-            found = duty.site.next(balance, point.state.omega, point.state.x)
-            solves += found.solves
-            far = abs(found.state.omega - point.state.omega) > LARGEST_SHIFT * point.state.omega
-            if far or not found.solution.converged:
-                return problem, replace(state, solves=solves)
-            points.append(found)
-        at_rest = (state.preload_at_rest, state.failure_at_rest)
-        state = worn_state(more, state.depth, state.cycles, points, solves)
-        state = replace(state, preload_at_rest=at_rest[0], failure_at_rest=at_rest[1])
-        problem = more
-    return problem, state
-
-
-def with_fewer(problem: WearProblem) -> WearProblem | None:
-    """The problem with the lower half of its harmonics, those that loads need among them; None where that is all."""
-    balance = problem.balance
-    needed = max([LEAST_HARMONIC, *(h for h, _ in balance.excitation.loads)])
-    harmonics = balance.basis.harmonics
-    half = (len(harmonics) + 1) // 2
-    kept = tuple(h for i, h in enumerate(harmonics) if h <= needed or i < half)
-    return None if kept == harmonics else with_harmonics(problem, kept)
-
-
-def with_harmonics(problem: WearProblem, kept: tuple[int, ...]) -> WearProblem:
-    """The problem with some of its harmonics."""
-    if kept == problem.balance.basis.harmonics:
-        return problem
-    mission = tuple(
-        duty if duty.balance is None else replace(duty, balance=duty.balance.with_harmonics(kept))
-        for duty in problem.mission
-    )
-    return replace(problem, balance=problem.balance.with_harmonics(kept), mission=mission)
-
-
-def carried(problem: WearProblem, state: WearState) -> WearState:
-    """A state in the same problem with other harmonics: those that it lacks are dropped, new ones are zero."""
-    points = []
-    for duty, point in zip(problem.mission, state.points, strict=True):
-        balance = problem.in_duty(duty, state.depth)
-        x = np.zeros((*point.state.x.shape[:2], balance.basis.n_coeff))
-        common = min(x.shape[2], point.state.x.shape[2])
-        x[..., :common] = point.state.x[..., :common]
-        there = replace(point.solution, state=balance.evaluate(point.state.omega, x))
-        points.append(OperatingPoint.of(balance, there, duty.site.output, point.solves))
-    made = worn_state(problem, state.depth, state.cycles, points, state.solves)
-    return replace(made, preload_at_rest=state.preload_at_rest, failure_at_rest=state.failure_at_rest)
-
-
-def _top(problem: WearProblem, state: WearState) -> int:
-    """The highest harmonic that any duty of a state moves in."""
-    return top_harmonic(problem.balance.basis, [point.state.x for point in state.points])
-
-
-def top_harmonic(basis: HarmonicBasis, displacements: Sequence[np.ndarray]) -> int:
-    """The highest harmonic in which any displacement (..., n_coeff) is not zero; of the basis where none moves."""
-    moves = np.any([np.any(x.reshape(-1, x.shape[-1]) != 0, axis=0) for x in displacements], axis=0)
-    order = basis.order[: len(moves)][moves]
-    return int(order.max()) if order.size and order.max() > 0 else basis.harmonics[-1]
 
 
 def _is_due(problem: WearProblem, state: WearState, second: WearState, rows: Sequence[WearRow]) -> bool:
