@@ -161,7 +161,8 @@ SMALL = {
 }  # fmt: skip
 
 
-LIKE_OTHERS = ("leaf_seal", "rig")  # a part and its contacts, as the beam and the pressed halves of test_scene_brb
+# one part that wears, as the blade; a part and its contacts, as the pressed halves of test_scene_brb
+LIKE_OTHERS = ("beam", "leaf_seal", "rig")
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import pickle
-import signal
 import subprocess
 import sys
 import time
@@ -21,6 +19,7 @@ import xarray
 from scipy import stats
 
 import tribodyn as td
+from tests.helpers import dying
 from tests.helpers.command import leave
 from tribodyn.workflows.designs import design, parallel_picture, pool, study_file, task
 from tribodyn.workflows.designs.journal import Journal
@@ -201,17 +200,9 @@ def test_the_key_of_a_run_follows_its_files(tmp_path: Path) -> None:
 def test_a_process_that_dies_takes_no_other_run_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     good = Task(1, "none", "", (), tmp_path)
     tasks = [replace(good, number=n) for n in (1, 2, 3, 4)]
-    rows = {row.run: row for row in pool.finished(tasks, 2, die_at_two)}
+    rows = {row.run: row for row in pool.finished(tasks, 2, dying.at_two)}
     assert {n: row.status for n, row in rows.items()} == {1: "refused", 2: "lost", 3: "refused", 4: "refused"}
     assert "died 3 times" in rows[2].sentence
-
-
-def die_at_two(one: Task) -> Row:
-    if one.number == 2:
-        os.kill(os.getpid(), signal.SIGTERM)
-    if one.number == 1:
-        time.sleep(1.0)  # still under way when the second dies beside it
-    return Row(one.number, one.key, "refused", "")
 
 
 def test_the_command_resumes_a_study_that_was_killed(

@@ -180,7 +180,8 @@ def test_the_study_compares_every_number_and_draws(tmp_path, capsys, monkeypatch
     monkeypatch.setattr(rig_time, "STEPS", 128)
     monkeypatch.setattr(rig_time, "PERIODS", 40)
     words = ["rig", "study", "--json", "--out", str(tmp_path)]
-    for override in (*QUICK, "response.frequency=['287 Hz', '293 Hz']"):
+    smaller = ("geometry.n_contact_width=3", "wear.step=25 %", "response.frequency=['287 Hz', '293 Hz']")
+    for override in (*QUICK, *smaller):
         words += ["--set", override]
     with pytest.raises(SystemExit) as stop:
         cli.main(words)

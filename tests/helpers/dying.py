@@ -1,0 +1,18 @@
+"""What a process of a pool does instead of a run; by itself, because each process imports it anew."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+
+from tribodyn.workflows.designs.task import Row, Task
+
+
+def at_two(one: Task) -> Row:
+    """Refuse a run, or die of the second."""
+    if one.number == 2:
+        os.kill(os.getpid(), signal.SIGTERM)
+    if one.number == 1:
+        time.sleep(1.0)  # still under way when the second dies beside it
+    return Row(one.number, one.key, "refused", "")
