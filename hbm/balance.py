@@ -21,6 +21,7 @@ from tribodyn.hbm.contact.law import STICKS, ContactCycle
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.krylov import gmres
+from tribodyn.hbm.linear import pair_slopes
 from tribodyn.hbm.linear.compliance import CompliancePoint, ContactCompliance
 from tribodyn.reduction.model import ReducedModel
 
@@ -289,15 +290,9 @@ class Linearisation:
         jac = cycle.jacobian
         if jac is None:
             raise ValueError("linearise needs a state evaluated with its contact derivative")
-        n_pair, m, _ = jac.shape
-        n_coeff = x.shape[2]
-        n_comp = m // n_coeff
-        dg = -jac
-        k = stiffness.reshape(n_pair, n_comp)
-        dg[:, np.arange(m), np.arange(m)] += np.repeat(k, n_coeff, axis=1)
-        self.active = np.flatnonzero(np.abs(dg).max(axis=(1, 2)) > 1e-14 * k.max(axis=1))
+        n_pair, n_comp, n_coeff = x.shape
+        self.active, self._dg = pair_slopes.departures(jac, stiffness.reshape(n_pair, n_comp))
         self.rows = (self.active[:, None] * n_comp + np.arange(n_comp)).ravel()
-        self._dg = np.ascontiguousarray(dg[self.active])
         self._shape, self._n_pair = (n_pair * n_comp, n_coeff), n_pair
         self._point = point
         self._product = self._point.jacobian_product(self.rows)

@@ -52,7 +52,10 @@ def modal_rows(y, n_e, ratio, has_static):
 
 @numba.njit(cache=True)
 def gathered(modal, moved, higher, n, n_port, unit, ratio, has_static):
-    """Displacement (n, n_coeff): modes, W_0 f and sum_k (i ratio)^k unit W_k f, rows of `moved` and `higher`."""
+    """Displacement (n, n_coeff): modes, W_0 f and sum_k (i ratio)^k unit W_k f, rows of `moved` and `higher`.
+
+    The rows of `higher` are those of the harmonics >= 1.
+    """
     n_coeff = len(modal)
     s = 1 if has_static else 0
     n_power = higher.shape[1] // n_port
@@ -61,19 +64,19 @@ def gathered(modal, moved, higher, n, n_port, unit, ratio, has_static):
         for i in range(n):
             out[i, c] = modal[c, i] + moved[c, i]
     for h in range(len(ratio)):
-        a, b = s + 2 * h, s + 2 * h + 1
+        a, b, p, q = s + 2 * h, s + 2 * h + 1, 2 * h, 2 * h + 1
         size, odd_sign, even_sign = unit, 1.0, 1.0
         for k in range(n_power):
             size *= ratio[h]
             first = k * n_port
             if k % 2 == 0:
                 for i in range(n):
-                    out[i, a] += odd_sign * size * higher[b, first + i]
-                    out[i, b] -= odd_sign * size * higher[a, first + i]
+                    out[i, a] += odd_sign * size * higher[q, first + i]
+                    out[i, b] -= odd_sign * size * higher[p, first + i]
                 odd_sign = -odd_sign
             else:
                 even_sign = -even_sign
                 for i in range(n):
-                    out[i, a] += even_sign * size * higher[a, first + i]
-                    out[i, b] += even_sign * size * higher[b, first + i]
+                    out[i, a] += even_sign * size * higher[p, first + i]
+                    out[i, b] += even_sign * size * higher[q, first + i]
     return out

@@ -10,6 +10,7 @@ the modes alone, and what these leave out is a product with a sparse factor.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -102,6 +103,7 @@ class ContactCompliance:
         other.__dict__.update(self.__dict__)
         other.basis = basis
         other._active, other._points = None, {}
+        other.__dict__.pop("outside", None)
         other._load = self._load[:, [old.index(h) for h in basis.harmonics]]
         other.base = None if self.base is None else self.basis.transfer(self.base, basis)
         kept = [(e, [basis.harmonics.index(old[p]) for p in ps if old[p] in basis.harmonics]) for e, ps in self.groups]
@@ -143,6 +145,26 @@ class ContactCompliance:
             del self._points[next(iter(self._points))]
         return point
 
+    def moving(self, rows: np.ndarray) -> np.ndarray:
+        """The rows of harmonics >= 1 of (n_coeff, ...), single precision: powers of s multiply no others."""
+        return rows[int(self.basis.has_static) :].astype(np.float32)
+
+    @cached_property
+    def outside(self) -> Outside | None:
+        """What excitation and outputs take from the matrices of one real system; None where they are not at hand."""
+        if not self.shared_real or self.residual is not None:
+            return None
+        x, basis, n = self.groups[0][0], self.basis, self.n_contact
+        stop, p = n + self.n_load, x.n_port
+        rows = np.ascontiguousarray(basis.to_real(self.port_force(None)[:stop]).T)
+        outputs = [w[:n, stop:] for w in (x.w0, *x.higher)]
+        return Outside(
+            (rows @ x.columns[:stop], self.moving(rows) @ x.single[:stop]),
+            np.concatenate([outputs[0], x.columns[:n, p:]], axis=1),
+            np.concatenate(outputs[1:], axis=1) if len(outputs) > 1 else x.single[:n],
+            np.ascontiguousarray(x.left[:, stop:]),
+        )
+
     def port_force(self, g: np.ndarray | None) -> np.ndarray:
         """(n_port, n_harmonic) complex port forces: g [N] at the contacts alone, or the excitation where g is None."""
         if g is not None:
@@ -151,6 +173,21 @@ class ContactCompliance:
             base = np.zeros((self.n_contact, self.basis.n_coeff)) if self.base is None else self.base
             contact, load = self.basis.to_complex(self.k[:, None] * base), self._load
         return np.concatenate([contact, load, np.zeros((len(self.output_names), load.shape[1]))])
+
+
+@dataclass(frozen=True)
+class Outside:
+    """What the excitation and the outputs of one real system take from its matrices, see `Expansion`.
+
+    excitation : its forces as rows times [W_0, modes] (n_coeff, n_port + n_left), and times the W_k (n_row, n_k n_port)
+    columns : (n_contact, n_output + n_left) [W_0, modes]; single : (n_contact, n_k n_output) the W_k
+    left : (n_left, n_output)
+    """
+
+    excitation: tuple[np.ndarray, np.ndarray]
+    columns: np.ndarray
+    single: np.ndarray
+    left: np.ndarray
 
 
 def _sharing(model: ReducedModel, harmonics: tuple[int, ...]) -> list[tuple[list[int], list[int]]]:
@@ -188,9 +225,13 @@ class CompliancePoint:
             for expansion, positions in compliance.groups
         ]
         n, stop = compliance.n_contact, compliance.n_contact + compliance.n_load
-        excited = slice(n, stop) if compliance.base is None else slice(0, stop)
-        ports = self._through_ports(compliance.port_force(None)[excited], excited)
-        x, self.outputs_lin = basis.to_real(ports[:n]), basis.to_real(ports[stop:])
+        if compliance.outside is not None:
+            moved = self._from_rows(*compliance.outside.excitation, compliance.groups[0][0].left)
+            x, self.outputs_lin = moved[:n], moved[stop:]
+        else:
+            excited = slice(n, stop) if compliance.base is None else slice(0, stop)
+            ports = self._through_ports(compliance.port_force(None)[excited], excited)
+            x, self.outputs_lin = basis.to_real(ports[:n]), basis.to_real(ports[stop:])
         self.x_lin = x if compliance.base is None else x - compliance.base
 
     def _through_ports(self, force: np.ndarray, columns: slice = slice(None), rows: slice = slice(None)) -> np.ndarray:
@@ -229,11 +270,14 @@ class CompliancePoint:
         """The same for one real system: every matrix meets all harmonics in one real product."""
         n, x = self.compliance.n_contact, self.compliance.groups[0][0]
         rows = np.ascontiguousarray(g.T)
-        moved = rows @ x.columns[:n]
-        higher = rows.astype(np.float32) @ x.single[:n]
-        y = self.modal(moved[:, x.n_port :], len(x.e))
+        return self._from_rows(rows @ x.columns[:n], self.compliance.moving(rows) @ x.single[:n], x.left, n)
+
+    def _from_rows(self, moved: np.ndarray, higher: np.ndarray, left: np.ndarray, n: int | None = None) -> np.ndarray:
+        """(n, n_coeff) displacement of the first n ports of `left` from forces times [W_0, modes] and W_k, as rows."""
+        x, n_port = self.compliance.groups[0][0], left.shape[1]
+        y = self.modal(moved[:, n_port:], len(x.e))
         still = self.compliance.basis.has_static
-        return all_harmonics.gathered(y @ x.left, moved, higher, n, x.n_port, x.unit, self._ratio, still)
+        return all_harmonics.gathered(y @ left, moved, higher, n or n_port, n_port, x.unit, self._ratio, still)
 
     @cached_property
     def _ratio(self) -> np.ndarray:
@@ -251,6 +295,10 @@ class CompliancePoint:
     def outputs(self, g: np.ndarray) -> np.ndarray:
         """(n_output, n_coeff) outputs under contact forces g alone [m]."""
         c = self.compliance
+        o = c.outside
+        if o is not None and self.outputs_lin.size:
+            rows = np.ascontiguousarray(g.T)
+            return self._from_rows(rows @ o.columns, c.moving(rows) @ o.single, o.left)
         contacts, outputs = slice(0, c.n_contact), slice(c.n_contact + c.n_load, None)
         return c.basis.to_real(self._through_ports(c.basis.to_complex(g), contacts, outputs))
 

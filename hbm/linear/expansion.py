@@ -217,12 +217,14 @@ class Expansion:
 
     def at(self, s: complex) -> PortCompliance:
         """The compliance at s = i h w."""
+        if s == 0 and self.flow is None:
+            return PortCompliance(self, s, None, None)
         core = s * self.c
         for k, t in enumerate(self.t):
-            core = core - s ** (k + 2) * t
-        core = core + np.diag((self.lam if s != 0 or self.flow is None else self.static_lam) + s * s)
+            core -= s ** (k + 2) * t
+        core.flat[:: len(core) + 1] += (self.lam if s != 0 else self.static_lam) + s * s
         if self.flow is not None:
-            core = core + self.flow
+            core += self.flow
         factor, pivots, _ = sla.lapack.zgetrf(core)
         if s != 0 and np.abs(np.diag(factor)).min() < RESONANCE_DISTANCE * abs(s) ** 2:
             raise UndampedResonance(
@@ -294,12 +296,15 @@ def _modes(stiffness: np.ndarray, mass: np.ndarray, count: int) -> tuple[np.ndar
 
 @dataclass(frozen=True)
 class PortCompliance:
-    """D(s)^-1 between ports at one s: sum_k s^k W_k + L S(s)^-1 L'; factor and pivots : S(s) = P L U."""
+    """D(s)^-1 between ports at one s: sum_k s^k W_k + L S(s)^-1 L'.
+
+    factor and pivots : S(s) = P L U; None at s = 0 without flow, where S is diagonal
+    """
 
     expansion: Expansion
     s: complex
-    factor: np.ndarray
-    pivots: np.ndarray
+    factor: np.ndarray | None
+    pivots: np.ndarray | None
 
     @property
     def ratio(self) -> complex:
@@ -308,7 +313,7 @@ class PortCompliance:
 
     def through_core(self, z: np.ndarray) -> np.ndarray:
         """S(s)^-1 z for modal forces z (n_mode, ...)."""
-        if self.s == 0 and self.expansion.flow is None:
+        if self.factor is None:
             return (z.T / self.expansion.static_lam).T
         solution: np.ndarray = sla.lapack.zgetrs(self.factor, self.pivots, z)[0]
         return solution.reshape(z.shape)

@@ -46,6 +46,34 @@ def test_compliance_and_its_slope_equal_direct_solves(model: ReducedModel) -> No
     assert np.abs(compliance.at(300.0).slope(g)[0] - slope).max() < 1e-4 * np.abs(slope).max()
 
 
+@pytest.mark.parametrize("moved_base", [False, True], ids=["fixed ground", "moved ground"])
+def test_response_to_the_loads_and_outputs_equal_direct_solves(model: ReducedModel, moved_base: bool) -> None:
+    balance = balance_of(model)
+    basis, rng = balance.basis, np.random.default_rng(1)
+    size = (3 * N_PAIR, basis.n_coeff)
+    base = 1e-5 * rng.normal(size=size) if moved_base else None
+    loads = {(0, "press"): 100.0, (1, "shake"): 60.0 - 20.0j, (3, "press"): 5.0j}
+    compliance = ContactCompliance(model, balance.contact.stiffness, basis, Excitation(loads, base), 1500.0)
+    system, b = model.at_harmonic(1)
+    g, k = rng.normal(size=size), compliance.k[:, None]
+    pushed = basis.to_complex(g)
+    held = 0.0 if base is None else basis.to_complex(k * base)
+    x, y, y_of_g = np.zeros((len(b), len(basis.harmonics)), complex), *np.zeros((2, 1, len(basis.harmonics)), complex)
+    for column, h in enumerate(basis.harmonics):
+        s = 1j * h * 1200.0
+        d = system.stiffness + b.T @ (k * b) + s * system.damping + s * s * system.mass
+        force = b.T @ (np.zeros(len(b)) if base is None else held[:, column])
+        force = force + sum(v * system.loads[name] for (of, name), v in loads.items() if of == h)
+        q = np.linalg.solve(d, force)
+        x[:, column], y[:, column] = b @ q, system.outputs["tip"] @ q
+        y_of_g[:, column] = system.outputs["tip"] @ np.linalg.solve(d, b.T @ pushed[:, column])
+    point = compliance.at(1200.0)
+    found = (point.x_lin + (0.0 if base is None else base), point.outputs_lin, point.outputs(g))
+    for ours, direct in zip(found, (x, y, y_of_g), strict=True):
+        wanted = basis.to_real(direct)
+        assert np.abs(ours - wanted).max() < 1e-8 * np.abs(wanted).max()
+
+
 def test_jacobian_and_frequency_slope_equal_finite_differences(model: ReducedModel) -> None:
     balance = balance_of(model)
     state = newton.solve_from_rest(balance, 400.0).state
