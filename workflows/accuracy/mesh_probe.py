@@ -115,12 +115,12 @@ class Probe:
         return summary.first_lost(self.result)
 
     def _solve(self, others: Sequence[Other], seen: Seen, end: float) -> None:
-        ours, folded = self.first.answers, isinstance(self.first.site, probes.OnCurve)
+        ours, on_curve = self.first.answers, isinstance(self.first.site, probes.OnCurve)
         for other in others:
             try:
                 with processor_seconds(end - process_time()):
                     taken, model = self._built(other, seen)
-                    there = probes.unworn(taken.file, model, folded)
+                    there = probes.unworn(taken.file, model, self.first.site)
                     deepest = probes.deepest(taken.file, there, self._joint)
             except (TimeUp, ValueError, RuntimeError) as refusal:
                 why = self.skipped if isinstance(refusal, TimeUp) else f"{other.how}: {refusal}"
@@ -137,7 +137,7 @@ class Probe:
                 pairs["depth"] = (deepest, reach)
             for name, (a, b) in pairs.items():
                 of.setdefault(name, []).append(convergence.difference(taken.size, a, b))
-            if self.more_harmonics and taken.size < 1 and not folded:
+            if self.more_harmonics and taken.size < 1 and not on_curve:
                 seen.moved = moved_by_more_harmonics(there, end - process_time())
 
     def _built(self, other: Other, seen: Seen) -> tuple[Other, Model]:

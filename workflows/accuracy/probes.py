@@ -31,6 +31,9 @@ from tribodyn.workflows.scene.schema import Scene
 
 # shares of the life at which states are looked at: more of the late ones, where the peak moves fast
 STATES = (0.0, 0.25, 0.5, 0.65, 0.8, 0.9)
+LOW = 0.5  # of the highest point of a curve: where it stays below, no other discretisation has its highest point
+OF_CURVES = 2  # times that a curve is followed with more harmonics
+BEYOND = 1.2  # times the last frequency at which it is higher: as far as another discretisation may move it
 FOR_FIRST = 0.75  # of the seconds for more harmonics, to the unworn state: all but depth and life are its own
 
 
@@ -76,14 +79,16 @@ class State:
 class OnCurve:
     """The highest point of a response curve that turns back.
 
-    It may be a fold, whose neighbours a search at given frequencies does not see: the whole curve is followed
+    It may be a fold, whose neighbours a search at given frequencies does not see: the curve is followed again.
+    highest : frequency [rad/s] up to which it is followed: what lies beyond takes solves and tells nothing
     """
 
     scene: Scene
+    highest: float
 
     def first(self, balance: HarmonicBalance) -> OperatingPoint:
         """Follow the curve of a contact as the run does. Raises NoPeak, SolveFailed."""
-        branch = curve.follow_response(self.scene, balance, lambda share, note: None)
+        branch = curve.follow_response(self.scene, balance, lambda share, note: None, self.highest)
         if not branch.converged[-1]:
             raise SolveFailed(f"the frequency response {branch.end}")
         return highest_of(branch, balance)
@@ -104,6 +109,12 @@ def highest_of(branch: Branch, balance: HarmonicBalance) -> OperatingPoint:
     return OperatingPoint.of(balance, Solution(state, CONVERGED, 0, 0, ()), branch.output_names[0], len(height))
 
 
+def _end_of_peak(branch: Branch) -> float:
+    """Frequency [rad/s] beyond which a curve is low, with a margin for what another discretisation moves."""
+    height = np.where(branch.converged, branch.amplitude(branch.output_names[0]), 0.0)
+    return BEYOND * float(branch.omega[height >= LOW * height.max()].max())
+
+
 def turns_back(branch: Branch) -> bool:
     """Whether a response curve has folds."""
     forward = np.diff(branch.omega) > 0
@@ -118,7 +129,8 @@ def states(file: SceneFile, balance: HarmonicBalance, result: Result) -> list[St
     if wear is None or not len(wear.cycles) or scene.wear is None:
         if result.response is not None and turns_back(result.response) and balance.contact.n_pair:
             here = highest_of(result.response, balance)
-            return [State(None, 0.0, np.zeros(balance.contact.n_pair), balance, OnCurve(scene), here)]
+            site = OnCurve(scene, _end_of_peak(result.response))
+            return [State(None, 0.0, np.zeros(balance.contact.n_pair), balance, site, here)]
         return [state] if (state := _at_response_peak(scene_peak(file), balance, result)) is not None else []
     left = np.flatnonzero(wear.preload > LIFE_SHARE * wear.preload[0]) if wear.preload[0] > 0 else np.arange(1)
     last = int(left[-1]) if len(left) else 0
@@ -172,15 +184,18 @@ class Climbed:
 def with_more_harmonics(state: State, steps: int | None = None) -> Climbed | None:
     """The same state with more and more harmonics, its place followed, as far as it is found within the seconds.
 
-    steps : how many times more of them are taken, None: as often as `harmonic_choice.climb` says
+    steps : how many times more of them are taken, None: as often as `harmonic_choice.climb` says, on a curve, of which
+        each takes all points, OF_CURVES times at most
     None where it is lost at once
     """
     top = state.balance.basis.harmonics[-1]
     basis, x, omega = state.balance.basis, state.here.state.x, state.here.state.omega
     wide = harmonic_choice.widened(state.balance, harmonic_choice.highest_looked_at(top), harmonic_choice.ROUGH)
     found: list[Answers] = []
-    cut = ""
-    for highest in harmonic_choice.climb(top)[:steps]:
+    climb, cut = harmonic_choice.climb(top)[:steps], ""
+    if isinstance(state.site, OnCurve) and len(climb) > OF_CURVES:
+        climb, cut = climb[:OF_CURVES], f"a curve is followed with more harmonics {OF_CURVES} times"
+    for highest in climb:
         finer = wide.with_harmonics(tuple(h for h in wide.basis.harmonics if h <= highest))
         try:
             point = state.site.next(finer, omega, basis.transfer(x, finer.basis))
@@ -197,14 +212,15 @@ def with_more_harmonics(state: State, steps: int | None = None) -> Climbed | Non
     return Climbed(found[-1], found[-2] if len(found) > 1 else None, cut) if found else None
 
 
-def unworn(file: SceneFile, model: modelling.Model, folded: bool = False) -> State:
+def unworn(file: SceneFile, model: modelling.Model, like: Site | OnCurve | None = None) -> State:
     """The unworn contact of a model.
 
-    folded : whether the scene's answers are those of the highest point of a curve that turns back
+    like : the place of the scene's own answers: those of the highest point of a curve that turns back are looked for
+        on the curve
     Raises  ValueError where it has no peak; RuntimeError where it has no solution
     """
     scene = file.scene
-    site: Site | OnCurve = OnCurve(scene) if folded else scene_peak(file)
+    site: Site | OnCurve = OnCurve(scene, like.highest) if isinstance(like, OnCurve) else scene_peak(file)
     load = 1.0
     if scene.wear is not None:
         duty = settings.mission(scene)[0]

@@ -22,10 +22,16 @@ CHOICES = 3  # times that harmonics are chosen, at the peak that the last choice
 SAME_PEAK = 1e-3  # distance of peaks, relative, that is none
 
 
-def follow_response(scene: Scene, balance: HarmonicBalance, advance: Callable[[float, str], None]) -> Branch:
-    """The response curve of the unworn contact by the scene's continuation method."""
+def follow_response(
+    scene: Scene, balance: HarmonicBalance, advance: Callable[[float, str], None], highest: float = np.inf
+) -> Branch:
+    """The response curve of the unworn contact by the scene's continuation method.
+
+    highest : frequency [rad/s] at which it ends, if that of the scene's range is higher
+    """
     method, options = continuation.load(scene.response.method_name), settings.response_options(scene)
     low, high = settings.response_range(scene)
+    high = max(low, min(high, highest))
     return method.follow(balance, low, high, options, lambda done, wanted: advance(done / wanted, ""))
 
 
