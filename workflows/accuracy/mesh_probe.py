@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from time import process_time
 
 import numpy as np
 
 from tribodyn.fem.interface import ContactInterface
-from tribodyn.hbm.continuation import harmonic_choice
 from tribodyn.hbm.wear.even_wear import depth_to_loss
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload, cycles_to_share
 from tribodyn.workflows.accuracy import convergence, other_meshes, probes
+from tribodyn.workflows.accuracy.at_once import LEAST, MESH
 from tribodyn.workflows.accuracy.convergence import Difference
 from tribodyn.workflows.accuracy.other_meshes import Other
-from tribodyn.workflows.accuracy.probes import Answers, State, relative
+from tribodyn.workflows.accuracy.probes import State, compared, relative
 from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.result import summary
@@ -26,21 +26,17 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.wear import Wear
 
-MESH = "mesh and contact grid"
 ANSWERS = ("peak_frequency", "amplitude", "energy", "preload")
 # no better known than the frequency of the peak they belong to: its stiffness limits the motion, too, as in
 # F / (2 zeta m omega^2); differences that cancel between two meshes say nothing of a third
 AT_A_PEAK = ("amplitude", "energy")
 STEEPENING = ("amplitude", "energy", "preload")  # that may change faster on finer meshes than other ones tell
-LEAST = 1e-3  # error of what a mesh changes at all, below which none is stated: meshes agree by chance on small errors
 # least error of the energy over that of the amplitude: what slips is what moves, and the friction work is the work of
 # the drive, which goes with the amplitude; where both differ otherwise on two meshes, that is taken for chance
 ENERGY_OVER_AMPLITUDE = 0.5
 PLATEAU = 1 / 3  # of the error of the amplitude: where it falls by less, the peak of another mesh may lie as well
 ONE_ELEMENT = 4  # pairs of a contact face that a single element covers: too coarse for any order
 FOR_MESHES = 0.9  # of the seconds; the rest is for frequencies beside the peak
-RICH = 5  # highest harmonic, at the least, that a mesh of twice the elements is solved with
-MOST_RICH = 6000  # unknowns of that balance, at most
 SAME_GRID = 0.95  # size of the contact elements over that of the scene's, above which they are the same
 
 
@@ -91,9 +87,6 @@ class Probe:
                 return unknown(MESH, str(refusal))
             seen.refused.clear()
             self._solve([other for other in more if not (both and other.file == both[0].file)], seen, end)
-        if both and both[1].instead is not None and not isinstance(self.first.site, probes.OnCurve):
-            for name, moved in self._moved_on(both[1].instead.file, end - process_time()).items():
-                seen.moved[name] = max(moved, seen.moved.get(name, 0.0))
         fine_enough = not self._single_element and not seen.grid_kept
         return self._contributions(MESH, seen, fine_enough, start + self.seconds)
 
@@ -152,26 +145,6 @@ class Probe:
                 return self._built(other.instead, seen)
             seen.grid_kept = True
         return other, model
-
-    def _moved_on(self, file: SceneFile, seconds: float) -> dict[str, float]:
-        """Relative changes that more harmonics make on a mesh of twice the elements, each peak looked for anew.
-
-        Where a harmonic of the vibration meets a higher mode on a finer mesh alone, it may make another peak there.
-        Empty where it is too large, takes longer, or finds nothing
-        """
-        own = self.first.balance.basis.harmonics
-        top = max(RICH, harmonic_choice.climb(own[-1])[0])
-        if other_meshes.STILL_FINER**2 * self.first.balance.contact.stiffness.size * (2 * top + 1) > MOST_RICH:
-            return {}
-        try:
-            with processor_seconds(seconds):
-                rich = file.changed(f"harmonics.kept={list(range(top + 1))}")
-                model = modelling.build(rich, None, Progress())
-                narrow = replace(model, balance=model.balance.with_harmonics(own))
-                ours, theirs = probes.unworn(file, narrow).answers, probes.unworn(rich, model).answers
-        except (TimeUp, ValueError, RuntimeError):
-            return {}
-        return {name: relative(a, b) for name, a, b in compared(ours, theirs)}
 
     def _keeps_grid(self, model: Model) -> bool:
         """Whether contact elements of a finer mesh are as long as the scene's own along t1 or t2."""
@@ -297,14 +270,6 @@ def element_lengths(interface: ContactInterface) -> np.ndarray:
     tangents = interface.frames[interface.faces[:, 0], :2]
     along = np.einsum("fkj,fcj->fkc", interface.points[interface.faces], tangents)
     return np.asarray(np.ptp(along, axis=1).mean(axis=0))
-
-
-def compared(a: Answers, b: Answers) -> Iterator[tuple[str, float, float]]:
-    """Two answers side by side, by quantity."""
-    yield from (
-        ("peak_frequency", a.hertz, b.hertz), ("amplitude", a.amplitude, b.amplitude), ("energy", a.energy, b.energy),
-        ("preload", a.preload, b.preload),
-    )  # fmt: skip
 
 
 def unknown(source: str, why: str) -> Iterator[Contribution]:

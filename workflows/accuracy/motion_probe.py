@@ -8,8 +8,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.continuation import harmonic_choice
 from tribodyn.hbm.continuation.arrivals import arrivals
 from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak, BesidePeak, OperatingPoint
-from tribodyn.workflows.accuracy.mesh_probe import compared
-from tribodyn.workflows.accuracy.probes import Answers, OnCurve, State, relative
+from tribodyn.workflows.accuracy.probes import Answers, OnCurve, State, compared, relative
 from tribodyn.workflows.accuracy.statement import Contribution
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 

@@ -282,6 +282,14 @@ def carried_to_life(seen: list[State], finer: list[Answers | None], cycles: floa
     return abs(cycles - finer_life) / finer_life
 
 
+def compared(a: Answers, b: Answers) -> Iterator[tuple[str, float, float]]:
+    """Two answers side by side, by quantity."""
+    yield from (
+        ("peak_frequency", a.hertz, b.hertz), ("amplitude", a.amplitude, b.amplitude), ("energy", a.energy, b.energy),
+        ("preload", a.preload, b.preload),
+    )  # fmt: skip
+
+
 def relative(ours: float, theirs: float) -> float:
     """Difference over the better value; where that vanishes, 0 if both do and 1 if not."""
     if theirs == 0:

@@ -13,7 +13,7 @@ from typing import Any
 from tribodyn.hbm import threads
 from tribodyn.hbm.continuation.operating_point import NoPeak
 from tribodyn.hbm.wear.history import cycles_to_preload
-from tribodyn.workflows.accuracy import mesh_probe, other_meshes, probes
+from tribodyn.workflows.accuracy import other_meshes, probes
 from tribodyn.workflows.accuracy.refinement import Promise
 from tribodyn.workflows.accuracy.statement import NAMES, QUANTITIES, UNITS, loaded
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
@@ -104,7 +104,7 @@ def solved(file: SceneFile, seconds: float, elements: float = ELEMENTS) -> tuple
         with processor_seconds(seconds), threads.limited(1):
             model = modelling.build(fine, None, Progress())
             there = probes.unworn(fine, model).answers
-        values |= {name: value for name, value, _ in mesh_probe.compared(there, there)}
+        values |= {name: value for name, value, _ in probes.compared(there, there)}
         wear = fine.scene.wear
         if fine.scene.wears and wear is not None:
             what = "the reference of its wear"

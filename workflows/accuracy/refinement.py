@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from math import ceil
 
 from tribodyn.geometry import parts
+from tribodyn.workflows.accuracy import at_once
 from tribodyn.workflows.accuracy.accuracy import OF_WEAR, parsed
 from tribodyn.workflows.accuracy.statement import NAMES, QUANTITIES, Contribution, Verdict, loaded
 from tribodyn.workflows.accuracy.trade_table import QUANTITIES as TRADED
@@ -142,7 +143,7 @@ def _error(found: Verdict, name: str, given: Sequence[str]) -> tuple[float | Non
     lacking = [part for part in own if part.error is None]
     if lacking:
         return None, "; ".join(f"{part.source}: {part.how}" for part in lacking)
-    return sum(part.error or 0.0 for part in own), ""
+    return at_once.total(part for part in own if part.source != at_once.AT_ONCE), ""
 
 
 def _large(found: Verdict, wanted: float, of: Sequence[str], given: Sequence[str]) -> list[str]:
@@ -153,13 +154,15 @@ def _large(found: Verdict, wanted: float, of: Sequence[str], given: Sequence[str
 
     parts = [part for part in found.contributions if part.quantity in of and part.source not in given]
     parts = sorted((part for part in parts if size(part) > SHARE * wanted), key=size, reverse=True)
-    return list(dict.fromkeys(part.source for part in parts))
+    sources = (at_once.KNOBS if part.source == at_once.AT_ONCE else (part.source,) for part in parts)
+    return list(dict.fromkeys(source for several in sources for source in several))
 
 
 def _alone(found: Verdict, of: Sequence[str], given: Sequence[str], others: set[str]) -> tuple[str, ...]:
     """Sources of errors of what is asked for that are neither given nor among others."""
     sources = dict.fromkeys(part.source for part in found.contributions if part.quantity in of)
-    return tuple(source for source in sources if source not in given and source not in others)
+    settled = (*given, *others, at_once.AT_ONCE)
+    return tuple(source for source in sources if source not in settled)
 
 
 def _harmonics(file: SceneFile, result: Result) -> Iterator[str]:

@@ -1,13 +1,13 @@
 """The verdict on a result: for every quantity its value, its total error, what dominates it, and whether it is stated.
 
-Contributions are added without their signs: what a reader bets on is their sum. A quantity with a part that nobody
-measured has no total error; one whose total is above LARGEST, or that belongs to a motion that does not stay or that
-time integration contradicts, is not stated.
+What a reader bets on is the total error, which `at_once` makes of what contributes to it. A quantity with a part that
+nobody measured has none; one whose total is above LARGEST, or that belongs to a motion that does not stay or that time
+integration contradicts, is not stated.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from time import process_time
 
 import numpy as np
@@ -16,8 +16,8 @@ from tribodyn.hbm.continuation.operating_point import AtFrequency, NoPeak
 from tribodyn.hbm.outcome import SolveEnd
 from tribodyn.hbm.wear.error_controlled_rule import jumps
 from tribodyn.hbm.wear.history import LIFE_SHARE
-from tribodyn.workflows.accuracy import jump_probe, mesh_probe, motion_probe, probes, time_probe
-from tribodyn.workflows.accuracy.mesh_probe import MESH, Probe
+from tribodyn.workflows.accuracy import at_once, jump_probe, mesh_probe, motion_probe, probes, time_probe
+from tribodyn.workflows.accuracy.mesh_probe import Probe
 from tribodyn.workflows.accuracy.other_meshes import with_more_modes
 from tribodyn.workflows.accuracy.probes import Answers, Climbed, State, relative
 from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution, Statement, Verdict
@@ -35,6 +35,7 @@ FOR_JUMP = 0.5  # of the seconds, for the instant of a jump to another peak, whe
 FOR_MOTIONS = 0.25  # of the seconds that are left then, for other motions at a given frequency
 HALF = 0.5  # of the seconds that are left, for one measurement of several
 FOR_MESH = 0.75  # of the seconds that are left then
+FOR_ALL = 0.75  # of the seconds that are left then, for all knobs at once
 CONTRADICTION = 3.0  # times the estimated error, from which on time integration contradicts the balance
 LEAST_OWN_ERROR = 1e-3  # of a time integration: how far it is from periodic adds to what its steps make
 AT_A_GIVEN_FREQUENCY = ("peak_frequency",)  # a motion at a given frequency tells nothing about it
@@ -83,11 +84,14 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spe
             parts += Probe(result, seen[0], HALF * left(), skipped).of_modes(more_modes)
     with progress.stage("verdict: mesh"):
         if not wanted.mesh:
-            parts += mesh_probe.unknown(MESH, "verdict.mesh is false")
+            parts += mesh_probe.unknown(at_once.MESH, "verdict.mesh is false")
         elif not seen:
-            parts += mesh_probe.unknown(MESH, "no state was solved")
+            parts += mesh_probe.unknown(at_once.MESH, "no state was solved")
         else:
             parts += Probe(result, seen[0], FOR_MESH * left(), skipped, moved).of_mesh(file)
+    if wanted.mesh and seen:
+        with progress.stage("verdict: all at once"):
+            parts += at_once.contributions(file, result.facts.full_dofs, seen[0], FOR_ALL * left())
     with progress.stage("verdict: time integration"):
         checked = time_probe.check(seen, wanted.in_time, left(), skipped)
     statements = {name: _statement(name, values[name], parts, checked, result) for name in QUANTITIES}
@@ -137,8 +141,8 @@ def _of_harmonics(
         return
     ours, how = seen[0].answers, "more harmonics at the same states"
     before = first.before or first.answers
-    changes = {name: relative(a, b) for name, a, b in mesh_probe.compared(before, first.answers)}
-    for quantity, a, b in mesh_probe.compared(ours, first.answers):
+    changes = {name: relative(a, b) for name, a, b in probes.compared(before, first.answers)}
+    for quantity, a, b in probes.compared(ours, first.answers):
         further = changes[quantity] if first.cut else 0.0
         yield Contribution("harmonics", quantity, relative(a, b) + further, how)
     if first.cut and first.before is None:
@@ -198,24 +202,26 @@ def _statement(
     own = [part for part in parts if part.quantity == name]
     known = [part for part in own if part.error is not None and np.isfinite(part.error)]
     lacking = [part for part in own if part.error is None or not np.isfinite(part.error)]
-    sum_of_known = _sum(known)
-    largest = max(known, key=lambda part: part.error or 0.0, default=None)
+    known_error = at_once.total(known)
+    single = [part for part in known if part.source != at_once.AT_ONCE]
+    largest = max(single, key=lambda part: part.error or 0.0, default=None)
     dominated = largest.source if largest is not None else None
     concerned = () if name in AT_A_GIVEN_FREQUENCY else checked.found if name in OF_WEAR else checked.found[:1]
     wanted = 0 if name in AT_A_GIVEN_FREQUENCY else checked.wanted if name in OF_WEAR else min(checked.wanted, 1)
     if name == "depth":  # what the energy of a cycle is off by moves the cycles, not the depth
-        miss, trouble = 0.0, _in_time("life", concerned, _sum(part for part in parts if part.quantity == "life"))[1]
+        of_life = at_once.total(part for part in parts if part.quantity == "life")
+        miss, trouble = 0.0, _in_time("life", concerned, of_life)[1]
     else:
-        miss, trouble = _in_time(name, concerned, sum_of_known)
-    total = None if lacking else max(sum_of_known, miss)
-    if miss > sum_of_known:
+        miss, trouble = _in_time(name, concerned, known_error)
+    total = None if lacking else max(known_error, miss)
+    if miss > known_error:
         dominated = "harmonics, by time integration"
     if trouble:
         return Statement(value, total, dominated, False, trouble)
     if total is None:
         missing = "; ".join(sorted({f"{part.source}: {part.how}" for part in lacking}))
-        large = sum_of_known > LARGEST
-        reason = f"total error not known ({missing}); the known parts sum to {sum_of_known:.2g}"
+        large = known_error > LARGEST
+        reason = f"total error not known ({missing}); the known parts sum to {known_error:.2g}"
         return Statement(value, None, dominated, not large, reason)
     if total > LARGEST:
         return Statement(value, total, dominated, False, f"its error is above {LARGEST:.0%}")
@@ -226,11 +232,6 @@ def _statement(
         at = f" at all but {len(concerned)} of {wanted} states" if concerned else ""
         reason += f"; not held against time integration{at}: {checked.refusal}"
     return Statement(value, total, dominated, True, reason)
-
-
-def _sum(parts: Iterable[Contribution]) -> float:
-    """Sum of the errors that are known."""
-    return float(sum(part.error for part in parts if part.error is not None and np.isfinite(part.error)))
 
 
 def _in_time(name: str, concerned: Sequence[tuple[State, InTime]], error: float) -> tuple[float, str]:
