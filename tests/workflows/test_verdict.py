@@ -20,7 +20,7 @@ from tribodyn.geometry.sources import msh
 from tribodyn.hbm.continuation.operating_point import AtFrequency, NoPeak
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.wear.history import WearHistory
-from tribodyn.workflows.accuracy import mesh_probe, other_meshes, probes, statement, time_probe, verdict
+from tribodyn.workflows.accuracy import at_once, mesh_probe, other_meshes, probes, statement, time_probe, verdict
 from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.accuracy.time_probe import InTime
@@ -77,6 +77,63 @@ def test_the_coarser_mesh_tells_the_error_of_this_one(small: td.Result) -> None:
     assert true < 1.5 * mesh.error < 15 * true
 
 
+def test_all_knobs_at_once_are_those_of_a_finer_run(small: td.Result) -> None:
+    """The unworn contact on twice the elements with harmonics to 5 and twice the modes, run as a scene of its own."""
+    finer = td.run(
+        "beam",
+        overrides=(*SMALL[2:], "geometry.n_patch=9", "geometry.n_length=8", "geometry.n_height=2", "reduction.modes=8",
+            "harmonics.kept=[0, 1, 2, 3, 4, 5]", "harmonics.samples=80", "wear.max_steps=1", "verdict.enabled=false"),
+    )  # fmt: skip
+    parts = {c.quantity: c for c in statement.loaded(small.verdict).contributions if c.source == at_once.AT_ONCE}
+    assert small.wear is not None
+    assert finer.wear is not None
+    assert set(parts) == {"peak_frequency", "amplitude", "energy", "preload"}
+    for name, of in (("peak_frequency", "omega"), ("preload", "preload")):
+        ours, theirs = (float(getattr(result.wear, of)[0]) for result in (small, finer))
+        assert parts[name].error == pytest.approx(abs(ours - theirs) / theirs, rel=1e-3), name
+        error = small.summary()["verdict"][name]["error"]
+        assert error is None or error > 1.7 * parts[name].error
+
+
+@pytest.mark.parametrize(
+    ("errors", "total"),
+    [
+        ({"modes": 0.01, "harmonics": 0.02, "samples": 0.001}, 1.3 * 0.03 + 0.001),
+        ({"modes": 0.01, "harmonics": 0.02, "samples": 0.001, at_once.AT_ONCE: 0.015}, 1.75 * 0.015 + 0.009 + 0.001),
+        ({"modes": 0.01, "harmonics": 0.5, at_once.AT_ONCE: 0.0}, 1.3 * 0.51),  # what is not settled agrees by chance
+        ({"modes": 0.002, at_once.AT_ONCE: 0.0}, 1e-3),
+        ({"modes": 1e-5, at_once.AT_ONCE: 0.0}, 1e-5),
+    ],
+)
+def test_the_change_by_all_knobs_at_once_tells_the_error_where_it_is_known(
+    errors: dict[str, float], total: float
+) -> None:
+    parts = [Contribution(source, "energy", error, "") for source, error in errors.items()]
+    assert at_once.total(parts) == pytest.approx(total)
+    said = verdict._statement("energy", 1.0, parts, time_probe.Checked((), 0, ""), td.Result({}, {}, ""))
+    assert said.error == pytest.approx(total)
+    assert said.stated == (total <= LARGEST)
+    assert said.dominated_by != at_once.AT_ONCE
+
+
+def test_a_finer_scene_without_a_solution_leaves_the_error_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Too dear is no statement about the scene; a peak that finer knobs do not have is one."""
+    file = scene_file.read("beam", SMALL)
+    balance = modelling.build(file, None, Progress(), (0, 1)).balance
+    site = settings.peak_of(file.scene)
+    first = probes.State(None, 0.0, np.zeros(25), balance, site, site.first(balance))
+
+    def lost(*_: object) -> probes.State:
+        raise NoPeak("it still rises")
+
+    monkeypatch.setattr(at_once.probes, "unworn", lost)
+    found = list(at_once.contributions(file, 1000, first, 60.0))
+    assert {part.quantity for part in found} == {"peak_frequency", "amplitude", "energy", "preload"}
+    assert all(part.error is None and "it still rises" in part.how for part in found)
+    assert not list(at_once.contributions(file, 1000, first, 0.0))
+    assert not list(at_once.contributions(file, 100_000, first, 60.0))
+
+
 def test_a_life_that_the_unworn_state_does_not_tell_is_worn_out_on_the_other_meshes(
     small: td.Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -114,7 +171,7 @@ def test_a_part_that_nobody_measured_leaves_the_error_unknown() -> None:
 def _life(checks: list[InTime], error: float = 0.05) -> statement.Statement:
     """What is stated of a life whose states were integrated in time; the first is the unworn one."""
     seen = tuple((probes.State(row, 1e6 * row, *(None,) * 4), check) for row, check in enumerate(checks))  # type: ignore[arg-type]
-    parts = [Contribution("harmonics", "life", error, "estimate")]
+    parts = [Contribution("wear steps", "life", error, "estimate")]
     return verdict._statement("life", 1e7, parts, time_probe.Checked(seen, 3, "no seconds"), td.Result({}, {}, ""))
 
 
