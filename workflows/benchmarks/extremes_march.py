@@ -20,6 +20,7 @@ KNOWN = 0.9  # of SMALLEST: doubt of a force that is little enough
 CLOSER = 12  # instants beside a transition, each half as far from it as the one before
 LONGEST = 50  # cycles after which the sliders must repeat
 ROUNDING = 1e-11  # of all that adds up to a force
+EPSILON = float(np.finfo(float).eps)
 SMALLEST = 5e-4  # largest relative difference allowed; what the march does not know so well is held to its doubt
 PAIRS = 128  # marched at a time, for the memory
 
@@ -64,7 +65,10 @@ def _held_at(balance: HarmonicBalance, state: State, fine: int) -> list[Held]:
         for name, part in (("friction", tangential), ("normal", normal))
     ]
     travel = np.maximum(balance.basis.order, 1) * state.x[:, tangential]
-    most = np.pi * (np.linalg.norm(force[:, tangential], axis=2) * np.linalg.norm(travel, axis=2)).sum(axis=1)
+    moving = balance.basis.order * state.x[:, tangential]
+    force_of, way, motion = (np.linalg.norm(one, axis=2) for one in (force[:, tangential], travel, moving))
+    # the solver's forces are of double precision and round with their springs, and the work with them
+    most = np.pi * (force_of * way + EPSILON / ROUNDING * spring[:, tangential] * motion).sum(axis=1)
     energy = balance.energy(state)
     return [*found, _held("work", work - energy, work, work_doubt, most)]
 
@@ -82,8 +86,11 @@ def _marched(
     law = _Law.of(balance)
     located, order = balance.basis.transitions == "located", balance.basis.order
     if not located:
-        angle = 2 * np.pi * np.arange(balance.basis.n_samples) / balance.basis.n_samples
-        return law.through(np.broadcast_to(angle, (len(state.x), len(angle))), state.x, order, exact=True)
+        # in extended precision: springs of 1e15 N/m round the friction work of a march in double by 2e-10
+        turn, n = 8 * np.arctan(np.longdouble(1)), balance.basis.n_samples
+        angle = np.broadcast_to(turn * np.arange(n) / n, (len(state.x), n))
+        means, doubt, work, slack = law.extended().through(angle, state.x.astype(np.longdouble), order, exact=True)
+        return means.astype(float), doubt, work.astype(float), slack
     parts = []
     for first in range(0, len(state.x), PAIRS):
         some = slice(first, first + PAIRS)
@@ -173,6 +180,10 @@ class _Law:
         p = balance.contact.only("this check").parameters
         return cls(p.stiffness[:, :-1], p.stiffness[:, -1], p.numbers["friction"], p.gap, balance.memory)
 
+    def extended(self) -> _Law:
+        """The same in extended precision, where the machine has it."""
+        return _Law(*(np.asarray(one, np.longdouble) for one in (self.k_t, self.k_n, self.mu, self.gap, self.slider)))
+
     def of_pairs(self, some: slice) -> _Law:
         return _Law(self.k_t[some], self.k_n[some], self.mu[some], self.gap[some], self.slider[some])
 
@@ -185,10 +196,10 @@ class _Law:
         u = np.einsum("pck,pnk->pcn", x, phi)
         force, slider = self._march(u)
         if exact:
-            step = np.full(angle.shape, 2 * np.pi / angle.shape[1])
+            step = np.full(angle.shape, angle[0, 1])
             rate = np.einsum("pck,pnk->pcn", _slope(x, order)[:, :-1], phi)
             work = np.einsum("pcn,pcn,pn->p", force[:, :-1], rate, step)
-            means = np.einsum("pcn,pnk,pn->pck", force, weighted, step) / (2 * np.pi)
+            means = np.einsum("pcn,pnk->pck", force, weighted) / angle.shape[1]
             return means, np.zeros(force.shape[:2]), work, np.zeros(len(work))
         means, work, kinks, slack = self._integrals(angle, u, force, slider, weighted)
         every = (angle[:, ::2], u[..., ::2], force[..., ::2], slider[..., ::2], weighted[:, ::2])
