@@ -22,12 +22,11 @@ from tribodyn.hbm.threads import single
 SCAN_TOLERANCE = 0.03  # of the response between the points of the first search
 SCAN_MISSES = 0.15  # of a peak's height, at most, between two points of the first search: five times their tolerance
 COARSEST = 0.05  # longest step of the first search, share of its range
-# highest harmonic of the search for higher peaks: contacts that lift bend a curve of many harmonics so much that a scan
-# of it takes longer than a wear step, and a peak that is found is solved with all of them
-SCANNED = 3
-# the same below the tracked peak, where a sweep arrives first: a contact that lifts drives higher modes by harmonics of
-# the load, and a superharmonic resonance may be the first to overtake
-SCANNED_BELOW = 7
+# highest harmonic of the scans for peaks: a contact that lifts drives higher modes by harmonics of the load, and such a
+# superharmonic resonance may be the highest. With more of them a scan takes longer than a wear step; a peak that is
+# found is solved with all
+SCANNED = 7
+SCANNED_ABOVE = 3  # the same above a tracked peak, where a sweep with rising frequency arrives last
 # amplitude over that of the tracked peak, from which on another one has overtaken it: what fewer harmonics miss of a
 # peak is less, and a peak that emerges passes this at once
 OVERTAKES = 1.2
@@ -126,7 +125,7 @@ class AtPeak:
     tolerance : relative, on the frequency of the peak
     highest : amplitude that no linear response inside the range passes, with the contact free or stuck, at load factor
         1 [m]: a tracked peak as high is not overtaken, and none is looked for
-    scanned : highest harmonic of the search for higher peaks
+    scanned : highest harmonic of the scans for peaks
     """
 
     output: str
@@ -192,7 +191,7 @@ class AtPeak:
                 return found
             known, point = more, found
 
-    def _scan(self, balance: HarmonicBalance, load_paths: bool = True) -> Branch:
+    def _scan(self, balance: HarmonicBalance) -> Branch:
         step = min(1 / self.n_scan, COARSEST)
         scan = adaptive.Options(
             tolerance=SCAN_TOLERANCE,
@@ -200,16 +199,14 @@ class AtPeak:
             max_step=min(5 * step, COARSEST),
             min_step=1e-3 * step,
             newton=self.newton,
-            load_paths=load_paths,
+            load_paths=not _is_rough(balance),
         )
         return adaptive.follow(balance, self.start, self.stop, scan)
 
-    def _highest(
-        self, balance: HarmonicBalance, branch: Branch, maxima: np.ndarray, bounded: bool = False
-    ) -> OperatingPoint:
-        """The first of a branch's maxima that can be refined; its solves count those of the branch.
+    def _highest(self, balance: HarmonicBalance, branch: Branch, maxima: np.ndarray) -> OperatingPoint:
+        """The first of a branch's maxima that can be refined between the points beside it, or little outside them.
 
-        bounded : refined between the points beside it, or little outside them
+        Its solves count those of the branch
         """
         solves = len(branch.omega)
         for best in maxima[:TRIED]:
@@ -217,7 +214,7 @@ class AtPeak:
             width = float(np.ptp(beside)) / 2
             within = float(beside.min()) - REACH * width, float(beside.max()) + REACH * width
             x = _point(balance, branch, best)
-            found = self._refine(balance, branch.omega[best], x, 0.5 * width, within if bounded else (0.0, np.inf))
+            found = self._refine(balance, branch.omega[best], x, 0.5 * width, within)
             solves += found.solves
             if found.solution.converged:
                 break
@@ -245,23 +242,23 @@ class AtPeak:
         """
         if OVERTAKES * point.amplitude >= self.highest * balance.load_factor:
             return None, 0
-        few, more = self._few(balance, self.scanned), self._few(balance, SCANNED_BELOW)
-        found, solves = self._higher(few, balance, point, False)
-        if found is None and more.basis != few.basis:
-            ends = sorted((self.start, self.stop))
-            below = replace(self, start=ends[0], stop=min(point.state.omega, ends[1]))
-            found, further = below._higher(more, balance, point, True)
-            solves += further
+        low, high = sorted((self.start, self.stop))
+        tracked = float(np.clip(point.state.omega, low, high))
+        few, fewer = (self._few(balance, top) for top in (self.scanned, min(SCANNED_ABOVE, self.scanned)))
+        parts = [(low, tracked, few), (tracked, high, fewer)] if few.basis != fewer.basis else [(low, high, few)]
+        found, solves = None, 0
+        for start, stop, scanned in parts:
+            if found is None and stop - start > APART * tracked:
+                part = replace(self, start=start, stop=stop)
+                found, further = part._higher(scanned, balance, point)
+                solves += further
         return found, solves
 
     def _higher(
-        self, few: HarmonicBalance, balance: HarmonicBalance, point: OperatingPoint, hammers: bool
+        self, few: HarmonicBalance, balance: HarmonicBalance, point: OperatingPoint
     ) -> tuple[OperatingPoint | None, int]:
-        """The same by one sweep with few harmonics.
-
-        hammers : the response may have micro-folds, so that jumps are many and slopes tell little about where a peak is
-        """
-        branch = self._scan(few, load_paths=not hammers)
+        """The same by one sweep of this range with few harmonics."""
+        branch = self._scan(few)
         try:
             maxima = self._maxima(branch)
         except NoPeak:
@@ -269,8 +266,8 @@ class AtPeak:
         might = branch.amplitude(self.output)[maxima] > (1 - SCAN_MISSES) * OVERTAKES * point.amplitude
         if not might.any():
             return None, len(branch.omega)
-        scanned = self._highest(few, branch, maxima[might], hammers)
-        if hammers and not scanned.solution.converged:  # no slope vanishes: the highest point of the sweep
+        scanned = self._highest(few, branch, maxima[might])
+        if _is_rough(few) and not scanned.solution.converged:  # no slope vanishes: the highest point of the sweep
             best = maxima[might][0]
             scanned = self._at(few, branch.omega[best], _point(few, branch, best), scanned.solves)
         if not self._is_higher(scanned, point):
@@ -386,6 +383,11 @@ class AtPeak:
             )
             found = replace(found, outcome=lost)
         return OperatingPoint.of(balance, found, self.output, solves)
+
+
+def _is_rough(balance: HarmonicBalance) -> bool:
+    """Whether a response may have micro-folds, with so many harmonics: jumps are many, slopes tell little of a peak."""
+    return balance.basis.harmonics[-1] > SCANNED_ABOVE
 
 
 def _point(balance: HarmonicBalance, branch: Branch, i: int) -> np.ndarray:

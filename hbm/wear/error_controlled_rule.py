@@ -17,7 +17,6 @@ import numpy as np
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
-from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import Outcome, SolveEnd, WearEnd
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.wear import fewer_harmonics
@@ -55,6 +54,12 @@ LOOKED_AT = 0.97  # ratio of preloads, counted from the first, at which higher p
 UNEXPECTED = 4.0
 SHIFTED = WearEnd.NO_STEP.say(f": the tracked peak moves by more than {LARGEST_SHIFT:.0%} in the shortest step")
 MAX_CORRECTIONS = 12  # solves of a stage
+RETREATS = 4  # of them at most, half way back, where no solution is found at a frequency that is tried
+# d (miss of the frequency) / d omega while it is not known: of a peak that is one mode's. Where a superharmonic
+# resonance stands on the flank of another the miss is tens of times too large
+UNKNOWN_SLOPE = -1.0
+# largest moves of the frequency, relative: with a slope that is known, with one that is not, over the move before
+MOST_MOVED, FIRST_MOVED, FURTHER_MOVED = 0.03, 1e-3, 4.0
 GAIN_ACCURACY = 1e-9  # of the depth, for laws whose depth per work is not constant
 
 
@@ -134,42 +139,53 @@ class _Taken:
     failure: Outcome[WearEnd] | None = None
 
 
+@dataclass(frozen=True)
+class _Lost:
+    """A step with no solution behind it, however short: why, and the solves spent."""
+
+    failure: Outcome[WearEnd] | None
+    solves: int
+
+
 def _step(whole: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow]) -> _Taken:
     """One accepted step from a state; where an event would be passed, the step ends at it.
 
     Where no solution with all harmonics follows, fewer are taken until the step succeeds; each step tries more again.
     """
-    problem, state = fewer_harmonics.settled(whole, state)
-    taken = None
-    while taken is None:
-        taken = _step_of(problem, tolerance, state, rows, whole.balance.basis)
+    problem, state = settled, start = fewer_harmonics.settled(whole, state)
+    while isinstance(taken := _step_of(problem, tolerance, state, rows, whole), _Lost):
+        start = replace(start, solves=taken.solves)
         fewer = fewer_harmonics.with_fewer(problem)
-        if taken is None and fewer is not None:
-            problem, state = fewer, fewer_harmonics.carried(fewer, state)
-    if problem is whole:
-        return taken
-    row = taken.row
-    here = replace(fewer_harmonics.carried(whole, state), solves=row.solves, preload_at_rest=row.preload_at_rest)
-    row = row_of(whole, here, row.cycles_in_step, row.worn, row.work, row.step_error, row.plan)
-    return replace(taken, row=row, after=taken.after and fewer_harmonics.carried(whole, taken.after))
+        if fewer is None:
+            problem = settled
+            taken = _leap(whole, problem, start, tolerance, taken.failure, rows)
+            break
+        problem, state = fewer, fewer_harmonics.carried(fewer, start)
+    row, after = taken.row, taken.after
+    if problem is not whole:
+        here = replace(fewer_harmonics.carried(whole, start if problem is settled else state), solves=row.solves)
+        here = replace(here, preload_at_rest=row.preload_at_rest)
+        row = row_of(whole, here, row.cycles_in_step, row.worn, row.work, row.step_error, row.plan)
+    return replace(taken, row=row, after=after and fewer_harmonics.carried(whole, after))
 
 
 def _step_of(
-    problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow], basis: HarmonicBasis
-) -> _Taken | None:
-    """A step with the harmonics of a problem; None where no solution follows and fewer can be tried.
+    problem: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow], whole: WearProblem
+) -> _Taken | _Lost:
+    """A step with the harmonics of a problem, where a solution follows.
 
-    basis : of the rows
+    whole : the problem with all harmonics, which rows have
     """
+    searched = fewer_harmonics.searched_with(whole, problem)
     last = fewer_harmonics.with_fewer(problem) is None
     smallest = 1e-9 * tolerance.scale / float(state.rate.max())
     leap = EXPLICIT_STEPS[0] * tolerance.share * tolerance.scale / float(state.rate.max())
     stride = 10 * leap
-    drift, slopes = np.zeros(len(state.points)), -np.ones(len(state.points))
+    drift, slopes = np.zeros(len(state.points)), np.full(len(state.points), UNKNOWN_SLOPE)
     if rows and rows[-1].plan[0] > 0:
         stride, slopes = float(rows[-1].plan[0]), rows[-1].plan[1:]
         top = problem.balance.basis.harmonics[-1]
-        if fewer_harmonics.top_harmonic(basis, list(rows[-1].duty_displacement)) == top:
+        if fewer_harmonics.top_harmonic(whole.balance.basis, list(rows[-1].duty_displacement)) == top:
             omega = np.array([point.state.omega for point in state.points])
             drift = (omega - rows[-1].duty_omega) / (state.cycles - rows[-1].cycles)
     target = _event(problem, state, rows)
@@ -192,8 +208,8 @@ def _step_of(
             if preload >= EVENT_WINDOW[0] * target:
                 found = None
                 if jumped or _is_due(problem, state, second, rows):
-                    found, searched = _overtaken(problem, second)
-                    solves += searched
+                    found, spent = _overtaken(searched, fewer_harmonics.carried(searched, second))
+                    solves += spent
                 if found is not None:
                     jumped = (stride, first, second, error, found)
                 elif jumped is None:
@@ -210,11 +226,8 @@ def _step_of(
             break
         else:
             stride = min(stride * _growth(error), 0.5 * longest if lost else np.inf)
-        if lost and not last and stride < 10 * leap:
-            return None
-        if stride < (leap if lost else smallest):
-            failure = second.failure or (SHIFTED if lost else None)
-            return _leap(problem, replace(state, solves=solves), leap, failure, rows)
+        if stride < ((leap if last else 10 * leap) if lost else smallest):
+            return _Lost(second.failure or (SHIFTED if lost else None), solves)
     if jumped is not None:
         stride, first, second, error, higher = jumped
     worn = second.depth - state.depth
@@ -223,7 +236,7 @@ def _step_of(
     ratio = float(np.clip(_growth(error) * min(trend, 1.0), *STEP_RATIO_LIMITS))
     plan = np.array([stride * ratio, *slopes])
     if higher is not None:
-        second, plan = worn_state(problem, second.depth, second.cycles, higher, 0), np.zeros(1 + len(slopes))
+        second, plan = worn_state(searched, second.depth, second.cycles, higher, 0), np.zeros(1 + len(slopes))
     row = row_of(problem, replace(state, solves=solves), stride, worn, work, error, plan)
     return _Taken(row, replace(second, solves=0))
 
@@ -264,25 +277,35 @@ def _overtaken(problem: WearProblem, state: WearState) -> tuple[tuple[OperatingP
 
 
 def _leap(
-    problem: WearProblem, state: WearState, stride: float, failure: Outcome[WearEnd] | None, rows: Sequence[WearRow]
+    whole: WearProblem,
+    problem: WearProblem,
+    state: WearState,
+    tolerance: Tolerance,
+    failure: Outcome[WearEnd] | None,
+    rows: Sequence[WearRow],
 ) -> _Taken:
     """An explicit step over the end of a branch, behind which the site is looked for as at the start.
 
     The response folds, or the tracked peak merges with a valley: no solution follows on the one here. A step that did
     not get over it, or behind which none was found, is followed by a longer one, up to the tolerance. Where pairs
     hammer and branches are short, the rule continues in such steps.
+    problem : that the state is solved in; it is looked for with the harmonics of scans, failing that with fewer
     """
     nothing = np.zeros_like(problem.area)
     plan = np.zeros(1 + len(state.points))
+    scans = fewer_harmonics.of_scans(whole)
+    fewer = fewer_harmonics.with_fewer(scans)
     tried = next((i for i, row in enumerate(reversed(rows)) if row.plan[0] > 0), len(rows))
-    for length in EXPLICIT_STEPS[min(tried, len(EXPLICIT_STEPS) - 1) :] / EXPLICIT_STEPS[0] * stride if failure else ():
+    for share in EXPLICIT_STEPS[min(tried, len(EXPLICIT_STEPS) - 1) :] if failure else ():
+        length = share * tolerance.share * tolerance.scale / float(state.rate.max())
         worn = length * state.rate
-        after = assess(problem, state.depth + worn, state.cycles + length, None)
-        state = replace(state, solves=state.solves + after.solves)
-        if not after.failure:
-            row = row_of(problem, state, length, worn, length * state.work, 1.0, plan)
-            return _Taken(row, replace(after, solves=0))
-        failure = after.failure
+        for there in (scans,) if fewer is None else (scans, fewer):
+            after = assess(there, state.depth + worn, state.cycles + length, None)
+            state = replace(state, solves=state.solves + after.solves)
+            if not after.failure:
+                row = row_of(problem, state, length, worn, length * state.work, 1.0, plan)
+                return _Taken(row, replace(after, solves=0))
+            failure = after.failure
     failed = row_of(problem, state, 0.0, nothing, nothing, 0.0, plan)
     return _Taken(failed, None, failure or WearEnd.NO_STEP.say())
 
@@ -338,13 +361,17 @@ def _stage(
     gain = _gain(problem, near)
     accuracy = np.array([duty.site.accuracy for duty in duties])
     x, depth = np.concatenate(guess, axis=1), near.depth + stretch * near.rate
-    solves = rounds = 0
+    solves = rounds = retreats = 0
+    known: tuple[np.ndarray, np.ndarray] | None = None  # frequencies and x that the search went on from
     for search in searches:
         search.start()
     while True:
         balance = WearingBalance(unworn, [duty.share for duty in duties], base, stretch, gain, depth)
         solution = newton.solve(balance, tuple(omega), x, duties[0].site.newton)
         solves, rounds = solves + len(duties), rounds + 1
+        if not solution.converged and known is not None and retreats < RETREATS:
+            omega, x, retreats = 0.5 * (known[0] + omega), 0.5 * (known[1] + x), retreats + 1
+            continue
         worn_at = solution.state
         depth = worn_at.depth
         points, corrections = [], []
@@ -367,6 +394,7 @@ def _stage(
         if rounds > MAX_CORRECTIONS:
             lost = SolveEnd.SITE_NOT_FOUND.say(f" {MAX_CORRECTIONS} solves")
             return replace(found, points=tuple(replace(p, solution=replace(p.solution, outcome=lost)) for p in points))
+        known = omega, solution.state.x
         x = solution.state.x + balance.follow(worn_at, after - omega)
         omega, gain = after, turned
 
@@ -392,6 +420,7 @@ class _Search:
 
     def __init__(self, slope: float):
         self.slope = slope
+        self._known = slope != UNKNOWN_SLOPE
         self.start()
 
     def start(self) -> None:
@@ -404,7 +433,10 @@ class _Search:
         """The frequency to try after one that missed by `miss`: secant, kept inside what brackets the zero."""
         if self._last is not None and omega != self._last[0]:
             slope = (miss - self._last[1]) / (omega - self._last[0])
-            self.slope = slope if slope < -0.1 else self.slope
+            self._known, self.slope = (True, slope) if slope < -0.1 else (self._known, self.slope)
+        reach = MOST_MOVED if self._known else FIRST_MOVED
+        if self._last is not None:
+            reach = min(reach, max(FIRST_MOVED, FURTHER_MOVED * abs(omega / self._last[0] - 1)))
         self._last = (omega, miss)
         if miss > 0:
             self._below = self._last
@@ -416,7 +448,7 @@ class _Search:
             if not min(low, high) < trial < max(low, high):
                 return 0.5 * (low + high)
             return trial
-        return float(np.clip(trial, 0.97 * omega, 1.03 * omega))
+        return float(np.clip(trial, (1 - reach) * omega, (1 + reach) * omega))
 
 
 def _error(

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tribodyn.hbm.continuation.operating_point import OperatingPoint
+from tribodyn.hbm.continuation.operating_point import SCANNED, OperatingPoint
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear.evolution import LARGEST_SHIFT, WearProblem, WearState, worn_state
 from tribodyn.hbm.wear.history import WearRow
@@ -51,12 +51,27 @@ def settled(whole: WearProblem, state: WearState) -> tuple[WearProblem, WearStat
 
 def with_fewer(problem: WearProblem) -> WearProblem | None:
     """The problem with the lower half of its harmonics, those that loads need among them; None where that is all."""
-    balance = problem.balance
-    needed = max([LEAST_HARMONIC, *(h for h, _ in balance.excitation.loads)])
-    harmonics = balance.basis.harmonics
+    harmonics = problem.balance.basis.harmonics
     half = (len(harmonics) + 1) // 2
+    needed = _needed(problem, LEAST_HARMONIC)
     kept = tuple(h for i, h in enumerate(harmonics) if h <= needed or i < half)
     return None if kept == harmonics else _with_harmonics(problem, kept)
+
+
+def of_scans(whole: WearProblem) -> WearProblem:
+    """The problem with the harmonics that scans for peaks have."""
+    return _with_harmonics(whole, tuple(h for h in whole.balance.basis.harmonics if h <= _needed(whole, SCANNED)))
+
+
+def searched_with(whole: WearProblem, problem: WearProblem) -> WearProblem:
+    """The problem in which peaks are looked for: with the harmonics of scans where a step got on with fewer."""
+    scans = of_scans(whole)
+    return problem if len(problem.balance.basis.harmonics) >= len(scans.balance.basis.harmonics) else scans
+
+
+def _needed(problem: WearProblem, least: int) -> int:
+    """The highest harmonic that loads have, at least some."""
+    return max([least, *(h for h, _ in problem.balance.excitation.loads)])
 
 
 def _with_harmonics(problem: WearProblem, kept: tuple[int, ...]) -> WearProblem:
@@ -72,6 +87,8 @@ def _with_harmonics(problem: WearProblem, kept: tuple[int, ...]) -> WearProblem:
 
 def carried(problem: WearProblem, state: WearState) -> WearState:
     """A state in the same problem with other harmonics: those that it lacks are dropped, new ones are zero."""
+    if all(point.state.x.shape[2] == problem.balance.basis.n_coeff for point in state.points):
+        return state
     points = []
     for duty, point in zip(problem.mission, state.points, strict=True):
         balance = problem.in_duty(duty, state.depth)

@@ -141,6 +141,7 @@ if TYPE_CHECKING:
         track,
         trade,
         verify,
+        verify_wear,
     )
     from tribodyn.workflows.designs.optimum import Optimum
     from tribodyn.workflows.designs.table import StudyTable
@@ -307,6 +308,7 @@ _HOME |= dict.fromkeys(
         "track",
         "trade",
         "verify",
+        "verify_wear",
     ),
     ("tribodyn.workflows.api.whole_scenes",),
 )
@@ -446,6 +448,7 @@ __all__ = [
     "vary",
     "verify",
     "verify_in_time",
+    "verify_wear",
     "wear",
     "wear_law",
     "wear_laws",

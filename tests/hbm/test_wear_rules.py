@@ -332,6 +332,38 @@ def test_where_no_branch_goes_on_the_rule_takes_explicit_steps_to_the_end(proble
     assert life(worn) == pytest.approx(life(explicit), rel=0.05)  # the first steps are shorter
 
 
+def test_behind_the_end_of_a_branch_all_harmonics_of_a_scan_are_looked_with() -> None:
+    """Fewer harmonics carry a step in vain; a peak that they lack would be lost if it were looked for with them."""
+    whole = wear_problem(balance=balance_of(pressed_body(), tuple(range(8))))
+    seen = []
+
+    class Never(AtFrequency):
+        def first(self, balance: HarmonicBalance) -> OperatingPoint:
+            seen.append(len(balance.basis.harmonics))
+            return super().first(balance)
+
+        def correct(self, balance: HarmonicBalance, state: State) -> Correction:
+            return Correction(state.omega, np.zeros_like(state.x), 0)
+
+    tolerance = error_controlled_rule.Tolerance(0.1, 2e-4)
+    never = replace(whole, mission=(Duty(Never("tip", 420.0)),))
+    worn = error_controlled_rule.evolve(never, tolerance, max_steps=2)
+    assert seen == [8, 8, 8]  # at the start and behind both steps
+    assert np.all(worn.step_error == 1.0)
+    assert np.all(np.any(worn.displacement[:, :, 7:] != 0, axis=(1, 2)))  # the step wears with all of them
+
+
+@pytest.mark.parametrize("steepness", [0.5, 1.0, 10.0, 30.0])
+def test_the_frequency_of_a_peak_is_found_where_its_distance_is_taken_for_far_too_large(steepness: float) -> None:
+    """The frequencies that are tried stay beside the peak: further off there may be no solution."""
+    search, peak = error_controlled_rule._Search(error_controlled_rule.UNKNOWN_SLOPE), 1.002
+    tried = [1.0]
+    while abs(tried[-1] - peak) > 1e-5 and len(tried) <= error_controlled_rule.MAX_CORRECTIONS:
+        tried.append(search.next(tried[-1], steepness * (peak - tried[-1])))
+    assert abs(tried[-1] - peak) <= 1e-5
+    assert max(tried) < peak + 0.002
+
+
 def test_the_forces_of_a_faint_contact_are_solved_too(problem: WearProblem) -> None:
     """A start whose residual is just below Newton's tolerance, but far above the stretch of the springs."""
     apart = newton.solve_from_rest(problem.balance.with_gap(np.full(N_PAIR, 1e-3)), 420.0).state.x[:, 2]

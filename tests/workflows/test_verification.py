@@ -110,9 +110,32 @@ def test_a_worn_row_is_compared_where_it_was_solved(folder: Path, capsys: pytest
     assert list((folder / "own").glob("verify_*Hz_row1.png"))
 
 
+def test_worn_states_are_compared_along_a_run(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    wear = store.load(folder / "result.h5").wear
+    assert wear is not None
+    given = ["verify", str(folder), "--states", "2", "--steps", "128"]
+    code, out, err = leave([*given, "--json"], capsys)
+    assert code == 0, err
+    found = json.loads(out)
+    rows = [state["row"] for state in found["states"]]
+    assert rows == [0, 1]  # nearest to a quarter and three quarters of the cycles
+    for row, state in zip(rows, found["states"], strict=True):
+        compared = state["comparison"]
+        assert state["energy_of_run_J"] == pytest.approx(wear.energy[row].sum())
+        assert compared["energy"]["balance_J"] == pytest.approx(state["energy_of_run_J"], rel=1e-6)
+        assert compared["frequency_hz"] == pytest.approx(wear.frequency[row])
+    assert Path(found["picture"]).is_file()
+    code, out, _ = leave(given, capsys)
+    assert code == 0
+    assert out.strip().splitlines()[-4].split()[:2] == ["row", "cycles"]  # head, two states, picture
+    assert f"{found['states'][1]['comparison']['energy']['difference']:.2%}" in out
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        (["--states", "0"], "--states must be at least 1"),
+        (["--states", "3", "--row", "1"], "expected either --states"),
         (["--at", "410"], "--at: expected"),
         (["--at=-3 Hz"], "outside what the scene models"),
         (["--at", "5 kHz"], "change response.frequency"),

@@ -13,7 +13,7 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import harmonic_choice
-from tribodyn.hbm.continuation.operating_point import SCANNED_BELOW, AtFrequency, AtPeak, Site
+from tribodyn.hbm.continuation.operating_point import SCANNED, AtFrequency, AtPeak, Site
 from tribodyn.hbm.wear.error_controlled_rule import jumps
 from tribodyn.hbm.wear.evolution import Duty
 from tribodyn.hbm.wear.history import WearHistory
@@ -50,7 +50,7 @@ def _sweep_with_more(
 
     None where the tracked peak itself is not found
     """
-    top = max(balance.basis.harmonics[-1] + MORE, SCANNED_BELOW)
+    top = max(balance.basis.harmonics[-1] + MORE, SCANNED)
     wide = harmonic_choice.widened(balance, top)
     wide = wide.with_harmonics(tuple(h for h in wide.basis.harmonics if h <= top)).with_load(duty.load)
     kept = balance.basis.transfer(wear.displacement[row], wide.basis)

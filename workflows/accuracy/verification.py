@@ -156,11 +156,25 @@ def compare(
     overrides : "section.key=value" on top of those of the run, such as more harmonics; steps : per period
     Raises  ValueError: the result has no such row or no solution to start from; SolveFailed: no balance solution
     """
-    start = time.perf_counter()
     file = rebuilt(result, overrides)
     with limited(file.scene.solver.threads):
         unworn = modelling.build(file, None, progress, result.harmonics).balance
-        balance, omega, x = _start(result, file.scene, unworn, at, row)
+    return held_against(result, file.scene, unworn, at, row, steps, progress)
+
+
+def held_against(
+    result: Result,
+    scene: Scene,
+    unworn: HarmonicBalance,
+    at: float | None,
+    row: int | None,
+    steps: int | None,
+    progress: Progress,
+) -> Comparison:
+    """The same with the model at hand: the scene that a result was computed from and its unworn problem."""
+    start = time.perf_counter()
+    with limited(scene.solver.threads):
+        balance, omega, x = _start(result, scene, unworn, at, row)
         target = omega if at is None else at
         if not 0 < target <= balance.omega_max:
             raise ValueError(
@@ -168,7 +182,7 @@ def compare(
                 f"{balance.omega_max / (2 * np.pi):g} Hz: change response.frequency with --set"
             )
         with progress.stage("harmonic balance"):
-            solution = _walk(balance, omega, target, x, settings.newton_options(file.scene))
+            solution = _walk(balance, omega, target, x, settings.newton_options(scene))
         if not solution.converged:
             raise SolveFailed(f"no balance at {target / (2 * np.pi):g} Hz: {solution.outcome}")
         steps = steps or max(STEPS, STEPS_PER_HARMONIC * balance.basis.harmonics[-1])

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from tribodyn.fem.material import Material
 from tribodyn.workflows.accuracy import converge as grids
-from tribodyn.workflows.accuracy import knob_trade, promise, reference, verification, wear_steps
+from tribodyn.workflows.accuracy import knob_trade, promise, reference, verification, wear_steps, worn_states
 from tribodyn.workflows.accuracy.converge import Study as GridStudy
 from tribodyn.workflows.accuracy.promise import Check
 from tribodyn.workflows.accuracy.reference import Held
@@ -22,6 +22,7 @@ from tribodyn.workflows.accuracy.refinement import Promise
 from tribodyn.workflows.accuracy.trade_table import Trade
 from tribodyn.workflows.accuracy.verification import Comparison
 from tribodyn.workflows.accuracy.wear_steps import WearStepTable
+from tribodyn.workflows.accuracy.worn_states import WornState
 from tribodyn.workflows.api.scenes import (
     Overrides,
     Report,
@@ -70,6 +71,19 @@ def verify(
     held = result if isinstance(result, Result) else load(result)
     omega = None if at is None else 2 * math.pi * at
     return verification.compare(held, omega, row, override_texts(overrides), steps, reporter(progress))
+
+
+def verify_wear(
+    result: Result | Place,
+    states: int,
+    *,
+    steps: int | None = None,
+    overrides: Overrides = (),
+    progress: Report = None,
+) -> list[WornState]:
+    """Hold so many states of a wear run, spread over its cycles, against time integration; the rest as for `verify`."""
+    held = result if isinstance(result, Result) else load(result)
+    return worn_states.compare(held, states, override_texts(overrides), steps, reporter(progress))
 
 
 def track(

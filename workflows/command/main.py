@@ -209,6 +209,7 @@ def verify(
     *,
     at: str | None = None,
     row: int | None = None,
+    states: int | None = None,
     steps: int | None = None,
     overrides: Overrides = (),
     out: Path | None = None,
@@ -224,6 +225,8 @@ def verify(
         Frequency such as 410Hz; the peak of the response, or the frequency of the row, by default.
     row
         Wear row whose depth the contact has; unworn by default.
+    states
+        So many worn states of a wear run, spread over its cycles, one line each.
     steps
         Time steps per period; 256 or 32 for each harmonic by default.
     out
@@ -231,17 +234,29 @@ def verify(
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.accuracy import verification
+    from tribodyn.workflows.accuracy import verification, worn_states
     from tribodyn.workflows.api import scenes, whole_scenes
     from tribodyn.workflows.run.failure import SolveFailed
     from tribodyn.workflows.run.progress import Progress, console_progress
 
     make_room(out)
+    if states is not None and (at is not None or row is not None):
+        raise ValueError("expected either --states, or --at and --row, and not both")
     hertz = None if at is None else quantity("--at", at, "Hz")
     progress = Progress() if as_json else console_progress()
-    found = whole_scenes.verify(result, hertz, row=row, steps=steps, overrides=overrides, progress=progress)
     folder = out or scenes.result_file(result).parent / "pictures"
     folder.mkdir(parents=True, exist_ok=True)
+    if states is not None:
+        held = scenes.load(result)
+        along = whole_scenes.verify_wear(held, states, steps=steps, overrides=overrides, progress=progress)
+        picture = folder / "verify_states.png"
+        worn_states.picture(held, along).savefig(picture)
+        if as_json:
+            print(json.dumps({"states": [state.record() for state in along], "picture": str(picture)}, indent=2))
+        else:
+            print("\n".join([worn_states.HEADER, *(state.line() for state in along), str(picture)]))
+        return
+    found = whole_scenes.verify(result, hertz, row=row, steps=steps, overrides=overrides, progress=progress)
     picture = folder / f"verify_{found.hertz:.6g}Hz{'' if row is None else f'_row{row}'}.png"
     verification.picture(found).savefig(picture)
     if as_json:

@@ -1,0 +1,124 @@
+"""A wear run beside direct time integration of the same reduced model, at states spread over its cycles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tribodyn.hbm.threads import limited
+from tribodyn.hbm.time.time_integration import IntegrationFailed
+from tribodyn.hbm.wear.history import WearHistory
+from tribodyn.workflows.accuracy import verification
+from tribodyn.workflows.accuracy.verification import Comparison
+from tribodyn.workflows.pictures.figures import axes_of
+from tribodyn.workflows.pictures.style import BLUE, GREEN, ORANGE
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.run import modelling
+from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.progress import Progress
+
+
+@dataclass(frozen=True)
+class WornState:
+    """A row of a wear run and what time integration says.
+
+    energy : per cycle, as the run took it [J]; found : None where there is no comparison, for the reason `why`
+    """
+
+    row: int
+    cycles: float
+    hertz: float
+    energy: float
+    found: Comparison | None
+    why: str = ""
+
+    @property
+    def time_energy(self) -> float:
+        """Energy per cycle of the motion that was integrated [J]; nan where none is periodic."""
+        periodic = self.found is not None and self.found.found.motion.periodic
+        return float(self.found.found.motion.energy.sum()) if self.found is not None and periodic else float("nan")
+
+    def record(self) -> dict[str, Any]:
+        """Numbers for machines; `comparison` as that of one state."""
+        return {
+            "row": self.row,
+            "cycles": self.cycles,
+            "frequency_hz": self.hertz,
+            "energy_of_run_J": self.energy,
+            "comparison": None if self.found is None else self.found.record(),
+            "no_comparison": self.why or None,
+        }
+
+    def line(self) -> str:
+        """One line of the table."""
+        head = f"{self.row:4d} {self.cycles:11.4g} {self.hertz:9.5g} {self.energy:11.5g}"
+        if self.found is None:
+            return f"{head}  {self.why}"
+        told = self.found.record()
+        energy, error = told["energy"], told["step_error"]
+        periodic = self.found.found.motion.periodic
+        integrated = f"{energy['time_J']:11.5g} {energy['difference']:11.2%}" if periodic else f"{'none':>11} {'-':>11}"
+        own = "-" if error is None else f"{error:.2%}"
+        tail = f"{head} {energy['balance_J']:11.5g} {integrated} {own:>9} {'yes' if told['stable'] else 'no':>7}"
+        seen = self.found.left_alone
+        return tail if seen is None else f"{tail}   {seen.energy:.5g} +- {seen.energy_spread:.2g}"
+
+
+HEADER = (
+    f"{'row':>4} {'cycles':>11} {'Hz':>9} {'run [J]':>11} {'balance [J]':>11} {'time [J]':>11} {'difference':>11} "
+    f"{'its steps':>9} {'stable':>7}   left alone [J]"
+)
+
+
+def spread(wear: WearHistory, count: int) -> list[int]:
+    """The rows nearest to the middles of `count` equal parts of the cycles."""
+    parts = (np.arange(count) + 0.5) / count * wear.cycles[-1]
+    return sorted({int(np.argmin(np.abs(wear.cycles - cycles))) for cycles in parts})
+
+
+def compare(
+    result: Result, count: int, overrides: Sequence[str], steps: int | None, progress: Progress
+) -> list[WornState]:
+    """Hold states of a wear run against time integration; arguments as for `verification.compare`.
+
+    Raises  ValueError: the result has no wear run, or less than one state is asked for
+    """
+    if result.wear is None:
+        raise ValueError("the result has no wear run: take a scene with [wear]")
+    if count < 1:
+        raise ValueError(f"--states must be at least 1, not {count}")
+    file = verification.rebuilt(result, overrides)
+    with limited(file.scene.solver.threads):
+        unworn = modelling.build(file, None, progress, result.harmonics).balance
+    found = []
+    for row in spread(result.wear, count):
+        comparison, why = None, ""
+        try:
+            comparison = verification.held_against(result, file.scene, unworn, None, row, steps, progress)
+        except (SolveFailed, IntegrationFailed) as error:
+            why = str(error)
+        wear = result.wear
+        energy = float(wear.energy[row].sum())
+        found.append(WornState(row, float(wear.cycles[row]), float(wear.frequency[row]), energy, comparison, why))
+    return found
+
+
+def picture(result: Result, states: Sequence[WornState]) -> Figure:
+    """Energy per cycle over the cycles: of the run, of time integration, and of the motion that was left alone."""
+    assert result.wear is not None
+    with axes_of() as (figure, ax):
+        ax.plot(1e-6 * result.wear.cycles, result.wear.energy.sum(axis=1), color=BLUE, label="run")
+        millions = [1e-6 * state.cycles for state in states]
+        ax.plot(millions, [s.time_energy for s in states], "o", color=ORANGE, label="time integration")
+        alone = [(1e-6 * s.cycles, s.found.left_alone) for s in states if s.found is not None and s.found.left_alone]
+        if alone:
+            at, seen = zip(*alone, strict=True)
+            heights, spreads = [s.energy for s in seen], [s.energy_spread for s in seen]
+            ax.errorbar(at, heights, spreads, fmt="s", color=GREEN, capsize=3, label="left alone, mean and spread")
+        ax.set(xlabel="cycles / 1e6", ylabel="friction work per cycle / J", yscale="log")
+        ax.legend(loc="best", fontsize=9)
+    return figure
