@@ -75,6 +75,15 @@ def factorise(K: Any, definite: bool = True, solver: str | None = None, shapes: 
     return factor
 
 
+def eigenvalues_below(K: Any, M: Any, value: float) -> int:
+    """How many eigenvalues of K phi = lambda M phi lie below a value, by one factorisation.
+
+    By Sylvester's law of inertia; K, M : (n, n) scipy.sparse symmetric, M positive definite
+    """
+    shifted = csr_matrix(K - value * M)
+    return (Pardiso(shifted, definite=False) if pardiso_available() else SuperLU(shifted)).negative
+
+
 def softest_residual(K: Any, solve: Callable[[np.ndarray], np.ndarray]) -> float:
     """|K x - b| / |b| for b along the softest direction, found by two inverse iterations from a fixed start.
 
@@ -130,6 +139,11 @@ class Pardiso:
             self._solver.set_iparm(place, value)
         self._call(ANALYSE_AND_FACTORISE, np.zeros(K.shape[0], self._kind))
 
+    @property
+    def negative(self) -> int:
+        """How many eigenvalues of an indefinite K are negative: the signs of its pivots, by Sylvester's law."""
+        return int(self._solver.get_iparm(23))
+
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """Solution of the same shape as rhs, (n,) or (n, k)."""
         return np.ascontiguousarray(self._call(SOLVE, np.asfortranarray(rhs, dtype=self._kind)))
@@ -178,6 +192,11 @@ class SuperLU:
         self._lu = splu(permuted, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         if definite and not (self._lu.U.diagonal() > 0).all():
             raise ArithmeticError("a pivot is not positive")
+
+    @property
+    def negative(self) -> int:
+        """How many eigenvalues of K are negative: the signs of its pivots, by Sylvester's law."""
+        return int((self._lu.U.diagonal() < 0).sum())
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """Solution of the same shape as rhs, (n,) or (n, k)."""

@@ -14,7 +14,7 @@ from scipy.sparse import csc_matrix, csr_matrix
 from threadpoolctl import threadpool_limits
 
 from tribodyn.fem.constraints import partition
-from tribodyn.fem.factor import Factor, factorise
+from tribodyn.fem.factor import Factor, eigenvalues_below, factorise
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.modes import StaticDivergence, modes
 from tribodyn.fem.system import SecondOrderSystem
@@ -137,14 +137,15 @@ def fixed_interface_modes(
 
     Raises  ValueError where not exactly one of n_modes, cutoff is given, more modes are asked than there are, or the
         cutoff is beyond what the mesh resolves: more modes than half of the slaves. How many there will be is foretold
-        as for a bar in bending, whose number of modes rises as the root of frequency; elsewhere it rises faster
+        as for a bar in bending, whose number of modes rises as the root of frequency; elsewhere it rises faster, and
+        they are counted where there would be too many if it rose as that of a plate, as frequency
     """
     n_slave = K_ss.shape[0]
     if (n_modes is None) == (cutoff is None):
         raise ValueError("Craig-Bampton: give the number of modes or the cutoff frequency, one of the two")
     if n_modes is not None and not 0 <= n_modes <= n_slave:
         raise ValueError(f"Craig-Bampton: {n_modes} modes were asked of {n_slave} DOFs that are not masters")
-    wanted = 16 if n_modes is None else n_modes
+    wanted, below = 16 if n_modes is None else n_modes, None
     while True:
         omega, phi = modes(K_ss, M_ss, min(wanted + 1, n_slave), factor=factor)
         if cutoff is None or omega[-1] > 2 * np.pi * cutoff or len(omega) == n_slave:
@@ -155,6 +156,13 @@ def fixed_interface_modes(
                 f"the cutoff of the reduction, {cutoff:g} Hz, is beyond what the mesh resolves: mode {len(omega)} of "
                 f"{n_slave} has {omega[-1] / (2 * np.pi):.3g} Hz; lower reduction.cutoff, or look at the material"
             )
+        if n_slave > FEW_SLAVES and below is None and 2 * len(omega) * 2 * np.pi * cutoff > n_slave * omega[-1]:
+            below = eigenvalues_below(K_ss, M_ss, (2 * np.pi * cutoff) ** 2)  # as for a plate there are too many
+            if 2 * below > n_slave:
+                raise ValueError(
+                    f"the cutoff of the reduction, {cutoff:g} Hz, is beyond what the mesh resolves: {below} of its "
+                    f"{n_slave} modes lie below it; lower reduction.cutoff, or look at the material"
+                )
         wanted *= 2
     kept = wanted if cutoff is None else int(np.sum(omega <= 2 * np.pi * cutoff))
     return omega[:kept], phi[:, :kept], float(omega[kept]) if kept < len(omega) else np.inf

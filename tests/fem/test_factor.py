@@ -7,10 +7,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from scipy.sparse import eye_array
+from scipy.linalg import eigvalsh
+from scipy.sparse import eye_array, random_array
 
 from tests.helpers.digest import digest
-from tribodyn.fem.factor import factorise
+from tribodyn.fem import factor
+from tribodyn.fem.factor import eigenvalues_below, factorise
 
 FRESH = """
 import sys
@@ -29,6 +31,16 @@ factorise(some @ some.T + 10 * sp.eye(300)).solve(np.ones(300))
 def test_an_unknown_solver_is_refused() -> None:
     with pytest.raises(ValueError, match="no solver 'umfpack': there are pardiso, superlu"):
         factorise(eye_array(3), solver="umfpack")
+
+
+@pytest.mark.parametrize("pardiso", [True, False])
+def test_eigenvalues_are_counted_by_one_factorisation(pardiso: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(factor, "pardiso_available", lambda: pardiso)
+    one, other = (random_array((150, 150), density=0.05, rng=seed) for seed in (1, 2))
+    K, M = one + one.T, other @ other.T + 2 * eye_array(150)
+    values = eigvalsh(K.toarray(), M.toarray())
+    for place in (1, 40, 75, 149):
+        assert eigenvalues_below(K, M, 0.5 * (values[place - 1] + values[place])) == place
 
 
 @pytest.mark.parametrize("before", ["", WORN], ids=["fresh", "after_other_work"])

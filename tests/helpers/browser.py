@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -63,8 +63,16 @@ def drag(driver: Any, element: Any, right: int, down: int) -> None:
     """Move the mouse over an element with its button held."""
     from selenium.webdriver import ActionChains
 
-    ActionChains(driver).move_to_element(element).click_and_hold().move_by_offset(right, down).release().perform()
-    time.sleep(0.4)
+    mouse = ActionChains(driver, duration=60)  # ms of a move
+    mouse.move_to_element(element).click_and_hold().move_by_offset(right, down).release().perform()
+
+
+def becomes(driver: Any, script: str, element: Any, wanted: Callable[[Any], bool]) -> bool:
+    """Whether what a script tells of an element is as wanted within some seconds."""
+    end = time.monotonic() + 10.0
+    while not (good := wanted(driver.execute_script(script, element))) and time.monotonic() < end:
+        time.sleep(0.05)
+    return good
 
 
 def of_width(driver: Any, width: int) -> None:
@@ -89,23 +97,23 @@ def clicked_zoomed_and_turned(
     assert len(charts) >= (1 if result.wear is None else 6)
     for chart in charts:
         driver.execute_script("arguments[0].scrollIntoView({block: 'center'})", chart)
-        before = driver.execute_script("return arguments[0]._fullLayout.xaxis.range.map(Number)", chart)
+        shown = "const r = arguments[0]._fullLayout.xaxis.range.map(Number); return r[1] - r[0]"
+        narrower = 0.8 * driver.execute_script(shown, chart)
         drag(driver, chart.find_element("css selector", ".nsewdrag"), 80, 5)
-        after = driver.execute_script("return arguments[0]._fullLayout.xaxis.range.map(Number)", chart)
-        assert after[1] - after[0] < 0.8 * (before[1] - before[0]), chart.get_attribute("data-chart")
+        zoomed = becomes(driver, shown, chart, lambda now, narrower=narrower: now < narrower)
+        assert zoomed, chart.get_attribute("data-chart")
     entries = charts[0].find_elements("css selector", ".legendtoggle")
     if entries:  # a single curve has none
         visible = "return arguments[0].data.map(t => String(t.visible))"
-        shown = driver.execute_script(visible, charts[0])
+        seen = driver.execute_script(visible, charts[0])
         entries[0].click()
-        time.sleep(0.5)  # a click waits for a second one
-        assert driver.execute_script(visible, charts[0]) != shown
+        assert becomes(driver, visible, charts[0], lambda now: now != seen)
     solid = driver.find_element("css selector", "#part-0 .solid")
     driver.execute_script("arguments[0].scrollIntoView({block: 'center'})", solid)
     eye = "return Object.values(arguments[0]._fullLayout.scene._scene.getCamera().eye)"
     before = driver.execute_script(eye, solid)
     drag(driver, solid, 120, 30)
-    assert np.linalg.norm(np.subtract(driver.execute_script(eye, solid), before)) > 0.1
+    assert becomes(driver, eye, solid, lambda now: np.linalg.norm(np.subtract(now, before)) > 0.1)
     slider = driver.find_element("css selector", "#part-0 .state")
     label = driver.find_element("css selector", "#part-0 .label")
     first, several = label.text, slider.get_attribute("max") != "0"

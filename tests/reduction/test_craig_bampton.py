@@ -114,6 +114,8 @@ def test_cutoff_keeps_the_modes_below_it(part, model):
         ValueError, match=r"beyond what the mesh resolves: mode 17 of \d+ has .* Hz; lower reduction.cutoff"
     ):
         craig_bampton(part.system, part.interface, cutoff=1e9)
+    with pytest.raises(ValueError, match=r"beyond what the mesh resolves: \d+ of its \d+ modes lie below it"):
+        craig_bampton(part.system, part.interface, cutoff=60 * omitted)
     for both in ({}, {"n_modes": 3, "cutoff": 1e3}):
         with pytest.raises(ValueError, match="one of the two"):
             craig_bampton(part.system, part.interface, **both)

@@ -35,6 +35,8 @@ from tribodyn.hbm.threads import single
 GAP_STEPS = 10 ** np.arange(-6.0, -2.5)
 MAX_GAPS = 20  # a curve with more is none
 MAX_REWINDS = 4  # times that a walk which came back onto its own way goes back, to four times shorter steps
+HEADWAY = 1e-3  # share of the range
+RAMP_PATIENCE = 150  # points of a curve over the load that brings no more load; whole curves take 190 or so
 MAX_LANDINGS = 20  # times that it goes back from a bound where it lands astray; steps of a corner need not get shorter
 
 
@@ -44,6 +46,7 @@ class Options:
 
     bounds : values of the parameter between which the curve is followed, start and stop by default
     guess : (n_pair, n_component, n_coeff) neighbour of the first solution [m]; from rest by default
+    patience : points in which the curve has to come further from its start, by HEADWAY of the range; any by default
     """
 
     step: float = number(default=0.05, above=0.0)
@@ -68,6 +71,7 @@ class Options:
     """Relative accuracy of the parameter at a fold."""
     bounds: tuple[float, float] | None = field(default=None, kw_only=True)
     guess: np.ndarray | None = field(default=None, kw_only=True)
+    patience: int | None = field(default=None, kw_only=True)
     newton: NewtonOptions = field(default_factory=NewtonOptions, kw_only=True)
 
     def __post_init__(self) -> None:
@@ -140,7 +144,8 @@ def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOpti
     first = newton.solve_from_rest(balance, omega, options)
     if first.converged:
         return first
-    ramp = follow(parameter.load(balance, omega), 0.0, balance.load_factor, Options(newton=options))
+    ramp_options = Options(newton=options, patience=RAMP_PATIENCE)
+    ramp = follow(parameter.load(balance, omega), 0.0, balance.load_factor, ramp_options)
     if ramp.parameter[-1] == balance.load_factor:
         last = newton.solve(balance, omega, ramp.contact[-1].reshape(first.state.x.shape), options)
         if last.converged:
@@ -169,6 +174,7 @@ class _Walk:
         self._rows = [1]  # points in the branch before each segment
         self._rewinds = self._landings = 0
         self._jumps: list[float] = []
+        self._milestone, self._since = self._start, 1  # how far it came, and how many points there were then
 
     @property
     def gaps(self) -> str:
@@ -182,6 +188,9 @@ class _Walk:
         if len(builder.value) >= self._options.max_points:
             here = path.say(builder.value[-1])
             return BranchEnd.ENDED.say(f" {here}: {self._options.max_points} points were allowed")
+        if self._stays():
+            told = f"{self._options.patience} points brought it hardly further than {path.say(self._milestone)}"
+            return BranchEnd.ENDED.say(f" {path.say(builder.value[-1])}: {told}")
         parts = self._stepper.advance()
         if not parts:
             if self._jump():
@@ -198,6 +207,13 @@ class _Walk:
             builder.add(part.end.value, part.end.solution, fold=part.end.fold)
         self._rows.append(len(builder.value))
         return self._came_back(parts)
+
+    def _stays(self) -> bool:
+        """Whether the points that the patience allows brought the walk hardly further."""
+        here, count = self._builder.value[-1], len(self._builder.value)
+        if abs(here - self._start) > abs(self._milestone - self._start) + HEADWAY * self._reach:
+            self._milestone, self._since = here, count
+        return self._options.patience is not None and count >= self._since + self._options.patience
 
     def _jump(self) -> bool:
         """Step over a gap in the curve, its parameter moving on as before; whether there is a solution behind."""
