@@ -277,7 +277,9 @@ class CompliancePoint:
         x, n_port = self.compliance.groups[0][0], left.shape[1]
         y = self.modal(moved[:, n_port:], len(x.e))
         still = self.compliance.basis.has_static
-        return all_harmonics.gathered(y @ left, moved, higher, n or n_port, n_port, x.unit, self._ratio, still)
+        return all_harmonics.gathered(
+            y @ left, moved, higher, n_port if n is None else n, n_port, x.unit, self._ratio, still
+        )
 
     @cached_property
     def _ratio(self) -> np.ndarray:
