@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.pressed_body import wear_problem
-from tribodyn.hbm.continuation.operating_point import AtPeak
+from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
 from tribodyn.hbm.wear.error_controlled_rule import jumps
 from tribodyn.hbm.wear.evolution import Duty
 from tribodyn.workflows.accuracy import jump_probe
@@ -60,3 +60,22 @@ def test_the_sweep_with_more_harmonics_meets_the_higher_peak() -> None:
             omega=np.full(2, point.state.omega),
         )
         assert jump_probe._sweep_with_more(balance, wear, Duty(SITE), 0, 1.0)(0.0) is overtaken
+
+
+def test_a_run_that_stays_at_a_lower_peak_is_told_of_the_higher_one() -> None:
+    """The lower peak at 523 Hz is passed by the one that a sweep of the whole range meets; nothing passes that."""
+    balance = wear_problem().balance
+    highest, lower = SITE.first(balance), AtPeak("tip", 500.0, 545.0).first(balance)
+    for point, said in ((lower, True), (highest, False)):
+        flat = point.state.x.reshape(1, -1, balance.basis.n_coeff)
+        wear: Any = SimpleNamespace(
+            displacement=np.concatenate([flat] * 3),
+            cycles=np.array([0.0, 4e5, 1e6]),
+            depth=np.zeros((3, balance.contact.n_pair)),
+            omega=np.full(3, point.state.omega),
+        )
+        told = jump_probe.peak_above(balance, wear, Duty(SITE), 1e6)
+        assert bool(told) is said
+        if said:
+            assert f"{highest.state.omega / (2 * np.pi):.4g} Hz after 4e+05 cycles" in told
+        assert jump_probe.peak_above(balance, wear, Duty(AtFrequency("tip", point.state.omega)), 1e6) == ""

@@ -8,6 +8,7 @@ integration contradicts, is not stated.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from time import process_time
 
 import numpy as np
@@ -94,7 +95,12 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spe
             parts += at_once.contributions(file, result.facts.full_dofs, seen[0], FOR_ALL * left())
     with progress.stage("verdict: time integration"):
         checked = time_probe.check(seen, wanted.in_time, left(), skipped)
+    with progress.stage("verdict: higher peak"):
+        staying, note = _of_staying(file, model, result, values["life"], left())
+        parts += staying
     statements = {name: _statement(name, values[name], parts, checked, result) for name in QUANTITIES}
+    if note and statements["life"].stated:
+        statements["life"] = replace(statements["life"], reason=f"{statements['life'].reason}; {note}")
     return Verdict(statements, tuple(parts), process_time() - clock)
 
 
@@ -173,6 +179,24 @@ def _of_jump(
         return [Contribution("instant of the jump", "life", None, str(refusal))]
     far = f"with more harmonics it moves by more than {jump_probe.SHARES[-1]:.0%} of the life"
     return [Contribution("instant of the jump", "life", error, far if error is None else "more harmonics decide on it")]
+
+
+def _of_staying(
+    file: SceneFile, model: Model, result: Result, life: float | None, seconds: float
+) -> tuple[list[Contribution], str]:
+    """Whether a run that stays at one peak would leave it with more harmonics, and what to say where nobody asked."""
+    wear, scene = result.wear, file.scene
+    if wear is None or life is None or scene.wear is None or jumps(wear.rows()):
+        return [], ""
+    duty = settings.mission(scene)[0]
+    try:
+        with processor_seconds(seconds):
+            met = jump_probe.peak_above(model.balance, wear, duty, life)
+    except TimeUp:
+        return [], "whether more harmonics would leave this peak was not asked: a sweep takes more of verdict.seconds"
+    except (ValueError, RuntimeError) as refusal:
+        return [], f"whether more harmonics would leave this peak is not known: {refusal}"
+    return [Contribution("another peak", "life", None, met)] if met else [], ""
 
 
 def _depth_error(result: Result, seen: Sequence[State], finer: Sequence[Answers | None]) -> float | None:
