@@ -39,11 +39,13 @@ def life_moved(balance: HarmonicBalance, wear: WearHistory, duty: Duty, life: fl
     at_once = overtaken(0.0)
     if at_once is None:
         return None
+    if overtaken(-SHARES[-1] if at_once else SHARES[-1]) != (not at_once):  # dear: asked before all nearer ones
+        return None
     slow, fast = (float(wear.energy[row].sum()) for row in (found[0], found[0] + 1))
-    for share in SHARES:
+    for share in SHARES[:-1]:
         if overtaken(-share if at_once else share) == (not at_once):
             return share * abs(1 - slow / fast)
-    return None
+    return SHARES[-1] * abs(1 - slow / fast)
 
 
 def peak_above(balance: HarmonicBalance, wear: WearHistory, duty: Duty, life: float) -> str:
