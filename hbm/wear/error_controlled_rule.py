@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from tribodyn.hbm import newton
-from tribodyn.hbm.continuation.operating_point import OperatingPoint
+from tribodyn.hbm.continuation.operating_point import NoPeak, OperatingPoint
 from tribodyn.hbm.outcome import Outcome, SolveEnd, WearEnd
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.wear import fewer_harmonics
@@ -299,8 +299,14 @@ def _leap(
     for share in EXPLICIT_STEPS[min(tried, len(EXPLICIT_STEPS) - 1) :] if failure else ():
         length = share * tolerance.share * tolerance.scale / float(state.rate.max())
         worn = length * state.rate
-        for there in (scans,) if fewer is None else (scans, fewer):
-            after = assess(there, state.depth + worn, state.cycles + length, None)
+        ways = (scans,) if fewer is None else (scans, fewer)
+        for there in ways:
+            try:
+                after = assess(there, state.depth + worn, state.cycles + length, None)
+            except NoPeak:  # a scan with many harmonics may end early
+                if there is ways[-1]:
+                    raise
+                continue
             state = replace(state, solves=state.solves + after.solves)
             if not after.failure:
                 row = row_of(problem, state, length, worn, length * state.work, 1.0, plan)

@@ -12,7 +12,14 @@ from tests.helpers.pressed_body import N_PAIR, balance_of, pressed_body, wear_pr
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import SEPARATES
-from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak, BesidePeak, Correction, OperatingPoint
+from tribodyn.hbm.continuation.operating_point import (
+    AtFrequency,
+    AtPeak,
+    BesidePeak,
+    Correction,
+    NoPeak,
+    OperatingPoint,
+)
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import SolveEnd, WearEnd
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
@@ -351,6 +358,17 @@ def test_behind_the_end_of_a_branch_all_harmonics_of_a_scan_are_looked_with() ->
     assert seen == [8, 8, 8]  # at the start and behind both steps
     assert np.all(worn.step_error == 1.0)
     assert np.all(np.any(worn.displacement[:, :, 7:] != 0, axis=(1, 2)))  # the step wears with all of them
+
+    class Ends(Never):
+        def first(self, balance: HarmonicBalance) -> OperatingPoint:
+            if len(balance.basis.harmonics) == 8 and balance.contact.gap.max() > whole.balance.contact.gap.max():
+                raise NoPeak("the scan with all of them ends early")
+            return super().first(balance)
+
+    seen.clear()
+    ends = replace(whole, mission=(Duty(Ends("tip", 420.0)),))
+    error_controlled_rule.evolve(ends, tolerance, max_steps=1)
+    assert seen == [8, 4]
 
 
 @pytest.mark.parametrize("steepness", [0.5, 1.0, 10.0, 30.0])
