@@ -35,8 +35,9 @@ MOST = 0.5  # of the seconds, for more harmonics, which matter most; a mesh need
 FOR_JUMP = 0.5  # of the seconds, for the instant of a jump to another peak, where there is one
 FOR_MOTIONS = 0.25  # of the seconds that are left then, for other motions at a given frequency
 HALF = 0.5  # of the seconds that are left, for one measurement of several
-FOR_MESH = 0.75  # of the seconds that are left then
+FOR_MESH = 0.85  # of the seconds that are left then
 FOR_ALL = 0.75  # of the seconds that are left then, for all knobs at once
+LEAST_FOR_ALL = 0.5  # of the seconds that other meshes took, without which all knobs at once are not tried
 CONTRADICTION = 3.0  # times the estimated error, from which on time integration contradicts the balance
 LEAST_OWN_ERROR = 1e-3  # of a time integration: how far it is from periodic adds to what its steps make
 AT_A_GIVEN_FREQUENCY = ("peak_frequency",)  # a motion at a given frequency tells nothing about it
@@ -83,6 +84,7 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spe
     if more_modes is not None:
         with progress.stage("verdict: modes"):
             parts += Probe(result, seen[0], HALF * left(), skipped).of_modes(more_modes)
+    before = left()
     with progress.stage("verdict: mesh"):
         if not wanted.mesh:
             parts += mesh_probe.unknown(at_once.MESH, "verdict.mesh is false")
@@ -90,7 +92,7 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spe
             parts += mesh_probe.unknown(at_once.MESH, "no state was solved")
         else:
             parts += Probe(result, seen[0], FOR_MESH * left(), skipped, moved).of_mesh(file)
-    if wanted.mesh and seen:
+    if wanted.mesh and seen and left() > LEAST_FOR_ALL * (before - left()):
         with progress.stage("verdict: all at once"):
             parts += at_once.contributions(file, result.facts.full_dofs, seen[0], FOR_ALL * left())
     with progress.stage("verdict: time integration"):

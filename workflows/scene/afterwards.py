@@ -30,7 +30,7 @@ class Pictures(Table):
 
 VERDICT_SECONDS = (10.0, 60.0)  # bounds where the scene does not say
 # of the seconds of the run: what a verdict needs besides its measurements keeps both below twice the run
-VERDICT_SHARE = 0.8
+VERDICT_SHARE = 0.9
 
 
 class VerdictOptions(Table):
@@ -39,8 +39,8 @@ class VerdictOptions(Table):
     enabled: StrictBool = True
     """Judge the result when the run is done."""
     seconds: Annotated[Number, Field(gt=0)] | None = None
-    """Processor seconds that the measurements may take together; what they do not reach is not known. By default four
-    fifths of those of the run, but 10 at least and 60 at most."""
+    """Processor seconds that the measurements may take together; what they do not reach is not known. By default nine
+    tenths of those of the run, but 10 at least and 60 at most."""
     mesh: StrictBool = True
     """Solve the unworn contact on other meshes, and with more modes."""
     in_time: StrictBool | None = None
