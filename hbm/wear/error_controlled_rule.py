@@ -176,6 +176,9 @@ def _step_of(
 
     whole : the problem with all harmonics, which rows have
     """
+    if not state.rate.max() > 0:
+        top = problem.balance.basis.harmonics[-1]
+        return _Lost(WearEnd.NO_STEP.say(f": no pair slips with harmonics 0 to {top}"), state.solves)
     searched = fewer_harmonics.searched_with(whole, problem)
     last = fewer_harmonics.with_fewer(problem) is None
     smallest = 1e-9 * tolerance.scale / float(state.rate.max())

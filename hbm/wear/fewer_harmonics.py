@@ -43,8 +43,10 @@ def settled(whole: WearProblem, state: WearState) -> tuple[WearProblem, WearStat
                 return problem, replace(state, solves=solves)
             points.append(found)
         at_rest = (state.preload_at_rest, state.failure_at_rest)
-        state = worn_state(more, state.depth, state.cycles, points, solves)
-        state = replace(state, preload_at_rest=at_rest[0], failure_at_rest=at_rest[1])
+        found_with_more = worn_state(more, state.depth, state.cycles, points, solves)
+        if not found_with_more.rate.max() > 0:  # another motion, which slips nowhere: no step follows from it
+            return problem, replace(state, solves=solves)
+        state = replace(found_with_more, preload_at_rest=at_rest[0], failure_at_rest=at_rest[1])
         problem = more
     return problem, state
 

@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from time import process_time, sleep
+from typing import Any
 
 import numba
 import numpy as np
@@ -93,6 +94,19 @@ def test_all_knobs_at_once_are_those_of_a_finer_run(small: td.Result) -> None:
         assert parts[name].error == pytest.approx(abs(ours - theirs) / theirs, rel=1e-3), name
         error = small.summary()["verdict"][name]["error"]
         assert error is None or error > 1.7 * parts[name].error
+
+
+def test_a_life_tells_whether_a_higher_peak_was_looked_for(small: td.Result) -> None:
+    """With one harmonic this beam stays at its peak; more of them change its motion by a third."""
+    file = scene_file.read("beam", SMALL)
+    nothing: Any = None
+    parts, note = verdict._of_staying(file, nothing, small, 1e7, 0.0)
+    assert parts == []
+    assert "by less than 10%" in note
+    given = scene_file.read("beam", (*SMALL, "wear.at=500 Hz"))
+    assert verdict._of_staying(given, nothing, small, 1e7, 0.0) == ([], "")
+    harmonics = [c.error for c in statement.loaded(small.verdict).contributions if c.source == "harmonics"]
+    assert max(error or 0.0 for error in harmonics) > verdict.MUCH
 
 
 @pytest.mark.parametrize(

@@ -44,6 +44,7 @@ AT_A_GIVEN_FREQUENCY = ("peak_frequency",)  # a motion at a given frequency tell
 OF_WEAR = ("depth", "life")  # belong to all states: where a worn motion does not stay, the contact may survive
 RESPONSE = ("amplitude", "energy", "preload")
 OF_FIRST = ("peak_frequency", *RESPONSE)
+MUCH = 0.1  # of the response, from which on more harmonics may make another peak the highest
 MOVED = 0.01  # of a quantity of the first state by more harmonics, above which other meshes are solved with them, too
 
 
@@ -98,7 +99,10 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spe
     with progress.stage("verdict: time integration"):
         checked = time_probe.check(seen, wanted.in_time, left(), skipped)
     with progress.stage("verdict: higher peak"):
-        staying, note = _of_staying(file, model, result, values["life"], left())
+        much = any(
+            (one.error or 0.0) > MUCH for one in parts if one.source == at_once.HARMONICS and one.quantity in RESPONSE
+        )
+        staying, note = _of_staying(file, model, result, values["life"], left() if much else 0.0)
         parts += staying
     statements = {name: _statement(name, values[name], parts, checked, result) for name in QUANTITIES}
     if note and statements["life"].stated:
@@ -186,11 +190,19 @@ def _of_jump(
 def _of_staying(
     file: SceneFile, model: Model, result: Result, life: float | None, seconds: float
 ) -> tuple[list[Contribution], str]:
-    """Whether a run that stays at one peak would leave it with more harmonics, and what to say where nobody asked."""
+    """Whether a run that stays at one peak would leave it with more harmonics, and what to say where nobody asked.
+
+    seconds : of the processor, 0 where more harmonics change too little to ask
+    """
     wear, scene = result.wear, file.scene
     if wear is None or life is None or scene.wear is None or jumps(wear.rows()):
         return [], ""
     duty = settings.mission(scene)[0]
+    if isinstance(duty.site, AtFrequency):
+        return [], ""
+    if not seconds:
+        few = f"they change the unworn motion by less than {MUCH:.0%}"
+        return [], f"whether more harmonics would leave this peak was not asked: {few}"
     try:
         with processor_seconds(seconds):
             met = jump_probe.peak_above(model.balance, wear, duty, life)
