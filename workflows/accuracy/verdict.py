@@ -44,7 +44,7 @@ AT_A_GIVEN_FREQUENCY = ("peak_frequency",)  # a motion at a given frequency tell
 OF_WEAR = ("depth", "life")  # belong to all states: where a worn motion does not stay, the contact may survive
 RESPONSE = ("amplitude", "energy", "preload")
 OF_FIRST = ("peak_frequency", *RESPONSE)
-MUCH = 0.1  # of the response, from which on more harmonics may make another peak the highest
+MUCH = 0.1  # of the amplitude, from which on more harmonics may make another peak the highest
 MOVED = 0.01  # of a quantity of the first state by more harmonics, above which other meshes are solved with them, too
 
 
@@ -100,7 +100,9 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spe
         checked = time_probe.check(seen, wanted.in_time, left(), skipped)
     with progress.stage("verdict: higher peak"):
         much = any(
-            (one.error or 0.0) > MUCH for one in parts if one.source == at_once.HARMONICS and one.quantity in RESPONSE
+            (one.error or 0.0) > MUCH
+            for one in parts
+            if one.source == at_once.HARMONICS and one.quantity == "amplitude"
         )
         staying, note = _of_staying(file, model, result, values["life"], left() if much else 0.0)
         parts += staying
@@ -201,7 +203,7 @@ def _of_staying(
     if isinstance(duty.site, AtFrequency):
         return [], ""
     if not seconds:
-        few = f"they change the unworn motion by less than {MUCH:.0%}"
+        few = f"they change the unworn amplitude by less than {MUCH:.0%}"
         return [], f"whether more harmonics would leave this peak was not asked: {few}"
     try:
         with processor_seconds(seconds):
