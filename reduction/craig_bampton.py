@@ -26,6 +26,7 @@ POINT_LOAD = 30  # a load or output on more DOFs than this is distributed: proje
 BLOCK = 128  # right-hand sides solved at once
 REPORTED_MODES = 10
 FEW_SLAVES = 400  # all of whose modes may be kept
+MOST_MODES = 1000  # below a cutoff: dense matrices of more of them, and their eigensolve, take minutes
 
 
 def craig_bampton(
@@ -136,9 +137,10 @@ def fixed_interface_modes(
     """Modes with the masters held: omega (k,) [rad/s], phi (n_slave, k), and the first omega left out (inf for none).
 
     Raises  ValueError where not exactly one of n_modes, cutoff is given, more modes are asked than there are, or the
-        cutoff is beyond what the mesh resolves: more modes than half of the slaves. How many there will be is foretold
-        as for a bar in bending, whose number of modes rises as the root of frequency; elsewhere it rises faster, and
-        they are counted where there would be too many if it rose as that of a plate, as frequency
+        cutoff is beyond what the mesh resolves, more modes than half of the slaves, or has more than MOST_MODES. How
+        many there will be is foretold as for a bar in bending, whose number of modes rises as the root of frequency;
+        elsewhere it rises faster, and they are counted where there would be too many if it rose as that of a plate, as
+        frequency
     """
     n_slave = K_ss.shape[0]
     if (n_modes is None) == (cutoff is None):
@@ -156,11 +158,13 @@ def fixed_interface_modes(
                 f"the cutoff of the reduction, {cutoff:g} Hz, is beyond what the mesh resolves: mode {len(omega)} of "
                 f"{n_slave} has {omega[-1] / (2 * np.pi):.3g} Hz; lower reduction.cutoff, or look at the material"
             )
-        if n_slave > FEW_SLAVES and below is None and 2 * len(omega) * 2 * np.pi * cutoff > n_slave * omega[-1]:
+        most = min(n_slave / 2, MOST_MODES)
+        if n_slave > FEW_SLAVES and below is None and len(omega) * 2 * np.pi * cutoff > most * omega[-1]:
             below = eigenvalues_below(K_ss, M_ss, (2 * np.pi * cutoff) ** 2)  # as for a plate there are too many
-            if 2 * below > n_slave:
+            if below > most:
+                why = "beyond what the mesh resolves" if 2 * below > n_slave else f"above {MOST_MODES} modes"
                 raise ValueError(
-                    f"the cutoff of the reduction, {cutoff:g} Hz, is beyond what the mesh resolves: {below} of its "
+                    f"the cutoff of the reduction, {cutoff:g} Hz, is {why}: {below} of its "
                     f"{n_slave} modes lie below it; lower reduction.cutoff, or look at the material"
                 )
         wanted *= 2

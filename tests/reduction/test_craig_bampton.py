@@ -9,6 +9,7 @@ import pytest
 
 from tests.helpers.coarse_beam import make
 from tribodyn.fem.factor import factorise
+from tribodyn.reduction import craig_bampton as craig_bampton_module
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.damping import modal_damping, rayleigh
 from tribodyn.reduction.linear import linear_modes, stuck_stiffness, system_modes
@@ -101,6 +102,16 @@ def test_truncation_estimate(part, model):
         error = getattr(info, f"{state}_frequency") / full - 1
         assert getattr(info, f"{state}_frequency_error") == pytest.approx(error, rel=0.3, abs=1e-8)
     assert model.info.stuck_frequency is None
+
+
+def test_a_cutoff_with_too_many_modes_is_refused_before_they_are_computed(part, model, monkeypatch):
+    omitted = model.info.first_omitted_frequency
+    found = craig_bampton(part.system, part.interface, cutoff=2 * omitted).info.n_modes
+    monkeypatch.setattr(craig_bampton_module, "MOST_MODES", found)
+    assert craig_bampton(part.system, part.interface, cutoff=2 * omitted).info.n_modes == found
+    monkeypatch.setattr(craig_bampton_module, "MOST_MODES", found - 1)
+    with pytest.raises(ValueError, match=rf"is above {found - 1} modes: {found} of its \d+ modes lie below it"):
+        craig_bampton(part.system, part.interface, cutoff=2 * omitted)
 
 
 def test_cutoff_keeps_the_modes_below_it(part, model):

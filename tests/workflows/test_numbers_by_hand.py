@@ -153,11 +153,13 @@ def test_the_ground_moves_ahead_by_its_phase() -> None:
     np.testing.assert_allclose(found[0], [0.0, 2 * np.cos(0.3), -2 * np.sin(0.3)], atol=1e-15)
 
 
-def test_the_total_error_is_the_sum_of_its_parts() -> None:
-    parts = [Contribution("mesh", "preload", 0.1, ""), Contribution("modes", "preload", 0.02, "")]
+def test_the_total_error_counts_the_sum_of_its_parts() -> None:
+    """1.3 times the sum where all knobs at once were not tried; what is no knob is added."""
+    errors = {"mesh and contact grid": 0.1, "modes": 0.02, "wear steps": 0.05}
+    parts = [Contribution(source, "preload", error, "") for source, error in errors.items()]
     said = verdict._statement("preload", 100.0, parts, Checked((), 0, ""), SimpleNamespace(wear_steps=0))
-    assert said.error == pytest.approx(0.12)
-    assert said.dominated_by == "mesh"
+    assert said.error == pytest.approx(1.3 * 0.12 + 0.05)
+    assert said.dominated_by == "mesh and contact grid"
 
 
 def test_life_is_off_by_depth_and_energy_together(monkeypatch: pytest.MonkeyPatch) -> None:
