@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.pressed_body import wear_problem
-from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
+from tribodyn.hbm.continuation.operating_point import AtPeak, OperatingPoint
 from tribodyn.hbm.wear.error_controlled_rule import jumps
 from tribodyn.hbm.wear.evolution import Duty
 from tribodyn.workflows.accuracy import jump_probe
@@ -48,36 +48,35 @@ def test_the_change_of_life_is_bounded_from_the_side_on_which_the_answer_changes
     assert jump_probe.life_moved(nothing, wear, Duty(SITE), 1e6) == 0.0
 
 
+def _worn_at(point: OperatingPoint, cycles: list[float]) -> Any:
+    """A history whose contact moves as at a point all the time, and does not wear."""
+    x = point.state.x
+    return SimpleNamespace(
+        displacement=np.stack([x.reshape(-1, x.shape[-1])] * len(cycles)),
+        cycles=np.array(cycles),
+        depth=np.zeros((len(cycles), len(x))),
+        omega=np.full(len(cycles), point.state.omega),
+    )
+
+
 def test_the_sweep_with_more_harmonics_meets_the_higher_peak() -> None:
     balance = wear_problem().balance
     highest, lower = SITE.first(balance), AtPeak("tip", 500.0, 545.0).first(balance)
     for point, overtaken in ((lower, True), (highest, False)):
-        flat = point.state.x.reshape(1, -1, balance.basis.n_coeff)
-        wear: Any = SimpleNamespace(
-            displacement=np.concatenate([flat, flat]),
-            cycles=np.array([0.0, 1.0]),
-            depth=np.zeros((2, balance.contact.n_pair)),
-            omega=np.full(2, point.state.omega),
-        )
+        wear = _worn_at(point, [0.0, 1.0])
         assert jump_probe._sweep_with_more(balance, wear, Duty(SITE), 0, 1.0)(0.0) is overtaken
 
 
-def test_a_run_that_stays_at_a_lower_peak_is_told_of_the_higher_one() -> None:
-    """The lower peak at 523 Hz is passed by the one that a sweep of the whole range meets; nothing passes that."""
+def test_a_run_that_stays_at_a_lower_peak_is_told_of_the_higher_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The lower peak at 523 rad/s is passed by the one that a sweep of the whole range meets; nothing passes that."""
     balance = wear_problem().balance
     highest, lower = SITE.first(balance), AtPeak("tip", 500.0, 545.0).first(balance)
-    for point, said in ((lower, True), (highest, False)):
-        flat = point.state.x.reshape(1, -1, balance.basis.n_coeff)
-        wear: Any = SimpleNamespace(
-            displacement=np.concatenate([flat] * 3),
-            cycles=np.array([0.0, 4e5, 1e6]),
-            depth=np.zeros((3, balance.contact.n_pair)),
-            omega=np.full(3, point.state.omega),
-        )
-        told = jump_probe.peak_above(balance, wear, Duty(SITE), 1e6)
-        assert bool(told) is said
-        if said:
-            assert told.endswith(" Hz after 4e+05 cycles, and wear goes on there")
-            met = float(told.split(" at ")[1].split()[0])
-            assert met == pytest.approx(highest.state.omega / (2 * np.pi), rel=0.01)  # here without more harmonics
-        assert jump_probe.peak_above(balance, wear, Duty(AtFrequency("tip", point.state.omega)), 1e6) == ""
+    cycles = [0.0, 4e5, 1e6]
+    assert jump_probe.peak_above(balance, _worn_at(highest, cycles), Duty(SITE), 1e6) == ""
+    told = jump_probe.peak_above(balance, _worn_at(lower, cycles), Duty(SITE), 1e6)
+    assert told.endswith(" Hz after 4e+05 cycles, and wear goes on there")
+    met = float(told.split(" at ")[1].split()[0])
+    assert met == pytest.approx(highest.state.omega / (2 * np.pi), rel=0.01)  # here without more harmonics
+    monkeypatch.setattr(jump_probe._Sweep, "at", lambda *given: None)
+    with pytest.raises(ValueError, match="is lost with harmonics 0 to 7"):
+        jump_probe.peak_above(balance, _worn_at(lower, cycles), Duty(SITE), 1e6)

@@ -26,10 +26,9 @@ KNOBS = (MESH, HARMONICS, MODES)
 ELEMENTS = other_meshes.STILL_FINER  # along every edge, over those of the scene
 RICH = 5  # highest harmonic, at the least
 MOST_UNKNOWNS = 6000  # of that balance
-MOST_DOFS = 100_000  # of that mesh
-# The three constants are those of the scoreboard (docs/accuracy/scoreboard.md): on 118 scenes of five seeds none of 302
-# errors comes nearer to the true one than 1.4 times. Twice the elements show half of an error of first order and three
-# quarters of one of second: 1.75 times lies between both, and the margin covers the rest
+# TIMES, MARGIN and ALONE are those of the scoreboard (docs/accuracy/scoreboard.md): on 118 scenes of five seeds none of
+# 302 errors comes nearer to the true one than 1.4 times. Twice the elements show half of an error of first order and
+# three quarters of one of second: 1.75 times lies between both, and the margin covers the rest
 TIMES = 1.75  # of the change by all knobs at once
 MARGIN = 0.3  # of the sum of the changes by each knob, beside it
 LEAST = 1e-3  # error of what a mesh changes at all, below which none is stated: meshes agree by chance on small errors
@@ -44,7 +43,7 @@ def contributions(file: SceneFile, n_dof: int, first: State, seconds: float) -> 
     balance = first.balance
     top = max(RICH, harmonic_choice.climb(balance.basis.harmonics[-1])[0])
     unknowns = ELEMENTS**2 * balance.contact.stiffness.size * (2 * top + 1)
-    if isinstance(first.site, OnCurve) or unknowns > MOST_UNKNOWNS or ELEMENTS**3 * n_dof > MOST_DOFS:
+    if isinstance(first.site, OnCurve) or unknowns > MOST_UNKNOWNS or ELEMENTS**3 * n_dof > other_meshes.MOST_FINER[0]:
         return
     finer = finer_at_once(file, top)
     how = f"{ELEMENTS:g} times the elements, harmonics 0 to {top} and more modes"

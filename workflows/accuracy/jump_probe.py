@@ -39,7 +39,7 @@ def life_moved(balance: HarmonicBalance, wear: WearHistory, duty: Duty, life: fl
     at_once = overtaken(0.0)
     if at_once is None:
         return None
-    if overtaken(-SHARES[-1] if at_once else SHARES[-1]) != (not at_once):  # dear: asked before all nearer ones
+    if overtaken(-SHARES[-1] if at_once else SHARES[-1]) != (not at_once):  # then no nearer instant need be asked
         return None
     slow, fast = (float(wear.energy[row].sum()) for row in (found[0], found[0] + 1))
     for share in SHARES[:-1]:
@@ -51,14 +51,15 @@ def life_moved(balance: HarmonicBalance, wear: WearHistory, duty: Duty, life: fl
 def peak_above(balance: HarmonicBalance, wear: WearHistory, duty: Duty, life: float) -> str:
     """Where a sweep with more harmonics meets a higher peak than the one that a run without a jump wears at.
 
-    Empty where it meets none at LOOKED_AT of the life [cycles], or the frequency is given. Where it meets one, the
-    contact goes on wearing there, and how fast is not known
+    duty : at a peak, not at a frequency that is given
+    Empty where it meets none at LOOKED_AT of the life [cycles]. Where it meets one, the contact goes on wearing there,
+    and how fast is not known. Raises  ValueError where the tracked peak is lost with more harmonics
     """
-    if isinstance(duty.site, AtFrequency):
-        return ""
     sweep = _Sweep.of(balance, wear, duty)
     row = max(int(np.searchsorted(wear.cycles, LOOKED_AT * life, "right")) - 1, 0)
     met = sweep.at(row, wear.depth[row])
+    if met is None:
+        raise ValueError(f"the tracked peak is lost with harmonics 0 to {sweep.top}")
     if not met:
         return ""
     return (
