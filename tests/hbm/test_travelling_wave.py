@@ -63,6 +63,19 @@ def test_one_sector_is_the_whole_wheel(sectors, disk_radius, engine_order, frequ
     assert wheel.preload(theirs) == pytest.approx(small.N * one.preload(mine), rel=1e-6)
 
 
+def test_more_harmonics_do_not_make_the_preconditioner_large(sectors):
+    """Each harmonic sees a system of its own: their shares of one flexibility are averaged, not added."""
+    few, _ = small.wave_and_wheel(sectors[0.0], 3)
+    basis = HarmonicBasis(tuple(range(16)), 128)
+    many = HarmonicBalance.of(few.model, few.contact.joints, basis, few.excitation, few.omega_max, few.memory)
+    x = few.basis.transfer(solved(few, 250.0).x, basis)
+    found = newton.solve(many, 2 * np.pi * 250.0, x, EXACT)
+    assert found.converged
+    assert found.products <= 12 * found.steps
+    rank = [balance.compliance.preconditioned.shape[1] for balance in (few, many)]
+    assert 0 < rank[1] <= rank[0] + 2
+
+
 def test_engine_orders_that_sectors_cannot_tell_apart_are_one(sectors):
     """EO, EO + N and, run backwards, N - EO: the same wave, or its mirror image."""
     reduced = sectors[0.0]
