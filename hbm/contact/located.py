@@ -30,6 +30,8 @@ TURN = 2 * math.pi
 STICK = 0.0  # kinds of segment; slip is the sign of T
 CELLS_PER_HARMONIC = 8  # of the grid on which roots are isolated: a polynomial of degree H has at most 2 H roots
 SEGMENT_COLUMNS = 6  # of a segment: start, stop, kind, w, origin (-1: memory), d w / d N at the origin
+SHORT = 0.5  # rad of the highest harmonic, below which a force is integrated by Gauss's rule: six points leave 1e-16
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
 def cycle(
@@ -369,9 +371,32 @@ def _products(table, hs, out):
 
 
 @numba.njit(cache=True)
+def _short(start, stop, hs):
+    """Whether integrals over [start, stop] are differences of nearly equal numbers; their products even more so."""
+    return (stop - start) * hs[-1] < SHORT
+
+
+@numba.njit(cache=True)
+def _add_short(factor, c, level, start, stop, hs, force):
+    """Add the Fourier coefficients of factor (c - level) over [start, stop], c a polynomial small beside its parts.
+
+    A stiff contact touches so shortly that its force is a 1e-8 of what its spring would bear over the whole cycle
+    """
+    half = 0.5 * (stop - start)
+    for p in range(POINTS.size):
+        angle = start + half * (1.0 + POINTS[p])
+        value = factor * (_at(c, hs, angle)[0] - level) * WEIGHTS[p] * half / math.pi
+        force[0] += 0.5 * value
+        for q in range(hs.size):
+            force[1 + 2 * q] += value * math.cos(hs[q] * angle)
+            force[2 + 2 * q] += value * math.sin(hs[q] * angle)
+
+
+@numba.njit(cache=True)
 def _normal(load, contact, closed, n_contact, hs, span, table, force, slope):
     """Coefficients of max(N, 0) and their derivative with respect to those of N."""
     out = slope[1]
+    n_short = 0
     if n_contact == 1:  # one state all the time: no integral, no rounding
         out[:] = 0.0
         if closed[0]:
@@ -380,7 +405,9 @@ def _normal(load, contact, closed, n_contact, hs, span, table, force, slope):
     else:
         table[0] = 0.0
         for j in range(n_contact):
-            if closed[j]:
+            if closed[j] and _short(contact[j], contact[j + 1], hs):
+                n_short += 1
+            elif closed[j]:
                 _span(contact[j], contact[j + 1], span)
                 _add(1.0, span, table[0])
         _products(table[0], hs, out)
@@ -388,12 +415,21 @@ def _normal(load, contact, closed, n_contact, hs, span, table, force, slope):
         force[a] = 0.0
         for b in range(len(out)):
             force[a] += out[a, b] * load[b]
+    if n_short == 0:
+        return
+    for j in range(n_contact):
+        if closed[j] and _short(contact[j], contact[j + 1], hs):
+            _add_short(1.0, load, 0.0, contact[j], contact[j + 1], hs, force)
+            _span(contact[j], contact[j + 1], span)
+            _add(1.0, span, table[0])
+    _products(table[0], hs, out)
 
 
 @numba.njit(cache=True)
 def _tangential(kt, mu, u, load, segments, n_segment, hs, span, table, force, slope):
     """Coefficients of T and their derivatives with respect to those of u and N."""
     m = u.size
+    n_short = 0
     stuck = n_segment == 1 and segments[0, 2] == STICK and segments[0, 1] - segments[0, 0] == TURN
     if stuck:  # linear, no integral, no rounding
         slope[:] = 0.0
@@ -402,36 +438,59 @@ def _tangential(kt, mu, u, load, segments, n_segment, hs, span, table, force, sl
     else:
         table[:] = 0.0
         for s in range(n_segment):
-            _span(segments[s, 0], segments[s, 1], span)
-            if segments[s, 2] == STICK:
-                _add(1.0, span, table[0])
+            if _short(segments[s, 0], segments[s, 1], hs):
+                n_short += 1
             else:
-                _add(segments[s, 2], span, table[1])
+                _add_segment(segments[s], span, table)
         _products(table[0], hs, slope[0])
         _products(table[1], hs, slope[1])
     for a in range(m):
         force[a] = 0.0
         for b in range(m):
+            force[a] += kt * slope[0, a, b] * u[b] + mu * slope[1, a, b] * load[b]
+    if n_short > 0:
+        for s in range(n_segment):
+            start, stop, kind = segments[s, 0], segments[s, 1], segments[s, 2]
+            if _short(start, stop, hs):
+                if kind == STICK:
+                    _add_short(kt, u, segments[s, 3], start, stop, hs, force)
+                else:
+                    _add_short(kind * mu, load, 0.0, start, stop, hs, force)
+                _add_segment(segments[s], span, table)
+        _products(table[0], hs, slope[0])
+        _products(table[1], hs, slope[1])
+    for a in range(m):
+        for b in range(m):
             slope[0, a, b] *= kt
             slope[1, a, b] *= mu
-            force[a] += slope[0, a, b] * u[b] + slope[1, a, b] * load[b]
     for s in range(n_segment):
         if segments[s, 2] == STICK:
             _span(segments[s, 0], segments[s, 1], span)
             if stuck:
                 span[:, 1:] = 0.0
-            _subtract_slider(kt, segments[s], hs, span, force, slope)
+            subtracted = 0.0 if not stuck and _short(segments[s, 0], segments[s, 1], hs) else kt * segments[s, 3]
+            _subtract_slider(kt, subtracted, segments[s], hs, span, force, slope)
 
 
 @numba.njit(cache=True)
-def _subtract_slider(kt, segment, hs, span, force, slope):
-    """Minus k_t w of one stick, and its derivative through the instant that determines w."""
-    w, origin, tilt = segment[3], segment[4], segment[5]
+def _add_segment(segment, span, table):
+    """The integrals of one segment to those of stick, or to those of slip by its sign."""
+    _span(segment[0], segment[1], span)
+    if segment[2] == STICK:
+        _add(1.0, span, table[0])
+    else:
+        _add(segment[2], span, table[1])
+
+
+@numba.njit(cache=True)
+def _subtract_slider(kt, pull, segment, hs, span, force, slope):
+    """Minus the pull k_t w of one stick, and the derivative of k_t w through the instant that determines w."""
+    origin, tilt = segment[4], segment[5]
     m = force.size
     for a in range(m):
         h = hs[(a - 1) // 2] if a > 0 else 0
         part = span[1, h] / math.pi if a > 0 and a % 2 == 0 else span[0, h] / (math.pi if a > 0 else TURN)
-        force[a] -= kt * w * part
+        force[a] -= pull * part
         if origin < 0.0 or part == 0.0:
             continue
         for b in range(m):

@@ -1,27 +1,37 @@
-"""What the time samples of the contact forces cost: one Newton step towards forces with located transitions."""
+"""What the time samples of the contact forces cost: the solution is solved again with located transitions."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.newton import NewtonOptions
 
 FINER = 8  # times the samples, for a law that cannot locate its transitions: the error falls with their square
+SETTLED = 1e-2  # residual over that of the start: a step alone is half of the way where few samples are far off
 
 
 def sampling_error(balance: HarmonicBalance, omega: float, x: np.ndarray) -> float:
     """Estimated relative error of the vibration of the worst output, caused by sampled contact forces.
 
     balance : solved at omega [rad/s] by x (n_pair, n_component, n_coeff) [m]
-    The solution is put into a balance that locates its transitions, on more samples, and one Newton step is taken.
+    The solution is put into a balance that locates its transitions, on more samples, and solved again; it is relative
+    to the vibration there, inf where Newton finds none, from rest neither.
     """
     fine = balance.with_samples(max(FINER * balance.basis.n_samples, 128), balance.contact.locates)
-    here, there = balance.evaluate(omega, x, jacobian=False), fine.evaluate(omega, x)
-    linear = fine.linearise(there)
-    step = linear.solve(-there.residual, 1e-3)[0]
-    moved = fine.at(omega).outputs(there.g - here.g + linear.departure_slope(step))
+    here, there = balance.evaluate(omega, x, jacobian=False), fine.evaluate(omega, x, jacobian=False)
+    left = newton.relative_residual(there, fine.x_lin(omega))
+    options = NewtonOptions()
+    found = newton.solve(fine, omega, x, replace(options, tolerance=max(SETTLED * left, options.tolerance)))
+    if not found.converged:  # too far off to be a start
+        found = newton.solve_from_rest(fine, omega)
+    if not found.converged:
+        return float("inf")
     dynamic = balance.basis.order > 0
-    size = np.linalg.norm(balance.outputs(here)[:, dynamic], axis=1)
-    change = np.linalg.norm(moved[:, dynamic], axis=1)
+    moved = fine.outputs(found.state)[:, dynamic]
+    size, change = (np.linalg.norm(y, axis=1) for y in (moved, moved - balance.outputs(here)[:, dynamic]))
     floor = 1e-2 * size.max(initial=0.0)  # a quiet output is measured against the liveliest one
     return float((change / np.maximum(size, floor)).max()) if floor > 0 else 0.0

@@ -18,7 +18,9 @@ import scipy.linalg as sla
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.newton import NewtonOptions, Solution
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
 
 DECADES = 13  # by which the springs are softened at most
@@ -37,8 +39,9 @@ def solve_along_stiffness(balance: HarmonicBalance, omega: float, options: Newto
     if balance.n_unknown > newton.MOST_DENSE:
         return None
     left = MOST_STEPS
+    soft = None
     for decade in range(DECADES + 1):
-        soft = _softened(balance, -float(decade))
+        soft = _softened(balance, -float(decade), soft)
         found, steps = _damped(soft, omega, soft.stuck(omega), options)
         left -= steps
         if found is not None:
@@ -51,10 +54,10 @@ def solve_along_stiffness(balance: HarmonicBalance, omega: float, options: Newto
     before: tuple[float, np.ndarray] | None = None
     while level < 0 and stride > SHORTEST and left > 0:
         target = min(0.0, level + stride)
-        stiffer = _softened(balance, target)
+        soft = _softened(balance, target, soft)
         starts = [x] if before is None else [x + (x - before[1]) * (target - level) / (level - before[0]), x]
         for start in starts:
-            found, steps = _damped(stiffer, omega, start, options)
+            found, steps = _damped(soft, omega, start, options)
             left -= steps
             if found is not None:
                 break
@@ -64,10 +67,11 @@ def solve_along_stiffness(balance: HarmonicBalance, omega: float, options: Newto
             before, level, x, stride = (level, x), target, found.x, GROWTH * stride
     if level < 0:
         return None
-    solution = newton.solve(balance, omega, x, options)
-    if not solution.converged or _rounded(balance, solution.state) > FORCE_KNOWN:
+    state = balance.evaluate(omega, x)
+    error = newton.relative_residual(state, balance.x_lin(omega))
+    if error > options.tolerance or _rounded(balance, state) > FORCE_KNOWN:
         return None
-    return replace(solution, steps=solution.steps + MOST_STEPS - left)
+    return Solution(state, CONVERGED, MOST_STEPS - left, 0, (error,))
 
 
 def _rounded(balance: HarmonicBalance, state: State) -> float:
@@ -78,15 +82,27 @@ def _rounded(balance: HarmonicBalance, state: State) -> float:
     return max((float(change / size) for change, size in sizes if size > 0), default=0.0)
 
 
-def _softened(balance: HarmonicBalance, level: float) -> HarmonicBalance:
-    """The same problem with all contact springs times ten to the level."""
-    if level == 0.0:
-        return balance
-    contact = balance.contact.with_parameters(lambda p: replace(p, stiffness=p.stiffness * 10.0**level))
-    made = HarmonicBalance.of(
-        balance.model, contact.joints, balance.basis, balance.excitation, balance.omega_max, balance.memory
-    )
-    return replace(made, load_factor=balance.load_factor)
+def _softened(balance: HarmonicBalance, level: float, other: HarmonicBalance | None) -> HarmonicBalance:
+    """The same problem with no contact spring stiffer than the stiffest times ten to the level.
+
+    other : one of another level, whose linear side it shares where that is the same
+    """
+    most = float(balance.contact.stiffness.max()) * 10.0**level
+    contact = balance.contact.with_parameters(lambda p: replace(p, stiffness=np.minimum(p.stiffness, most)))
+    residual = balance.model.residual  # made with springs of its own
+    reference = np.minimum(contact.stiffness, _of_the_body(balance)) if residual is None else residual.stiffness
+    if other is not None and np.array_equal(other.reference_stiffness, reference.ravel()):
+        return other.with_contact(contact)
+    compliance = ContactCompliance(balance.model, reference, balance.basis, balance.excitation, balance.omega_max)
+    return replace(balance, contact=contact, compliance=compliance, at_rest=None)
+
+
+def _of_the_body(balance: HarmonicBalance) -> np.ndarray:
+    """(n_pair, n_component) stiffness of the body against a contact displacement with all others held [N/m]."""
+    system, b = balance.model.at_harmonic(balance.basis.harmonics[-1])
+    b = np.asarray(b)
+    against: np.ndarray = np.einsum("ij,jk,ik->i", b, np.asarray(system.stiffness), b.conj(), optimize=True).real
+    return (against / (np.abs(b) ** 2).sum(axis=1) ** 2).reshape(balance.contact.stiffness.shape)
 
 
 def _damped(

@@ -226,6 +226,47 @@ def test_friction_proportional_to_the_motion():
         np.testing.assert_allclose(cycle.force[0, 0], 0.5 * cycle.force[0, 1], atol=1e-14)
 
 
+@pytest.mark.parametrize("stiffness", [1e8, 1e11, 1e14])
+def test_a_touch_of_a_thousandth_of_the_cycle_is_known_to_many_digits(stiffness: float) -> None:
+    """What a stiff spring pushes is a small difference of what it would over the whole cycle; friction far less yet.
+
+    Against Gauss's rule in extended precision: stick from the touch on, slip shortly before the end of it.
+    """
+    a, u1, u2, kt, mu = 5e-5, -1.7e-5, -2e-7, 2e5, 0.4
+    deep = (10 * np.sqrt(a) / stiffness) ** (2 / 3)
+    x = np.array([[[0.0, u1, u2], [deep - a, a, 0.0]]])
+    basis = HarmonicBasis((0, 1), 64, "located")
+    law = contact_law.load("jenkins")
+    p = ContactParameters.of(("t1", "n"), [[kt, stiffness]], friction=mu)
+    found = aft.cycle(law, x, p, basis).force[0]
+
+    far = np.longdouble
+    c0, c1 = far(stiffness) * far(x[0, 1, 0]), far(stiffness) * far(a)
+    end = np.arccos(-c0 / c1)
+
+    def load(t):
+        return c0 + c1 * np.cos(t)
+
+    def pull(t):  # of the stick that begins with the touch
+        return far(kt) * (far(u1) * (np.cos(t) - np.cos(end)) + far(u2) * (np.sin(t) + np.sin(end)))
+
+    left, right = far(0), end  # u falls after the touch at -end and rises again: it slips where |T| reaches mu N
+    for _ in range(80):
+        middle = (left + right) / 2
+        left, right = (middle, right) if abs(pull(middle)) < mu * load(middle) else (left, middle)
+    points, weights = (v.astype(far) for v in np.polynomial.legendre.leggauss(30))
+
+    def coefficients(f, start, stop):
+        t = start + (stop - start) / 2 * (1 + points)
+        value = f(t) * weights * (stop - start) / 2 / far(np.pi)
+        return np.array([value.sum() / 2, (value * np.cos(t)).sum(), (value * np.sin(t)).sum()])
+
+    stick, slip = coefficients(pull, -end, left), coefficients(lambda t: mu * load(t), left, end)
+    friction = stick + np.sign(pull(left)) * slip
+    for ours, exact in zip(found, (friction, coefficients(load, -end, end)), strict=True):
+        np.testing.assert_allclose(ours, exact.astype(float), atol=1e-8 * float(abs(exact).max()))
+
+
 @cases(150)
 @given(
     st.lists(st.floats(-1, 1, allow_subnormal=False), min_size=9, max_size=9),

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.continuation.stiffening import solve_along_stiffness
-from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.workflows.benchmarks.extremes_march import held
-from tribodyn.workflows.benchmarks.extremes_models import lattice
+from tribodyn.workflows.benchmarks.extremes_models import Setting, lattice
 
 
 @pytest.mark.parametrize(("stiffness", "transitions"), [(1e10, "sampled"), (1e12, "located")])
@@ -24,8 +25,24 @@ def test_a_stiff_contact_that_lifts_is_solved(stiffness: float, transitions: str
     solution = arc_length.solve_along_load(balance, omega)
     assert solution.converged
     assert solution.products == 0  # directions of the dense Jacobian: it was solved by stiffening
-    state = solution.state
-    assert {4, 7} <= set(state.cycle.status.tolist())
+    assert {4, 7} <= set(solution.state.cycle.status.tolist())
+    _holds(balance, setting, solution)
+
+
+@pytest.mark.parametrize("changes", [{"tangential": 1e15}, {"normal": 1e15}], ids=str)
+def test_springs_stiff_one_way_alone_are_solved(changes: dict[str, float]) -> None:
+    """The soft ones keep their own stiffness on the way; normal ones touch for a thousandth of the cycle."""
+    body = lattice(3, 3)
+    setting = replace(body.ordinary, **changes)
+    balance = body.balance(setting)
+    solution = solve_along_stiffness(balance, setting.omega, NewtonOptions())
+    assert solution is not None
+    _holds(balance, setting, solution)
+
+
+def _holds(balance: HarmonicBalance, setting: Setting, solution: Solution) -> None:
+    """The motion of the free structure under the contact forces, and the forces of a march of its own."""
+    state, omega = solution.state, setting.omega
     system, b = balance.model.system, np.asarray(balance.model.interface.B)
     force, x = (balance.basis.to_complex(a.reshape(len(b), -1)) for a in (state.cycle.force, state.x))
     loads = [setting.preload * system.loads["press"], setting.force * system.loads["shake"]]

@@ -45,7 +45,7 @@ def lines(result: Result) -> list[tuple[str, str]]:
     for entry in entries:
         if entry.error is None:
             value = f"unknown: {entry.by}"
-        elif entry.source == "wear steps" and entry.error >= UNKNOWN:
+        elif entry.source in ("samples", "wear steps") and entry.error >= UNKNOWN:
             value = f"above {UNKNOWN:.0%} of {entry.quantity}: no {entry.quantity} can be stated ({entry.by})"
         else:
             value = f"{entry.error:.1e} of {entry.quantity} ({entry.by})"
