@@ -1,12 +1,25 @@
-"""Floquet exponents from the linearised time steps of an integrated periodic motion."""
+"""Floquet exponents from the linearised time steps of an integrated periodic motion.
+
+Of large models the largest multiplier alone, by Arnoldi's method on differences of marched periods.
+Source  Newton-Krylov shooting and its multipliers: Sanchez, Net, Garcia-Archilla and Simo 2004
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.contact.law import STICKS
+from tribodyn.hbm.time.period_search import DIFFERENCE, PeriodSearch
 from tribodyn.hbm.time.time_integration import Options, PeriodicMotion, TimeStepper, integrate
 
+GROWTH = 1e-3  # of a perturbation over a period, below which the multipliers of so many steps cannot tell it from none
+ACCURACY = 5e-3  # of the largest multiplier of a large model, where it is above 1
+FEWEST_PRODUCTS, MOST_PRODUCTS = 12, 60  # periods marched for it
+DENSE = 400  # state variables up to which the largest multiplier is taken from the whole monodromy matrix
 MAX_STATES = 900  # up to which the monodromy matrix is formed, whose eigenvalues are dense work
 LEAST_MULTIPLIER = 1e-10  # smaller ones belong to the time stepping, not to the structure
 
@@ -27,6 +40,54 @@ def exponents(balance: HarmonicBalance, state: State, options: Options | None = 
     multipliers = np.linalg.eigvals(monodromy(stepper, motion))
     multipliers = multipliers[np.abs(multipliers) > LEAST_MULTIPLIER]
     return np.log(multipliers.astype(complex)) * state.omega / (2 * np.pi)
+
+
+def largest(balance: HarmonicBalance, state: State, options: Options | None = None) -> float:
+    """Modulus of the largest multiplier of the periodic motion near a balance state.
+
+    Sliders that never move do not count. Of a large model, one that is below 1 in any case need not be exact
+    Raises  ValueError where no periodic motion is found near the state, or it has no equation of motion in time
+    """
+    options = options or Options()
+    stepper = TimeStepper(balance, state.omega, options)
+    if _size(stepper) <= DENSE:
+        growth = exponents(balance, state, options).real * 2 * np.pi / state.omega
+        return float(np.exp(growth.max(initial=-np.inf)))
+    search = PeriodSearch(stepper, replace(options, accelerate=True), False)
+    period = search.mix(stepper.start_from(state))
+    if period.drift > options.tolerance:
+        raise ValueError(f"no periodic motion near this state: drift {period.drift:.1e} at least")
+    plain = PeriodSearch(stepper, replace(options, accelerate=False, max_periods=1 + MOST_PRODUCTS), False)
+    base = plain.step(period.end)
+    size = DIFFERENCE * float(np.linalg.norm(base.start))
+    moves = np.ones(len(base.start), bool)
+    moves[2 * stepper.n_dynamic :] = np.repeat(period.record.bits != STICKS, balance.memory.shape[1])
+
+    def product(v: np.ndarray) -> np.ndarray:
+        there = plain.step(plain.vector.unpack(base.start + size * v, period.end))
+        return np.where(moves, (there.image - base.image) / size, 0.0)
+
+    return _largest_ritz(product, np.where(moves, np.random.default_rng(0).normal(size=len(moves)), 0.0))
+
+
+def _largest_ritz(product: Callable[[np.ndarray], np.ndarray], start: np.ndarray) -> float:
+    """Modulus of the largest eigenvalue of a map, by Arnoldi's method; of one below 1 a bound is enough."""
+    v = [start / np.linalg.norm(start)]
+    h = np.zeros((MOST_PRODUCTS + 1, MOST_PRODUCTS))
+    for k in range(1, MOST_PRODUCTS + 1):
+        w = product(v[-1])
+        for i in (*range(k), *range(k)):  # twice: the basis loses its right angles otherwise
+            share = v[i] @ w
+            h[i, k - 1] += share
+            w = w - share * v[i]
+        h[k, k - 1] = np.linalg.norm(w)
+        values, vectors = np.linalg.eig(h[:k, :k])
+        top = int(np.argmax(np.abs(values)))
+        found, miss = float(np.abs(values[top])), float(h[k, k - 1] * np.abs(vectors[-1, top]))
+        if miss <= ACCURACY * found or (k >= FEWEST_PRODUCTS and found + miss < 1):
+            return found
+        v.append(w / h[k, k - 1])
+    raise ValueError(f"the largest multiplier did not converge: {found:.3g}, off by up to {miss:.1g}")
 
 
 def size(balance: HarmonicBalance, omega: float, options: Options | None = None) -> int:

@@ -29,13 +29,18 @@ SHORTEST = 1 / 64  # share of a Newton step
 
 @dataclass(frozen=True)
 class Period:
-    """A period that was marched: state vectors before and after it, what moves after it, its record and cost."""
+    """A period that was marched: state vectors before and after it, what moves after it, its record and cost.
+
+    size : of the vibration, as the root of an energy like the length of a state vector
+    drift : change of the state over the period, relative to that
+    """
 
     start: np.ndarray
     image: np.ndarray
     end: Moving
     record: Record
     rounds: int
+    size: float
     drift: float
 
 
@@ -96,7 +101,7 @@ class PeriodSearch:
             end = end._replace(memory=self.stepper.memory_of(record.x))
         z, image = self.vector.pack(motion), self.vector.pack(end)
         change = float(np.linalg.norm(image - z))
-        self._last = Period(z, image, end, record, rounds, change / speed if speed > 0 else change)
+        self._last = Period(z, image, end, record, rounds, speed, change / speed if speed > 0 else change)
         self.periods += 1
         if self.periods == 1 or self._last.drift < PROGRESS * self.best.drift:
             self.best, self._best_at = self._last, self.periods
@@ -143,6 +148,17 @@ class StateVector:
 
     def pack(self, m: Moving) -> np.ndarray:
         return self._weight * np.concatenate([m.z, m.memory.ravel()])
+
+    def apart(self, a: np.ndarray, b: np.ndarray) -> float:
+        """Distance of two state vectors, what the sliders keep left out."""
+        n = 2 * self._stepper.n_dynamic
+        return float(np.linalg.norm((a - b)[:n]))
+
+    def pushed(self, vector: np.ndarray, length: float) -> np.ndarray:
+        """A state vector with a push of all modes alike, the same each time."""
+        n = 2 * self._stepper.n_dynamic
+        push = np.random.default_rng(0).normal(size=n)
+        return vector + np.concatenate([push * (length / np.linalg.norm(push)), np.zeros(len(vector) - n)])
 
     def unpack(self, vector: np.ndarray, near: Moving) -> Moving:
         z, memory = np.split(vector / self._weight, [len(near.z)])

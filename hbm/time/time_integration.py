@@ -10,6 +10,7 @@ the march begins; what is returned is always one plainly integrated period toget
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -126,10 +127,17 @@ class TimeStepper:
         the others follow statically, so that all of them count and the more of them move the finer the steps are
     lam, damping : of the modes that move, (n_dynamic,) and (n_dynamic, n_dynamic), with unit modal mass
     linear, contact : see `time_step`; static : (n_contact, n_contact) compliance W of the modes that follow
+    modes : of the structure without contact, where another stepper of the same model has them already
     Raises  ValueError for models whose harmonics see different systems, or whose mass matrix is singular
     """
 
-    def __init__(self, balance: HarmonicBalance, omega: float, options: Options):
+    def __init__(
+        self,
+        balance: HarmonicBalance,
+        omega: float,
+        options: Options,
+        modes: tuple[np.ndarray, np.ndarray] | None = None,
+    ):
         model = balance.model
         model.require_masters("time integration")
         if model.per_harmonic is not None:
@@ -139,7 +147,8 @@ class TimeStepper:
             )
         self.balance, self.omega, self.options = balance, omega, options
         system = model.system
-        lam, phi = _free_modes(system)
+        self.modes = modes or _free_modes(system)
+        lam, phi = self.modes
         self.h = 2 * np.pi / omega / options.steps
         m = self.n_dynamic = max(1, int(np.sum(lam < (RESOLVED / self.h) ** 2)))
         self.lam, moving, rest = lam[:m], phi[:, :m], phi[:, m:] / np.sqrt(lam[m:])
@@ -172,14 +181,24 @@ class TimeStepper:
             np.ascontiguousarray(samples @ self.rest.T), np.ascontiguousarray(samples @ output_rest.T),
         )  # fmt: skip
         compliance = 0.5 * U @ (Q[:m] @ U.T) + self.static
-        joint = balance.contact.merged("time integration")
-        components = joint.parameters.components
-        normal = components.index("n") if "n" in components else -1
         symmetric = system.gyroscopic is None and system.circulatory is None
         compliance = 0.5 * (compliance + compliance.T) if symmetric else compliance.T
-        compliance = np.ascontiguousarray(compliance)
+        self._meet(np.ascontiguousarray(compliance))
+
+    def _meet(self, compliance: np.ndarray) -> None:
+        """Take up the contact of the balance; compliance : of a step, as in `time_step.Contact`."""
+        joint = self.balance.contact.merged("time integration")
+        components = joint.parameters.components
+        normal = components.index("n") if "n" in components else -1
         self.contact = time_step.Contact(joint.parameters.packed(), joint.parameters.gap, normal, compliance)
         self.law = compiled_law.pointer(joint.module.step)
+
+    def worn(self, balance: HarmonicBalance) -> TimeStepper:
+        """The same for a balance that differs in its gaps alone."""
+        other = copy(self)
+        other.balance = balance
+        other._meet(self.contact.A)
+        return other
 
     def _load(self, n: int) -> np.ndarray:
         """(n, n_coeff) coefficients of the loads."""
@@ -361,8 +380,8 @@ def leave_alone(
     motion = stepper.start_from(begin)
     for _ in range(periods):
         found = search.step(motion)
+        seen = _of_sector(balance, motion_of(stepper, found, search.periods, CONVERGED, motion))
         motion = found.end
-        seen = _of_sector(balance, _result(stepper, found, search.periods, CONVERGED))
         energy.append(float(seen.energy.sum()))
         amplitude.append(np.sqrt(2 * seen.outputs.var(axis=1)))
     late, swing = np.array(energy[periods // 2 :]), np.array(amplitude[periods // 2 :])
@@ -416,19 +435,32 @@ def _to_periodic(stepper: TimeStepper, motion: Moving, options: Options, with_sl
     search = PeriodSearch(stepper, options, with_slopes)
     found = search.mix(motion) if options.accelerate else search.march(motion)
     if found.drift <= options.tolerance:
-        return _result(stepper, found, search.periods, CONVERGED)
+        return motion_of(stepper, found, search.periods, CONVERGED)
     hint = "; is the motion stable there?" if search.periods < options.max_periods else ""
     smallest = search.best.drift
     outcome = SolveEnd.NOT_PERIODIC.say(
         f" {search.periods} periods: drift {found.drift:.1e}, smallest {smallest:.1e}{hint}"
     )
-    return _result(stepper, found, search.periods, outcome)
+    return motion_of(stepper, found, search.periods, outcome)
 
 
-def _result(stepper: TimeStepper, period: Period, periods: int, outcome: Outcome[SolveEnd]) -> PeriodicMotion:
+def motion_of(
+    stepper: TimeStepper,
+    period: Period,
+    periods: int,
+    outcome: Outcome[SolveEnd],
+    start: Moving | None = None,
+) -> PeriodicMotion:
+    """What one marched period shows.
+
+    periods, outcome : as of the `PeriodicMotion`
+    start : what moved before it, of a motion that does not repeat itself, where the work of the first step counts from
+    """
     record = period.record
     components = stepper.balance.contact.components
     before = np.roll(record.x, 1, axis=0), np.roll(record.f, 1, axis=0)
+    if start is not None:
+        before[0][0], before[1][0] = start.x, start.f
     work = 0.5 * ((record.f + before[1]) * (record.x - before[0])).sum(axis=0)
     work = work[:, stepper.balance.contact.tangential].sum(axis=1)
     preload = float(record.f[:, :, components.index("n")].mean(axis=0).sum()) if "n" in components else 0.0

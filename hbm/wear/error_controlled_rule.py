@@ -35,10 +35,10 @@ from tribodyn.hbm.wear.evolution import (
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, WearRow, history, rows_to_resume
 from tribodyn.hbm.wear.implicit_stage import WearingBalance
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
+from tribodyn.hbm.wear.step_control import STEP_RATIO_LIMITS, Tolerance, growth, local_error
 
 GAMMA = 1 - 1 / np.sqrt(2)
 TURN = 2 * np.pi
-STEP_RATIO_LIMITS = (0.2, 3.0)  # limits of the ratio of one step to the one before
 ERROR_TREND_POWER = 0.2  # power with which an error that grows from step to step holds the next one back
 # shares of an event's preload between which a step that would pass the event must end: just below it, so that the next
 # step starts beyond it
@@ -61,14 +61,6 @@ UNKNOWN_SLOPE = -1.0
 # largest moves of the frequency, relative: with a slope that is known, with one that is not, over the move before
 MOST_MOVED, FIRST_MOVED, FURTHER_MOVED = 0.03, 1e-3, 4.0
 GAIN_ACCURACY = 1e-9  # of the depth, for laws whose depth per work is not constant
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """share : local error allowed per step, of the depth scale and of the cycles passed; scale : depth scale [m]."""
-
-    share: float
-    scale: float
 
 
 @single
@@ -205,7 +197,9 @@ def _step_of(
         if lost:
             error, longest = np.inf, stride
         else:
-            error = _error(problem, tolerance, state, stride, first, second)
+            deviation = (1 - GAMMA) * stride * (first.rate - second.rate)
+            worn = second.depth - state.depth
+            error = local_error(tolerance, problem.area, deviation, worn, stride, second.cycles)
         if error <= 1.0:
             preload = problem.preload(second.points[0].state)
             if preload >= EVENT_WINDOW[0] * target:
@@ -228,7 +222,7 @@ def _step_of(
         elif jumped is not None:
             break
         else:
-            stride = min(stride * _growth(error), 0.5 * longest if lost else np.inf)
+            stride = min(stride * growth(error), 0.5 * longest if lost else np.inf)
         if stride < ((leap if last else 10 * leap) if lost else smallest):
             return _Lost(second.failure or (SHIFTED if lost else None), solves)
     if jumped is not None:
@@ -236,7 +230,7 @@ def _step_of(
     worn = second.depth - state.depth
     work = stride * ((1 - GAMMA) * first.work + GAMMA * second.work)
     trend = (rows[-1].step_error / error) ** ERROR_TREND_POWER if rows and error > 0 else 1.0
-    ratio = float(np.clip(_growth(error) * min(trend, 1.0), *STEP_RATIO_LIMITS))
+    ratio = float(np.clip(growth(error) * min(trend, 1.0), *STEP_RATIO_LIMITS))
     plan = np.array([stride * ratio, *slopes])
     if higher is not None:
         second, plan = worn_state(searched, second.depth, second.cycles, higher, 0), np.zeros(1 + len(slopes))
@@ -458,19 +452,3 @@ class _Search:
                 return 0.5 * (low + high)
             return trial
         return float(np.clip(trial, (1 - reach) * omega, (1 + reach) * omega))
-
-
-def _error(
-    problem: WearProblem, tolerance: Tolerance, state: WearState, stride: float, first: WearState, second: WearState
-) -> float:
-    """Local error over the tolerance: of the deepest deviation, and of the cycles that the same volume takes."""
-    deviation = (1 - GAMMA) * stride * (first.rate - second.rate)
-    on_depth = np.abs(deviation).max() / tolerance.scale
-    volume = float(problem.area @ (second.depth - state.depth))
-    on_life = abs(float(problem.area @ deviation)) / volume * stride / second.cycles if volume > 0 else 0.0
-    return float(max(on_depth, on_life) / tolerance.share)
-
-
-def _growth(error: float) -> float:
-    """Ratio of the next step to this one by the second order of the error, with a margin."""
-    return float(np.clip(0.85 / np.sqrt(max(error, 1e-10)), *STEP_RATIO_LIMITS))

@@ -142,6 +142,7 @@ if TYPE_CHECKING:
         trade,
         verify,
         verify_wear,
+        wear_in_time,
     )
     from tribodyn.workflows.designs.optimum import Optimum
     from tribodyn.workflows.designs.table import StudyTable
@@ -278,6 +279,7 @@ _HOME |= dict.fromkeys(
         "vary",
         "verify_in_time",
         "wear",
+        "wear_in_time",
         "wear_mistuned",
         "worn",
         "write_mistuned",
@@ -309,6 +311,7 @@ _HOME |= dict.fromkeys(
         "trade",
         "verify",
         "verify_wear",
+        "wear_in_time",
     ),
     ("tribodyn.workflows.api.whole_scenes",),
 )
@@ -450,6 +453,7 @@ __all__ = [
     "verify_in_time",
     "verify_wear",
     "wear",
+    "wear_in_time",
     "wear_law",
     "wear_laws",
     "wear_mistuned",

@@ -23,6 +23,7 @@ from tribodyn.hbm.linear.expansion import Expansion
 from tribodyn.hbm.time import time_integration, verify
 from tribodyn.hbm.time.time_integration import Options
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
+from tribodyn.hbm.wear.step_control import Tolerance
 from tribodyn.workflows.benchmarks.extremes_models import lattice, rigid
 
 
@@ -146,7 +147,7 @@ def test_the_error_of_a_wear_step_is_its_distance_from_an_implicit_euler_step() 
     """depth + h rate(after) is of first order: from the step of second order it is off by the first one's error."""
     share, scale = 0.01, 1e-5
     problem = wear_problem()
-    history = error_controlled_rule.evolve(problem, error_controlled_rule.Tolerance(share, scale), 4)
+    history = error_controlled_rule.evolve(problem, Tolerance(share, scale), 4)
     rate = 1e-9 * history.energy / problem.area
     for now in range(3):
         off = history.worn[now] - history.cycles_in_step[now] * rate[now + 1]

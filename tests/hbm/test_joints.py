@@ -24,6 +24,7 @@ from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import Duty
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.step_control import Tolerance
 from tribodyn.reduction.model import ReducedModel
 
 OMEGA = 420.0
@@ -208,7 +209,7 @@ def test_joints_wear_by_their_own_laws(rule: str) -> None:
     def worn(problem: object) -> np.ndarray:
         if rule == "thesis":
             return thesis_rule.evolve(problem, 5e-7, max_steps=6).depth[-1]
-        return error_controlled_rule.evolve(problem, error_controlled_rule.Tolerance(0.05, 2e-4), max_steps=4).depth[-1]
+        return error_controlled_rule.evolve(problem, Tolerance(0.05, 2e-4), max_steps=4).depth[-1]
 
     one = worn(whole)
     assert np.all(one > 0)

@@ -16,12 +16,13 @@ from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.even_wear import depth_to_loss
 from tribodyn.hbm.wear.evolution import WearProblem
 from tribodyn.hbm.wear.history import WearHistory
+from tribodyn.hbm.wear.step_control import Tolerance
 
 
 def worn(problem: WearProblem, rule: str, max_steps: int = 10_000, resume: WearHistory | None = None) -> WearHistory:
     if rule == "thesis":
         return thesis_rule.evolve(problem, 2e-6, max_steps, None, resume)
-    return error_controlled_rule.evolve(problem, error_controlled_rule.Tolerance(0.05, 1e-5), max_steps, None, resume)
+    return error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-5), max_steps, None, resume)
 
 
 @pytest.fixture(scope="module")

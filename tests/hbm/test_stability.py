@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.helpers.verification_models import oscillator, random_structure
+from tests.helpers.three_pairs import FLIPS_AT, three_pairs
+from tests.helpers.verification_models import oscillator
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
@@ -21,29 +22,19 @@ from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.time_integration import Options, TimeStepper
 from tribodyn.reduction.model import ReducedModel
 
-OMEGA = 305.3
-
-
-def balance_of(friction: float, static: float, shaker: float, top: int) -> HarmonicBalance:
-    model = random_structure(3)
-    parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(3e6, 5e6), friction=friction)
-    excitation = Excitation.of({"static": static}, {1: {"shaker": shaker}})
-    basis = HarmonicBasis(tuple(range(top + 1)), 512)
-    return HarmonicBalance.of(model, Joint("contact", "jenkins", parameters), basis, excitation, 1.2 * OMEGA)
-
 
 @pytest.mark.parametrize(("method", "smallest", "error"), [("hill", 0.0, 1e-9), ("floquet", 0.5, 0.02)])
 def test_exponents_of_a_stuck_contact_are_eigenvalues(method, smallest, error):
-    balance = balance_of(friction=1e9, static=0.0, shaker=1.0, top=3)
+    balance = three_pairs(friction=1e9, static=0.0, shaker=1.0, top=3)
     balance = balance.with_gap(np.full(3, -1e-4))  # pressed together by interference
-    solution = newton.solve_from_rest(balance, OMEGA)
+    solution = newton.solve_from_rest(balance, FLIPS_AT)
     assert np.all(solution.state.cycle.status == 1)
     system, b = balance.model.system, np.asarray(balance.model.interface.B)
     stiffness = system.stiffness + b.T @ (balance.contact.stiffness.ravel()[:, None] * b)
     n = len(stiffness)
     inverse = np.linalg.inv(system.mass)
     first_order = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiffness, -inverse @ system.damping]])
-    expected = np.exp(np.linalg.eigvals(first_order) * 2 * np.pi / OMEGA)
+    expected = np.exp(np.linalg.eigvals(first_order) * 2 * np.pi / FLIPS_AT)
     result = stability(balance, solution.state, method, n_modes=n)
     assert result.stable
     assert len(result.exponents) == 2 * n
@@ -52,26 +43,26 @@ def test_exponents_of_a_stuck_contact_are_eigenvalues(method, smallest, error):
 
 
 def test_modes_left_out_of_hill_follow_statically():
-    balance = balance_of(friction=0.3, static=30.0, shaker=60.0, top=5)
-    state = newton.solve_from_rest(balance, OMEGA).state
+    balance = three_pairs(friction=0.3, static=30.0, shaker=60.0, top=5)
+    state = newton.solve_from_rest(balance, FLIPS_AT).state
     few, all_modes = stability(balance, state, n_modes=8), stability(balance, state, n_modes=13)
     assert len(few.exponents) == 16
     assert few.exponents[0].real == pytest.approx(all_modes.exponents[0].real, rel=0.01)
 
 
 def test_monodromy_with_friction_is_the_finite_difference_of_the_period_map():
-    balance = balance_of(friction=0.3, static=30.0, shaker=60.0, top=7)
-    state = newton.solve_from_rest(balance, OMEGA).state
+    balance = three_pairs(friction=0.3, static=30.0, shaker=60.0, top=7)
+    state = newton.solve_from_rest(balance, FLIPS_AT).state
     options = Options(steps=256, tolerance=1e-11)
-    stepper = TimeStepper(balance, OMEGA, options)
-    motion = time_integration.integrate(balance, OMEGA, state, options, with_slopes=True)
+    stepper = TimeStepper(balance, FLIPS_AT, options)
+    motion = time_integration.integrate(balance, FLIPS_AT, state, options, with_slopes=True)
     exact = np.linalg.eigvals(monodromy(stepper, motion))
     start = stepper.start_from(state)
     for _ in range(300):
         start, record, _, _ = stepper.period(start)
     assert np.all(record.bits == 7)
     n = stepper.n_dynamic
-    unit = np.repeat([1 / OMEGA, stepper.h, 1 / OMEGA], [n, n, start.memory.size])
+    unit = np.repeat([1 / FLIPS_AT, stepper.h, 1 / FLIPS_AT], [n, n, start.memory.size])
 
     def end_of(change: np.ndarray) -> np.ndarray:
         z, memory = np.split(unit * change, [2 * n])
@@ -88,8 +79,8 @@ def test_monodromy_with_friction_is_the_finite_difference_of_the_period_map():
 
 
 def test_hill_and_floquet_agree_on_a_flip_from_which_a_plain_march_departs():
-    balance = balance_of(friction=0.0, static=30.0, shaker=60.0, top=15)
-    state = newton.solve_from_rest(balance, OMEGA).state
+    balance = three_pairs(friction=0.0, static=30.0, shaker=60.0, top=15)
+    state = newton.solve_from_rest(balance, FLIPS_AT).state
     assert np.all(state.cycle.status == 6)
     hill, floquet = stability(balance, state), stability(balance, state, "floquet")
     assert not hill.stable
@@ -97,8 +88,8 @@ def test_hill_and_floquet_agree_on_a_flip_from_which_a_plain_march_departs():
     assert hill.crossing == floquet.crossing == "flip"
     np.testing.assert_allclose(hill.multipliers[0], floquet.multipliers[0], rtol=0.01)
     np.testing.assert_allclose(hill.exponents[:7].real, floquet.exponents[:7].real, rtol=0.03)
-    plain = time_integration.integrate(balance, OMEGA, state, Options(accelerate=False, max_periods=60))
-    mixed = time_integration.integrate(balance, OMEGA, state, Options())
+    plain = time_integration.integrate(balance, FLIPS_AT, state, Options(accelerate=False, max_periods=60))
+    mixed = time_integration.integrate(balance, FLIPS_AT, state, Options())
     assert str(plain.outcome).startswith("not periodic")
     assert mixed.outcome == CONVERGED
 

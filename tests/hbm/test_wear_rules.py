@@ -29,6 +29,7 @@ from tribodyn.hbm.wear.evolution import Duty, WearProblem, assess
 from tribodyn.hbm.wear.history import WearHistory, cycles_to_preload
 from tribodyn.hbm.wear.implicit_stage import WearingBalance
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.step_control import Tolerance
 from tribodyn.workflows.scene import scene_file
 
 
@@ -89,7 +90,7 @@ def test_wear_inside_the_balance_has_the_derivative_of_finite_differences(proble
 def test_error_controlled_rule_converges_with_its_tolerance(problem: WearProblem, fine: WearHistory) -> None:
     errors = []
     for share in (0.1, 0.01):
-        worn = error_controlled_rule.evolve(problem, error_controlled_rule.Tolerance(share, 2e-4))
+        worn = error_controlled_rule.evolve(problem, Tolerance(share, 2e-4))
         assert problem.area @ worn.depth[-1] == pytest.approx(1e-9 * worn.work.sum(), rel=1e-12)
         errors.append(abs(life(worn) / life(fine) - 1))
         assert np.all(np.diff(worn.depth, axis=0) >= 0)
@@ -103,7 +104,7 @@ def test_a_resumed_run_ends_in_the_same_bits(problem: WearProblem, kind: str) ->
     def run(resume=None, max_steps=10000):
         if kind == "thesis":
             return thesis_rule.evolve(problem, 2e-6, max_steps, None, resume)
-        tolerance = error_controlled_rule.Tolerance(0.05, 1e-5)
+        tolerance = Tolerance(0.05, 1e-5)
         return error_controlled_rule.evolve(problem, tolerance, max_steps, None, resume)
 
     whole = run()
@@ -149,7 +150,7 @@ def test_error_controlled_missions_equal_the_finest_thesis_run(problem: WearProb
     mission = (Duty(AtFrequency("tip", 420.0), 0.4), Duty(AtPeak("tip", 250.0, 1200.0), 0.6, load=0.7))
     mixed = wear_problem(mission=mission, lost_below=0.02)
     fine = thesis_rule.evolve(mixed, 1.5e-6)
-    worn = error_controlled_rule.evolve(mixed, error_controlled_rule.Tolerance(0.02, 2e-4))
+    worn = error_controlled_rule.evolve(mixed, Tolerance(0.02, 2e-4))
     assert str(worn.end).startswith("preload fell")
     assert life(worn) == pytest.approx(life(fine), rel=0.01)
     assert len(worn.cycles) < len(fine.cycles) / 3  # on four pairs a search for a higher peak outweighs twenty steps
@@ -159,7 +160,7 @@ def test_error_controlled_missions_equal_the_finest_thesis_run(problem: WearProb
 def test_error_controlled_rule_takes_laws_whose_depth_per_work_changes(law: str) -> None:
     other = wear_problem(wear=JointWear.of(law, coefficient=4e-10))
     fine = thesis_rule.evolve(other, 1.5e-6)
-    worn = error_controlled_rule.evolve(other, error_controlled_rule.Tolerance(0.02, 2e-4))
+    worn = error_controlled_rule.evolve(other, Tolerance(0.02, 2e-4))
     assert life(worn) == pytest.approx(life(fine), rel=0.01)
 
 
@@ -167,10 +168,10 @@ def test_a_law_file_of_ones_own_is_taken_by_both_rules() -> None:
     law = str(scene_file.CASES / "beam" / "running_in.py")
     own = wear_problem(wear=JointWear.of(law, coefficient=4e-10))
     fine = thesis_rule.evolve(own, 1.5e-6)
-    worn = error_controlled_rule.evolve(own, error_controlled_rule.Tolerance(0.02, 2e-4))
+    worn = error_controlled_rule.evolve(own, Tolerance(0.02, 2e-4))
     assert life(worn) == pytest.approx(life(fine), rel=0.015)
     plain_problem = wear_problem(wear=JointWear.of("energy", coefficient=4e-10))
-    plain = error_controlled_rule.evolve(plain_problem, error_controlled_rule.Tolerance(0.02, 2e-4))
+    plain = error_controlled_rule.evolve(plain_problem, Tolerance(0.02, 2e-4))
     assert 0.25 * life(plain) < life(worn) < life(plain)  # a fresh face wears four times as fast
 
 
@@ -211,7 +212,7 @@ def test_events_are_where_the_penetration_of_a_pair_changes_its_sign(problem: We
             assert lost[0] == pytest.approx(k, abs=1)
         elif not np.isfinite(found.lost[i]):
             assert touching[-1] == len(fine.cycles) - 1
-    coarse = error_controlled_rule.evolve(problem, error_controlled_rule.Tolerance(0.01, 2e-4))
+    coarse = error_controlled_rule.evolve(problem, Tolerance(0.01, 2e-4))
     rough = events(coarse, ("t1", "t2", "n"), gap, basis)
     assert rough is not None
     assert found.first_loss is not None
@@ -237,7 +238,7 @@ def test_a_branch_that_has_ended_is_looked_for_afresh(problem: WearProblem) -> N
 
 def test_error_controlled_steps_get_over_the_end_of_a_branch(problem: WearProblem) -> None:
     """The branch ends where the deepest pair is at 1e-5 m; the next one is found from 2e-6 m further on."""
-    end, gap, tolerance = 1e-5, problem.balance.contact.gap, error_controlled_rule.Tolerance(0.05, 2e-4)
+    end, gap, tolerance = 1e-5, problem.balance.contact.gap, Tolerance(0.05, 2e-4)
     over = []
 
     class Ending(AtFrequency):
@@ -265,7 +266,7 @@ def test_error_controlled_steps_get_over_the_end_of_a_branch(problem: WearProble
 
 def test_fewer_harmonics_carry_wear_where_no_solution_with_all_follows() -> None:
     """With eight harmonics no solution is found while the deepest pair is between 1e-5 and 6e-5 m, with four it is."""
-    tolerance = error_controlled_rule.Tolerance(0.1, 2e-4)
+    tolerance = Tolerance(0.1, 2e-4)
     whole = wear_problem(balance=balance_of(pressed_body(), tuple(range(8))))
     gap = whole.balance.contact.gap
 
@@ -298,7 +299,7 @@ def test_fewer_harmonics_carry_wear_where_no_solution_with_all_follows() -> None
 
 def test_a_step_behind_which_no_solution_is_found_is_followed_by_a_longer_one(problem: WearProblem) -> None:
     """The branch ends where the deepest pair is at 1e-5 m; less than 5e-6 m further on nothing is found by any way."""
-    end, gap, tolerance = 1e-5, problem.balance.contact.gap, error_controlled_rule.Tolerance(0.05, 2e-4)
+    end, gap, tolerance = 1e-5, problem.balance.contact.gap, Tolerance(0.05, 2e-4)
     missed, over = [], []
 
     class Blind(AtFrequency):
@@ -330,7 +331,7 @@ def test_where_no_branch_goes_on_the_rule_takes_explicit_steps_to_the_end(proble
         def correct(self, balance: HarmonicBalance, state: State) -> Correction:
             return Correction(state.omega, np.zeros_like(state.x), 0)
 
-    tolerance = error_controlled_rule.Tolerance(0.1, 2e-4)
+    tolerance = Tolerance(0.1, 2e-4)
     worn = error_controlled_rule.evolve(replace(problem, mission=(Duty(Never("tip", 420.0)),)), tolerance)
     explicit = thesis_rule.evolve(problem, error_controlled_rule.EXPLICIT_STEPS[-1] * 0.1 * 2e-4)
     assert worn.end == explicit.end
@@ -352,7 +353,7 @@ def test_behind_the_end_of_a_branch_all_harmonics_of_a_scan_are_looked_with() ->
         def correct(self, balance: HarmonicBalance, state: State) -> Correction:
             return Correction(state.omega, np.zeros_like(state.x), 0)
 
-    tolerance = error_controlled_rule.Tolerance(0.1, 2e-4)
+    tolerance = Tolerance(0.1, 2e-4)
     never = replace(whole, mission=(Duty(Never("tip", 420.0)),))
     worn = error_controlled_rule.evolve(never, tolerance, max_steps=2)
     assert seen == [8, 8, 8]  # at the start and behind both steps
@@ -405,7 +406,7 @@ def test_a_contact_that_outlives_its_wear_is_told_with_what_is_left() -> None:
     problem = wear_problem(mission=(Duty(AtFrequency("tip", 420.0), load=0.2),))
     for worn in (
         thesis_rule.evolve(problem, 1e-6, max_steps=400),
-        error_controlled_rule.evolve(problem, error_controlled_rule.Tolerance(0.05, 2e-4), max_steps=200),
+        error_controlled_rule.evolve(problem, Tolerance(0.05, 2e-4), max_steps=200),
     ):
         assert worn.ended.survived, worn.end
         assert "N of preload left" in str(worn.end)
@@ -497,7 +498,7 @@ class TwoPlaces(AtFrequency):
 
 
 def test_the_jump_to_a_peak_that_overtakes_is_located_and_said(problem: WearProblem) -> None:
-    tolerance = error_controlled_rule.Tolerance(0.02, 1e-4)
+    tolerance = Tolerance(0.02, 1e-4)
     worn = error_controlled_rule.evolve(wear_problem(mission=(Duty(TwoPlaces("tip", 420.0)),)), tolerance)
     after = int(np.flatnonzero(worn.omega == SECOND)[0])
     assert np.all(worn.omega[after:] == SECOND)

@@ -39,6 +39,7 @@ from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.step_control import Tolerance
 
 DECLARED = (SingularStuckSystem, UndampedResonance, CycleNotPeriodic)
 TOLERANCE = NewtonOptions().tolerance
@@ -152,7 +153,7 @@ def test_wear_only_grows(d: Drawn, law: str, rule: str, share: float) -> None:
         if rule == "thesis":
             history = thesis_rule.evolve(problem, depth, max_steps=3)
         else:
-            history = error_controlled_rule.evolve(problem, error_controlled_rule.Tolerance(0.1, depth), max_steps=2)
+            history = error_controlled_rule.evolve(problem, Tolerance(0.1, depth), max_steps=2)
     except DECLARED:
         return
     except ValueError as refused:

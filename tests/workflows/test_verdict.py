@@ -20,6 +20,7 @@ from tests.helpers import foreign_files
 from tribodyn.geometry.sources import msh
 from tribodyn.hbm.continuation.operating_point import AtFrequency, NoPeak
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
+from tribodyn.hbm.stability.stays import MULTIPLIERS
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.accuracy import at_once, mesh_probe, other_meshes, probes, statement, time_probe, verdict
 from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution
@@ -204,7 +205,7 @@ def test_a_depth_is_not_stated_where_a_worn_motion_does_not_stay() -> None:
 
 
 def _in_time(
-    energy: float, stable: bool = True, how: str = time_probe.MULTIPLIERS, outcome: Outcome[SolveEnd] = CONVERGED
+    energy: float, stable: bool = True, how: str = MULTIPLIERS, outcome: Outcome[SolveEnd] = CONVERGED
 ) -> InTime:
     return InTime(0.0, energy, 0.0, 1e-4, stable, how, outcome)
 
@@ -241,7 +242,7 @@ def test_small_contacts_are_integrated_in_time_by_default(monkeypatch: pytest.Mo
     seen = [probes.State(None, 0.0, np.zeros(9), balance, site, here)]
     checked = time_probe.check(seen, None, 60.0, "late")
     ((_, found),) = checked.found
-    assert (checked.wanted, checked.refusal, found.stable, found.how) == (1, "", True, time_probe.MULTIPLIERS)
+    assert (checked.wanted, checked.refusal, found.stable, found.how) == (1, "", True, MULTIPLIERS)
     assert max(abs(found.amplitude), abs(found.energy), abs(found.preload)) < 0.02
     assert time_probe.check(seen, None, 0.0, "late").refusal == "late"
     assert "false" in time_probe.check(seen, False, 60.0, "").refusal

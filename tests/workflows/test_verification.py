@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.command import leave
-from tribodyn.workflows.accuracy import verification
+from tribodyn.workflows.accuracy import verification, worn_in_time
 from tribodyn.workflows.result import store
 from tribodyn.workflows.run import pipeline
 from tribodyn.workflows.run.progress import Progress
@@ -131,11 +132,32 @@ def test_worn_states_are_compared_along_a_run(folder: Path, capsys: pytest.Captu
     assert f"{found['states'][1]['comparison']['energy']['difference']:.2%}" in out
 
 
+def test_a_wear_run_is_worn_again_along_its_motion_in_time(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(worn_in_time, "TOLERANCE", 2.0)  # few steps
+    wear = store.load(folder / "result.h5").wear
+    assert wear is not None
+    given = ["verify", str(folder), "--wear", "--steps", "64"]
+    code, out, err = leave([*given, "--json"], capsys)
+    assert code == 0, err
+    found = json.loads(out)
+    assert found["end"] == "stopped after the volume that the run wore"
+    rows = list(csv.DictReader(Path(found["table"]).read_text(encoding="utf-8").splitlines()))
+    assert [float(row["cycles"]) for row in rows] == [row["cycles"] for row in found["rows"]]
+    assert found["rows"][0]["frequency_hz"] == pytest.approx(wear.frequency[0])
+    worn = found["rows"][-1]["depth_m"]
+    assert 0 < worn < 1.5 * wear.depth[-1].max()
+    assert Path(found["picture"]).is_file()
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (["--states", "0"], "--states must be at least 1"),
-        (["--states", "3", "--row", "1"], "expected either --states"),
+        (["--states", "3", "--row", "1"], "expected one of --states"),
+        (["--wear", "--states", "3"], "expected one of --states"),
+        (["--wear", "--steps", "3"], "at least 8"),
         (["--at", "410"], "--at: expected"),
         (["--at=-3 Hz"], "outside what the scene models"),
         (["--at", "5 kHz"], "change response.frequency"),

@@ -8,21 +8,17 @@ from time import process_time
 
 import numpy as np
 
-from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.outcome import Outcome, SolveEnd
-from tribodyn.hbm.stability import exponents, floquet
+from tribodyn.hbm.stability.stays import stays
 from tribodyn.hbm.time.time_integration import IntegrationFailed, Options
-from tribodyn.hbm.time.verify import Verification, verify
+from tribodyn.hbm.time.verify import verify
 from tribodyn.workflows.accuracy.probes import State
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 
 MOST = 60  # components of a contact that a verdict integrates in time without being asked
-MOST_MULTIPLIERS = 200  # state variables up to which the multipliers of the integrated motion are formed
 STEPS, STEPS_PER_HARMONIC = 256, 32  # time steps per period; per period of the highest harmonic kept
 PERIODS = 60
-MULTIPLIERS = "its Floquet multipliers in time"
 DRIFT = 1e-4  # of the vibration over one period: periodic enough for differences above a tenth of a per cent
-GROWTH = 1e-3  # of a perturbation over a period, below which the multipliers of so many steps cannot tell it from none
 
 
 @dataclass(frozen=True)
@@ -85,14 +81,6 @@ def in_time(state: State) -> InTime:
     except IntegrationFailed as failure:
         why = SolveEnd.INTEGRATION_FAILED.say(f" {failure}")
         return InTime(np.nan, np.nan, np.nan, np.nan, False, "time integration", why)
-    stable, how = _stable(state, balance, found, options)
+    stable, how = stays(balance, solution, found, options)
     output = next(iter(found.amplitude.values()), 0.0)
     return InTime(output, found.energy, found.preload, found.step_error, stable, how, found.outcome)
-
-
-def _stable(state: State, balance: HarmonicBalance, found: Verification, options: Options) -> tuple[bool, str]:
-    """By multipliers of the motion in time where the model is small, else by Hill's method on the balance solution."""
-    if found.motion.periodic and floquet.size(balance, state.here.state.omega, options) <= MOST_MULTIPLIERS:
-        growth = np.exp(floquet.exponents(balance, state.here.state, options).real * 2 * np.pi / found.omega)
-        return bool(growth.max(initial=0.0) <= 1 + GROWTH), MULTIPLIERS
-    return exponents.stability(balance, state.here.state).stable, "Hill's method"

@@ -15,6 +15,7 @@ import numpy as np
 
 from tribodyn.hbm.continuation.operating_point import AtFrequency, NoPeak
 from tribodyn.hbm.outcome import SolveEnd
+from tribodyn.hbm.stability.stays import MULTIPLIERS
 from tribodyn.hbm.wear.error_controlled_rule import jumps
 from tribodyn.hbm.wear.history import LIFE_SHARE
 from tribodyn.workflows.accuracy import at_once, jump_probe, mesh_probe, motion_probe, probes, time_probe
@@ -23,7 +24,7 @@ from tribodyn.workflows.accuracy.other_meshes import with_more_modes
 from tribodyn.workflows.accuracy.probes import Answers, Climbed, State, relative
 from tribodyn.workflows.accuracy.statement import LARGEST, QUANTITIES, Contribution, Statement, Verdict
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
-from tribodyn.workflows.accuracy.time_probe import MULTIPLIERS, Checked, InTime
+from tribodyn.workflows.accuracy.time_probe import Checked, InTime
 from tribodyn.workflows.result import summary
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import settings

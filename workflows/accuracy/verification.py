@@ -16,7 +16,7 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
-from tribodyn.hbm.stability import exponents
+from tribodyn.hbm.stability.stays import stays
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time.time_integration import LeftAlone, Options, leave_alone
 from tribodyn.hbm.time.verify import Verification, verify
@@ -42,7 +42,8 @@ class Comparison:
     """The balance at one frequency and what time integration says.
 
     balance, solution : the problem, with the wear of `row` (None: unworn), and its solution
-    found : the comparison; stable : of the balance solution, by Hill's method; steps : per period; seconds : spent
+    found : the comparison; stable : whether a machine stays at the motion, by the method that `how` names
+    steps : per period; seconds : spent
     left_alone : what a plain march does where that solution is unstable or nothing periodic was found, else None
     """
 
@@ -50,6 +51,7 @@ class Comparison:
     solution: Solution
     found: Verification
     stable: bool
+    how: str
     row: int | None
     steps: int
     seconds: float
@@ -92,6 +94,7 @@ class Comparison:
             "contact_difference": found.contact,
             "largest_difference": found.largest,
             "stable": self.stable,
+            "stable_by": self.how,
             "steps_per_period": self.steps,
             "step_error": found.step_error if np.isfinite(found.step_error) else None,
             "periods": found.periods,
@@ -134,7 +137,7 @@ class Comparison:
         error = "unknown" if record["step_error"] is None else f"{record['step_error']:.1e}"
         shown.append(("time steps", f"{self.steps} per period, their own error {error}"))
         shown.append(("periodic", f"{self.found.outcome}, {self.found.periods} periods, drift {self.found.drift:.1e}"))
-        shown.append(("stable", "yes" if self.stable else "no: the motion may leave the balance solution"))
+        shown.append(("stable", f"{'yes' if self.stable else 'no: a machine leaves this motion'}, by {self.how}"))
         if (seen := self.left_alone) is not None:
             spread = f"{seen.energy:.6g} J per cycle on average, spread {seen.energy_spread:.2g} J"
             shown.append(("left alone", f"{spread}, drift {seen.drift:.1e} after {seen.periods} periods"))
@@ -185,15 +188,31 @@ def held_against(
             solution = _walk(balance, omega, target, x, settings.newton_options(scene))
         if not solution.converged:
             raise SolveFailed(f"no balance at {target / (2 * np.pi):g} Hz: {solution.outcome}")
-        steps = steps or max(STEPS, STEPS_PER_HARMONIC * balance.basis.harmonics[-1])
+        steps = steps or steps_of(balance)
         with progress.stage("time integration"):
             options = Options(steps, tolerance=TOLERANCE, max_periods=PERIODS)
             found = verify(balance, solution.state, options)
-            stable = exponents.stability(balance, solution.state).stable
+            stable, how = stays(balance, solution.state, found, options)
             left_alone = None
             if not stable or not found.motion.periodic:
                 left_alone = leave_alone(balance, target, solution.state, LEFT_ALONE, options)
-    return Comparison(balance, solution, found, stable, row, steps, time.perf_counter() - start, left_alone)
+    return Comparison(balance, solution, found, stable, how, row, steps, time.perf_counter() - start, left_alone)
+
+
+def alone(result: Result, scene: Scene, unworn: HarmonicBalance, row: int, steps: int | None) -> LeftAlone:
+    """What a plain march does from the motion that a wear run had in a row, also where that is no solution.
+
+    Raises  ValueError: the result has no such row, or its motion cannot be marched; IntegrationFailed
+    """
+    with limited(scene.solver.threads):
+        balance, omega, x = _start(result, scene, unworn, None, row)
+        options = Options(steps or steps_of(balance), tolerance=TOLERANCE)
+        return leave_alone(balance, omega, balance.evaluate(omega, x, jacobian=False), LEFT_ALONE, options)
+
+
+def steps_of(balance: HarmonicBalance) -> int:
+    """Time steps per period that suit the harmonics of a balance."""
+    return max(STEPS, STEPS_PER_HARMONIC * balance.basis.harmonics[-1])
 
 
 def rebuilt(result: Result, overrides: Sequence[str] = ()) -> scene_file.SceneFile:

@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import WearProblem
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
+from tribodyn.hbm.wear.step_control import Tolerance
 from tribodyn.workflows.accuracy.published import WearStep, published_wear_steps
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE, STYLE
 from tribodyn.workflows.run import modelling, wear_run
@@ -111,7 +112,7 @@ def _measure(problem: WearProblem, delta: float, rule: str, step: float, say: Ca
     if rule == "thesis":
         worn = thesis_rule.evolve(problem, step * delta)
     else:
-        worn = error_controlled_rule.evolve(problem, error_controlled_rule.Tolerance(step, delta))
+        worn = error_controlled_rule.evolve(problem, Tolerance(step, delta))
     seconds = process_time() - clock
     life = cycles_to_preload(worn)
     say(f"{rule} {step:g}: {len(worn.cycles)} wear steps, {seconds:.1f} s, {worn.end}")

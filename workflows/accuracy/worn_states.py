@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.hbm.threads import limited
-from tribodyn.hbm.time.time_integration import IntegrationFailed
+from tribodyn.hbm.time.time_integration import IntegrationFailed, LeftAlone
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.accuracy import verification
 from tribodyn.workflows.accuracy.verification import Comparison
@@ -27,6 +28,7 @@ class WornState:
     """A row of a wear run and what time integration says.
 
     energy : per cycle, as the run took it [J]; found : None where there is no comparison, for the reason `why`
+    left_alone : what a plain march does, where the motion is unstable or there is no comparison, if it could be marched
     """
 
     row: int
@@ -34,6 +36,7 @@ class WornState:
     hertz: float
     energy: float
     found: Comparison | None
+    left_alone: LeftAlone | None
     why: str = ""
 
     @property
@@ -43,29 +46,31 @@ class WornState:
         return float(self.found.found.motion.energy.sum()) if self.found is not None and periodic else float("nan")
 
     def record(self) -> dict[str, Any]:
-        """Numbers for machines; `comparison` as that of one state."""
+        """Numbers for machines; `comparison` as that of one state, `left_alone_J` mean and spread."""
+        alone = self.left_alone
         return {
             "row": self.row,
             "cycles": self.cycles,
             "frequency_hz": self.hertz,
             "energy_of_run_J": self.energy,
             "comparison": None if self.found is None else self.found.record(),
+            "left_alone_J": None if alone is None else [alone.energy, alone.energy_spread],
             "no_comparison": self.why or None,
         }
 
     def line(self) -> str:
         """One line of the table."""
         head = f"{self.row:4d} {self.cycles:11.4g} {self.hertz:9.5g} {self.energy:11.5g}"
+        seen = self.left_alone
+        alone = "" if seen is None else f"   {seen.energy:.5g} +- {seen.energy_spread:.2g}"
         if self.found is None:
-            return f"{head}  {self.why}"
+            return f"{head} {'none':>11} {'-':>11} {'-':>11} {'-':>9} {'-':>7}{alone}   {self.why}"
         told = self.found.record()
         energy, error = told["energy"], told["step_error"]
         periodic = self.found.found.motion.periodic
         integrated = f"{energy['time_J']:11.5g} {energy['difference']:11.2%}" if periodic else f"{'none':>11} {'-':>11}"
         own = "-" if error is None else f"{error:.2%}"
-        tail = f"{head} {energy['balance_J']:11.5g} {integrated} {own:>9} {'yes' if told['stable'] else 'no':>7}"
-        seen = self.found.left_alone
-        return tail if seen is None else f"{tail}   {seen.energy:.5g} +- {seen.energy_spread:.2g}"
+        return f"{head} {energy['balance_J']:11.5g} {integrated} {own:>9} {'yes' if told['stable'] else 'no':>7}{alone}"
 
 
 HEADER = (
@@ -96,14 +101,17 @@ def compare(
         unworn = modelling.build(file, None, progress, result.harmonics).balance
     found = []
     for row in spread(result.wear, count):
-        comparison, why = None, ""
+        comparison, alone, why = None, None, ""
         try:
             comparison = verification.held_against(result, file.scene, unworn, None, row, steps, progress)
+            alone = comparison.left_alone
         except (SolveFailed, IntegrationFailed) as error:
             why = str(error)
+            with suppress(IntegrationFailed):
+                alone = verification.alone(result, file.scene, unworn, row, steps)
         wear = result.wear
-        energy = float(wear.energy[row].sum())
-        found.append(WornState(row, float(wear.cycles[row]), float(wear.frequency[row]), energy, comparison, why))
+        at = (float(wear.cycles[row]), float(wear.frequency[row]), float(wear.energy[row].sum()))
+        found.append(WornState(row, *at, comparison, alone, why))
     return found
 
 
@@ -114,7 +122,7 @@ def picture(result: Result, states: Sequence[WornState]) -> Figure:
         ax.plot(1e-6 * result.wear.cycles, result.wear.energy.sum(axis=1), color=BLUE, label="run")
         millions = [1e-6 * state.cycles for state in states]
         ax.plot(millions, [s.time_energy for s in states], "o", color=ORANGE, label="time integration")
-        alone = [(1e-6 * s.cycles, s.found.left_alone) for s in states if s.found is not None and s.found.left_alone]
+        alone = [(1e-6 * s.cycles, s.left_alone) for s in states if s.left_alone is not None]
         if alone:
             at, seen = zip(*alone, strict=True)
             heights, spreads = [s.energy for s in seen], [s.energy_spread for s in seen]

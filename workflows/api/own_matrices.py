@@ -31,6 +31,7 @@ from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import WearHistory, WearRow
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.step_control import Tolerance
 from tribodyn.reduction import damping, foreign
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.foreign import ForeignMatrices, Terms
@@ -287,7 +288,7 @@ class Balance:
             return thesis_rule.evolve(problem, step, max_steps, on_row, resume)
         assert tolerance is not None
         assert scale is not None
-        share = error_controlled_rule.Tolerance(tolerance, scale)
+        share = Tolerance(tolerance, scale)
         return error_controlled_rule.evolve(problem, share, max_steps, on_row, resume)
 
     def _output(self, output: str | None) -> str:

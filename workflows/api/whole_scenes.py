@@ -14,7 +14,15 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from tribodyn.fem.material import Material
 from tribodyn.workflows.accuracy import converge as grids
-from tribodyn.workflows.accuracy import knob_trade, promise, reference, verification, wear_steps, worn_states
+from tribodyn.workflows.accuracy import (
+    knob_trade,
+    promise,
+    reference,
+    verification,
+    wear_steps,
+    worn_in_time,
+    worn_states,
+)
 from tribodyn.workflows.accuracy.converge import Study as GridStudy
 from tribodyn.workflows.accuracy.promise import Check
 from tribodyn.workflows.accuracy.reference import Held
@@ -22,6 +30,7 @@ from tribodyn.workflows.accuracy.refinement import Promise
 from tribodyn.workflows.accuracy.trade_table import Trade
 from tribodyn.workflows.accuracy.verification import Comparison
 from tribodyn.workflows.accuracy.wear_steps import WearStepTable
+from tribodyn.workflows.accuracy.worn_in_time import LifeInTime
 from tribodyn.workflows.accuracy.worn_states import WornState
 from tribodyn.workflows.api.scenes import (
     Overrides,
@@ -84,6 +93,24 @@ def verify_wear(
     """Hold so many states of a wear run, spread over its cycles, against time integration; the rest as for `verify`."""
     held = result if isinstance(result, Result) else load(result)
     return worn_states.compare(held, states, override_texts(overrides), steps, reporter(progress))
+
+
+def wear_in_time(
+    result: Result | Place,
+    rows: Place,
+    *,
+    steps: int | None = None,
+    overrides: Overrides = (),
+    progress: Report = None,
+) -> LifeInTime:
+    """Wear the contact of a wear run along its motion in time, at the frequencies of the run.
+
+    The motion is marched on while the contact wears, with mean wear rates where it does not repeat itself.
+    rows : .csv file that takes every wear step as soon as it is done; steps : per period, as for `verify`
+    Raises  ValueError where there is no wear run, or no motion in time, as of a travelling wave
+    """
+    held = result if isinstance(result, Result) else load(result)
+    return worn_in_time.compare(held, override_texts(overrides), steps, Path(rows), reporter(progress))
 
 
 def track(

@@ -13,6 +13,7 @@ from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.step_control import Tolerance
 from tribodyn.hbm.wear.step_error import UNKNOWN, step_error
 from tribodyn.workflows.benchmarks.extremes_judge import CONVERGED, REFUSED, WRONG, Verdict
 from tribodyn.workflows.benchmarks.extremes_models import Body
@@ -55,14 +56,14 @@ def _thesis(body: Body, share: float) -> Verdict:
 
 def _controlled(body: Body, share: float) -> Verdict:
     problem, delta = _problem(body)
-    tolerance = error_controlled_rule.Tolerance(share, delta)
+    tolerance = Tolerance(share, delta)
     return _judged(body, problem, error_controlled_rule.evolve(problem, tolerance, MOST_STEPS), tolerance=share)
 
 
 def _coefficient(body: Body, value: float) -> Verdict:
     """Depth against cycles x coefficient does not depend on the coefficient."""
     problem, delta = _problem(body, value)
-    worn = error_controlled_rule.evolve(problem, error_controlled_rule.Tolerance(0.03, delta), MOST_STEPS)
+    worn = error_controlled_rule.evolve(problem, Tolerance(0.03, delta), MOST_STEPS)
     return _judged(body, problem, worn, value / ORDINARY, 0.03)
 
 
@@ -105,7 +106,7 @@ def _cycles_for(body: Body, volume: float) -> float:
 def _reference(body: Body) -> WearHistory:
     if body.name not in _references:
         problem, delta = _problem(body)
-        _references[body.name] = error_controlled_rule.evolve(problem, error_controlled_rule.Tolerance(TIGHT, delta))
+        _references[body.name] = error_controlled_rule.evolve(problem, Tolerance(TIGHT, delta))
     return _references[body.name]
 
 

@@ -27,6 +27,7 @@ from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import WearHistory, cycles_to_share
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.step_control import Tolerance
 from tribodyn.reduction.damping import modal_damping
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.workflows.accuracy.limit import limit_of
@@ -265,7 +266,7 @@ def wear() -> Numbers:
         duty = Duty(AtFrequency("mass", body.ordinary.omega))
         wears = JointWear.of(law, coefficient=coefficient)
         problem = WearProblem(balance, (duty,), wears, body.model.interface.area, lost_below=0.5)
-        tolerance = error_controlled_rule.Tolerance(0.05, delta)
+        tolerance = Tolerance(0.05, delta)
         histories = {
             "thesis": thesis_rule.evolve(problem, 0.05 * delta, 6),
             "error-controlled": error_controlled_rule.evolve(problem, tolerance, 6),

@@ -210,6 +210,7 @@ def verify(
     at: str | None = None,
     row: int | None = None,
     states: int | None = None,
+    wear: Flag = False,
     steps: int | None = None,
     overrides: Overrides = (),
     out: Path | None = None,
@@ -227,6 +228,8 @@ def verify(
         Wear row whose depth the contact has; unworn by default.
     states
         So many worn states of a wear run, spread over its cycles, one line each.
+    wear
+        Wear the contact along the motion in time, at the frequencies of the run, and hold its life against the run's.
     steps
         Time steps per period; 256 or 32 for each harmonic by default.
     out
@@ -234,14 +237,14 @@ def verify(
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.accuracy import verification, worn_states
+    from tribodyn.workflows.accuracy import verification, worn_in_time, worn_states
     from tribodyn.workflows.api import scenes, whole_scenes
     from tribodyn.workflows.run.failure import SolveFailed
     from tribodyn.workflows.run.progress import Progress, console_progress
 
     make_room(out)
-    if states is not None and (at is not None or row is not None):
-        raise ValueError("expected either --states, or --at and --row, and not both")
+    if sum((states is not None, wear, at is not None or row is not None)) > 1:
+        raise ValueError("expected one of --states, --wear, and --at with --row")
     hertz = None if at is None else quantity("--at", at, "Hz")
     progress = Progress() if as_json else console_progress()
     folder = out or scenes.result_file(result).parent / "pictures"
@@ -255,6 +258,16 @@ def verify(
             print(json.dumps({"states": [state.record() for state in along], "picture": str(picture)}, indent=2))
         else:
             print("\n".join([worn_states.HEADER, *(state.line() for state in along), str(picture)]))
+        return
+    if wear:
+        table = folder / "wear_in_time.csv"
+        life = whole_scenes.wear_in_time(result, table, steps=steps, overrides=overrides, progress=progress)
+        picture = folder / "wear_in_time.png"
+        worn_in_time.picture(life).savefig(picture)
+        if as_json:
+            print(json.dumps({**life.record(), "picture": str(picture), "table": str(table)}, indent=2))
+        else:
+            print("\n".join([*life.lines(), str(table), str(picture)]))
         return
     found = whole_scenes.verify(result, hertz, row=row, steps=steps, overrides=overrides, progress=progress)
     picture = folder / f"verify_{found.hertz:.6g}Hz{'' if row is None else f'_row{row}'}.png"

@@ -14,6 +14,7 @@ from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, WearRow, history, rows_to_resume
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.step_control import Tolerance
 from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import references, settings
@@ -113,5 +114,5 @@ def evolve(
     """Wear by the rule that a scene asks for; limit : of `step_limit` [m], the rest as for hbm.wear.thesis_rule."""
     if wear.rule == "thesis":
         return thesis_rule.evolve(problem, limit, max_steps, on_row, resume)
-    tolerance = error_controlled_rule.Tolerance(wear.tolerance, limit)
+    tolerance = Tolerance(wear.tolerance, limit)
     return error_controlled_rule.evolve(problem, tolerance, max_steps, on_row, resume)

@@ -1,0 +1,214 @@
+"""What a motion does on average over its periods, whether it repeats itself or not.
+
+A plain march goes where a machine goes: to a stable periodic motion, to one that takes several periods, or to one that
+never repeats itself. Energy and wear per cycle then are means over periods, and their scatter is told with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.time import time_integration, wave_in_time
+from tribodyn.hbm.time.period_search import Period, PeriodSearch
+from tribodyn.hbm.time.time_integration import PeriodicMotion, TimeStepper
+from tribodyn.hbm.time.time_step import Moving
+
+PERIODIC = 1e-5  # drift over a period, relative, of a motion that counts as periodic
+# push of a periodic motion, relative to its vibration; share of it down to which it must die away; distance, relative
+# to the vibration, at which the motion has left
+PUSH, DECAYED, LEFT = 1e-3, 0.3, 0.1
+SAME_SCATTER = 2.0  # standard errors by which the means of two blocks may differ and still be those of one motion
+
+
+@dataclass(frozen=True)
+class MeanOptions:
+    """How long to march.
+
+    steps : per period; block : periods whose means are compared; most_blocks : after which to give up
+    search : periods in which a periodic motion is looked for
+    accuracy : relative difference of the energy of two blocks below which the motion has settled, and standard error of
+        the mean that is asked for
+    """
+
+    steps: int = 256
+    block: int = 8
+    most_blocks: int = 40
+    search: int = 60
+    accuracy: float = 5e-3
+
+    def __post_init__(self) -> None:
+        if self.block < 2 or self.most_blocks < 2:
+            raise ValueError("a mean motion needs at least two blocks of two periods")
+
+
+@dataclass(frozen=True)
+class MeanMotion:
+    """Means over the periods of a motion that has settled.
+
+    energy : (n_pair,) friction work per period [J]; normal_force : (n_pair,) [N], zero where the law has none
+    seen : mean of what was asked of every period; amplitude : (n_output,) [m]
+    spread : standard deviation of the work of a period, over its mean; error : standard error of that mean, relative
+    settled : whether the motion came to rest in its statistics; periods : marched in all
+    """
+
+    energy: np.ndarray
+    normal_force: np.ndarray
+    seen: np.ndarray
+    amplitude: np.ndarray
+    spread: float
+    error: float
+    settled: bool
+    periods: int
+
+
+class Follower:
+    """A motion that is followed while gaps and frequency change, and the loads do not.
+
+    A periodic motion is followed as such, as long as a push dies away. Where it does not, or where nothing repeats
+    itself, the motion is marched on plainly, until that becomes periodic.
+    """
+
+    def __init__(self, options: MeanOptions):
+        self.options = options
+        self._stepper: TimeStepper | None = None
+        self._motion: Moving | None = None
+        self._regular = True
+
+    def start(self, balance: HarmonicBalance, state: State) -> None:
+        """Begin at a state of a balance.
+
+        Raises  ValueError for models with no equation of motion in time; IntegrationFailed
+        """
+        if wave_in_time.is_wave(balance):
+            raise ValueError("means over a motion serve one part or several bodies, not a travelling wave of a wheel")
+        self._motion = self._at(balance, state.omega).start_from(state)
+        self._regular = True
+
+    def mean(self, balance: HarmonicBalance, omega: float, see: Callable[[PeriodicMotion], np.ndarray]) -> MeanMotion:
+        """Follow the motion to a place, until it is periodic or has settled.
+
+        see : what to average besides, of one period
+        Source  means of blocks: Flyvbjerg and Petersen 1989
+        Raises  IntegrationFailed
+        """
+        stepper = self._at(balance, omega)
+        spent = 0
+        if self._regular:
+            found, spent = self._periodic(stepper)
+            if found is not None:
+                one = time_integration.motion_of(stepper, found, spent, CONVERGED)
+                return MeanMotion(one.energy, _normal(balance, one), see(one), _swing(one), 0.0, 0.0, True, spent)
+        settled = self._settled(balance, stepper, see)
+        self._regular = settled.settled and settled.spread <= self.options.accuracy
+        return replace(settled, periods=settled.periods + spent)
+
+    def _periodic(self, stepper: TimeStepper) -> tuple[Period | None, int]:
+        """A periodic motion that a push does not drive away, and the periods marched; else the motion has left it."""
+        o = self.options
+        assert self._motion is not None
+        options = replace(
+            stepper.options, tolerance=PERIODIC, max_periods=o.search, patience=o.search // 2, accelerate=True
+        )
+        search = PeriodSearch(stepper, options, False)
+        found = search.mix(self._motion)
+        if found.drift > PERIODIC:
+            return None, search.periods
+        self._motion = found.end
+        plain = PeriodSearch(stepper, replace(stepper.options, max_periods=o.block * o.most_blocks), False)
+        motion = plain.vector.unpack(plain.vector.pushed(found.image, PUSH * found.size), found.end)
+        furthest = 0.0
+        while plain.periods < o.block * o.most_blocks:
+            later = plain.step(motion)
+            motion = later.end
+            away = plain.vector.apart(later.image, found.image) / (PUSH * found.size)
+            furthest = max(furthest, away)
+            if plain.periods % o.block == 0 and away <= DECAYED:
+                return found, search.periods + plain.periods
+            if away * PUSH >= LEFT:
+                break
+        if furthest * PUSH < LEFT:  # a push that neither dies away nor grows
+            return found, search.periods + plain.periods
+        self._motion = motion
+        return None, search.periods + plain.periods
+
+    def _settled(
+        self, balance: HarmonicBalance, stepper: TimeStepper, see: Callable[[PeriodicMotion], np.ndarray]
+    ) -> MeanMotion:
+        """Means of a plain march, once two blocks of periods show one motion."""
+        o, motion = self.options, self._motion
+        assert motion is not None
+        search = PeriodSearch(stepper, replace(stepper.options, max_periods=o.block * o.most_blocks), False)
+        rows: list[tuple[np.ndarray, ...]] = []
+        work: list[float] = []
+        first: int | None = None
+        for block in range(1, o.most_blocks + 1):
+            for _ in range(o.block):
+                found = search.step(motion)
+                one = time_integration.motion_of(stepper, found, search.periods, CONVERGED, motion)
+                motion = found.end
+                work.append(float(one.energy.sum()))
+                rows.append((one.energy, _normal(balance, one), see(one), _swing(one)))
+            if block > 1 and first is None and self._same(np.array(work[-2 * o.block :])):
+                first = len(work) - o.block  # in the block before more of the transient is left
+            if first is not None and _standard_error(np.array(work[first:])) <= o.accuracy:
+                break
+        self._motion = motion
+        kept = slice(len(rows) // 2 if first is None else first, None)
+        late = np.array(work[kept])
+        energy, normal, seen, amplitude = (np.mean(column, axis=0) for column in zip(*rows[kept], strict=True))
+        whole, error = float(late.mean()), _standard_error(late)
+        spread = float(late.std() / whole) if whole > 0 else 0.0
+        return MeanMotion(energy, normal, seen, amplitude, spread, error, first is not None, len(work))
+
+    def _same(self, work: np.ndarray) -> bool:
+        """Whether two blocks of periods show one motion."""
+        before, after = np.split(work, 2)
+        chance = SAME_SCATTER * float(np.hypot(before.std(), after.std())) / np.sqrt(len(after))
+        return bool(abs(after.mean() - before.mean()) <= self.options.accuracy * work.mean() + chance)
+
+    def _at(self, balance: HarmonicBalance, omega: float) -> TimeStepper:
+        """The stepper at a place; what moves is taken along."""
+        before = self._stepper
+        if before is not None and before.omega == omega:
+            self._stepper = before.worn(balance)
+            return self._stepper
+        options = time_integration.Options(self.options.steps, accelerate=False)
+        stepper = TimeStepper(balance, omega, options, None if before is None else before.modes)
+        if before is not None and self._motion is not None:
+            self._motion = _carried(self._motion, before, stepper)
+        self._stepper = stepper
+        return stepper
+
+
+def _normal(balance: HarmonicBalance, motion: PeriodicMotion) -> np.ndarray:
+    components = balance.contact.components
+    if "n" not in components:
+        return np.zeros(balance.contact.n_pair)
+    normal: np.ndarray = motion.force[:, components.index("n")].mean(axis=1)
+    return normal
+
+
+def _swing(motion: PeriodicMotion) -> np.ndarray:
+    """(n_output,) amplitude in one period [m]."""
+    swing: np.ndarray = np.sqrt(2 * motion.outputs.var(axis=1))
+    return swing
+
+
+def _standard_error(work: np.ndarray) -> float:
+    """Of the mean, relative."""
+    whole = float(work.mean())
+    return float(work.std()) / np.sqrt(len(work)) / whole if whole > 0 else 0.0
+
+
+def _carried(motion: Moving, before: TimeStepper, after: TimeStepper) -> Moving:
+    """What moves, at another frequency: modes that no longer move, or move now, stand still."""
+    old, new = before.n_dynamic, after.n_dynamic
+    z, common = np.zeros(2 * new), min(old, new)
+    z[:common] = motion.z[:common]
+    z[new : new + common] = motion.z[old : old + common] * (after.h / before.h)
+    return after.moving(z, motion.memory, motion.x, motion.f)

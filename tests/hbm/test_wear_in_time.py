@@ -1,0 +1,115 @@
+"""Wear along the motion in time beside balances with many harmonics; the motion it follows, and its stability."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.helpers.pressed_body import N_PAIR, balance_of, pressed_body, wear_problem
+from tests.helpers.three_pairs import FLIPS_AT, three_pairs
+from tribodyn.hbm import newton
+from tribodyn.hbm.outcome import WearEnd
+from tribodyn.hbm.stability import floquet
+from tribodyn.hbm.stability.stays import HILL, MULTIPLIERS, stays
+from tribodyn.hbm.time import time_integration
+from tribodyn.hbm.time.mean_motion import Follower, MeanOptions
+from tribodyn.hbm.time.time_integration import Options
+from tribodyn.hbm.time.verify import verify
+from tribodyn.hbm.wear import error_controlled_rule, in_time
+from tribodyn.hbm.wear import law as wear_law
+from tribodyn.hbm.wear.evolution import WearProblem
+from tribodyn.hbm.wear.history import WearHistory, cycles_to_preload
+from tribodyn.hbm.wear.in_time import FixedPlaces, MotionExposure, PlacesOfRun
+from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.step_control import Tolerance
+
+LEFT = 0.5  # share of the preload
+
+
+@pytest.fixture(scope="module")
+def problem() -> WearProblem:
+    return wear_problem(balance=balance_of(pressed_body(), tuple(range(8))), lost_below=LEFT)
+
+
+@pytest.fixture(scope="module")
+def run(problem: WearProblem) -> WearHistory:
+    return error_controlled_rule.evolve(problem, Tolerance(0.02, 2e-4))
+
+
+def test_life_in_time_is_that_of_many_harmonics(problem: WearProblem, run: WearHistory) -> None:
+    rows: list[in_time.TimeRow] = []
+    found = in_time.evolve(problem, FixedPlaces(problem), Tolerance(0.05, 2e-4), MeanOptions(128), on_row=rows.append)
+    assert found.end.kind is WearEnd.PRELOAD_LOST
+    assert len(rows) == len(found.cycles)
+    assert found.settled.all()
+    assert found.life(LEFT) == pytest.approx(cycles_to_preload(run, LEFT), rel=5e-3)
+    assert found.energy[0].sum() == pytest.approx(run.energy[0].sum(), rel=5e-3)
+    depth = [np.interp(found.life(LEFT), h.cycles, h.depth.max(axis=1)) for h in (found, run)]
+    assert depth[0] == pytest.approx(depth[1], rel=0.05)  # between rows both are straight lines
+
+
+def test_a_law_by_slip_path_sees_a_motion_as_it_sees_a_balance(problem: WearProblem) -> None:
+    balance = problem.balance
+    state = newton.solve_from_rest(balance, 420.0).state
+    motion = time_integration.integrate(balance, 420.0, state, Options(256))
+    archard = JointWear.of("archard", coefficient=1e-9)
+    rates = []
+    for exposure, own in ((wear_law.Exposure, ()), (MotionExposure, (motion,))):
+        seen = exposure(balance, state, problem.area, archard.numbers, np.zeros(N_PAIR), 0.0, "contact", *own)
+        rates.append(wear_law.depth_rate("archard", seen))
+    np.testing.assert_allclose(*rates, rtol=0.02)
+
+
+def test_places_of_a_run_have_its_jumps_and_its_end(problem: WearProblem, run: WearHistory) -> None:
+    n = len(run.cycles)
+    duty_omega = run.duty_omega.copy()
+    duty_omega[n // 2 :] *= 0.7
+    part = replace(run, duty_omega=duty_omega, end=WearEnd.STEPS_DONE.say())
+    places, removed = PlacesOfRun(problem, part), run.depth @ problem.area
+    assert list(places.ends) == [removed[n // 2], removed[-1]]
+    assert places.omegas(0, removed[-1])[0] == duty_omega[0, 0]  # within the leg also beyond its end
+    assert places.omegas(1, removed[-1])[0] == duty_omega[-1, 0]
+    assert places.start(1, run.depth[-1])[0].omega == duty_omega[n // 2, 0]
+    whole = replace(problem, lost_below=0.0)
+    found = in_time.evolve(whole, PlacesOfRun(whole, part), Tolerance(0.5, 2e-4), MeanOptions(64))
+    assert (found.omega == np.where(found.depth @ problem.area < 0.999 * places.ends[0], *duty_omega[[0, -1], 0])).all()
+    assert found.end.kind is WearEnd.STEPS_DONE
+
+
+def test_a_periodic_motion_is_followed_and_one_that_a_push_drives_away_is_left() -> None:
+    balance = balance_of(pressed_body(), (0, 1, 2, 3))
+    state = newton.solve_from_rest(balance, 420.0).state
+    exact = time_integration.integrate(balance, 420.0, state, Options(128))
+    follower = Follower(MeanOptions(128))
+    follower.start(balance, state)
+    found = follower.mean(balance, 420.0, lambda motion: motion.energy)
+    assert found.spread == 0.0
+    assert found.energy.sum() == pytest.approx(exact.energy.sum(), rel=1e-3)
+    np.testing.assert_array_equal(found.seen, found.energy)
+    assert len(found.normal_force) == N_PAIR
+    flips = three_pairs(friction=0.0, static=30.0, shaker=60.0, top=15)
+    state = newton.solve_from_rest(flips, FLIPS_AT).state
+    follower = Follower(MeanOptions(128))
+    follower.start(flips, state)
+    left = follower.mean(flips, FLIPS_AT, lambda motion: np.sqrt(2 * motion.outputs.var(axis=1)))
+    periodic = time_integration.integrate(flips, FLIPS_AT, state, Options(128))
+    assert periodic.periodic
+    assert abs(left.amplitude[0] / np.sqrt(2 * periodic.outputs[0].var()) - 1) > 1e-3
+    assert stays(flips, state, verify(flips, state, Options(128)), Options(128)) == (False, MULTIPLIERS)
+    assert stays(flips, state, None, Options(128)) == (False, HILL)
+
+
+def test_the_largest_multiplier_without_the_monodromy_matrix(monkeypatch: pytest.MonkeyPatch) -> None:
+    balance = balance_of(pressed_body(), (0, 1, 2, 3))
+    state = newton.solve_from_rest(balance, 420.0).state
+    options = Options(64, tolerance=1e-9)
+    flips = three_pairs(friction=0.0, static=30.0, shaker=60.0, top=15)
+    unstable = newton.solve_from_rest(flips, FLIPS_AT).state
+    whole = [floquet.largest(b, s, options) for b, s in ((balance, state), (flips, unstable))]
+    monkeypatch.setattr(floquet, "DENSE", 0)
+    found = [floquet.largest(b, s, options) for b, s in ((balance, state), (flips, unstable))]
+    assert found[0] == pytest.approx(whole[0], rel=0.2)  # any value below 1 does
+    assert max(found[0], whole[0]) < 1 < whole[1]
+    assert found[1] == pytest.approx(whole[1], rel=0.01)

@@ -1,0 +1,174 @@
+"""The life of a wear run beside the life of its contact along the motion in time, at the same places."""
+
+from __future__ import annotations
+
+import csv
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tribodyn.hbm.outcome import WearEnd
+from tribodyn.hbm.threads import limited
+from tribodyn.hbm.time.mean_motion import MeanOptions
+from tribodyn.hbm.wear import in_time
+from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_share
+from tribodyn.hbm.wear.in_time import PlacesOfRun, TimeRow, WearInTime
+from tribodyn.hbm.wear.step_control import Tolerance
+from tribodyn.workflows.accuracy import verification
+from tribodyn.workflows.pictures.figures import axes_of
+from tribodyn.workflows.pictures.style import BLUE, ORANGE
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.run import modelling, wear_run
+from tribodyn.workflows.run.progress import Progress
+
+TOLERANCE = 0.05  # of a wear step in time
+SHARES = (0.9, 0.75, 0.5, 0.25, 0.1, 0.01, LIFE_SHARE)  # of the first preload, that are told
+COLUMNS = ("cycles", "frequency_hz", "preload_n", "energy_j", "spread", "amplitude_m", "depth_m", "settled", "periods")
+
+
+@dataclass(frozen=True)
+class LifeInTime:
+    """A wear run, and its contact worn along the motion in time.
+
+    steps : per period; tolerance : of a wear step in time; seconds : spent
+    """
+
+    run: WearHistory
+    found: WearInTime
+    steps: int
+    tolerance: float
+    seconds: float
+
+    @property
+    def unsettled(self) -> float:
+        """Share of the cycles in which the means of the motion had not come to rest."""
+        found = self.found
+        whole = float(found.cycles_in_step.sum())
+        return float(found.cycles_in_step[~found.settled].sum()) / whole if whole > 0 else 0.0
+
+    def at_share(self, share: float) -> tuple[float | None, float | None]:
+        """Cycles after which a share of the first preload is left: of the run, and in time."""
+        return cycles_to_share(self.run.cycles, self.run.preload, share), self.found.life(share)
+
+    def record(self) -> dict[str, Any]:
+        """Numbers for machines."""
+        found = self.found
+        return {
+            "shares": [dict(zip(("share", "run", "time"), (s, *self.at_share(s)), strict=True)) for s in SHARES],
+            "scatter": found.scatter,
+            "largest_spread": float(found.spread.max()),
+            "unsettled": self.unsettled,
+            "steps_per_period": self.steps,
+            "tolerance": self.tolerance,
+            "periods": int(found.periods.sum()),
+            "end": str(found.end),
+            "seconds": self.seconds,
+            "rows": [dict(zip(COLUMNS, _columns(found, i), strict=True)) for i in range(len(found.cycles))],
+        }
+
+    def lines(self) -> list[str]:
+        """The comparison for people."""
+        found = self.found
+        shown = [f"{'preload left':>12} {'run, cycles':>13} {'in time':>13} {'difference':>11}"]
+        for share in SHARES:
+            ours, theirs = self.at_share(share)
+            if ours is None and theirs is None:
+                continue
+            numbers = [f"{'-':>13}" if v is None else f"{v:13.4g}" for v in (ours, theirs)]
+            apart = f"{ours / theirs - 1:11.2%}" if ours is not None and theirs is not None else f"{'-':>11}"
+            shown.append(f"{share:12.3g} {' '.join(numbers)} {apart}")
+        spread = int(np.argmax(found.spread))
+        shown += [
+            f"end in time: {found.end}",
+            f"work of a period: spread up to {found.spread[spread]:.2g} of its mean, at {found.cycles[spread]:.3g} "
+            f"cycles; standard error of the life by it {found.scatter:.2g}",
+            f"{self.steps} steps a period, {int(found.periods.sum())} periods, {len(found.cycles)} wear steps of "
+            f"tolerance {self.tolerance:g}",
+        ]
+        if self.unsettled > 0:
+            shown.append(f"for {self.unsettled:.0%} of the cycles the mean work had not come to rest")
+        return shown
+
+
+def _columns(found: WearInTime, i: int) -> tuple[Any, ...]:
+    return (
+        float(found.cycles[i]),
+        float(found.omega[i]) / (2 * np.pi),
+        float(found.preload[i]),
+        float(found.energy[i].sum()),
+        float(found.spread[i]),
+        float(found.amplitude[i]),
+        float(found.depth[i].max()),
+        bool(found.settled[i]),
+        int(found.periods[i]),
+    )
+
+
+def compare(
+    result: Result,
+    overrides: Sequence[str],
+    steps: int | None,
+    rows: Path,
+    progress: Progress,
+) -> LifeInTime:
+    """Wear the contact of a run along its motion in time, at the frequencies that the run took its cycles at.
+
+    overrides : "section.key=value" on top of those of the run; steps : per period
+    rows : table of what is computed, row by row as soon as it is done
+    Raises  ValueError: the result has no wear run, or its motion cannot be marched; IntegrationFailed
+    """
+    if result.wear is None or not result.wear.depth[-1].max() > 0:
+        raise ValueError("the result has no wear run in which something wears: take a scene with [wear]")
+    start = time.perf_counter()
+    file = verification.rebuilt(result, overrides)
+    scene = file.scene
+    assert scene.wear is not None
+    with limited(scene.solver.threads):
+        balance = modelling.build(file, None, progress, result.harmonics).balance
+        problem = wear_run.wear_problem(scene, file.folder, balance, scene.wear.lost_below)
+        scale = float(result.wear.depth[-1].max())
+        steps = steps or verification.steps_of(balance)
+        whole = float(problem.area @ result.wear.depth[-1])
+        with progress.track("wear in time") as advance, rows.open("w", newline="", encoding="utf-8") as file_of_rows:
+            table = csv.writer(file_of_rows)
+            table.writerow(COLUMNS)
+
+            def on_row(row: TimeRow) -> None:
+                one = in_time.together([row], WearEnd.UNFINISHED.say())
+                table.writerow(_columns(one, 0))
+                file_of_rows.flush()
+                advance(
+                    float(problem.area @ row.depth) / whole if whole > 0 else 0.0,
+                    f"{row.cycles:.3g} cycles, preload {row.preload:.4g} N",
+                )
+
+            found = in_time.evolve(
+                problem,
+                PlacesOfRun(problem, result.wear),
+                Tolerance(TOLERANCE, scale),
+                MeanOptions(steps),
+                on_row=on_row,
+            )
+    return LifeInTime(result.wear, found, steps, TOLERANCE, time.perf_counter() - start)
+
+
+def picture(life: LifeInTime) -> Figure:
+    """Preload and work per cycle over the cycles, of the run and in time; the spread of the work as a band."""
+    found, run = life.found, life.run
+    with axes_of(9.0, 3.8, columns=2) as (figure, (left, right)):
+        left.plot(1e-6 * run.cycles, run.preload, color=BLUE, label="run")
+        left.plot(1e-6 * found.cycles, found.preload, color=ORANGE, label="in time")
+        left.set(xlabel="cycles / 1e6", ylabel="preload / N")
+        left.legend(loc="best", fontsize=9)
+        right.plot(1e-6 * run.cycles, run.energy.sum(axis=1), color=BLUE)
+        work = found.energy.sum(axis=1)
+        right.plot(1e-6 * found.cycles, work, color=ORANGE)
+        low, high = np.maximum(work * (1 - found.spread), 1e-3 * work), work * (1 + found.spread)
+        right.fill_between(1e-6 * found.cycles, low, high, color=ORANGE, alpha=0.3, lw=0)
+        right.set(xlabel="cycles / 1e6", ylabel="friction work per cycle / J", yscale="log")
+    return figure
