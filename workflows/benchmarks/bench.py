@@ -23,6 +23,7 @@ from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import natural
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.reference import DenseBalance
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.run import modelling, settings
@@ -46,7 +47,8 @@ class Timing:
     seconds : of the whole response curve by the compliance form, the sum of the least times of its points, of the
         processor on one thread and of the clock on two; newton_steps : of it
     again : the same from the even and from the odd repeats alone, their relative difference
-    ratio : seconds of the dense algorithm over ours on the same dense_points; dense_seconds : of these
+    ratio : seconds of the dense algorithm over ours on the same dense_points, None without any; dense_seconds : of
+        these; dense_lost : points that it did not converge at in 40 steps, which do not count
     max_difference : of the contact displacement, both refined to rounding, relative to its largest value
     contact, balance, direction : share of our time by routine; thesis_seconds : published, one core, or None
     """
@@ -62,6 +64,7 @@ class Timing:
     newton_steps: int
     ratio: float | None
     dense_points: int
+    dense_lost: int
     dense_seconds: float
     max_difference: float | None
     contact: float
@@ -118,6 +121,7 @@ def _measure(balance: HarmonicBalance, harmonics: str, threads: int, windows: tu
     count, length = windows
     starts = np.linspace(3, POINTS - length - 1, count).astype(int)
     dense_seconds = own_seconds = difference = 0.0
+    lost = 0
     for start in starts:
         q = _refined(balance, dense, branch.omega, branch.contact, wanted[start - 3 : start])
         for i in range(start, start + length):
@@ -127,10 +131,16 @@ def _measure(balance: HarmonicBalance, harmonics: str, threads: int, windows: tu
                 guess = natural.extrapolate(wanted[i - 3 : i], q[-3:], wanted[i])
                 solution = dense.solve(wanted[i], guess, TOLERANCE)
                 taken.append(now() - clock)
+            if solution.outcome != CONVERGED:  # its time is that of no solution
+                lost += 1
+                q += _refined(balance, dense, branch.omega, branch.contact, wanted[i : i + 1])
+                continue
             dense_seconds += min(taken)
             own_seconds += per_point[i - 1]
             q.append(solution.q)
         last = wanted[start + length - 1]
+        if solution.outcome != CONVERGED:
+            continue
         own = branch.contact[int(np.argmin(np.abs(branch.omega - last)))].reshape(solution.x.shape)
         exact = newton.solve(balance, last, own, NewtonOptions(1e-12)).state.x
         polished = dense.solve(last, q[-1], 1e-12, max_steps=6).x
@@ -146,8 +156,9 @@ def _measure(balance: HarmonicBalance, harmonics: str, threads: int, windows: tu
         seconds=float(per_point.sum()),
         again=abs(halves[0] - halves[1]) / min(halves),
         newton_steps=int(branch.newton_steps.sum()),
-        ratio=dense_seconds / own_seconds,
-        dense_points=count * length,
+        ratio=dense_seconds / own_seconds if own_seconds else None,
+        dense_points=count * length - lost,
+        dense_lost=lost,
         dense_seconds=dense_seconds,
         max_difference=difference,
         contact=shares["contact"],
@@ -217,13 +228,17 @@ def as_text(rows: list[Timing]) -> str:
         published = THESIS_SHARES.get(r.harmonics)
         if published and r.threads == 1:
             shares += " (thesis " + "/".join(f"{v:.0f}" for v in published) + ")"
+        ratio = "-" if r.ratio is None else f"{r.ratio:.1f}"
         lines.append(
             f"{r.harmonics:>9} {r.threads:7d} {r.converged:4d}/{r.points:<4d} {r.seconds:8.2f} {r.again:6.0%} "
-            f"{r.newton_steps:7d} {r.ratio:8.1f} {r.max_difference:19.1e} {thesis:>14}   {shares}"
+            f"{r.newton_steps:7d} {ratio:>8} {r.max_difference:19.1e} {thesis:>14}   {shares}"
         )
     lines.append(f"least of {REPEATS} repeats for each point; again: the same from every second one, the difference")
     lines.append(
         "ratio: seconds of the dense algorithm over ours on the same points "
         f"({', '.join(f'{r.harmonics}/{r.threads}: {r.dense_points}' for r in rows)} points)"
     )
+    missed = [f"{r.dense_lost} at {r.harmonics}/{r.threads}" for r in rows if r.dense_lost]
+    if missed:
+        lines.append(f"the dense algorithm did not converge at further points, which do not count: {', '.join(missed)}")
     return "\n".join(lines)
