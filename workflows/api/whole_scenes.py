@@ -20,6 +20,7 @@ from tribodyn.workflows.accuracy import (
     reference,
     verification,
     wear_steps,
+    work_precision,
     worn_in_time,
     worn_states,
 )
@@ -30,6 +31,7 @@ from tribodyn.workflows.accuracy.refinement import Promise
 from tribodyn.workflows.accuracy.trade_table import Trade
 from tribodyn.workflows.accuracy.verification import Comparison
 from tribodyn.workflows.accuracy.wear_steps import WearStepTable
+from tribodyn.workflows.accuracy.work_precision import WorkPrecision
 from tribodyn.workflows.accuracy.worn_in_time import LifeInTime
 from tribodyn.workflows.accuracy.worn_states import WornState
 from tribodyn.workflows.api.scenes import (
@@ -168,6 +170,24 @@ def trade(
 def compare_wear_steps(scene: Place, *, overrides: Overrides = (), progress: Report = None) -> WearStepTable:
     """Cost and error of wear steps by both rules, as `tribodyn trade SCENE --knob wear_step`."""
     return wear_steps.compare(fspath(scene), reporter(progress).say, override_texts(overrides))
+
+
+def compare_motions(
+    scene: Place,
+    at: float | None = None,
+    *,
+    overrides: Overrides = (),
+    progress: Report = None,
+    keep: Callable[[WorkPrecision], None] = lambda found: None,
+    earlier: WorkPrecision | None = None,
+) -> WorkPrecision:
+    """Error and seconds of one motion and of the life, by more harmonics and by more time steps.
+
+    at : frequency [Hz]; where the scene wears, or the highest point of its response, where None
+    keep : called with what is there after each candidate; earlier : whose candidates of the same scene are taken over
+    """
+    omega, texts = None if at is None else 2 * math.pi * at, override_texts(overrides)
+    return work_precision.run(fspath(scene), omega, texts, reporter(progress).say, keep, earlier)
 
 
 def check_promise(

@@ -91,6 +91,7 @@ def trade(
     most: int = 99,
     out: Path | None = None,
     check: str | None = None,
+    at: str | None = None,
     as_json: Json = False,
 ) -> None:
     """Measure what each knob costs and what it is worth, against where it tends to on the same scene.
@@ -101,7 +102,8 @@ def trade(
         Name of a scene or a .toml file.
     knob
         Knob to measure, can be repeated; the other knobs of an earlier table stay. All knobs by default.
-        wear_step alone is table 4.2 of the thesis with life added.
+        wear_step alone is table 4.2 of the thesis with life added. motion alone: error against seconds of one motion,
+        by more harmonics and by more time steps, and of life by more harmonics.
     most
         Settings of each knob, the finest ones.
     out
@@ -110,6 +112,9 @@ def trade(
         Measure no table, but run what `run --accuracy` would choose for this accuracy, such as "1 %" or "1 % of
         life", against a run that is finer in every knob; exit code 1 where the promise is broken. --out: the table
         to go by.
+    at
+        Frequency of --knob motion, such as "150 Hz"; where the scene wears, or the highest point of its response, by
+        default.
     as_json
         Print JSON for machines.
     """
@@ -124,6 +129,11 @@ def trade(
         if out is not None:
             wear_steps.picture(table).savefig(out)
         print(json.dumps(wear_steps.as_records(table), indent=2) if as_json else wear_steps.as_text(table))
+        return
+    if at is not None and knob != ("motion",):
+        raise ValueError("--at goes with --knob motion alone")
+    if knob == ("motion",):
+        _motion(scene, at, overrides, out, as_json)
         return
     if check is not None:
         kept = whole_scenes.check_promise(scene, check, table=out, overrides=overrides, progress=aside)
@@ -145,6 +155,24 @@ def trade(
     else:
         print(knob_trade.as_text(found))
         print(*accuracy.advice(found), path, path.with_suffix(".png"), sep="\n")
+
+
+def _motion(scene: str, at: str | None, overrides: tuple[str, ...], out: Path | None, as_json: bool) -> None:
+    from tribodyn.workflows.accuracy import work_precision_table as shown
+    from tribodyn.workflows.api import whole_scenes
+
+    make_room(out, (".json",))
+    path = out or Path("results") / Path(scene).stem / "motion.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    earlier = shown.load(path) if path.exists() else None
+    hertz = None if at is None else quantity("--at", at, "Hz")
+    found = whole_scenes.compare_motions(
+        scene, hertz, overrides=overrides, progress=aside, keep=lambda there: shown.save(there, path), earlier=earlier
+    )
+    shown.picture(found).savefig(path.with_suffix(".png"))
+    print(json.dumps(shown.as_records(found), indent=2) if as_json else shown.as_text(found))
+    if not as_json:
+        print(path, path.with_suffix(".png"), sep="\n")
 
 
 def converge(
