@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from tribodyn.workflows.run import settings
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError, read
 
@@ -119,6 +121,25 @@ def test_a_mission_shares_its_cycles_out() -> None:
         read("beam", [mission])
     with pytest.raises(SceneError, match=r"sum to 1, got 0\.9"):
         read("beam", ["wear.at=", mission.replace("60", "50")])
+
+
+def test_a_sweep_takes_its_cycles_in_proportion_to_the_frequency() -> None:
+    wear = read("beam", ["wear.at=400 Hz to 800 Hz in 4"]).scene.wear
+    assert wear is not None
+    assert [duty.at.frequency for duty in wear.duties] == [450.0, 550.0, 650.0, 750.0]
+    assert [duty.share for duty in wear.duties] == pytest.approx([f / 2400 for f in (450, 550, 650, 750)])
+    same = read("beam", ['wear.at={start = "400 Hz", stop = "0.8 kHz", points = 4}']).scene.wear
+    assert same is not None
+    assert same.duties == wear.duties
+    beyond = read("beam", ["wear.at=1 kHz to 5 kHz in 4"]).scene
+    assert settings.highest_frequency(beyond) == 2 * np.pi * 4500
+    assert settings.highest_frequency(read("beam").scene) == settings.response_range(beyond)[1]
+    one = read("beam", ["wear.at=410 Hz"]).scene.wear
+    assert one is not None
+    assert [duty.share for duty in one.duties] == [1.0]
+    for wrong in ("800 Hz to 400 Hz", "400 Hz to much", "400 Hz to 800 Hz in few", "400 Hz to 800 Hz in 1"):
+        with pytest.raises(SceneError):
+            read("beam", [f"wear.at={wrong}"])
 
 
 @pytest.mark.parametrize("name", scene_file.names())

@@ -107,6 +107,7 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, spe
         )
         staying, note = _of_staying(file, model, result, values["life"], left() if much else 0.0)
         parts += staying
+    parts += _of_mission(file, result)
     statements = {name: _statement(name, values[name], parts, checked, result) for name in QUANTITIES}
     if note and statements["life"].stated:
         statements["life"] = replace(statements["life"], reason=f"{statements['life'].reason}; {note}")
@@ -188,6 +189,15 @@ def _of_jump(
         return [Contribution("instant of the jump", "life", None, str(refusal))]
     far = f"with more harmonics it moves by more than {jump_probe.SHARES[-1]:.0%} of the life"
     return [Contribution("instant of the jump", "life", error, far if error is None else "more harmonics decide on it")]
+
+
+def _of_mission(file: SceneFile, result: Result) -> list[Contribution]:
+    """What the other parts of a mission add to depth and life: the states that are asked are those of the first."""
+    wear = file.scene.wear
+    if wear is None or not result.wear_steps or len(wear.duties) == 1:
+        return []
+    why = f"the states that a verdict asks are those of the first of {len(wear.duties)} parts of the mission"
+    return [Contribution("mission", name, None, why) for name in ("depth", "life")]
 
 
 def _of_staying(

@@ -259,7 +259,7 @@ def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: t
     transitions = joint_transitions(all_joints) if harmonics.transitions == "auto" else harmonics.transitions
 
     turned: dict[str, float] = {}
-    top = settings.response_range(scene)[1]
+    top = settings.highest_frequency(scene)
     if isinstance(scene, StructureScene) and scene.bolts and part is not None:
         shanks = tightening.rods(scene, part.mesh, part.node_sets)
 

@@ -190,7 +190,7 @@ def _wear(scene: Scene) -> tuple[int | None, int]:
         likely = most if share is None else round(STEPS_AT_ONE_PERCENT * (100 * share) ** STEPS_EXPONENT)
     steps = min(most, likely)
     solves = 0
-    for place in [duty.at for duty in scene.wear.mission] or [scene.wear.at]:
+    for place in (duty.at for duty in scene.wear.duties):
         solves += steps if place.peak is None else steps * SOLVES_AT_PEAK[scene.wear.rule] + scene.response.points
     return (None if share is None else steps), solves
 

@@ -120,7 +120,7 @@ class Bench:
             model.balance.contact.joints,
             model.balance.basis,
             Excitation({**loads, (0, HOLD): 1.0}),
-            settings.response_range(scene)[1],
+            settings.highest_frequency(scene),
         )
 
 

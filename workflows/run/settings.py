@@ -49,6 +49,12 @@ def response_range(scene: Scene) -> tuple[float, float]:
     return 2 * np.pi * low, 2 * np.pi * high
 
 
+def highest_frequency(scene: Scene) -> float:
+    """Highest frequency that is asked for, of the response or of a place where cycles are taken [rad/s]."""
+    worn = () if scene.wear is None else scene.wear.duties
+    return 2 * np.pi * max([scene.response.frequency[1], *(duty.at.frequency or 0.0 for duty in worn)])
+
+
 def newton_options(scene: Scene) -> NewtonOptions:
     """How exactly every balance is solved."""
     return NewtonOptions(tolerance=scene.solver.tolerance, krylov=scene.solver.krylov)
@@ -65,9 +71,7 @@ def mission(scene: Scene, highest: float = np.inf) -> tuple[Duty, ...]:
     highest : amplitude of the largest linear response, see `AtPeak` [m]
     """
     assert scene.wear is not None
-    if not scene.wear.mission:
-        return (Duty(site_of(scene, scene.wear.at, highest)),)
-    return tuple(Duty(site_of(scene, duty.at, highest), duty.share, duty.load) for duty in scene.wear.mission)
+    return tuple(Duty(site_of(scene, duty.at, highest), duty.share, duty.load) for duty in scene.wear.duties)
 
 
 def site_of(scene: Scene, place: Place, highest: float = np.inf) -> AtFrequency | AtPeak | BesidePeak:

@@ -95,7 +95,7 @@ def _mission(scene: Scene, balance: HarmonicBalance) -> tuple[Duty, ...]:
     if not balance.at_speed:
         return duties
     found = []
-    for duty, table in zip(duties, scene.wear.mission, strict=True):
+    for duty, table in zip(duties, scene.wear.duties, strict=True):
         own = None if table.speed is None else balance.at_speed.get(table.speed)
         if own is not None:
             duty = replace(duty, site=settings.site_of(scene, table.at, highest(own)), balance=own)

@@ -66,6 +66,43 @@ def _place(value: object) -> object:
 At = Annotated[Place, BeforeValidator(_place)]
 
 
+class Sweep(Table):
+    """A slow sweep of the frequency over a band, again and again: cycles in proportion to the frequency."""
+
+    start: Annotated[Frequency, Field(gt=0)]
+    """Lowest frequency."""
+    stop: Annotated[Frequency, Field(gt=0)]
+    """Highest frequency."""
+    points: Annotated[StrictInt, Field(ge=2, le=500)] = 21
+    """Equal parts of the band, each worn at its middle."""
+
+    @model_validator(mode="after")
+    def _rises(self) -> Self:
+        if self.stop <= self.start:
+            raise ValueError(f"expected a sweep that rises, got {self.start:g} Hz to {self.stop:g} Hz")
+        return self
+
+    def duties(self) -> tuple[MissionDuty, ...]:
+        """The middles of the parts; a sweep at a constant rate spends the same time in each."""
+        width = (self.stop - self.start) / self.points
+        middles = [self.start + (i + 0.5) * width for i in range(self.points)]
+        return tuple(MissionDuty(at=Place(frequency=f), share=f / sum(middles)) for f in middles)
+
+
+def _place_or_sweep(value: object) -> object:
+    if isinstance(value, dict) and "start" in value:
+        return Sweep.model_validate(value)
+    if isinstance(value, str) and " to " in value:
+        band, _, points = value.partition(" in ")
+        start, _, stop = band.partition(" to ")
+        given = {"points": int(points)} if points.strip().isdigit() else {}
+        if not points or given:
+            return Sweep.model_validate({"start": start, "stop": stop, **given})
+    if isinstance(value, Sweep):
+        return value
+    return _place(value)
+
+
 class MissionDuty(Table):
     """A part of the mission: a share of all cycles at one place, with the harmonic loads times `load`."""
 
@@ -115,12 +152,20 @@ class Wear(LawTable):
     """Whose preload that is: of the vibrating contact, its mean force, or of the contact without harmonic loads."""
     step: Annotated[WearStep, BeforeValidator(_step)] | None = None
     """Largest depth that one step of the thesis's rule may add: a share of delta_max such as "5 %", or a depth."""
-    at: At = Place(peak=1.0)
-    """Where the cycles are taken: "peak", a share of its frequency such as "98 % of peak", or a frequency."""
+    at: Annotated[Place | Sweep, BeforeValidator(_place_or_sweep)] = Place(peak=1.0)
+    """Where the cycles are taken: "peak", a share of its frequency such as "98 % of peak", a frequency, or a slow sweep
+    such as "420 Hz to 880 Hz" or "420 Hz to 880 Hz in 41" parts."""
     mission: tuple[MissionDuty, ...] = ()
     """List of duties that share the cycles, instead of `at`."""
     max_steps: Annotated[StrictInt, Field(ge=0)] = 10_000
     """Largest number of wear steps."""
+
+    @property
+    def duties(self) -> tuple[MissionDuty, ...]:
+        """The parts of the mission; of one place or a sweep, what these stand for."""
+        if self.mission:
+            return self.mission
+        return self.at.duties() if isinstance(self.at, Sweep) else (MissionDuty(at=self.at, share=1.0),)
 
     @model_validator(mode="after")
     def _whole(self) -> Wear:

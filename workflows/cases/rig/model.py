@@ -74,8 +74,9 @@ class Rig:
     def frequency(self) -> float:
         """Frequency of the wear test [Hz]."""
         assert self.scene.wear is not None
-        assert self.scene.wear.at.frequency is not None
-        return self.scene.wear.at.frequency
+        hertz = self.scene.wear.duties[0].at.frequency
+        assert hertz is not None
+        return hertz
 
     @property
     def height(self) -> float:
@@ -155,7 +156,10 @@ def check(file: SceneFile) -> None:
     for missing, key in (
         (list(scene.prescribed) != [PLATFORM], f"one table under prescribed, [prescribed.{PLATFORM}]"),
         (list(scene.loads.harmonic) != [SHAKER], f"one harmonic load, [loads.harmonic.{SHAKER}]"),
-        (wear is None or bool(wear.mission) or wear.at.frequency is None, 'wear at one frequency, wear.at = "290 Hz"'),
+        (
+            wear is None or len(wear.duties) > 1 or wear.duties[0].at.frequency is None,
+            'wear at one frequency, wear.at = "290 Hz"',
+        ),
         (scene.harmonics.automatic, "harmonics that are named, harmonics.kept = [0, 1, 2, 3]"),
         *((name not in scene.springs, f"the joint [springs.{name}]") for name in springs),
     ):
