@@ -25,11 +25,12 @@ def sampling_error(balance: HarmonicBalance, omega: float, x: np.ndarray) -> flo
     here, there = balance.evaluate(omega, x, jacobian=False), fine.evaluate(omega, x, jacobian=False)
     left = newton.relative_residual(there, fine.x_lin(omega))
     options = NewtonOptions()
-    found = newton.solve(fine, omega, x, replace(options, tolerance=max(SETTLED * left, options.tolerance)))
-    if not found.converged:  # too far off to be a start
+    closer = replace(options, tolerance=max(SETTLED * left, newton.LEAST_TOLERANCE))
+    found = newton.solve(fine, omega, x, closer)
+    if not found.converged and found.history[-1] > options.tolerance:  # too far off to be a start
         found = newton.solve_from_rest(fine, omega)
-    if not found.converged:
-        return float("inf")
+        if not found.converged:
+            return float("inf")
     dynamic = balance.basis.order > 0
     moved = fine.outputs(found.state)[:, dynamic]
     size, change = (np.linalg.norm(y, axis=1) for y in (moved, moved - balance.outputs(here)[:, dynamic]))
