@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.helpers.coarse_scenes import RIG
 from tribodyn.hbm import newton
 from tribodyn.workflows.accuracy import work_precision as measured
 from tribodyn.workflows.accuracy import work_precision_table as table
@@ -97,3 +98,11 @@ def test_what_finds_nothing_is_told(
     assert out.with_suffix(".png").stat().st_size > 10_000
     with pytest.raises(SystemExit, match="2"):
         cli.main(["trade", "beam", "--at", "950 Hz"])
+
+
+def test_a_prescribed_displacement_is_held_by_its_force_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(measured, "TOPS", (3,))
+    found = measured.run("rig_thesis", 2 * np.pi * 290, (*RIG, "wear="), lambda _: None)
+    (integrated,) = found.of(measured.IN_TIME)
+    for name in found.names:
+        assert found.error(integrated, name) == pytest.approx(0.0, abs=0.1)

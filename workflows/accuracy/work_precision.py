@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from time import process_time
 
@@ -31,6 +32,7 @@ from tribodyn.workflows.accuracy.limit import Limit, limit_of
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.run import curve, modelling, settings, wear_run
 from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.content import code, digests
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -160,8 +162,11 @@ def _trials(file: SceneFile) -> dict[str, tuple[int, ...]]:
     """Sizes of the candidates by their kind."""
     tops = tops_of(file)
     trials = {SAMPLED: tops, IN_TIME: STEPS} | ({LIFE: tops} if file.scene.wears else {})
-    located = all(hasattr(law.load(contact.law_name), "located") for contact in file.scene.joints.values())
-    return {LOCATED: tops, **trials} if located else trials
+    return {LOCATED: tops, **trials} if _locates(file) else trials
+
+
+def _locates(file: SceneFile) -> bool:
+    return all(hasattr(law.load(contact.law_name), "located") for contact in file.scene.joints.values())
 
 
 def told(row: Candidate) -> str:
@@ -213,14 +218,17 @@ class _Start:
     """What all candidates start from.
 
     problems : by the highest harmonic; own : that of the scene; state : of the latter, STRIDE beside
-    omega : where the motion is wanted [rad/s]
+    omega : where the motion is wanted [rad/s]; located : whether the laws can locate their transitions
+    held : what is integrated in time where a displacement is prescribed in harmonic 0 alone, see `Bench.held_by_force`
     """
 
     problems: Mapping[int, HarmonicBalance]
     own: HarmonicBalance
     state: State
     omega: float
+    located: bool
     options: NewtonOptions
+    held: HarmonicBalance | None = None
 
 
 def _start(file: SceneFile, at: float | None) -> _Start:
@@ -241,8 +249,20 @@ def _start(file: SceneFile, at: float | None) -> _Start:
     for factor in (1 - STRIDE, 1 + STRIDE):
         beside = newton.solve(own, factor * omega, x, options)
         if beside.converged:
-            return _Start(problems, own, beside.state, omega, options)
+            return _with_force(file, _Start(problems, own, beside.state, omega, _locates(file), options))
     raise RuntimeError(f"there is no motion beside {omega / (2 * np.pi):g} Hz to start from: {beside.outcome}")
+
+
+def _with_force(file: SceneFile, start: _Start) -> _Start:
+    """The same with prescribed displacements held by the force that the most harmonics find there."""
+    if not getattr(file.scene, "prescribed", None):
+        return start
+    for top in sorted(start.problems, reverse=True):
+        with suppress(RuntimeError):
+            _, state = _balanced(start, start.located, top)
+            held = Bench().held_by_force(_with_harmonics(file, top), state)
+            return replace(start, held=held.with_load(start.own.load_factor))
+    return start
 
 
 @single
@@ -293,9 +313,11 @@ def _integrated(start: _Start, steps: int) -> PeriodicMotion:
     why = "no balance to start from"
     for top in [top for top in start.problems if top in BEFORE_TIME] or list(start.problems)[-1:]:
         try:
-            balance, state = _balanced(start, True, top)
+            balance, state = _balanced(start, start.located, top)
         except RuntimeError:
             continue
+        if start.held is not None:
+            balance = start.held.with_harmonics(balance.basis.harmonics)
         motion = time_integration.integrate(balance, start.omega, state, options)
         if motion.periodic:
             return motion

@@ -26,6 +26,7 @@ from tribodyn.workflows.pictures.style import BLUE, GREEN, GREY, ORANGE
 from tribodyn.workflows.result.whole_file import replacing
 
 FORMAT = "tribodyn work and precision 1"
+SETTLED = 0.01  # doubt about a limit above which this is said not to be known
 FLOOR = 1e-7  # relative errors below this are drawn here
 LOOKS = {LOCATED: (BLUE, "o-"), SAMPLED: (GREEN, "s--"), IN_TIME: (ORANGE, "^-"), LIFE: (BLUE, "o-")}
 UNITS = {"energy": "J", "amplitude": "m", "preload": "N", LIFE: "cycles"}
@@ -85,6 +86,8 @@ def _limits(found: WorkPrecision) -> list[str]:
         if ours is None:
             continue
         told = f"{TITLES[name]}: limit of the harmonics {_told(ours, name)}"
+        if ours.doubt > SETTLED:
+            told += f", not settled to {100 * SETTLED:g} %"
         if theirs is not None:
             told += f", of the time steps {_told(theirs, name)}: {100 * (theirs.value / ours.value - 1):+.3f} %"
         elif name != LIFE:
@@ -111,11 +114,12 @@ def picture(found: WorkPrecision) -> Figure:
                     error = [max(abs(found.error(row, name) or 0.0) + doubt, FLOOR) for row in rows]
                     pane.plot([row.seconds for row in rows], error, look, color=colour, label=kind, markersize=5)
                     for row, height in zip(rows, error, strict=True):
-                        at = (row.seconds, height)
-                        pane.annotate(f"{row.size}", at, (4, 3), textcoords="offset points", fontsize=8, color=colour)
+                        at, beside = (row.seconds, height), (-4, -10) if kind == SAMPLED else (4, 3)
+                        pane.annotate(f"{row.size}", at, beside, textcoords="offset points", fontsize=8, color=colour)
             seconds = [row.seconds for row in found.rows if name in row.values]
             log_axis(pane.xaxis, min(seconds, default=0.0), max(seconds, default=0.0))
-            pane.set(yscale="log", xlabel="\n".join(["seconds of one processor", *_missing(found, name)]))
+            notes = [f"not settled: the limit is known to {100 * doubt:.0f} % only"] if doubt > SETTLED else []
+            pane.set(yscale="log", xlabel="\n".join(["seconds of one processor", *notes, *_missing(found, name)]))
             pane.set_title(named(found.scene, TITLES[name]))
             pane.axhline(max(doubt, FLOOR), color=GREY, linestyle=":", linewidth=1)
         panes[0].set_ylabel("relative error, with the doubt about the limit in it")
