@@ -29,7 +29,8 @@ from tribodyn.hbm.threads import single
 DECADES = 13  # by which the springs are softened at most
 SHORTEST = 0.02  # step of the decimal logarithm of the stiffness
 GROWTH = 1.6  # of a step after one that converged
-MOST_STEPS = 400  # of Newton on the whole way
+MOST_STEPS = 600  # of Newton on the whole way
+HASTY = 24  # of them at one stiffness: those that converge take fewer
 AGREES = 1e-6  # residual at the end from the contact's own springs, whose compliance is known less well beside them
 CLOSER = 1e-3  # tolerance at the end over the wanted one: a step more, as a soft support multiplies what is left
 LEAST_LENGTH = 1e-4  # of a damped step
@@ -44,10 +45,11 @@ def solve_along_stiffness(balance: HarmonicBalance, omega: float, options: Newto
     if balance.n_unknown > newton.MOST_DENSE:
         return None
     left = MOST_STEPS
+    hasty = replace(options, max_steps=min(options.max_steps, HASTY))
     soft = None
     for decade in range(DECADES + 1):
         soft = _softened(balance, -float(decade), soft)
-        found, steps = _damped(soft, omega, soft.stuck(omega), options)
+        found, steps = _damped(soft, omega, soft.stuck(omega), hasty)
         left -= steps
         if found is not None:
             break
@@ -62,7 +64,7 @@ def solve_along_stiffness(balance: HarmonicBalance, omega: float, options: Newto
         soft = _softened(balance, target, soft)
         starts = [x] if before is None else [x + (x - before[1]) * (target - level) / (level - before[0]), x]
         for start in starts:
-            found, steps = _damped(soft, omega, start, options)
+            found, steps = _damped(soft, omega, start, hasty)
             left -= steps
             if found is not None:
                 break
