@@ -102,7 +102,7 @@ class Follower:
             found, spent = self._periodic(stepper)
             if found is not None:
                 one = time_integration.motion_of(stepper, found, spent, CONVERGED)
-                return MeanMotion(one.energy, _normal(balance, one), see(one), _swing(one), 0.0, 0.0, True, spent)
+                return MeanMotion(one.energy, _normal(balance, one), see(one), one.amplitude, 0.0, 0.0, True, spent)
         settled = self._settled(balance, stepper, see)
         self._regular = settled.settled and settled.spread <= self.options.accuracy
         return replace(settled, periods=settled.periods + spent)
@@ -152,7 +152,7 @@ class Follower:
                 one = time_integration.motion_of(stepper, found, search.periods, CONVERGED, motion)
                 motion = found.end
                 work.append(float(one.energy.sum()))
-                rows.append((one.energy, _normal(balance, one), see(one), _swing(one)))
+                rows.append((one.energy, _normal(balance, one), see(one), one.amplitude))
             if block > 1 and first is None and self._same(np.array(work[-2 * o.block :])):
                 first = len(work) - o.block  # in the block before more of the transient is left
             if first is not None and _standard_error(np.array(work[first:])) <= o.accuracy:
@@ -191,12 +191,6 @@ def _normal(balance: HarmonicBalance, motion: PeriodicMotion) -> np.ndarray:
         return np.zeros(balance.contact.n_pair)
     normal: np.ndarray = motion.force[:, components.index("n")].mean(axis=1)
     return normal
-
-
-def _swing(motion: PeriodicMotion) -> np.ndarray:
-    """(n_output,) amplitude in one period [m]."""
-    swing: np.ndarray = np.sqrt(2 * motion.outputs.var(axis=1))
-    return swing
 
 
 def _standard_error(work: np.ndarray) -> float:

@@ -93,6 +93,12 @@ class PeriodicMotion:
         """Frequency [Hz]."""
         return self.omega / (2 * np.pi)
 
+    @property
+    def amplitude(self) -> np.ndarray:
+        """(n_output,) vibration amplitude of each output, the root of twice its mean square [m]."""
+        swing: np.ndarray = np.sqrt(2 * self.outputs.var(axis=1))
+        return swing
+
     def coefficients(self, series: np.ndarray, basis: HarmonicBasis) -> np.ndarray:
         """Fourier coefficients (..., n_coeff) of a series (..., n_step) of this motion, to stand beside the balance."""
         weight = np.where(basis.order == 0, 1.0, 2.0) / series.shape[-1]
@@ -383,7 +389,7 @@ def leave_alone(
         seen = _of_sector(balance, motion_of(stepper, found, search.periods, CONVERGED, motion))
         motion = found.end
         energy.append(float(seen.energy.sum()))
-        amplitude.append(np.sqrt(2 * seen.outputs.var(axis=1)))
+        amplitude.append(seen.amplitude)
     late, swing = np.array(energy[periods // 2 :]), np.array(amplitude[periods // 2 :])
     return LeftAlone(
         energy=float(late.mean()),

@@ -1,5 +1,13 @@
-"""Coarse settings of the blade and of the rig, for tests that need their scenes and not their numbers."""
+"""Coarse settings of the beam, of the blade and of the rig, for tests that need their scenes and not their numbers."""
 
+BEAM = (
+    "harmonics.kept=[0, 1]",
+    "geometry.n_patch=3",
+    "geometry.n_length=2",
+    "geometry.n_height=1",
+    "reduction.modes=3",
+    "response.points=6",
+)
 BLADE = (
     "geometry.n_span=4",
     "geometry.n_side=1",

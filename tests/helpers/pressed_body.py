@@ -16,6 +16,7 @@ from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear.evolution import Duty, WearProblem
+from tribodyn.hbm.wear.history import WearHistory, cycles_to_preload
 from tribodyn.hbm.wear.law import JointWear
 from tribodyn.reduction.model import ReducedModel
 
@@ -57,3 +58,10 @@ def wear_problem(**changes: object) -> WearProblem:
         "lost_below": 0.01,
     }
     return WearProblem(**(given | changes))
+
+
+def life(worn: WearHistory) -> float:
+    """Cycles to 2 % of the first preload."""
+    found = cycles_to_preload(worn, 0.02)
+    assert found is not None
+    return found

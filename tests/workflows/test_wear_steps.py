@@ -7,16 +7,12 @@ import json
 import numpy as np
 import pytest
 
+from tests.helpers.coarse_scenes import BEAM
 from tribodyn.workflows.accuracy import wear_steps
 from tribodyn.workflows.command import main as cli
 
 SMALL = (
-    "harmonics.kept=[0, 1]",
-    "geometry.n_patch=3",
-    "geometry.n_length=2",
-    "geometry.n_height=1",
-    "reduction.modes=3",
-    "response.points=6",
+    *BEAM,
     "harmonics.samples=16",
 )
 

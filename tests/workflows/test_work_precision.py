@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.helpers.coarse_scenes import RIG
+from tests.helpers.coarse_scenes import BEAM, RIG
 from tribodyn.hbm import newton
 from tribodyn.workflows.accuracy import work_precision as measured
 from tribodyn.workflows.accuracy import work_precision_table as table
@@ -19,12 +19,7 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 
 SMALL = (
-    "harmonics.kept=[0, 1]",
-    "geometry.n_patch=3",
-    "geometry.n_length=2",
-    "geometry.n_height=1",
-    "reduction.modes=3",
-    "response.points=6",
+    *BEAM,
     'wear.at="950 Hz"',
     'wear.rule="thesis"',
     'wear.step="50 %"',

@@ -14,7 +14,8 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import harmonic_choice
-from tribodyn.hbm.continuation.operating_point import SCANNED, AtFrequency, AtPeak, Site
+from tribodyn.hbm.continuation.operating_point import SCANNED, AtFrequency, AtPeak
+from tribodyn.hbm.continuation.sites import Site
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear.error_controlled_rule import jumps
 from tribodyn.hbm.wear.evolution import Duty

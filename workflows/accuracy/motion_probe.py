@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation import harmonic_choice
 from tribodyn.hbm.continuation.arrivals import arrivals
-from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak, BesidePeak, OperatingPoint
+from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak, OperatingPoint
+from tribodyn.hbm.continuation.sites import BesidePeak
 from tribodyn.workflows.accuracy.probes import Answers, OnCurve, State, compared, relative
 from tribodyn.workflows.accuracy.statement import Contribution
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds

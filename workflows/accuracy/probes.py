@@ -15,7 +15,8 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import harmonic_choice
 from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak, NoPeak, OperatingPoint, Site
+from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak, NoPeak, OperatingPoint
+from tribodyn.hbm.continuation.sites import Site
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import CONVERGED

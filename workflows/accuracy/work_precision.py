@@ -331,5 +331,5 @@ def _of_state(balance: HarmonicBalance, state: State) -> dict[str, float]:
 
 
 def _of_motion(motion: PeriodicMotion) -> dict[str, float]:
-    swing = float(np.sqrt(2 * motion.outputs[0].var()))
+    swing = float(motion.amplitude[0])
     return {"energy": float(motion.energy.sum()), "amplitude": swing, "preload": motion.preload}

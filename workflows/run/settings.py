@@ -9,7 +9,8 @@ import numpy as np
 
 from tribodyn.hbm import continuation
 from tribodyn.hbm.contact import law
-from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak, BesidePeak
+from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
+from tribodyn.hbm.continuation.sites import BesidePeak
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.evolution import Duty

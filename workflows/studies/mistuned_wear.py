@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.hbm.continuation.branch import amplitude
-from tribodyn.hbm.continuation.operating_point import BesidePeak, Site
+from tribodyn.hbm.continuation.sites import BesidePeak, Site
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.wear.evolution import WearProblem
 from tribodyn.hbm.wear.history import WearHistory, WearRow

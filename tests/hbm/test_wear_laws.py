@@ -1,0 +1,83 @@
+"""Wear laws: archard beside energy, laws whose depth per work changes, files of one's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.helpers.pressed_body import N_PAIR, life, wear_problem
+from tribodyn.hbm.outcome import WearEnd
+from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
+from tribodyn.hbm.wear import law as wear_law
+from tribodyn.hbm.wear.evolution import WearProblem
+from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.step_control import Tolerance
+from tribodyn.workflows.scene import scene_file
+
+
+@pytest.fixture(scope="module")
+def problem() -> WearProblem:
+    return wear_problem()
+
+
+def test_archard_and_energy_law_agree_up_to_the_uncoupled_directions(problem: WearProblem) -> None:
+    point = problem.mission[0].site.first(problem.balance)
+    area = problem.area
+    own = {"coefficient": np.ones(N_PAIR)}
+    exposure = wear_law.Exposure(problem.balance, point.state, area, own, np.zeros(N_PAIR), 0.0)
+    energy = wear_law.load("energy").depth_rate(exposure)
+    archard = wear_law.load("archard").depth_rate(exposure)
+    slips = energy > 0.05 * energy.max()
+    # uncoupled sliders dissipate mu N (|ds1| + |ds2|), which lies between mu N |ds| and sqrt(2) times that
+    ratio = energy[slips] / (0.4 * archard[slips])
+    assert np.all((ratio > 0.97) & (ratio < 1.03 * np.sqrt(2)))
+
+
+@pytest.mark.parametrize("law", ["archard"])
+def test_error_controlled_rule_takes_laws_whose_depth_per_work_changes(law: str) -> None:
+    other = wear_problem(wear=JointWear.of(law, coefficient=4e-10))
+    fine = thesis_rule.evolve(other, 1.5e-6)
+    worn = error_controlled_rule.evolve(other, Tolerance(0.02, 2e-4))
+    assert life(worn) == pytest.approx(life(fine), rel=0.01)
+
+
+def test_a_law_file_of_ones_own_is_taken_by_both_rules() -> None:
+    law = str(scene_file.CASES / "beam" / "running_in.py")
+    own = wear_problem(wear=JointWear.of(law, coefficient=4e-10))
+    fine = thesis_rule.evolve(own, 1.5e-6)
+    worn = error_controlled_rule.evolve(own, Tolerance(0.02, 2e-4))
+    assert life(worn) == pytest.approx(life(fine), rel=0.015)
+    plain_problem = wear_problem(wear=JointWear.of("energy", coefficient=4e-10))
+    plain = error_controlled_rule.evolve(plain_problem, Tolerance(0.02, 2e-4))
+    assert 0.25 * life(plain) < life(worn) < life(plain)  # a fresh face wears four times as fast
+
+
+@pytest.mark.parametrize(("text", "says"), [(None, "there is no wear law file"), ("x = 1", "no function depth_rate")])
+def test_a_file_that_is_no_wear_law_is_refused(tmp_path: Path, text: str | None, says: str) -> None:
+    path = tmp_path / "law.py"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(ValueError, match=says):
+        wear_law.load(str(path))
+
+
+@pytest.mark.parametrize(
+    ("body", "says"),
+    [
+        ("return exposure.enrgy", "cannot be run: AttributeError: .* 'enrgy'"),
+        ("return exposure.energy[:1]", r"depths of shape \(1,\) and not"),
+        ("return exposure.energy + float('nan')", "not finite"),
+    ],
+)
+def test_a_wear_law_that_fails_in_the_run_is_told(tmp_path: Path, body: str, says: str) -> None:
+    path = tmp_path / "law.py"
+    path.write_text(f"def depth_rate(exposure):\n    {body}\n")
+    with pytest.raises(ValueError, match=says):
+        thesis_rule.evolve(wear_problem(wear=JointWear.of(str(path))), 5e-7, max_steps=1)
+
+
+def test_a_law_that_takes_nothing_off_is_not_called_a_contact_at_rest() -> None:
+    worn = thesis_rule.evolve(wear_problem(wear=JointWear.of("energy", coefficient=0.0)), 5e-7)
+    assert worn.ended is WearEnd.NO_LOSS
