@@ -52,6 +52,7 @@ class MeanMotion:
 
     energy : (n_pair,) friction work per period [J]; normal_force : (n_pair,) [N], zero where the law has none
     seen : mean of what was asked of every period; amplitude : (n_output,) [m]
+    off : largest difference of a mean displacement from what harmonic 0 prescribes [m]; zero without one
     spread : standard deviation of the work of a period, over its mean; error : standard error of that mean, relative
     settled : whether the motion came to rest in its statistics; periods : marched in all
     """
@@ -60,6 +61,7 @@ class MeanMotion:
     normal_force: np.ndarray
     seen: np.ndarray
     amplitude: np.ndarray
+    off: float
     spread: float
     error: float
     settled: bool
@@ -102,7 +104,9 @@ class Follower:
             found, spent = self._periodic(stepper)
             if found is not None:
                 one = time_integration.motion_of(stepper, found, spent, CONVERGED)
-                return MeanMotion(one.energy, _normal(balance, one), see(one), one.amplitude, 0.0, 0.0, True, spent)
+                off = float(np.abs(one.off).max(initial=0.0))
+                means = one.energy, _normal(balance, one), see(one), one.amplitude, off
+                return MeanMotion(*means, spread=0.0, error=0.0, settled=True, periods=spent)
         settled = self._settled(balance, stepper, see)
         self._regular = settled.settled and settled.spread <= self.options.accuracy
         return replace(settled, periods=settled.periods + spent)
@@ -152,24 +156,34 @@ class Follower:
                 one = time_integration.motion_of(stepper, found, search.periods, CONVERGED, motion)
                 motion = found.end
                 work.append(float(one.energy.sum()))
-                rows.append((one.energy, _normal(balance, one), see(one), one.amplitude))
+                rows.append((one.energy, _normal(balance, one), see(one), one.amplitude, one.off))
             if block > 1 and first is None and self._same(np.array(work[-2 * o.block :])):
-                first = len(work) - o.block  # in the block before more of the transient is left
+                off = np.array([row[-1] for row in rows[-o.block :]])
+                if self._held(stepper, off):
+                    first = len(work) - o.block  # in the block before more of the transient is left
             if first is not None and _standard_error(np.array(work[first:])) <= o.accuracy:
                 break
         self._motion = motion
         kept = slice(len(rows) // 2 if first is None else first, None)
         late = np.array(work[kept])
-        energy, normal, seen, amplitude = (np.mean(column, axis=0) for column in zip(*rows[kept], strict=True))
+        energy, normal, seen, amplitude, off = (np.mean(column, axis=0) for column in zip(*rows[kept], strict=True))
         whole, error = float(late.mean()), _standard_error(late)
         spread = float(late.std() / whole) if whole > 0 else 0.0
-        return MeanMotion(energy, normal, seen, amplitude, spread, error, first is not None, len(work))
+        largest = float(np.abs(off).max(initial=0.0))
+        return MeanMotion(energy, normal, seen, amplitude, largest, spread, error, first is not None, len(work))
 
     def _same(self, work: np.ndarray) -> bool:
         """Whether two blocks of periods show one motion."""
         before, after = np.split(work, 2)
         chance = SAME_SCATTER * float(np.hypot(before.std(), after.std())) / np.sqrt(len(after))
         return bool(abs(after.mean() - before.mean()) <= self.options.accuracy * work.mean() + chance)
+
+    def _held(self, stepper: TimeStepper, off: np.ndarray) -> bool:
+        """Whether a block of periods has the mean displacement that is prescribed; off : (n_period, k)."""
+        if stepper.hold is None:
+            return True
+        chance = SAME_SCATTER * off.std(axis=0) / np.sqrt(len(off))
+        return bool((np.abs(off.mean(axis=0)) <= self.options.accuracy * abs(stepper.hold.height) + chance).all())
 
     def _at(self, balance: HarmonicBalance, omega: float) -> TimeStepper:
         """The stepper at a place; what moves is taken along."""
@@ -205,4 +219,4 @@ def _carried(motion: Moving, before: TimeStepper, after: TimeStepper) -> Moving:
     z, common = np.zeros(2 * new), min(old, new)
     z[:common] = motion.z[:common]
     z[new : new + common] = motion.z[old : old + common] * (after.h / before.h)
-    return after.moving(z, motion.memory, motion.x, motion.f)
+    return after.moving(z, motion.memory, motion.x, motion.f, motion.hold)

@@ -144,6 +144,7 @@ class TimeRow:
     normal_force: np.ndarray
     omega: float
     amplitude: float
+    off: float
     settled: bool
     periods: int
     step_error: float
@@ -158,6 +159,7 @@ class WearInTime:
     spread : (n_row,) standard deviation of the work of a period over its mean; error : (n_row,) of that mean, relative
     preload : (n_row,) mean normal force of the joints that wear [N]; normal_force : (n_row, n_pair)
     omega : (n_row,) frequency [rad/s]; amplitude : (n_row,) of the first output, mean over periods [m]; first duty
+    off : (n_row,) largest difference of a mean displacement from what harmonic 0 prescribes [m]
     settled : (n_row,) whether the means had come to rest; periods : (n_row,) marched for the step
     step_error : (n_row,) local error of the wear step over its tolerance
     end : why the run ended
@@ -173,6 +175,7 @@ class WearInTime:
     normal_force: np.ndarray
     omega: np.ndarray
     amplitude: np.ndarray
+    off: np.ndarray
     settled: np.ndarray
     periods: np.ndarray
     step_error: np.ndarray
@@ -196,6 +199,7 @@ class _Rate:
     first: MeanMotion
     rate: np.ndarray
     energy: np.ndarray
+    off: float
     spread: float
     error: float
     settled: bool
@@ -255,6 +259,7 @@ def evolve(
                 normal_force=force,
                 omega=walk.omega,
                 amplitude=float(here.first.amplitude[0]),
+                off=here.off,
                 settled=here.settled,
                 periods=periods,
                 step_error=error,
@@ -347,6 +352,7 @@ class _Walk:
         weight = work / work.sum() if work.sum() > 0 else work
         return _Rate(
             found[0], rate, energy,
+            off=max(m.off for m in found),
             spread=float(weight @ [m.spread for m in found]),
             error=float(np.linalg.norm(weight * [m.error for m in found])),
             settled=all(m.settled for m in found),

@@ -28,7 +28,10 @@ from tribodyn.workflows.run.progress import Progress
 
 TOLERANCE = 0.05  # of a wear step in time
 SHARES = (0.9, 0.75, 0.5, 0.25, 0.1, 0.01, LIFE_SHARE)  # of the first preload, that are told
-COLUMNS = ("cycles", "frequency_hz", "preload_n", "energy_j", "spread", "amplitude_m", "depth_m", "settled", "periods")
+COLUMNS = (
+    "cycles", "frequency_hz", "preload_n", "energy_j", "spread", "amplitude_m", "depth_m", "mean_off_m", "settled",
+    "periods",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,7 @@ class LifeInTime:
             "shares": [dict(zip(("share", "run", "time"), (s, *self.at_share(s)), strict=True)) for s in SHARES],
             "scatter": found.scatter,
             "largest_spread": float(found.spread.max()),
+            "largest_mean_off_m": float(found.off.max()),
             "unsettled": self.unsettled,
             "steps_per_period": self.steps,
             "tolerance": self.tolerance,
@@ -90,6 +94,8 @@ class LifeInTime:
             f"{self.steps} steps a period, {int(found.periods.sum())} periods, {len(found.cycles)} wear steps of "
             f"tolerance {self.tolerance:g}",
         ]
+        if (off := float(found.off.max())) > 0:
+            shown.append(f"mean of the prescribed displacement: at most {off:.2g} m from what is prescribed")
         if self.unsettled > 0:
             shown.append(f"for {self.unsettled:.0%} of the cycles the mean work had not come to rest")
         return shown
@@ -104,6 +110,7 @@ def _columns(found: WearInTime, i: int) -> tuple[Any, ...]:
         float(found.spread[i]),
         float(found.amplitude[i]),
         float(found.depth[i].max()),
+        float(found.off[i]),
         bool(found.settled[i]),
         int(found.periods[i]),
     )
