@@ -145,6 +145,9 @@ class TimeRow:
     omega: float
     amplitude: float
     off: float
+    apart: float
+    works: np.ndarray
+    repeats: int
     settled: bool
     periods: int
     step_error: float
@@ -160,6 +163,9 @@ class WearInTime:
     preload : (n_row,) mean normal force of the joints that wear [N]; normal_force : (n_row, n_pair)
     omega : (n_row,) frequency [rad/s]; amplitude : (n_row,) of the first output, mean over periods [m]; first duty
     off : (n_row,) largest difference of a mean displacement from what harmonic 0 prescribes [m]
+    apart : (n_row,) share of the time in which no pair carries a force; works : (n_row, n_period) friction work of the
+        last periods [J]; repeats : (n_row,) periods of the loads after which the motion comes back, 0 where it does
+        not; first duty
     settled : (n_row,) whether the means had come to rest; periods : (n_row,) marched for the step
     step_error : (n_row,) local error of the wear step over its tolerance
     end : why the run ended
@@ -176,6 +182,9 @@ class WearInTime:
     omega: np.ndarray
     amplitude: np.ndarray
     off: np.ndarray
+    apart: np.ndarray
+    works: np.ndarray
+    repeats: np.ndarray
     settled: np.ndarray
     periods: np.ndarray
     step_error: np.ndarray
@@ -260,6 +269,9 @@ def evolve(
                 omega=walk.omega,
                 amplitude=float(here.first.amplitude[0]),
                 off=here.off,
+                apart=here.first.apart,
+                works=here.first.works,
+                repeats=here.first.repeats,
                 settled=here.settled,
                 periods=periods,
                 step_error=error,
