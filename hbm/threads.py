@@ -1,7 +1,9 @@
-"""Threads of BLAS: one, unless more are asked for.
+"""How many threads may work: one, unless more are asked for.
 
-The solver makes many small products; threads that wait for each other make them many times slower, and two pay nowhere
-that was measured. So each entry of the solver is `single`, however it is called, and `limited` asks for another number.
+The solver makes many small products; BLAS threads that wait for each other make them many times slower, and two pay
+nowhere that was measured. So each entry of the solver is `single`: BLAS has one thread in it, however it is called.
+`limited` asks for more: BLAS has them outside of the solver, and what the solver can share among processes is shared,
+see `continuation.two_ends`.
 """
 
 from __future__ import annotations
@@ -18,7 +20,8 @@ from threadpoolctl import ThreadpoolController
 P = ParamSpec("P")
 R = TypeVar("R")
 
-_limit: ContextVar[int | None] = ContextVar("tribodyn_threads", default=None)  # None: nobody has limited them yet
+_asked: ContextVar[int] = ContextVar("tribodyn_threads", default=1)
+_blas: ContextVar[int | None] = ContextVar("tribodyn_blas_threads", default=None)  # None: nobody has limited them yet
 
 
 @cache
@@ -35,26 +38,41 @@ def usable(count: int) -> int:
     return min(count, ours or 1)
 
 
+def asked() -> int:
+    """Threads, or processes, that may work here: those of `limited`, else one."""
+    return _asked.get()
+
+
 @contextmanager
 def limited(count: int) -> Iterator[None]:
-    """So many BLAS threads within the context, also in what is `single` there, but not more than `usable`."""
+    """So many threads within the context, but not more than `usable`; BLAS has one of them in what is `single`."""
     count = usable(count)
-    before = _limit.set(count)
+    before = _asked.set(count)
+    try:
+        with _blas_threads(count):
+            yield
+    finally:
+        _asked.reset(before)
+
+
+@contextmanager
+def _blas_threads(count: int) -> Iterator[None]:
+    before = _blas.set(count)
     try:
         with _controller().limit(limits=count):
             yield
     finally:
-        _limit.reset(before)
+        _blas.reset(before)
 
 
 def single(function: Callable[P, R]) -> Callable[P, R]:
-    """The function on one BLAS thread, unless it is called where their number is `limited` already."""
+    """The function on one BLAS thread."""
 
     @wraps(function)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
-        if _limit.get() is not None:
+        if _blas.get() == 1:
             return function(*args, **kwargs)
-        with limited(1):
+        with _blas_threads(1):
             return function(*args, **kwargs)
 
     return wrapped

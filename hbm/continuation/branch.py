@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import BranchEnd, Outcome, SolveEnd
+
+if TYPE_CHECKING:
+    from tribodyn.hbm.continuation.curve import Segment
 
 
 @dataclass(frozen=True)
@@ -69,31 +73,47 @@ def amplitude(coefficients: np.ndarray) -> np.ndarray:
     return np.sqrt(np.sum(dynamic**2, axis=-1))
 
 
+@dataclass(frozen=True, eq=False)
+class BranchPoint:
+    """One point of a branch; the fields are those of `Branch`, x (n_pair, n_component, n_coeff) [m]."""
+
+    value: float
+    x: np.ndarray
+    omega: float
+    response: np.ndarray
+    energy: float
+    outcome: Outcome[SolveEnd]
+    steps: int
+
+
 class BranchBuilder:
     """Collects solutions into a Branch.
 
     parameter : what the continuation steps in
+    points : collected so far; value, x : of them; folds : indices of those that are folds
     """
 
     def __init__(self, parameter: Parameter):
         self._parameter = parameter
+        self.points: list[BranchPoint] = []
         self.value: list[float] = []
         self.x: list[np.ndarray] = []
         self.folds: list[int] = []
-        self._rows: list[tuple[float, np.ndarray, float, Outcome[SolveEnd], int]] = []
-        self._output_names: tuple[str, ...] = ()
 
     def add(self, value: float, solution: Solution, fold: bool = False) -> None:
         """Append one solution, converged or not, at a value of the parameter."""
         state = solution.state
         balance, _ = self._parameter.place(value)
-        self.value.append(value)
-        self.x.append(state.x)
+        response, energy = balance.outputs(state), float(balance.energy(state).sum())
+        self.append(BranchPoint(value, state.x, state.omega, response, energy, solution.outcome, solution.steps), fold)
+
+    def append(self, point: BranchPoint, fold: bool = False) -> None:
+        """Append a point that is known already."""
+        self.points.append(point)
+        self.value.append(point.value)
+        self.x.append(point.x)
         if fold:
             self.mark_fold()
-        self._output_names = balance.compliance.output_names
-        energy = float(balance.energy(state).sum())
-        self._rows.append((state.omega, balance.outputs(state), energy, solution.outcome, solution.steps))
 
     def mark_fold(self) -> None:
         """Mark the last point as a fold."""
@@ -102,23 +122,44 @@ class BranchBuilder:
 
     def truncate(self, n_point: int) -> None:
         """Keep the first points only."""
-        del self.value[n_point:], self.x[n_point:], self._rows[n_point:]
+        del self.value[n_point:], self.x[n_point:], self.points[n_point:]
         self.folds = [i for i in self.folds if i < n_point]
 
     def finish(self, end: Outcome[BranchEnd]) -> Branch:
         """The branch; `end` says why it ends where it ends."""
-        omega, response, energy, outcome, steps = zip(*self._rows, strict=True)
-        x = np.stack(self.x)
+        points, x = self.points, np.stack(self.x)
+        balance, _ = self._parameter.place(points[-1].value)
         return Branch(
-            omega=np.array(omega),
-            output_names=self._output_names,
-            response=np.stack(response),
+            omega=np.array([p.omega for p in points]),
+            output_names=balance.compliance.output_names,
+            response=np.stack([p.response for p in points]),
             contact=x.reshape(len(x), -1, x.shape[-1]),
-            energy=np.array(energy),
-            outcome=outcome,
-            newton_steps=np.array(steps),
+            energy=np.array([p.energy for p in points]),
+            outcome=tuple(p.outcome for p in points),
+            newton_steps=np.array([p.steps for p in points]),
             end=end,
             folds=tuple(self.folds),
             parameter_name=self._parameter.name,
             parameter=np.array(self.value),
         )
+
+
+class Walk(Protocol):
+    """A continuation under way, from its first point on.
+
+    builder : the branch so far
+    parts : the curve up to the points that the last step added, a segment for each; None where the method is a sweep,
+        which has no tangents and may jump
+    """
+
+    builder: BranchBuilder
+    parts: list[Segment] | None
+
+    @property
+    def notes(self) -> str:
+        """What the sentence of the end is to say of the way so far, such as where it jumped."""
+        ...
+
+    def advance(self) -> Outcome[BranchEnd] | None:
+        """One step more; why the branch ends, or None."""
+        ...

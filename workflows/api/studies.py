@@ -13,6 +13,7 @@ from tribodyn.fem.part import Part
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
+from tribodyn.hbm.continuation import two_ends
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd, WearEnd
@@ -189,7 +190,8 @@ def follow_response(file: SceneFile, balance: HarmonicBalance) -> Branch:
 def follow_arc_length(file: SceneFile, balance: HarmonicBalance) -> Branch:
     """The response over the scene's range by arc length, round its folds."""
     low, high = settings.response_range(file.scene)
-    return arc_length.follow(balance, low, high, arc_length.Options(newton=settings.newton_options(file.scene)))
+    options = arc_length.Options(newton=settings.newton_options(file.scene))
+    return two_ends.follow(arc_length, balance, low, high, options)
 
 
 def follow_adaptive(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: float) -> Branch:

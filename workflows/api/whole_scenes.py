@@ -249,7 +249,7 @@ def posterior(
 def benchmark(quick: bool = True, *, progress: Report = None) -> list[Timing]:
     """Time the solver beside the dense algorithm of the thesis on the beam scene.
 
-    quick : harmonics 0+1 and 0+3 on one thread
+    quick : harmonics 0+1 and 0+3 alone
     """
     from tribodyn.workflows.benchmarks import bench
 

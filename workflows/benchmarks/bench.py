@@ -13,7 +13,7 @@ import pstats
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from time import perf_counter, process_time
+from time import process_time
 
 import numpy as np
 
@@ -45,7 +45,7 @@ class Timing:
 
     harmonics : such as "0+3", 0 to 3; unknowns : of the dense algorithm, and of ours at the contact
     seconds : of the whole response curve by the compliance form, the sum of the least times of its points, of the
-        processor on one thread and of the clock on two; newton_steps : of it
+        processor; newton_steps : of it
     again : the same from the even and from the odd repeats alone, their relative difference
     ratio : seconds of the dense algorithm over ours on the same dense_points, None without any; dense_seconds : of
         these; dense_lost : points that it did not converge at in 40 steps, which do not count
@@ -54,7 +54,6 @@ class Timing:
     """
 
     harmonics: str
-    threads: int
     points: int
     converged: int
     unknowns: int
@@ -75,17 +74,14 @@ class Timing:
 
 
 def run(quick: bool, say: Callable[[str], None]) -> list[Timing]:
-    """The table: 0+1 and 0+3 on one thread when quick, else 0+1, 0+3, 0+5 on one and two threads."""
-    plans = [("0+1", 1, (8, 3)), ("0+3", 1, (2, 2))]
-    if not quick:
-        plans = [("0+1", 1, (10, 4)), ("0+3", 1, (4, 2)), ("0+5", 1, (3, 1))]
-        plans += [("0+1", 2, (10, 4)), ("0+3", 2, (4, 2)), ("0+5", 2, (3, 1))]
+    """The table: 0+1 and 0+3 when quick, else 0+5 too; on one thread."""
+    plans = [("0+1", (8, 3)), ("0+3", (2, 2))] if quick else [("0+1", (10, 4)), ("0+3", (4, 2)), ("0+5", (3, 1))]
     problem = _problem()
     rows = []
-    for harmonics, threads, windows in plans:
-        say(f"harmonics {harmonics}, {threads} thread{'s' if threads > 1 else ''}")
-        with limited(threads):
-            rows.append(_measure(problem(harmonics), harmonics, threads, windows))
+    for harmonics, windows in plans:
+        say(f"harmonics {harmonics}")
+        with limited(1):
+            rows.append(_measure(problem(harmonics), harmonics, windows))
     return rows
 
 
@@ -104,12 +100,11 @@ def _problem() -> Callable[[str], HarmonicBalance]:
     return of
 
 
-def _measure(balance: HarmonicBalance, harmonics: str, threads: int, windows: tuple[int, int]) -> Timing:
+def _measure(balance: HarmonicBalance, harmonics: str, windows: tuple[int, int]) -> Timing:
     low, high = settings.response_range(scene_file.read("beam_thesis", ()).scene)
     options = natural.Options(n_points=POINTS, newton=NewtonOptions(TOLERANCE))
     natural.follow(balance, high, high * 0.999, replace(options, n_points=2))  # compiles outside the clock
-    now = process_time if threads == 1 else perf_counter  # other work on the machine does not count
-    branch, steps = _timed(balance, high, low, options, now)
+    branch, steps = _timed(balance, high, low, options)
     per_point = np.min(steps, axis=0)
     halves = [float(np.min(steps[i::2], axis=0).sum()) for i in (0, 1)]
     profiler = cProfile.Profile()
@@ -127,10 +122,10 @@ def _measure(balance: HarmonicBalance, harmonics: str, threads: int, windows: tu
         for i in range(start, start + length):
             taken = []
             for _ in range(DENSE_REPEATS):
-                clock = now()
+                clock = process_time()
                 guess = natural.extrapolate(wanted[i - 3 : i], q[-3:], wanted[i])
                 solution = dense.solve(wanted[i], guess, TOLERANCE)
-                taken.append(now() - clock)
+                taken.append(process_time() - clock)
             if solution.outcome != CONVERGED:  # its time is that of no solution
                 lost += 1
                 q += _refined(balance, dense, branch.omega, branch.contact, wanted[i : i + 1])
@@ -148,7 +143,6 @@ def _measure(balance: HarmonicBalance, harmonics: str, threads: int, windows: tu
     p = dense.profile
     return Timing(
         harmonics=harmonics,
-        threads=threads,
         points=len(branch.omega),
         converged=int(branch.converged.sum()),
         unknowns=balance.n_unknown,
@@ -165,20 +159,20 @@ def _measure(balance: HarmonicBalance, harmonics: str, threads: int, windows: tu
         balance=shares["balance"],
         direction=shares["direction"],
         dense_inversion=p.inversion / max(p.contact + p.balance + p.inversion, 1e-300),
-        thesis_seconds=THESIS_SECONDS.get(harmonics) if threads == 1 else None,
+        thesis_seconds=THESIS_SECONDS.get(harmonics),
     )
 
 
 def _timed(
-    balance: HarmonicBalance, high: float, low: float, options: natural.Options, now: Callable[[], float]
+    balance: HarmonicBalance, high: float, low: float, options: natural.Options
 ) -> tuple[Branch, list[np.ndarray]]:
     """The curve, and the seconds of its points in each repeat; the first entry holds the first two points."""
     steps = []
     for _ in range(REPEATS):
-        times = [now()]
+        times = [process_time()]
 
         def on_point(_done: int, _wanted: int, times: list[float] = times) -> None:
-            times.append(now())
+            times.append(process_time())
 
         branch = natural.follow(balance, high, low, options, on_point)
         steps.append(np.diff(times))
@@ -219,26 +213,26 @@ def as_records(rows: list[Timing]) -> list[dict[str, object]]:
 def as_text(rows: list[Timing]) -> str:
     """The rows for people, the thesis's figures beside ours."""
     lines = [
-        "harmonics threads   points   seconds  again  Newton    ratio  largest difference  thesis 1 core   "
+        "harmonics   points   seconds  again  Newton    ratio  largest difference  thesis 1 core   "
         "contact/balance/direction %"
     ]
     for r in rows:
         thesis = f"{r.thesis_seconds:.0f} s" if r.thesis_seconds else "-"
         shares = f"{100 * r.contact:.0f}/{100 * r.balance:.0f}/{100 * r.direction:.0f}"
         published = THESIS_SHARES.get(r.harmonics)
-        if published and r.threads == 1:
+        if published:
             shares += " (thesis " + "/".join(f"{v:.0f}" for v in published) + ")"
         ratio = "-" if r.ratio is None else f"{r.ratio:.1f}"
         lines.append(
-            f"{r.harmonics:>9} {r.threads:7d} {r.converged:4d}/{r.points:<4d} {r.seconds:8.2f} {r.again:6.0%} "
+            f"{r.harmonics:>9} {r.converged:4d}/{r.points:<4d} {r.seconds:8.2f} {r.again:6.0%} "
             f"{r.newton_steps:7d} {ratio:>8} {r.max_difference:19.1e} {thesis:>14}   {shares}"
         )
     lines.append(f"least of {REPEATS} repeats for each point; again: the same from every second one, the difference")
     lines.append(
         "ratio: seconds of the dense algorithm over ours on the same points "
-        f"({', '.join(f'{r.harmonics}/{r.threads}: {r.dense_points}' for r in rows)} points)"
+        f"({', '.join(f'{r.harmonics}: {r.dense_points}' for r in rows)} points)"
     )
-    missed = [f"{r.dense_lost} at {r.harmonics}/{r.threads}" for r in rows if r.dense_lost]
+    missed = [f"{r.dense_lost} at {r.harmonics}" for r in rows if r.dense_lost]
     if missed:
         lines.append(f"the dense algorithm did not converge at further points, which do not count: {', '.join(missed)}")
     return "\n".join(lines)

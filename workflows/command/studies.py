@@ -21,6 +21,7 @@ def bench(
     fe: Annotated[tuple[str, ...], Parameter(name="--fe", negative=(), consume_multiple=False)] = (),
     way: Annotated[tuple[str, ...], Parameter(name="--way", negative=(), consume_multiple=False)] = (),
     contact: Annotated[tuple[str, ...], Parameter(name="--contact", negative=(), consume_multiple=False)] = (),
+    two_cores: Flag = False,
     out: Path = Path("scaling.png"),
     as_json: Json = False,
 ) -> None:
@@ -29,7 +30,7 @@ def bench(
     Parameters
     ----------
     quick
-        Harmonics 0+1 and 0+3 on one thread, in under a minute; with --scaling up to 13 x 13 contact nodes.
+        Harmonics 0+1 and 0+3 alone, in under a minute; with --scaling up to 13 x 13 contact nodes.
     scaling
         Time and memory of one response at 0+3 from 5 x 5 to 31 x 31 contact nodes instead, with a plot.
     fe
@@ -41,6 +42,8 @@ def bench(
     contact
         Set-up, memory and seconds of one response at 0+3 on "500", "3k", "12k" or "48k" contact DOFs instead, with
         residual flexibility and, up to 3k, beside the dense compliance; can be repeated.
+    two_cores
+        Seconds of one response on one core and on two instead, followed from both ends, on 507 and 1587 contact DOFs.
     out
         File of the plot of --scaling.
     as_json
@@ -57,6 +60,12 @@ def bench(
 
         sizes = large_contact.run(contact, aside)
         print(json.dumps(large_contact.as_records(sizes), indent=2) if as_json else large_contact.as_text(sizes))
+        return
+    if two_cores:
+        from tribodyn.workflows.benchmarks import two_cores as both
+
+        cores = both.run(aside)
+        print(json.dumps(both.as_records(cores), indent=2) if as_json else both.as_text(cores))
         return
     if scaling:
         make_room(out, PICTURE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,15 +28,21 @@ class Clock:
 
     def __init__(self, earlier: Result | None):
         self._before = Facts() if earlier is None else earlier.facts
-        self._start, self._processor = time.perf_counter(), time.process_time()
+        self._start, self._processor = time.perf_counter(), _processor()
 
     def seconds(self) -> float:
         """Seconds so far."""
         return self._before.seconds + time.perf_counter() - self._start
 
     def processor_seconds(self) -> float:
-        """Seconds of the processor so far, of all threads; of a machine that does other work, too, the same."""
-        return self._before.processor_seconds + time.process_time() - self._processor
+        """Seconds of the processor so far, of all threads and processes; other work on the machine changes nothing."""
+        return self._before.processor_seconds + _processor() - self._processor
+
+
+def _processor() -> float:
+    """Seconds of the processor of this process and of those that it has ended."""
+    ended = os.times()
+    return time.process_time() + ended.children_user + ended.children_system
 
 
 @contextmanager

@@ -8,7 +8,7 @@ import numpy as np
 
 from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation import harmonic_choice, residual_shear
+from tribodyn.hbm.continuation import harmonic_choice, residual_shear, two_ends
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.continuation.operating_point import AtPeak
@@ -25,14 +25,14 @@ SAME_PEAK = 1e-3  # distance of peaks, relative, that is none
 def follow_response(
     scene: Scene, balance: HarmonicBalance, advance: Callable[[float, str], None], highest: float = np.inf
 ) -> Branch:
-    """The response curve of the unworn contact by the scene's continuation method.
+    """The response curve of the unworn contact by the scene's continuation method, from both ends on two threads.
 
     highest : frequency [rad/s] at which it ends, if that of the scene's range is higher
     """
     method, options = continuation.load(scene.response.method_name), settings.response_options(scene)
     low, high = settings.response_range(scene)
     high = max(low, min(high, highest))
-    return method.follow(balance, low, high, options, lambda done, wanted: advance(done / wanted, ""))
+    return two_ends.follow(method, balance, low, high, options, lambda done, wanted: advance(done / wanted, ""))
 
 
 def choose_harmonics(

@@ -257,11 +257,12 @@ class NonlinearMode(Table):
 
 
 class Solver(Table):
-    """Tolerances of the solver, and threads of the linear algebra."""
+    """Tolerances of the solver, and how many threads may work."""
 
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-8
     """Newton's tolerance on the contact displacement, relative to its size."""
     krylov: Annotated[Number, Field(gt=0, lt=1)] = 0.1
     """How exactly each Newton direction is solved, at the least."""
     threads: Annotated[StrictInt, Field(ge=1)] = 1
-    """Threads of the linear algebra."""
+    """Threads of the linear algebra while the model is made. With two or more, responses are followed from both ends at
+    once by two processes, on systems that can fork, such as Linux; all that is solved besides takes one."""

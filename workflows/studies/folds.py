@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from tribodyn.hbm.continuation import two_ends
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.outcome import SolveEnd
@@ -46,16 +47,16 @@ def find(file: SceneFile, progress: Progress, bracket: float = 0.02) -> FoldsFou
 
     bracket : distance to the fold of the balance, relative, within which its end in time is looked for
     Raises  SolveFailed where the curve has no first point; ValueError for a sector of a wheel, whose perturbations are
-    other waves than its motion
+    other waves than its motion, and for a scene with prescribed nodes, which have no equation of motion
     """
-    if getattr(file.scene, "wheel", None):
-        raise ValueError(f"{file.name} has a [wheel]: its folds cannot be looked for in time")
+    if getattr(file.scene, "prescribed", None) or getattr(file.scene, "wheel", None):
+        raise ValueError(f"{file.name} has a [wheel] or [prescribed] nodes: its folds cannot be looked for in time")
     low, high = settings.response_range(file.scene)
     with limited(file.scene.solver.threads):
         balance = modelling.build(file, None, progress).balance
         with progress.stage("frequency response"):
             options = arc_length.Options(newton=settings.newton_options(file.scene))
-            branch = arc_length.follow(balance, low, high, options)
+            branch = two_ends.follow(arc_length, balance, low, high, options)
         if not branch.converged[0]:
             raise SolveFailed(f"the frequency response {branch.end}")
         found = []

@@ -15,6 +15,7 @@ from tribodyn.fem.cyclic import Sector
 from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation import two_ends
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import adaptive
 from tribodyn.hbm.linear.travelling_wave import on_wheel
@@ -110,7 +111,8 @@ def follow(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: 
     Raises  SolveFailed where the curve does not come to the end of the range
     """
     low, high = (2 * np.pi * hertz for hertz in frequency)
-    branch = adaptive.follow(balance, low, high, adaptive.Options(tolerance=tolerance, max_points=MAX_POINTS))
+    options = adaptive.Options(tolerance=tolerance, max_points=MAX_POINTS)
+    branch = two_ends.follow(adaptive, balance, low, high, options)
     if branch.ended is not BranchEnd.REACHED:
         raise SolveFailed(f"the frequency response {branch.end}")
     return branch

@@ -18,11 +18,12 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import parameter
 from tribodyn.hbm.continuation.branch import Branch, BranchBuilder
+from tribodyn.hbm.continuation.curve import Segment
 from tribodyn.hbm.continuation.methods.arc_length import solve_along_load
 from tribodyn.hbm.continuation.methods.natural import EXTRAPOLATION_DEGREE, extrapolate
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.newton import NewtonOptions, Solution
-from tribodyn.hbm.outcome import BranchEnd
+from tribodyn.hbm.outcome import BranchEnd, Outcome
 from tribodyn.hbm.threads import single
 
 # Least share of the miss of extrapolation that counts as error of interpolation. On a smooth curve the share follows
@@ -82,31 +83,31 @@ def follow(
     Returns a Branch; `end` says where it ends and why, and where the response jumped to another branch on the way
     """
     options = options or Options()
-    path = parameter.of(problem)
-    builder = BranchBuilder(path)
+    sweep = begin(parameter.of(problem), start, stop, options)
+    while (end := sweep.advance()) is None:
+        if on_point is not None:
+            _tell(on_point, sweep.builder, start, stop, options)
+    if on_point is not None and end.kind is BranchEnd.REACHED:
+        _tell(on_point, sweep.builder, start, stop, options)
+    return sweep.builder.finish(end)
+
+
+def begin(path: Parameter, start: float, stop: float, options: Options) -> _Sweep:
+    """The first point, from which to follow."""
     first = None
     if options.guess is not None:
         first = newton.solve(*path.place(start), options.guess, options.newton)
     if first is None or not first.converged:
         first = solve_along_load(*path.place(start), options.newton)
-    builder.add(start, first)
-    if not first.converged:
-        return builder.finish(BranchEnd.ENDED.say(f" {path.say(start)}: {first.outcome}"))
-    sweep = _Sweep(path, options, builder, first, start, stop)
-    while builder.value[-1] != stop:
-        if len(builder.value) >= options.max_points:
-            here = path.say(builder.value[-1])
-            return builder.finish(BranchEnd.ENDED.say(f" {here}: {options.max_points} points were allowed"))
-        trouble = sweep.advance()
-        if trouble:
-            return builder.finish(BranchEnd.ENDED.say(f" {path.say(builder.value[-1])}: {trouble}"))
-        if on_point is not None:
-            done = len(builder.value)
-            share = abs(builder.value[-1] - start) / abs(stop - start)
-            on_point(done, max(done, min(options.max_points, round(done / max(share, 1e-3)))))
-    jumps = ", ".join(path.say(value) for value in sweep.jumps)
-    jumped = f"; the response jumped at {jumps}" if jumps else ""
-    return builder.finish(BranchEnd.REACHED.say(f" {path.say(stop)}{jumped}"))
+    return _Sweep(path, options, first, start, stop)
+
+
+def _tell(
+    on_point: Callable[[int, int], None], builder: BranchBuilder, start: float, stop: float, options: Options
+) -> None:
+    done = len(builder.value)
+    share = abs(builder.value[-1] - start) / abs(stop - start)
+    on_point(done, max(done, min(options.max_points, round(done / max(share, 1e-3)))))
 
 
 def interpolate(branch: Branch, values: np.ndarray) -> np.ndarray:
@@ -126,17 +127,37 @@ def interpolate(branch: Branch, values: np.ndarray) -> np.ndarray:
 class _Sweep:
     """The last points, the step to come, and points solved ahead."""
 
-    def __init__(
-        self, path: Parameter, options: Options, builder: BranchBuilder, first: Solution, start: float, stop: float
-    ):
-        self._path, self._options, self._builder, self._stop = path, options, builder, stop
+    def __init__(self, path: Parameter, options: Options, first: Solution, start: float, stop: float):
+        self._path, self._options, self._stop = path, options, stop
+        self.builder = BranchBuilder(path)
+        self.builder.add(start, first)
+        self.parts: list[Segment] | None = None
         self._span = stop - start
         self._step, self._shortest, self._crawled = options.step, options.min_step, 0
         self._ahead: list[tuple[float, Solution]] = []  # the nearest last
         self._clean = 0  # first point after the last jump
         self._response = [self._outputs(start, first)]
         self._largest = self._size(self._response[0])
-        self.jumps: list[float] = []
+        self._jumps: list[float] = []
+        self._first = first
+
+    @property
+    def notes(self) -> str:
+        """Where the response jumped to another branch; empty where it did not."""
+        places = ", ".join(self._path.say(value) for value in self._jumps)
+        return f"; the response jumped at {places}" if places else ""
+
+    def advance(self) -> Outcome[BranchEnd] | None:
+        """One point more; why the branch ends, or None."""
+        builder, most = self.builder, self._options.max_points
+        trouble = "" if self._first.converged else str(self._first.outcome)
+        if not trouble and builder.value[-1] != self._stop:
+            trouble = f"{most} points were allowed" if len(builder.value) >= most else self._step_on()
+        if trouble:
+            return BranchEnd.ENDED.say(f" {self._path.say(builder.value[-1])}: {trouble}")
+        if builder.value[-1] == self._stop:
+            return BranchEnd.REACHED.say(f" {self._path.say(self._stop)}{self.notes}")
+        return None
 
     def _outputs(self, value: float, solution: Solution) -> np.ndarray:
         return self._path.place(value)[0].outputs(solution.state)
@@ -145,9 +166,9 @@ class _Sweep:
         """(n_output,) size of a response or of a difference of two [m]."""
         return np.linalg.norm(response, axis=1)
 
-    def advance(self) -> str:
+    def _step_on(self) -> str:
         """One point more; a sentence where that fails."""
-        here = self._builder.value[-1]
+        here = self.builder.value[-1]
         while True:
             value, solution = self._solve(here)
             if not solution.converged:
@@ -177,7 +198,7 @@ class _Sweep:
             step *= 10
             value = here + min(step, (self._stop - here) / self._span) * self._span
             place = self._path.place(value)
-            solution = newton.solve(*place, self._builder.x[-1], self._options.newton)
+            solution = newton.solve(*place, self.builder.x[-1], self._options.newton)
             if not solution.converged and self._options.load_paths:
                 solution = solve_along_load(*place, self._options.newton)
             if solution.converged:
@@ -196,14 +217,14 @@ class _Sweep:
             return self._ahead.pop()
         if abs(self._stop - here) <= TAKEN * abs(value - here):
             value = self._stop
-        known = max(self._clean, len(self._builder.value) - EXTRAPOLATION_DEGREE - 1)
-        guess = extrapolate(np.array(self._builder.value[known:]), self._builder.x[known:], value)
+        known = max(self._clean, len(self.builder.value) - EXTRAPOLATION_DEGREE - 1)
+        guess = extrapolate(np.array(self.builder.value[known:]), self.builder.x[known:], value)
         return value, newton.solve(*self._path.place(value), guess, self._options.newton)
 
     def _error(self, value: float, response: np.ndarray) -> float:
         """Estimated error of interpolation in the step to a value, relative to the tolerance."""
-        first = max(self._clean, len(self._builder.value) - EXTRAPOLATION_DEGREE - 1)
-        known = np.array(self._builder.value[first:])
+        first = max(self._clean, len(self.builder.value) - EXTRAPOLATION_DEGREE - 1)
+        known = np.array(self.builder.value[first:])
         if len(known) < EXTRAPOLATION_DEGREE:  # too few points to tell: the first steps are short anyway
             return 1.0
         missed = self._size(response - extrapolate(known, self._response[first:], value))
@@ -217,10 +238,10 @@ class _Sweep:
         return float(share * relative.max(initial=0.0) / self._options.tolerance)
 
     def _accept(self, value: float, solution: Solution, response: np.ndarray, jumped: bool) -> None:
-        self._builder.add(value, solution)
+        self.builder.add(value, solution)
         self._response.append(response)
         self._largest = np.maximum(self._largest, self._size(response))
         if jumped:
-            self.jumps.append(value)
-            self._clean = len(self._builder.value) - 1
+            self._jumps.append(value)
+            self._clean = len(self.builder.value) - 1
             self._step = self._options.step

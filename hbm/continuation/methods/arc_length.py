@@ -28,7 +28,7 @@ from tribodyn.hbm.continuation.sliding import solve_along_friction
 from tribodyn.hbm.continuation.stepper import Stepper
 from tribodyn.hbm.continuation.stiffening import solve_along_stiffness
 from tribodyn.hbm.newton import NewtonOptions, Solution
-from tribodyn.hbm.outcome import BranchEnd, Outcome
+from tribodyn.hbm.outcome import CONVERGED, BranchEnd, Outcome
 from tribodyn.hbm.threads import single
 
 # Steps of the parameter over a gap in the curve, shares of its range, tried in turn; a longer one could miss a peak.
@@ -99,7 +99,17 @@ def follow(
     Raises  ValueError where start and stop are the same or out of the bounds
     """
     options = options or Options()
-    path = parameter.of(problem)
+    walk = begin(parameter.of(problem), start, stop, options)
+    while (end := walk.advance()) is None:
+        if on_point is not None:
+            done = len(walk.builder.value)
+            share = abs(walk.builder.value[-1] - start) / abs(stop - start)
+            on_point(done, max(done, min(options.max_points, round(done / max(share, 1e-3)))))
+    return walk.builder.finish(end)
+
+
+def begin(path: Parameter, start: float, stop: float, options: Options) -> _Walk:
+    """The first point, from which to follow; raises ValueError as `follow` does."""
     if start == stop:
         raise ValueError(f"start and stop are the same, {path.say(start)}: there is no curve to follow")
     bounds = options.bounds or (min(start, stop), max(start, stop))
@@ -109,17 +119,7 @@ def follow(
         first = newton.solve(*path.place(start), options.guess, options.newton)
     else:
         first = first_on(path, start, options.newton)
-    builder = BranchBuilder(path)
-    builder.add(start, first)
-    if not first.converged:
-        return builder.finish(BranchEnd.ENDED.say(f" {path.say(start)}: {first.outcome}"))
-    walk = _Walk(path, options, builder, Stepper(path, options, first, start, stop), bounds, abs(stop - start))
-    while (end := walk.advance()) is None:
-        if on_point is not None:
-            done = len(builder.value)
-            share = abs(builder.value[-1] - start) / abs(stop - start)
-            on_point(done, max(done, min(options.max_points, round(done / max(share, 1e-3)))))
-    return builder.finish(end.kind.say(end.detail + walk.gaps))
+    return _Walk(path, options, first, start, stop, bounds)
 
 
 def first_on(path: Parameter, value: float, options: NewtonOptions) -> Solution:
@@ -161,42 +161,54 @@ class _Walk:
         self,
         path: Parameter,
         options: Options,
-        builder: BranchBuilder,
-        stepper: Stepper,
+        first: Solution,
+        start: float,
+        stop: float,
         bounds: tuple[float, float],
-        reach: float,
     ):
-        self._path, self._options, self._builder, self._stepper, self._bounds = path, options, builder, stepper, bounds
-        self._reach = reach
-        self._start = builder.value[0]
+        self._path, self._options, self._bounds = path, options, bounds
+        self._start, self._reach = start, abs(stop - start)
+        self.builder = BranchBuilder(path)
+        self.builder.add(start, first)
+        self.parts: list[Segment] | None = []
+        if first.converged:
+            self._stepper = Stepper(path, options, first, start, stop)
         self._first: CurvePoint | None = None
-        self._size = float(np.linalg.norm(builder.x[0]))
+        self._size = float(np.linalg.norm(self.builder.x[0]))
         self._rows = [1]  # points in the branch before each segment
         self._rewinds = self._landings = 0
         self._jumps: list[float] = []
         self._milestone, self._since = self._start, 1  # how far it came, and how many points there were then
 
     @property
-    def gaps(self) -> str:
-        """Where the walk stepped over gaps in the curve, to be added to how it ended; empty where it did not."""
+    def notes(self) -> str:
+        """Where the walk stepped over gaps in the curve; empty where it did not."""
         places = ", ".join(self._path.say(value) for value in self._jumps)
         return f"; stepped over gaps in the curve at {places}" if places else ""
 
     def advance(self) -> Outcome[BranchEnd] | None:
         """One step more; why the branch ends, or None."""
-        builder, path = self._builder, self._path
+        self.parts = []
+        end = self._step_on()
+        return None if end is None else end.kind.say(end.detail + self.notes)
+
+    def _step_on(self) -> Outcome[BranchEnd] | None:
+        builder, path = self.builder, self._path
+        here = path.say(builder.value[-1])
+        if builder.points[0].outcome != CONVERGED:
+            return BranchEnd.ENDED.say(f" {here}: {builder.points[0].outcome}")
         if len(builder.value) >= self._options.max_points:
-            here = path.say(builder.value[-1])
             return BranchEnd.ENDED.say(f" {here}: {self._options.max_points} points were allowed")
         if self._stays():
             told = f"{self._options.patience} points brought it hardly further than {path.say(self._milestone)}"
-            return BranchEnd.ENDED.say(f" {path.say(builder.value[-1])}: {told}")
+            return BranchEnd.ENDED.say(f" {here}: {told}")
         parts = self._stepper.advance()
         if not parts:
             if self._jump():
                 return None
-            return BranchEnd.ENDED.say(f" {path.say(builder.value[-1])}: {self._stepper.trouble}")
+            return BranchEnd.ENDED.say(f" {here}: {self._stepper.trouble}")
         self._first = self._first or parts[0].start.bare()
+        self.parts = passed = []
         for part in parts:
             bound = next((b for b in self._bounds if part.crosses(b)), None)
             if bound is not None:
@@ -205,29 +217,30 @@ class _Walk:
                 builder.mark_fold()
             assert part.end.solution is not None
             builder.add(part.end.value, part.end.solution, fold=part.end.fold)
+            passed.append(part.bare())
         self._rows.append(len(builder.value))
         return self._came_back(parts)
 
     def _stays(self) -> bool:
         """Whether the points that the patience allows brought the walk hardly further."""
-        here, count = self._builder.value[-1], len(self._builder.value)
+        here, count = self.builder.value[-1], len(self.builder.value)
         if abs(here - self._start) > abs(self._milestone - self._start) + HEADWAY * self._reach:
             self._milestone, self._since = here, count
         return self._options.patience is not None and count >= self._since + self._options.patience
 
     def _jump(self) -> bool:
         """Step over a gap in the curve, its parameter moving on as before; whether there is a solution behind."""
-        here, span, sense = self._builder.value[-1], self._bounds[1] - self._bounds[0], self._stepper.sense
+        here, span, sense = self.builder.value[-1], self._bounds[1] - self._bounds[0], self._stepper.sense
         for share in GAP_STEPS if len(self._jumps) < MAX_GAPS else ():
             value = here + sense * share * span
             if sense == 0 or not self._bounds[0] < value < self._bounds[1]:
                 break
-            solution = newton.solve(*self._path.place(value), self._builder.x[-1], self._options.newton)
+            solution = newton.solve(*self._path.place(value), self.builder.x[-1], self._options.newton)
             if solution.converged:
                 self._jumps.append(value)
-                self._builder.add(value, solution)
+                self.builder.add(value, solution)
                 self._stepper = Stepper(self._path, self._options, solution, value, value + sense * self._reach)
-                self._rows, self._first = [len(self._builder.value)], None
+                self._rows, self._first = [len(self.builder.value)], None
                 return True
         return False
 
@@ -242,7 +255,7 @@ class _Walk:
             self._landings += 1
             self._rewind(len(self._stepper.segments) - 1)
             return None
-        self._builder.add(bound, last)
+        self.builder.add(bound, last)
         if astray:
             return BranchEnd.ENDED.say(f" {self._path.say(bound)}: the curve jumps to another branch there")
         if not last.converged:
@@ -252,7 +265,7 @@ class _Walk:
 
     def _came_back(self, parts: list[Segment]) -> Outcome[BranchEnd] | None:
         """Whether the curve is closed, or lost itself in infinity or in its own past."""
-        builder, here, newton_options = self._builder, self._path.say(self._builder.value[-1]), self._options.newton
+        builder, here, newton_options = self.builder, self._path.say(self.builder.value[-1]), self._options.newton
         growth = self._options.max_growth
         if np.linalg.norm(builder.x[-1]) > growth * self._size > 0:
             told = f"the response grows without bound, {growth:.0e} times that of the first point"
@@ -284,6 +297,7 @@ class _Walk:
 
     def _rewind(self, index: int) -> None:
         """Back to the start of an earlier segment."""
+        self.parts = []
         self._stepper.rewind(index)
-        self._builder.truncate(self._rows[index])
+        self.builder.truncate(self._rows[index])
         del self._rows[index + 1 :]

@@ -16,10 +16,11 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import parameter
 from tribodyn.hbm.continuation.branch import Branch, BranchBuilder
+from tribodyn.hbm.continuation.curve import Segment
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.newton import NewtonOptions, Solution
-from tribodyn.hbm.outcome import BranchEnd, SolveEnd
+from tribodyn.hbm.outcome import BranchEnd, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
 
 EXTRAPOLATION_DEGREE = 2  # higher ones amplify the kinks of the contact
@@ -59,24 +60,54 @@ def follow(
         of the branch that are folds are marked
     """
     options = options or Options()
-    path = parameter.of(problem)
-    builder = BranchBuilder(path)
-    solution = arc_length.first_on(path, start, options.newton)
-    builder.add(start, solution)
-    wanted = np.linspace(start, stop, options.n_points)[1:]
-    for done, value in enumerate(wanted, start=1):
+    sweep, end = begin(parameter.of(problem), start, stop, options), None
+    while end is None:
+        end = sweep.advance()
+        if on_point is not None and sweep.done:
+            on_point(sweep.done + 1, options.n_points)
+    return sweep.builder.finish(end)
+
+
+def begin(path: Parameter, start: float, stop: float, options: Options) -> _Sweep:
+    """The first point, from which to follow."""
+    return _Sweep(path, start, stop, options)
+
+
+class _Sweep:
+    """The values to come, and the solution at the last. done : values that are behind, the first not counted."""
+
+    def __init__(self, path: Parameter, start: float, stop: float, options: Options):
+        self._path, self._stop, self._options = path, stop, options
+        self._solution = arc_length.first_on(path, start, options.newton)
+        rising = np.linspace(min(start, stop), max(start, stop), options.n_points)
+        self._wanted = (rising if start <= stop else rising[::-1])[1:]  # the same values either way
+        self.builder = BranchBuilder(path)
+        self.builder.add(start, self._solution)
+        self.parts: list[Segment] | None = None
+        self.done = 0
+
+    @property
+    def notes(self) -> str:
+        """At which folds the response jumped; empty where it did not."""
+        folds = ", ".join(self._path.say(self.builder.value[i]) for i in self.builder.folds)
+        return f"; the response jumped at folds: {folds} (arc_length goes round them)" if folds else ""
+
+    def advance(self) -> Outcome[BranchEnd] | None:
+        """The next value; why the branch ends, or None."""
+        path, builder, options = self._path, self.builder, self._options
+        solution = self._solution
+        if solution.converged:
+            value = self._wanted[self.done]
+            solution = _step(path, builder, value, options, options.refinements)
+            if not solution.converged:
+                solution = _by_arc_length(path, builder, solution, value, self._stop, options)
+            self._solution = solution
+            self.done += 1
         if not solution.converged:
-            break
-        solution = _step(path, builder, value, options, options.refinements)
-        if not solution.converged:
-            solution = _by_arc_length(path, builder, solution, value, stop, options)
-        if on_point is not None:
-            on_point(done + 1, options.n_points)
-    if solution.converged:
-        folds = ", ".join(path.say(builder.value[i]) for i in builder.folds)
-        jumped = f"; the response jumped at folds: {folds} (arc_length goes round them)" if folds else ""
-        return builder.finish(BranchEnd.REACHED.say(f" {path.say(stop)}{jumped}"))
-    return builder.finish(BranchEnd.ENDED.say(f" {path.say(builder.value[-1])}: {solution.outcome}"))
+            return BranchEnd.ENDED.say(f" {path.say(builder.value[-1])}: {solution.outcome}")
+        if self.done == len(self._wanted):
+            return BranchEnd.REACHED.say(f" {path.say(self._stop)}{self.notes}")
+        return None
 
 
 def _step(path: Parameter, builder: BranchBuilder, value: float, options: Options, halvings: int) -> Solution:
