@@ -138,11 +138,13 @@ class ReducedModel:
 class StaticReaction:
     """The static force that keeps prescribed coordinates where they are.
 
+    name : of the load whose static amplitude is the height
     dofs : (k,) coordinates of the reduced model; shape : (k,) their displacement per unit height [m/m]
     psi : (n, k) static shapes of unit displacements of each; stiffness : (k, k) psi^T K psi [N/m]
     support : (k,) springs in the model that act about the prescribed position [N/m]
     """
 
+    name: str
     dofs: np.ndarray
     shape: np.ndarray
     psi: np.ndarray

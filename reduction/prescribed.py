@@ -27,14 +27,14 @@ def prescribe(
     name: str,
     shape: np.ndarray | float = 1.0,
     support: np.ndarray | float = 0.0,
-) -> tuple[ReducedModel, StaticReaction]:
+) -> ReducedModel:
     """Prescribe the static displacement of some coordinates of a reduced model; the rest of their motion stays free.
 
     dofs : (k,) physical coordinates, outside the contact
     name : of the new load, whose static amplitude is the height [m]
     shape : displacement of each per unit height; support : springs that hold each about the prescribed position, which
         are in the stiffness for the sake of the other harmonics and carry no force at that position [N/m]
-    Returns the model, whose harmonic 0 sees another system, and what gives the reaction
+    Returns the model, whose harmonic 0 sees another system, and whose `info.reaction` gives the force
     Raises  ValueError where a coordinate belongs to the contact, where the name is taken, or where the part can still
         move rigidly
     """
@@ -64,12 +64,13 @@ def prescribe(
     loads = {**system.loads, name: np.zeros(system.n_dof)}
     dynamic = replace(system, loads=loads)
     static = _cut(system, free, held, name, full_shape)
-    reaction = StaticReaction(held, full_shape, psi, psi.T @ K @ psi, springs, model)
+    reaction = StaticReaction(name, held, full_shape, psi, psi.T @ K @ psi, springs, model)
 
     def per_harmonic(h: int) -> tuple[SecondOrderSystem, np.ndarray]:
         return (static if h == 0 else dynamic), B
 
-    return replace(model, system=dynamic, per_harmonic=per_harmonic), reaction
+    info = replace(model.info, reaction=reaction)
+    return replace(model, system=dynamic, per_harmonic=per_harmonic, info=info)
 
 
 def _cut(

@@ -123,8 +123,9 @@ def stability(
     n_modes : modes that move dynamically in Hill's method, by default those below three times the highest harmonic,
         at least FEWEST_MODES and at most MOST_MODES of them
     top : highest harmonic of the perturbation in Hill's method, by default that of the balance
-    Raises  ValueError for unknown methods and for models whose harmonics see different systems, but for travelling
-        waves by Hill's method
+    A displacement that is prescribed in harmonic 0 alone is free to grow: the force that holds it stays as it is.
+    Raises  ValueError for unknown methods and for models whose harmonics see different systems, but for such a
+        displacement, and for travelling waves by Hill's method
     """
     if method not in ("hill", "floquet"):
         raise ValueError(f"no stability method '{method}': there are hill, floquet")
@@ -132,10 +133,10 @@ def stability(
     model.require_masters("stability")
     if method == "hill" and model.per_index is not None:
         return _of_wave(balance, state, n_modes, top)
-    if model.per_harmonic is not None:
+    if model.per_harmonic is not None and model.info.reaction is None:
         raise ValueError(
-            "stability needs one system for all harmonics: perturbations of a stored cyclic part, or with a "
-            "displacement prescribed in harmonic 0 alone, see other systems than the solution does"
+            "stability needs one system for all harmonics: perturbations of a stored cyclic part see other systems "
+            "than the solution does"
         )
     found = floquet.exponents(balance, state) if method == "floquet" else _hill(balance, state, n_modes, top)
     return Stability(state.omega, _sorted(found, state.omega)[0], method)
@@ -242,7 +243,7 @@ def _of_wave(balance: HarmonicBalance, state: State, n_modes: int | None, top: i
 
 def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int | None) -> np.ndarray:
     basis = _perturbed(balance, top)
-    expansion = balance.compliance.groups[0][0]
+    expansion = balance.compliance.groups[-1][0]  # a displacement prescribed in harmonic 0 alone is free to grow
     m = min(_moving(balance, state, n_modes, basis.harmonics[-1]), len(expansion.lam))
     n_contact = balance.compliance.n_contact
     phi, rest = expansion.b[:n_contact, :m], expansion.b[:n_contact, m:]

@@ -45,7 +45,8 @@ def exponents(balance: HarmonicBalance, state: State, options: Options | None = 
 def largest(balance: HarmonicBalance, state: State, options: Options | None = None) -> float:
     """Modulus of the largest multiplier of the periodic motion near a balance state.
 
-    Sliders that never move do not count. Of a large model, one that is below 1 in any case need not be exact
+    Sliders that never move do not count, and a force that holds a mean displacement stays as it is. Of a large model,
+    one that is below 1 in any case need not be exact
     Raises  ValueError where no periodic motion is found near the state, or it has no equation of motion in time
     """
     options = options or Options()
@@ -61,7 +62,9 @@ def largest(balance: HarmonicBalance, state: State, options: Options | None = No
     base = plain.step(period.end)
     size = DIFFERENCE * float(np.linalg.norm(base.start))
     moves = np.ones(len(base.start), bool)
-    moves[2 * stepper.n_dynamic :] = np.repeat(period.record.bits != STICKS, balance.memory.shape[1])
+    moves[2 * stepper.n_dynamic :] = False  # what holds a mean displacement stays as it is
+    n_memory = balance.memory.size
+    moves[2 * stepper.n_dynamic :][:n_memory] = np.repeat(period.record.bits != STICKS, balance.memory.shape[1])
 
     def product(v: np.ndarray) -> np.ndarray:
         there = plain.step(plain.vector.unpack(base.start + size * v, period.end))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from tribodyn.hbm.time.period_search import Period, PeriodSearch
 from tribodyn.hbm.time.time_integration import PeriodicMotion, TimeStepper
 from tribodyn.hbm.time.time_step import Moving
 
+REPEATED = 1e-2  # distance of two states, relative to the vibration, up to which the motion has come back
 PERIODIC = 1e-5  # drift over a period, relative, of a motion that counts as periodic
 # push of a periodic motion, relative to its vibration; share of it down to which it must die away; distance, relative
 # to the vibration, at which the motion has left
@@ -52,6 +54,10 @@ class MeanMotion:
 
     energy : (n_pair,) friction work per period [J]; normal_force : (n_pair,) [N], zero where the law has none
     seen : mean of what was asked of every period; amplitude : (n_output,) [m]
+    off : largest difference of a mean displacement from what harmonic 0 prescribes [m]; zero without one
+    apart : share of the time in which no pair carries a force
+    works : (n_period,) friction work of the last periods of a block [J]
+    repeats : periods of the loads after which the motion comes back, 0 where it does not within a block
     spread : standard deviation of the work of a period, over its mean; error : standard error of that mean, relative
     settled : whether the motion came to rest in its statistics; periods : marched in all
     """
@@ -60,6 +66,10 @@ class MeanMotion:
     normal_force: np.ndarray
     seen: np.ndarray
     amplitude: np.ndarray
+    off: float
+    apart: float
+    works: np.ndarray
+    repeats: int
     spread: float
     error: float
     settled: bool
@@ -102,7 +112,10 @@ class Follower:
             found, spent = self._periodic(stepper)
             if found is not None:
                 one = time_integration.motion_of(stepper, found, spent, CONVERGED)
-                return MeanMotion(one.energy, _normal(balance, one), see(one), one.amplitude, 0.0, 0.0, True, spent)
+                off = float(np.abs(one.off).max(initial=0.0))
+                means = one.energy, _normal(balance, one), see(one), one.amplitude, off, _apart(one)
+                works = np.full(self.options.block, one.energy.sum())
+                return MeanMotion(*means, works, 1, spread=0.0, error=0.0, settled=True, periods=spent)
         settled = self._settled(balance, stepper, see)
         self._regular = settled.settled and settled.spread <= self.options.accuracy
         return replace(settled, periods=settled.periods + spent)
@@ -143,8 +156,9 @@ class Follower:
         o, motion = self.options, self._motion
         assert motion is not None
         search = PeriodSearch(stepper, replace(stepper.options, max_periods=o.block * o.most_blocks), False)
-        rows: list[tuple[np.ndarray, ...]] = []
+        rows: list[tuple[Any, ...]] = []
         work: list[float] = []
+        states: list[np.ndarray] = []
         first: int | None = None
         for block in range(1, o.most_blocks + 1):
             for _ in range(o.block):
@@ -152,24 +166,50 @@ class Follower:
                 one = time_integration.motion_of(stepper, found, search.periods, CONVERGED, motion)
                 motion = found.end
                 work.append(float(one.energy.sum()))
-                rows.append((one.energy, _normal(balance, one), see(one), one.amplitude))
+                states = [*states[-o.block :], found.image]
+                rows.append((one.energy, _normal(balance, one), see(one), one.amplitude, one.off, _apart(one)))
             if block > 1 and first is None and self._same(np.array(work[-2 * o.block :])):
-                first = len(work) - o.block  # in the block before more of the transient is left
+                off = np.array([row[4] for row in rows[-o.block :]])
+                if self._held(stepper, off):
+                    first = len(work) - o.block  # in the block before more of the transient is left
             if first is not None and _standard_error(np.array(work[first:])) <= o.accuracy:
                 break
         self._motion = motion
         kept = slice(len(rows) // 2 if first is None else first, None)
         late = np.array(work[kept])
-        energy, normal, seen, amplitude = (np.mean(column, axis=0) for column in zip(*rows[kept], strict=True))
+        energy, normal, seen, amplitude, off, apart = (
+            np.mean(column, axis=0) for column in zip(*rows[kept], strict=True)
+        )
         whole, error = float(late.mean()), _standard_error(late)
         spread = float(late.std() / whole) if whole > 0 else 0.0
-        return MeanMotion(energy, normal, seen, amplitude, spread, error, first is not None, len(work))
+        back = (search.vector.apart(state, states[-1]) <= REPEATED * found.size for state in states[-2::-1])
+        return MeanMotion(
+            energy=energy,
+            normal_force=normal,
+            seen=seen,
+            amplitude=amplitude,
+            off=float(np.abs(off).max(initial=0.0)),
+            apart=float(apart),
+            works=np.array(work[-o.block :]),
+            repeats=next((n for n, same in enumerate(back, 1) if same), 0),
+            spread=spread,
+            error=error,
+            settled=first is not None,
+            periods=len(work),
+        )
 
     def _same(self, work: np.ndarray) -> bool:
         """Whether two blocks of periods show one motion."""
         before, after = np.split(work, 2)
         chance = SAME_SCATTER * float(np.hypot(before.std(), after.std())) / np.sqrt(len(after))
         return bool(abs(after.mean() - before.mean()) <= self.options.accuracy * work.mean() + chance)
+
+    def _held(self, stepper: TimeStepper, off: np.ndarray) -> bool:
+        """Whether a block of periods has the mean displacement that is prescribed; off : (n_period, k)."""
+        if stepper.hold is None:
+            return True
+        chance = SAME_SCATTER * off.std(axis=0) / np.sqrt(len(off))
+        return bool((np.abs(off.mean(axis=0)) <= self.options.accuracy * abs(stepper.hold.height) + chance).all())
 
     def _at(self, balance: HarmonicBalance, omega: float) -> TimeStepper:
         """The stepper at a place; what moves is taken along."""
@@ -193,6 +233,11 @@ def _normal(balance: HarmonicBalance, motion: PeriodicMotion) -> np.ndarray:
     return normal
 
 
+def _apart(motion: PeriodicMotion) -> float:
+    """Share of a period in which no pair carries a force."""
+    return float(np.mean(~motion.force.any(axis=(0, 1))))
+
+
 def _standard_error(work: np.ndarray) -> float:
     """Of the mean, relative."""
     whole = float(work.mean())
@@ -205,4 +250,4 @@ def _carried(motion: Moving, before: TimeStepper, after: TimeStepper) -> Moving:
     z, common = np.zeros(2 * new), min(old, new)
     z[:common] = motion.z[:common]
     z[new : new + common] = motion.z[old : old + common] * (after.h / before.h)
-    return after.moving(z, motion.memory, motion.x, motion.f)
+    return after.moving(z, motion.memory, motion.x, motion.f, motion.hold)

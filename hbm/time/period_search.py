@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 THROWN_OFF = 4.0  # drift, over the smallest one, from which on past periods no longer tell where to go
 LOST = 100.0  # ... from which on mixing does not come back by itself: the motion leaves the periodic one
 PROGRESS = 0.9  # drift, over the smallest one, that counts as a better period
+SLOWLY = 1 / 8  # share of the change of a force that holds a mean displacement, taken after a period that is not mixed
 DIFFERENCE = 1e-6  # step of the derivative of a period, relative to the state
 KRYLOV, FORCING = 60, 0.05  # products at most and relative residual of a linear solve
 SHORTEST = 1 / 64  # share of a Newton step
@@ -99,7 +100,11 @@ class PeriodSearch:
         end, record, rounds, speed = self.stepper.period(motion, self.with_slopes)
         if self.options.accelerate:
             end = end._replace(memory=self.stepper.memory_of(record.x))
+        if self.stepper.hold is not None:
+            end = end._replace(hold=self.stepper.hold.after(record))
         z, image = self.vector.pack(motion), self.vector.pack(end)
+        if not self.options.accelerate:
+            end = end._replace(hold=motion.hold + SLOWLY * (end.hold - motion.hold))
         change = float(np.linalg.norm(image - z))
         self._last = Period(z, image, end, record, rounds, speed, change / speed if speed > 0 else change)
         self.periods += 1
@@ -133,7 +138,7 @@ class PeriodSearch:
 
 
 class StateVector:
-    """(eta, v, memory) as one vector whose square is an energy, and back."""
+    """(eta, v, memory, hold) as one vector whose square is an energy, and back."""
 
     def __init__(self, stepper: TimeStepper):
         rate = np.sqrt(np.maximum(stepper.lam, 0.0) + stepper.omega**2)
@@ -145,12 +150,13 @@ class StateVector:
         spring = np.sqrt(k[:, :n_state]).ravel()
         spring[spring == 0] = 1.0
         self._weight = np.concatenate([rate, np.full(len(rate), 1 / stepper.h), spring])
+        self._root = np.zeros((0, 0)) if stepper.hold is None else stepper.hold.root
 
     def pack(self, m: Moving) -> np.ndarray:
-        return self._weight * np.concatenate([m.z, m.memory.ravel()])
+        return np.concatenate([self._weight * np.concatenate([m.z, m.memory.ravel()]), self._root.T @ m.hold])
 
     def apart(self, a: np.ndarray, b: np.ndarray) -> float:
-        """Distance of two state vectors, what the sliders keep left out."""
+        """Distance of two state vectors, what the sliders and a hold keep left out."""
         n = 2 * self._stepper.n_dynamic
         return float(np.linalg.norm((a - b)[:n]))
 
@@ -161,5 +167,7 @@ class StateVector:
         return vector + np.concatenate([push * (length / np.linalg.norm(push)), np.zeros(len(vector) - n)])
 
     def unpack(self, vector: np.ndarray, near: Moving) -> Moving:
-        z, memory = np.split(vector / self._weight, [len(near.z)])
-        return self._stepper.moving(z, memory.reshape(self._shape), near.x, near.f)
+        n = len(self._weight)
+        z, memory = np.split(vector[:n] / self._weight, [len(near.z)])
+        hold = np.linalg.solve(self._root.T, vector[n:])
+        return self._stepper.moving(z, memory.reshape(self._shape), near.x, near.f, hold)

@@ -24,6 +24,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.time import time_step, wave_in_time
+from tribodyn.hbm.time.hold import Hold
 from tribodyn.hbm.time.period_search import Period, PeriodSearch
 from tribodyn.hbm.time.time_step import Moving, Record
 
@@ -62,6 +63,7 @@ class PeriodicMotion:
     outputs : (n_output, n_step) observed outputs [m]
     energy : (n_pair,) work of the tangential contact force over the period, integral of f dx [J]
     preload : mean normal force of the whole contact [N], zero where the law has no normal component
+    off : (k,) mean of each coordinate that is prescribed in harmonic 0, less what is prescribed [m]
     status : (n_pair,) bits of what happened: STICKS | SLIPS | SEPARATES
     drift : change of the state over the period, relative to the vibration (both as square roots of energy)
     periods : periods integrated in all; iterations : contact iterations per step, on average over the last period
@@ -76,6 +78,7 @@ class PeriodicMotion:
     outputs: np.ndarray
     energy: np.ndarray
     preload: float
+    off: np.ndarray
     status: np.ndarray
     drift: float
     periods: int
@@ -134,7 +137,9 @@ class TimeStepper:
     lam, damping : of the modes that move, (n_dynamic,) and (n_dynamic, n_dynamic), with unit modal mass
     linear, contact : see `time_step`; static : (n_contact, n_contact) compliance W of the modes that follow
     modes : of the structure without contact, where another stepper of the same model has them already
-    Raises  ValueError for models whose harmonics see different systems, or whose mass matrix is singular
+    hold : what holds a displacement that is prescribed in harmonic 0; None where there is none
+    Raises  ValueError for models whose harmonics see different systems but for such a displacement, or whose mass
+        matrix is singular
     """
 
     def __init__(
@@ -146,10 +151,10 @@ class TimeStepper:
     ):
         model = balance.model
         model.require_masters("time integration")
-        if model.per_harmonic is not None:
+        if model.per_harmonic is not None and model.info.reaction is None:
             raise ValueError(
-                "time integration needs one system for all harmonics: a cyclic part or a displacement prescribed in "
-                "harmonic 0 alone has no equation of motion in time"
+                "time integration needs one system for all harmonics: a cyclic part alone has no equation of motion in "
+                "time"
             )
         self.balance, self.omega, self.options = balance, omega, options
         system = model.system
@@ -179,9 +184,15 @@ class TimeStepper:
         base = balance.excitation.base
         self._base = np.zeros((len(B), basis.n_coeff)) if base is None else balance.loaded(base)
         E, Q, kick = _exact_step(self.lam, full, flow, diagonal, self.h, self._modal_load, basis, omega)
+        static = int(basis.has_static)
+        self.hold = Hold.of(balance, force[:, :static].sum(axis=1), self._base[:, :static].sum(axis=1))
+        at = np.zeros((len(phi), 0)) if self.hold is None else self.hold.at
+        rows = np.concatenate([rows, at.T])
         outputs = np.concatenate([rows @ moving, np.zeros((len(rows), m)), -(rows @ rest) @ follows.T], axis=1)
         self.rest = follows @ (rest.T @ force) - self._base  # (n_contact, n_coeff)
         output_rest = (rows @ rest) @ (rest.T @ force)
+        modal = moving.T @ at
+        self._of_hold = modal, Q @ modal, follows @ (rest.T @ at), (rows @ rest) @ (rest.T @ at)
         self.linear = time_step.Linear(
             E, Q, U, np.ascontiguousarray(outputs), np.ascontiguousarray(np.roll(samples, 1, axis=0) @ kick.T),
             np.ascontiguousarray(samples @ self.rest.T), np.ascontiguousarray(samples @ output_rest.T),
@@ -223,11 +234,12 @@ class TimeStepper:
         """
         basis, m = self.balance.basis, self.n_dynamic
         contact_force = state.cycle.force.reshape(len(self.static), -1)
+        hold = np.zeros(0) if self.hold is None else self.hold.in_balance(state)
         force = basis.to_complex(self._modal_load - self.linear.U.T @ contact_force)
         eta, v = np.zeros(m), np.zeros(m)
         for i, h in enumerate(basis.harmonics):
             if h == 0:
-                eta += self._at_rest(state)
+                eta += self._at_rest(state, hold)
             elif not at_rest:
                 s = 1j * h * self.omega
                 amplitude = np.linalg.solve(
@@ -238,15 +250,17 @@ class TimeStepper:
         angles = 2 * np.pi * np.arange(1, self.options.steps + 1) / self.options.steps
         x = (state.x @ basis.functions(angles).T).transpose(2, 0, 1)
         memory = self.memory_of(np.ascontiguousarray(x))
-        return self.moving(np.concatenate([eta, self.h * v]), memory, x[-1], state.cycle.force[..., 0])
+        return self.moving(np.concatenate([eta, self.h * v]), memory, x[-1], state.cycle.force[..., 0], hold)
 
-    def _at_rest(self, state: State) -> np.ndarray:
+    def _at_rest(self, state: State, hold: np.ndarray) -> np.ndarray:
         """Modal coordinates of harmonic 0, by the stuck system: without contact a part may be loose."""
         k, U = self.balance.compliance.k, self.linear.U
-        pull = k * (state.flat[:, 0] - self.rest[:, 0]) - state.cycle.force.reshape(len(k), -1)[:, 0]
+        modal, _, rest, _ = self._of_hold
+        pull = k * (state.flat[:, 0] - self.rest[:, 0] - rest @ hold) - state.cycle.force.reshape(len(k), -1)[:, 0]
         pull += k * (self.static @ state.cycle.force.reshape(len(k), -1)[:, 0])
         found: np.ndarray = np.linalg.solve(
-            np.diag(self.lam) + self.flow + U.T @ (k[:, None] * U), self._modal_load[:, 0] + U.T @ pull
+            np.diag(self.lam) + self.flow + U.T @ (k[:, None] * U),
+            self._modal_load[:, 0] + modal @ hold + U.T @ pull,
         )
         return found
 
@@ -255,10 +269,11 @@ class TimeStepper:
         memory: np.ndarray = time_step.memory_after(self.law, x, self.contact, self.balance.memory)[0]
         return memory
 
-    def moving(self, z: np.ndarray, memory: np.ndarray, x: np.ndarray, f: np.ndarray) -> Moving:
-        """What moves at t = 0 from z = (eta, h v) and memory, with guesses for x and f (n_pair, c)."""
+    def moving(self, z: np.ndarray, memory: np.ndarray, x: np.ndarray, f: np.ndarray, hold: np.ndarray) -> Moving:
+        """What moves at t = 0 from z = (eta, h v), memory and hold, with guesses for x and f (n_pair, c)."""
         x, f, s = np.array(x), np.array(f), np.array(memory)
         x_free = self.linear.U @ z[: self.n_dynamic] + self.rest @ self.balance.basis.functions(np.zeros(()))
+        x_free += self._of_hold[2] @ hold
         contact = self.contact._replace(A=self.static)
         closed = np.zeros(self.n_pair, bool)
         _, rounds, _ = time_step.solve_contact(
@@ -267,7 +282,7 @@ class TimeStepper:
         if rounds < 0:
             raise IntegrationFailed("the contact has no equilibrium to start from")
         s, bits = time_step.memory_after(self.law, x[None], self.contact, s)
-        return Moving(z.copy(), x, f, s, bits)
+        return Moving(z.copy(), x, f, s, bits, np.array(hold))
 
     def period(self, start: Moving, with_slopes: bool = False) -> tuple[Moving, Record, int, float]:
         """March one period from t = 0.
@@ -281,7 +296,15 @@ class TimeStepper:
             np.empty((n, n_pair, c)), np.empty((n, n_pair, c)), np.empty((n, len(self.linear.outputs))),
             np.zeros(n_pair, np.int64), np.zeros((n if with_slopes else 0, n_pair, c + n_state, 2 * c + n_state)),
         )  # fmt: skip
-        failed, spent, speed = time_step.march(self.law, self.contact, self.linear, end, record)
+        linear = self.linear
+        if self.hold is not None:
+            _, kick, rest, output_rest = self._of_hold
+            linear = linear._replace(
+                kick=linear.kick + kick @ start.hold,
+                rest=linear.rest + rest @ start.hold,
+                output_rest=linear.output_rest + output_rest @ start.hold,
+            )
+        failed, spent, speed = time_step.march(self.law, self.contact, linear, end, record)
         if failed >= 0:
             raise IntegrationFailed(
                 f"the contact iteration did not converge in step {failed} of {n}: take more steps per period"
@@ -470,14 +493,17 @@ def motion_of(
     work = 0.5 * ((record.f + before[1]) * (record.x - before[0])).sum(axis=0)
     work = work[:, stepper.balance.contact.tangential].sum(axis=1)
     preload = float(record.f[:, :, components.index("n")].mean(axis=0).sum()) if "n" in components else 0.0
+    n, hold = len(stepper.balance.compliance.output_names), stepper.hold
+    off = np.zeros(0) if hold is None else record.y[:, n:].mean(axis=0) - hold.target
     return PeriodicMotion(
         omega=stepper.omega,
         time=stepper.h * np.arange(1, stepper.options.steps + 1),
         x=np.moveaxis(record.x, 0, 2),
         force=np.moveaxis(record.f, 0, 2),
-        outputs=record.y.T,
+        outputs=record.y.T[:n],
         energy=work,
         preload=preload,
+        off=off,
         status=record.bits,
         drift=period.drift,
         periods=periods,

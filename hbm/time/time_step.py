@@ -61,13 +61,17 @@ class Linear(NamedTuple):
 
 
 class Moving(NamedTuple):
-    """What moves: z (2 m,), x and f (n_pair, c), memory (n_pair, n_state), bits (n_pair,) status after it."""
+    """What moves: z (2 m,), x and f (n_pair, c), memory (n_pair, n_state), bits (n_pair,) status after it.
+
+    hold : (k,) force that holds a mean displacement, constant within a period
+    """
 
     z: np.ndarray
     x: np.ndarray
     f: np.ndarray
     memory: np.ndarray
     bits: np.ndarray
+    hold: np.ndarray
 
 
 class Record(NamedTuple):
@@ -408,7 +412,7 @@ def march(step, contact, linear, moving, record):
 
     Returns the step that failed or -1, the rounds of the contact solver spent, and the largest |h v|
     """
-    z, x, f, memory, bits = moving
+    z, x, f, memory, bits, _ = moving
     n_pair, c = x.shape
     m, n_state = linear.Q.shape[1], memory.shape[1]
     work = room(c, n_state)

@@ -144,6 +144,10 @@ class TimeRow:
     normal_force: np.ndarray
     omega: float
     amplitude: float
+    off: float
+    apart: float
+    works: np.ndarray
+    repeats: int
     settled: bool
     periods: int
     step_error: float
@@ -158,6 +162,10 @@ class WearInTime:
     spread : (n_row,) standard deviation of the work of a period over its mean; error : (n_row,) of that mean, relative
     preload : (n_row,) mean normal force of the joints that wear [N]; normal_force : (n_row, n_pair)
     omega : (n_row,) frequency [rad/s]; amplitude : (n_row,) of the first output, mean over periods [m]; first duty
+    off : (n_row,) largest difference of a mean displacement from what harmonic 0 prescribes [m]
+    apart : (n_row,) share of the time in which no pair carries a force; works : (n_row, n_period) friction work of the
+        last periods [J]; repeats : (n_row,) periods of the loads after which the motion comes back, 0 where it does
+        not; first duty
     settled : (n_row,) whether the means had come to rest; periods : (n_row,) marched for the step
     step_error : (n_row,) local error of the wear step over its tolerance
     end : why the run ended
@@ -173,6 +181,10 @@ class WearInTime:
     normal_force: np.ndarray
     omega: np.ndarray
     amplitude: np.ndarray
+    off: np.ndarray
+    apart: np.ndarray
+    works: np.ndarray
+    repeats: np.ndarray
     settled: np.ndarray
     periods: np.ndarray
     step_error: np.ndarray
@@ -196,6 +208,7 @@ class _Rate:
     first: MeanMotion
     rate: np.ndarray
     energy: np.ndarray
+    off: float
     spread: float
     error: float
     settled: bool
@@ -255,6 +268,10 @@ def evolve(
                 normal_force=force,
                 omega=walk.omega,
                 amplitude=float(here.first.amplitude[0]),
+                off=here.off,
+                apart=here.first.apart,
+                works=here.first.works,
+                repeats=here.first.repeats,
                 settled=here.settled,
                 periods=periods,
                 step_error=error,
@@ -347,6 +364,7 @@ class _Walk:
         weight = work / work.sum() if work.sum() > 0 else work
         return _Rate(
             found[0], rate, energy,
+            off=max(m.off for m in found),
             spread=float(weight @ [m.spread for m in found]),
             error=float(np.linalg.norm(weight * [m.error for m in found])),
             settled=all(m.settled for m in found),

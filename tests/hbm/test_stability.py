@@ -67,7 +67,7 @@ def test_monodromy_with_friction_is_the_finite_difference_of_the_period_map():
     def end_of(change: np.ndarray) -> np.ndarray:
         z, memory = np.split(unit * change, [2 * n])
         shape = start.memory.shape
-        moved = stepper.moving(start.z + z, start.memory + memory.reshape(shape), start.x, start.f)
+        moved = stepper.moving(start.z + z, start.memory + memory.reshape(shape), start.x, start.f, start.hold)
         end, *_ = stepper.period(moved)
         return np.concatenate([end.z, end.memory.ravel()]) / unit
 

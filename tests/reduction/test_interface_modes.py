@@ -94,8 +94,10 @@ def test_a_displacement_can_be_prescribed_after_the_interface_is_reduced() -> No
 
     def answers(model: ReducedModel) -> tuple[np.ndarray, ...]:
         places = np.searchsorted(model.info.master_dofs, held)
-        made, reaction = prescribe(model, places, "height")
+        made = prescribe(model, places, "height")
+        reaction = made.info.reaction
         assert made.per_harmonic is not None
+        assert reaction is not None
         moved = []
         for h, load in ((0, "height"), (1, "point")):
             system, B = made.per_harmonic(h)

@@ -5,74 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribodyn.fem.interface import COMPONENTS, ContactInterface
-from tribodyn.fem.system import SecondOrderSystem
+from tests.helpers.held_bodies import N_PAIR, OMEGA, PLATFORM, problem, two_bodies
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact import law
-from tribodyn.hbm.contact.joint import Joint
-from tribodyn.hbm.contact.law import ContactParameters
-from tribodyn.hbm.excitation import Excitation
-from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.reduction.damping import modal_damping
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.prescribed import prescribe
-
-N_PAIR = 3
-PLATFORM = np.array([21, 22])  # coordinates of body 2 that are held
-OMEGA = 2 * np.pi * 47.0
-
-
-def two_bodies(seed: int = 3) -> ReducedModel:
-    """A chain of masses in three dimensions on springs, and above it a second one; three node pairs between them.
-
-    Body 1 is held by springs, body 2 only sideways and, in the direction of its height, by springs of 4e5 N/m at
-    coordinates 21 and 22.
-    """
-    random = np.random.default_rng(seed)
-    n1, n2 = 12, 12
-    n = n1 + n2
-
-    def body(size: int) -> np.ndarray:
-        root = random.normal(size=(size, size))
-        return root @ root.T / size
-
-    M = np.zeros((n, n))
-    M[:n1, :n1], M[n1:, n1:] = np.eye(n1) + 0.2 * body(n1), np.eye(n2) + 0.2 * body(n2)
-    K = np.zeros((n, n))
-    K[:n1, :n1] = 2e5 * (body(n1) + 0.3 * np.eye(n1))
-    rise = np.zeros(n2)  # rigid motion of body 2 along the contact normal and its height
-    rise[[2, 5, 8]] = 1.0
-    rise[[9, 10]] = 1.0
-    stiff = 4e5 * (body(n2) + 0.3 * np.eye(n2))
-    keep = np.eye(n2) - np.outer(rise, rise) / (rise @ rise)
-    K[n1:, n1:] = keep @ stiff @ keep  # no force resists the rise but the support
-    K[PLATFORM, PLATFORM] += 4e5
-    B = np.zeros((3 * N_PAIR, n))
-    B[np.arange(9), np.arange(9)] = 1.0
-    B[np.arange(9), n1 + np.arange(9)] = -1.0
-    B[2::3] *= -1.0  # body 1 approaches along -z
-    loads = {"shaker": np.eye(n)[9]}
-    system = SecondOrderSystem(M, K, None, loads, {"tip": np.eye(n)[10]})
-    system = replace(system, damping=modal_damping(system, 0.02))
-    interface = ContactInterface(
-        COMPONENTS,
-        np.zeros((N_PAIR, 3)),
-        np.tile(np.eye(3), (N_PAIR, 1, 1)),
-        np.array([1.0, 2.0, 1.0]),
-        np.zeros(N_PAIR),
-        B,
-        np.zeros((0, 4), int),
-    )
-    return ReducedModel(system, interface)
-
-
-def problem(model: ReducedModel, height: float, force: float, gap=(0.0, 1e-5, -1e-5), kept=(0, 1, 2, 3)):
-    parameters = ContactParameters.of(COMPONENTS, np.full((N_PAIR, 3), 3e5), friction=0.4, gap=np.asarray(gap, float))
-    excitation = Excitation.of({"height": height}, {1: {"shaker": force}})
-    return HarmonicBalance.of(
-        model, Joint("contact", "jenkins", parameters), HarmonicBasis(kept, 128), excitation, 2 * OMEGA
-    )
 
 
 def thesis(model: ReducedModel, balance: HarmonicBalance, height: float, force: float, start: np.ndarray):
@@ -139,7 +77,7 @@ def static_shape(model, balance, state):
 @pytest.mark.parametrize(("height", "force"), [(4e-5, 1.5), (4e-5, 12.0), (1.5e-4, 30.0)])
 def test_equals_the_rearranged_equations_of_the_thesis(height, force):
     free = two_bodies()
-    model, reaction = prescribe(free, PLATFORM, "height")
+    model = prescribe(free, PLATFORM, "height")
     balance = problem(model, height, force)
     solution = newton.solve_from_rest(balance, OMEGA, newton.NewtonOptions(tolerance=1e-12))
     assert solution.converged
@@ -164,29 +102,29 @@ def test_equals_the_rearranged_equations_of_the_thesis(height, force):
 
     x = (free.interface.B @ X).reshape(state.x.shape)
     np.testing.assert_allclose(x, state.x, atol=1e-9 * np.abs(state.x).max())
-    np.testing.assert_allclose(reaction.force(height, state.cycle.force[:, :, 0]), F_k, rtol=1e-8)
+    np.testing.assert_allclose(model.info.reaction.force(height, state.cycle.force[:, :, 0]), F_k, rtol=1e-8)
     output = balance.outputs(state)[0]
     np.testing.assert_allclose(X[10], output, atol=1e-9 * np.abs(X[10]).max())
 
 
 def test_reaction_is_the_preload_when_the_support_acts_about_the_height():
-    model, reaction = prescribe(two_bodies(), PLATFORM, "height", support=4e5)
+    model = prescribe(two_bodies(), PLATFORM, "height", support=4e5)
     for height, force in ((4e-5, 0.0), (8e-5, 10.0), (1.5e-4, 30.0)):
         balance = problem(model, height, force)
         solution = newton.solve_from_rest(balance, OMEGA)
         assert solution.converged
-        held = reaction.force(height, solution.state.cycle.force[:, :, 0])
+        held = model.info.reaction.force(height, solution.state.cycle.force[:, :, 0])
         assert balance.preload(solution.state) > 1.0
         assert held.sum() == pytest.approx(balance.preload(solution.state), rel=1e-9)
 
 
 def test_no_interference_means_no_preload_and_lost_contact_the_open_response():
-    model, reaction = prescribe(two_bodies(), PLATFORM, "height", support=4e5)
+    model = prescribe(two_bodies(), PLATFORM, "height", support=4e5)
     balance = problem(model, 0.0, 0.0, gap=(0.0, 0.0, 0.0))
     solution = newton.solve_from_rest(balance, OMEGA)
     assert solution.converged
     assert balance.preload(solution.state) == pytest.approx(0.0, abs=1e-12)
-    assert np.abs(reaction.force(0.0, solution.state.cycle.force[:, :, 0])).max() < 1e-9
+    assert np.abs(model.info.reaction.force(0.0, solution.state.cycle.force[:, :, 0])).max() < 1e-9
 
     open_ = problem(model, 1e-5, 1.0, gap=(1.0, 1.0, 1.0))
     solution = newton.solve_from_rest(open_, OMEGA)
@@ -199,7 +137,7 @@ def test_no_interference_means_no_preload_and_lost_contact_the_open_response():
 
 
 def test_harmonics_above_zero_share_one_system():
-    model, _ = prescribe(two_bodies(), PLATFORM, "height")
+    model = prescribe(two_bodies(), PLATFORM, "height")
     assert model.at_harmonic(1)[0] is model.at_harmonic(3)[0]
     assert len(problem(model, 1e-5, 1.0).compliance.groups) == 2
 
@@ -208,7 +146,7 @@ def test_shape_and_other_static_loads_enter_the_reaction():
     """Against one dense static solve with the contact closed everywhere."""
     free = two_bodies()
     shape = np.array([1.0, 0.4])
-    model, reaction = prescribe(free, PLATFORM[::-1], "height", shape=shape[::-1])
+    model = prescribe(free, PLATFORM[::-1], "height", shape=shape[::-1])
     K, u = free.system.stiffness, np.setdiff1d(np.arange(24), PLATFORM)
     k, B = 3e5, free.interface.B
     closed = K + k * B.T @ B
@@ -218,7 +156,7 @@ def test_shape_and_other_static_loads_enter_the_reaction():
     q[u] = np.linalg.solve(closed[np.ix_(u, u)], load[u] - closed[np.ix_(u, PLATFORM)] @ q[PLATFORM])
     force = (k * B @ q).reshape(N_PAIR, 3)
     expected = (K @ q)[PLATFORM]
-    np.testing.assert_allclose(reaction.force(1e-4, force, {"shaker": 2.0}), expected, rtol=1e-9)
+    np.testing.assert_allclose(model.info.reaction.force(1e-4, force, {"shaker": 2.0}), expected, rtol=1e-9)
     system, _ = model.at_harmonic(0)
     pushed = 1e-4 * system.loads["height"] + 2.0 * system.loads["shaker"]
     static = np.linalg.solve(system.stiffness + k * B.T @ B, pushed)

@@ -91,6 +91,7 @@ class Comparison:
                 "largest_pair_difference": found.energy_pairs,
             },
             "preload": {"balance_N": preload, "time_N": motion.preload, "difference": found.preload},
+            "mean_off_m": float(np.abs(motion.off).max()) if motion.off.size else None,
             "contact_difference": found.contact,
             "largest_difference": found.largest,
             "stable": self.stable,
@@ -134,6 +135,8 @@ class Comparison:
         for name, output in record["outputs"].items():
             shown.append((f"waveform {name}", f"{output['waveform_difference']:.2%} at the worst instant"))
         shown.append(("contact", f"{self.found.contact:.2%} at the worst pair and instant"))
+        if (off := record["mean_off_m"]) is not None:
+            shown.append(("mean held", f"to {off:.1g} m of what is prescribed"))
         error = "unknown" if record["step_error"] is None else f"{record['step_error']:.1e}"
         shown.append(("time steps", f"{self.steps} per period, their own error {error}"))
         shown.append(("periodic", f"{self.found.outcome}, {self.found.periods} periods, drift {self.found.drift:.1e}"))

@@ -11,7 +11,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from time import process_time
 
@@ -32,7 +31,6 @@ from tribodyn.workflows.accuracy.limit import Limit, limit_of
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.run import curve, modelling, settings, wear_run
 from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.content import code, digests
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -219,7 +217,6 @@ class _Start:
 
     problems : by the highest harmonic; own : that of the scene; state : of the latter, STRIDE beside
     omega : where the motion is wanted [rad/s]; located : whether the laws can locate their transitions
-    held : what is integrated in time where a displacement is prescribed in harmonic 0 alone, see `Bench.held_by_force`
     """
 
     problems: Mapping[int, HarmonicBalance]
@@ -228,7 +225,6 @@ class _Start:
     omega: float
     located: bool
     options: NewtonOptions
-    held: HarmonicBalance | None = None
 
 
 def _start(file: SceneFile, at: float | None) -> _Start:
@@ -249,20 +245,8 @@ def _start(file: SceneFile, at: float | None) -> _Start:
     for factor in (1 - STRIDE, 1 + STRIDE):
         beside = newton.solve(own, factor * omega, x, options)
         if beside.converged:
-            return _with_force(file, _Start(problems, own, beside.state, omega, _locates(file), options))
+            return _Start(problems, own, beside.state, omega, _locates(file), options)
     raise RuntimeError(f"there is no motion beside {omega / (2 * np.pi):g} Hz to start from: {beside.outcome}")
-
-
-def _with_force(file: SceneFile, start: _Start) -> _Start:
-    """The same with prescribed displacements held by the force that the most harmonics find there."""
-    if not getattr(file.scene, "prescribed", None):
-        return start
-    for top in sorted(start.problems, reverse=True):
-        with suppress(RuntimeError):
-            _, state = _balanced(start, start.located, top)
-            held = Bench().held_by_force(_with_harmonics(file, top), state)
-            return replace(start, held=held.with_load(start.own.load_factor))
-    return start
 
 
 @single
@@ -316,8 +300,6 @@ def _integrated(start: _Start, steps: int) -> PeriodicMotion:
             balance, state = _balanced(start, start.located, top)
         except RuntimeError:
             continue
-        if start.held is not None:
-            balance = start.held.with_harmonics(balance.basis.harmonics)
         motion = time_integration.integrate(balance, start.omega, state, options)
         if motion.periodic:
             return motion

@@ -28,7 +28,11 @@ from tribodyn.workflows.run.progress import Progress
 
 TOLERANCE = 0.05  # of a wear step in time
 SHARES = (0.9, 0.75, 0.5, 0.25, 0.1, 0.01, LIFE_SHARE)  # of the first preload, that are told
-COLUMNS = ("cycles", "frequency_hz", "preload_n", "energy_j", "spread", "amplitude_m", "depth_m", "settled", "periods")
+LONG_TAIL = 0.1  # share of the first preload, below which the cycles in time are shown only as far as the run's go
+COLUMNS = (
+    "cycles", "frequency_hz", "preload_n", "energy_j", "spread", "amplitude_m", "depth_m", "mean_off_m", "apart",
+    "repeats", "settled", "periods",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,7 @@ class LifeInTime:
             "shares": [dict(zip(("share", "run", "time"), (s, *self.at_share(s)), strict=True)) for s in SHARES],
             "scatter": found.scatter,
             "largest_spread": float(found.spread.max()),
+            "largest_mean_off_m": float(found.off.max()),
             "unsettled": self.unsettled,
             "steps_per_period": self.steps,
             "tolerance": self.tolerance,
@@ -90,6 +95,8 @@ class LifeInTime:
             f"{self.steps} steps a period, {int(found.periods.sum())} periods, {len(found.cycles)} wear steps of "
             f"tolerance {self.tolerance:g}",
         ]
+        if (off := float(found.off.max())) > 0:
+            shown.append(f"mean of the prescribed displacement: at most {off:.2g} m from what is prescribed")
         if self.unsettled > 0:
             shown.append(f"for {self.unsettled:.0%} of the cycles the mean work had not come to rest")
         return shown
@@ -104,6 +111,9 @@ def _columns(found: WearInTime, i: int) -> tuple[Any, ...]:
         float(found.spread[i]),
         float(found.amplitude[i]),
         float(found.depth[i].max()),
+        float(found.off[i]),
+        float(found.apart[i]),
+        int(found.repeats[i]),
         bool(found.settled[i]),
         int(found.periods[i]),
     )
@@ -158,17 +168,25 @@ def compare(
 
 
 def picture(life: LifeInTime) -> Figure:
-    """Preload and work per cycle over the cycles, of the run and in time; the spread of the work as a band."""
+    """Preload and work per cycle over the cycles, of the run and in time, and how long no pair carries a force.
+
+    A dot is the work of one period: there are two where a motion takes two periods, and many where it never repeats
+    itself.
+    """
     found, run = life.found, life.run
-    with axes_of(9.0, 3.8, columns=2) as (figure, (left, right)):
+    with axes_of(12.5, 3.8, columns=3) as (figure, (left, middle, right)):
         left.plot(1e-6 * run.cycles, run.preload, color=BLUE, label="run")
         left.plot(1e-6 * found.cycles, found.preload, color=ORANGE, label="in time")
         left.set(xlabel="cycles / 1e6", ylabel="preload / N")
         left.legend(loc="best", fontsize=9)
-        right.plot(1e-6 * run.cycles, run.energy.sum(axis=1), color=BLUE)
-        work = found.energy.sum(axis=1)
-        right.plot(1e-6 * found.cycles, work, color=ORANGE)
-        low, high = np.maximum(work * (1 - found.spread), 1e-3 * work), work * (1 + found.spread)
-        right.fill_between(1e-6 * found.cycles, low, high, color=ORANGE, alpha=0.3, lw=0)
-        right.set(xlabel="cycles / 1e6", ylabel="friction work per cycle / J", yscale="log")
+        middle.plot(1e-6 * run.cycles, run.energy.sum(axis=1), color=BLUE)
+        middle.plot(1e-6 * found.cycles, found.energy.sum(axis=1), color=ORANGE)
+        dots = np.repeat(found.cycles, found.works.shape[1])
+        middle.plot(1e-6 * dots, found.works.ravel(), ".", color=ORANGE, ms=3, alpha=0.6)
+        middle.set(xlabel="cycles / 1e6", ylabel="friction work per cycle / J", yscale="log")
+        right.plot(1e-6 * found.cycles, found.apart, color=ORANGE)
+        right.set(xlabel="cycles / 1e6", ylabel="share of the time with no contact", ylim=(0, 1))
+        shown = 1.2 * max(float(run.cycles[-1]), found.life(LONG_TAIL) or 0.0)
+        for axes in (left, middle, right):
+            axes.set_xlim(0.0, 1e-6 * min(shown, max(float(found.cycles[-1]), float(run.cycles[-1]))))
     return figure

@@ -142,8 +142,7 @@ def with_prescribed(scene: MeshScene, part: Part, reduced: ReducedModel) -> Redu
             matrix = Spring(spring.group, spring.direction, spring.stiffness).matrix(part.mesh, part.node_sets)
             support += matrix.diagonal()[part.free[dofs]]
         masters = np.searchsorted(reduced.info.master_dofs, dofs)
-        reduced, reaction = prescribe(reduced, masters, name, support=support)
-        reduced = replace(reduced, info=replace(reduced.info, reaction=reaction))
+        reduced = prescribe(reduced, masters, name, support=support)
     return reduced
 
 

@@ -14,15 +14,13 @@ import numpy as np
 from filelock import FileLock
 
 from tribodyn.fem.part import Part
-from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.balance import State
 from tribodyn.reduction.model import ReducedModel
-from tribodyn.workflows.run import modelling, part_reduction, settings
+from tribodyn.workflows.run import modelling, part_reduction
 from tribodyn.workflows.run.contact_surfaces import surface_gap
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import PartScene
 
-HOLD = "hold"  # the load that takes the place of a prescribed displacement
 LATE: Any = {
     "scene": True, "damping": True, "harmonics": True, "wear": True, "solver": True, "pictures": True, "surfaces": True,
     "loads": {"static": {"__all__": {"value", "pressure"}}, "harmonic": {"__all__": {"value", "pressure", "phase"}}},
@@ -96,32 +94,6 @@ class Bench:
         assert self.part is not None
         reduced = part_reduction.with_prescribed(scene, self.part, modelling.damped(scene, plain))
         return modelling.make_model(scene, self.part, reduced)
-
-    def held_by_force(self, file: SceneFile, state: State, opening: np.ndarray | None = None) -> HarmonicBalance:
-        """A scene with a prescribed displacement, held instead by the static force that a solved state takes there.
-
-        A displacement prescribed in harmonic 0 alone has no equation of motion in time. With the force as a static load
-        the same state has one: its mean is then free to differ, and the balance solution of both problems is the same.
-        Raises  ValueError for a scene that prescribes nothing
-        """
-        scene, model = file.part_scene, self.model(file, opening)
-        if not scene.prescribed:
-            raise ValueError(f"{file.name} prescribes no displacement: integrate it as it is")
-        name, given = next(iter(scene.prescribed.items()))
-        height, reaction = given.displacement, part_reduction.reaction_of(model.reduced)
-        plain = modelling.damped(scene, self.plain(file, opening))
-        push = np.zeros(plain.system.n_dof)
-        force = reaction.force(height, state.cycle.force[:, :, 0])
-        push[reaction.dofs] = force + reaction.support * reaction.shape * height
-        system = replace(plain.system, loads={**plain.system.loads, HOLD: push})
-        loads = {key: value for key, value in model.balance.excitation.loads.items() if key != (0, name)}
-        return HarmonicBalance.of(
-            replace(plain, system=system),
-            model.balance.contact.joints,
-            model.balance.basis,
-            Excitation({**loads, (0, HOLD): 1.0}),
-            settings.highest_frequency(scene),
-        )
 
 
 def _made(file: SceneFile) -> tuple[Part, ReducedModel]:

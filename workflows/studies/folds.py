@@ -47,10 +47,10 @@ def find(file: SceneFile, progress: Progress, bracket: float = 0.02) -> FoldsFou
 
     bracket : distance to the fold of the balance, relative, within which its end in time is looked for
     Raises  SolveFailed where the curve has no first point; ValueError for a sector of a wheel, whose perturbations are
-    other waves than its motion, and for a scene with prescribed nodes, which have no equation of motion
+    other waves than its motion
     """
-    if getattr(file.scene, "prescribed", None) or getattr(file.scene, "wheel", None):
-        raise ValueError(f"{file.name} has a [wheel] or [prescribed] nodes: its folds cannot be looked for in time")
+    if getattr(file.scene, "wheel", None):
+        raise ValueError(f"{file.name} has a [wheel]: its folds cannot be looked for in time")
     low, high = settings.response_range(file.scene)
     with limited(file.scene.solver.threads):
         balance = modelling.build(file, None, progress).balance

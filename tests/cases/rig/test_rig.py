@@ -82,14 +82,11 @@ def test_lost_contact_is_the_open_rig(rig):
 
 
 @pytest.mark.slow
-def test_the_force_found_instead_of_the_height_makes_the_same_motion(rig):
-    """The balance is the same to rounding, and comes closer to time integration with more harmonics."""
+def test_the_balance_comes_closer_to_time_integration_with_more_harmonics(rig):
     errors = []
     for kept in ((0, 1), (0, 1, 2, 3, 4, 5)):
         more = rig.with_harmonics(kept)
         cycle = more.cycle()
-        same = more.bench.held_by_force(more.file, cycle.state).evaluate(2 * np.pi * rig.frequency, cycle.state.x)
-        assert np.abs(same.residual).max() < 1e-7 * np.abs(same.x).max()
         found = in_time(more, cycle)
         assert found.periodic
         assert found.preload == pytest.approx(cycle.preload, rel=0.02)

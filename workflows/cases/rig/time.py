@@ -1,9 +1,4 @@
-"""The rig in time: does its harmonic balance describe the motion that the equations have?
-
-A displacement that is prescribed in harmonic 0 alone has no equation of motion. The same state has one with the force
-that the balance found at the platform as a static load: its mean is then free to differ, and the balance solution of
-the two problems is the same.
-"""
+"""The rig in time: does its harmonic balance describe the motion that the equations have?"""
 
 from __future__ import annotations
 
@@ -34,8 +29,7 @@ def in_time(rig: Rig, cycle: Cycle) -> InTime:
     """Integrate from a solved cycle to the periodic motion nearby."""
     options = TimeOptions(STEPS, tolerance=DRIFT, max_periods=PERIODS)
     try:
-        balance = rig.bench.held_by_force(rig.file, cycle.state, rig.opening)
-        found = verify_in_time(balance, cycle.state, options)
+        found = verify_in_time(rig.model().balance, cycle.state, options)
     except IntegrationFailed as failure:
         return InTime(None, None, None, str(failure))
     amplitude = found.amplitude[OUTPUT]

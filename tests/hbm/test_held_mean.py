@@ -1,0 +1,152 @@
+"""A displacement that harmonic 0 prescribes, in time: beside balances with many harmonics and a force that is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.helpers.held_bodies import OMEGA, PLATFORM, problem, two_bodies
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.contact import law
+from tribodyn.hbm.continuation.operating_point import AtFrequency
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.outcome import WearEnd
+from tribodyn.hbm.stability import exponents, floquet
+from tribodyn.hbm.time import time_integration
+from tribodyn.hbm.time.mean_motion import Follower, MeanOptions
+from tribodyn.hbm.time.time_integration import Options, TimeStepper
+from tribodyn.hbm.time.verify import verify
+from tribodyn.hbm.wear import error_controlled_rule, in_time
+from tribodyn.hbm.wear.evolution import Duty, WearProblem
+from tribodyn.hbm.wear.history import cycles_to_preload
+from tribodyn.hbm.wear.in_time import FixedPlaces
+from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.step_control import Tolerance
+from tribodyn.reduction.prescribed import prescribe
+
+HEIGHT = 1.5e-4
+STEPS = 128
+
+
+def held(
+    force: float, top: int = 15, height: float = HEIGHT, friction: float = 0.4, gap: float = 0.0
+) -> HarmonicBalance:
+    model = prescribe(two_bodies(), PLATFORM, "height", support=4e5)
+    gaps = (gap, gap + 1e-5, gap - 1e-5)
+    return problem(model, height, force, gaps, tuple(range(top + 1)), friction)
+
+
+def solved(balance: HarmonicBalance) -> State:
+    found = newton.solve_from_rest(balance, OMEGA)
+    assert found.converged
+    return found.state
+
+
+@pytest.mark.parametrize(("height", "force"), [(4e-5, 1.5), (HEIGHT, 30.0)])
+def test_motion_in_time_is_that_of_many_harmonics(height: float, force: float) -> None:
+    """They stick, slip and lift; at the larger load the motion is unstable."""
+    balance = held(force, height=height)
+    state = solved(balance)
+    assert np.bitwise_or.reduce(state.cycle.status) == law.STICKS | law.SLIPS | law.SEPARATES
+    found = verify(balance, state, Options(512, tolerance=1e-8))
+    assert found.motion.periodic
+    assert found.largest < 1e-3
+    assert np.abs(found.motion.off).max() < 1e-7 * height  # of the displacement as it was marched
+    stepper = TimeStepper(balance, OMEGA, Options(512))
+    assert stepper.hold is not None
+    reaction = balance.model.info.reaction
+    assert reaction is not None
+    in_time = reaction.force(height, found.motion.force.mean(axis=2))  # another formula than that of the hold
+    np.testing.assert_allclose(in_time, reaction.force(height, state.cycle.force[:, :, 0]), rtol=2e-3)
+    own = reaction.support * reaction.shape * height  # of the springs that act about the height
+    np.testing.assert_allclose(stepper.hold.in_balance(state) - own, in_time, rtol=2e-3)
+
+
+def test_a_force_that_is_known_makes_the_same_motion() -> None:
+    """The force that holds the mean, as a static load of the same bodies with nothing prescribed."""
+    balance = held(12.0, height=4e-5)
+    options = Options(STEPS, tolerance=1e-10)
+    exact = time_integration.integrate(balance, OMEGA, solved(balance), options)
+    reaction = balance.model.info.reaction
+    assert reaction is not None
+    free = two_bodies()
+    push = np.zeros(free.system.n_dof)
+    push[reaction.dofs] = reaction.force(4e-5, exact.force.mean(axis=2)) + reaction.support * 4e-5
+    loads = {**free.system.loads, "push": push}
+    joints, basis = balance.contact.joints, balance.basis
+    pushed = HarmonicBalance.of(
+        replace(free, system=replace(free.system, loads=loads)), joints, basis,
+        Excitation.of({"push": 1.0}, {1: {"shaker": 12.0}}), 2 * OMEGA,
+    )  # fmt: skip
+    found = time_integration.integrate(pushed, OMEGA, solved(pushed), options)
+    assert len(exact.off) == len(PLATFORM)
+    assert len(found.off) == 0
+    np.testing.assert_allclose(found.outputs, exact.outputs, atol=1e-6 * np.abs(exact.outputs).max())
+    assert found.energy.sum() == pytest.approx(exact.energy.sum(), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("friction", "gap", "status"), [(1e6, -1e-4, law.STICKS), (0.4, 1.0, law.SEPARATES)], ids=["stuck", "loose"]
+)
+def test_a_plain_march_comes_to_the_mean_of_a_stuck_and_of_a_loose_contact(
+    friction: float, gap: float, status: int
+) -> None:
+    """From rest at half the height: no balance tells the force."""
+    balance = held(3.0, 3, friction=friction, gap=gap)
+    lower = held(3.0, 3, 0.5 * HEIGHT, friction, gap)
+    options = Options(64, tolerance=1e-7, accelerate=False, max_periods=400)
+    found = time_integration.integrate(balance, OMEGA, lower.evaluate(OMEGA, solved(lower).x), options)
+    assert found.periodic
+    assert (found.status == status).all()
+    assert np.abs(found.off).max() < 1e-6 * HEIGHT
+
+
+def test_the_mean_of_a_motion_that_never_repeats_itself_is_held() -> None:
+    balance = held(12.0, 7, 4e-5)
+    state = solved(balance)
+    follower = Follower(MeanOptions(128))
+    follower.start(balance, state)
+    found = follower.mean(balance, OMEGA, lambda motion: motion.outputs.mean(axis=1))
+    assert found.settled
+    assert found.spread > 0.02
+    assert 0 < found.off < 1e-3 * 4e-5
+    assert found.energy.sum() == pytest.approx(balance.energy(state).sum(), rel=0.02)
+
+
+def test_multipliers_while_the_force_stays_are_those_by_hill() -> None:
+    """Of a contact that lifts without friction, where Hill's method sees all that a perturbation does."""
+    balance = held(12.0, 9, 4e-5, friction=0.0)
+    state = solved(balance)
+    hill = np.abs(np.exp(exponents.stability(balance, state).exponents * 2 * np.pi / OMEGA))
+    multipliers = np.abs(np.exp(floquet.exponents(balance, state, Options(STEPS)) * 2 * np.pi / OMEGA))
+    np.testing.assert_allclose(np.sort(hill)[-4:], np.sort(multipliers)[-4:], rtol=0.01)
+
+
+def test_what_drives_a_motion_away_in_time_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the whole monodromy matrix, and by marched periods, of which the force is no part."""
+    monkeypatch.setattr(floquet, "DENSE", 0)
+    for force, height, stable in ((1.5, 4e-5, True), (30.0, HEIGHT, False)):
+        balance = held(force, 9, height)
+        state, options = solved(balance), Options(STEPS, tolerance=1e-9)
+        whole = np.exp(floquet.exponents(balance, state, options).real.max() * 2 * np.pi / OMEGA)
+        assert (whole < 1) == stable
+        assert floquet.largest(balance, state, options) == pytest.approx(whole, rel=0.2 if stable else 0.02)
+
+
+def test_life_in_time_is_that_of_many_harmonics() -> None:
+    problem = WearProblem(
+        balance=held(6.0, 9),
+        mission=(Duty(AtFrequency("tip", OMEGA)),),
+        wear=JointWear.of("energy", coefficient=1e-9),
+        area=np.full(3, 1e-4),
+        lost_below=0.5,
+    )
+    run = error_controlled_rule.evolve(problem, Tolerance(0.01, 1e-4))
+    found = in_time.evolve(problem, FixedPlaces(problem), Tolerance(0.02, 1e-4), MeanOptions(128))
+    assert found.end.kind is run.ended is WearEnd.PRELOAD_LOST
+    assert found.settled.all()
+    assert found.off.max() < 1e-3 * HEIGHT
+    assert found.life(0.5) == pytest.approx(cycles_to_preload(run, 0.5), rel=0.01)
