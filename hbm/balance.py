@@ -27,7 +27,6 @@ from tribodyn.reduction.model import ReducedModel
 
 ROUNDING = 1e-13  # of the work that a pair's force and motion could do at most
 NEARLY_ALL = 0.03  # share of the flexibility that products may leave out and still find Newton's directions alone
-FACTORED = 256  # size of a coarse part from which on its factors cost less than its inverse, for the few products made
 INNER, INNER_PRODUCTS = 0.05, 60  # residual and products of a direction within a direction, where they leave out more
 
 
@@ -321,10 +320,10 @@ class Linearisation:
             n = len(self._block_inverse)
             solved: np.ndarray = np.matmul(self._block_inverse, full.reshape(n, -1, 1)).reshape(self._shape)
             return solved[self.rows]
-        if self._coarse_inverse is None:
+        if self._coarse_factors is None:
             return d
-        u, inverse = self._coarse_inverse
-        return d + u @ inverse((u.T @ self.g_slope(d)).ravel()).reshape(u.shape[1], -1)
+        found: np.ndarray = pair_slopes.preconditioned(d, self.g_slope(d), *self._coarse_factors)
+        return found
 
     @cached_property
     def _block_inverse(self) -> np.ndarray | None:
@@ -345,18 +344,13 @@ class Linearisation:
             return None
 
     @cached_property
-    def _coarse_inverse(self) -> tuple[np.ndarray, Callable[[np.ndarray], np.ndarray]] | None:
-        """U and the product with (I - A U^T D U)^-1 A; None where there is no coarse part or it is singular."""
+    def _coarse_factors(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+        """U, A and the factors of I - A U^T D U; None where there is no coarse part or it is singular."""
         if self.coarse is None:
             return None
         u, a, matrix = self.coarse
-        if len(a) < FACTORED:
-            try:
-                return u, np.linalg.solve(matrix, a).__matmul__
-            except np.linalg.LinAlgError:
-                return None
         lower_upper, pivots, zero = sla.lapack.dgetrf(matrix)
-        return (u, lambda v: sla.lu_solve((lower_upper, pivots), a @ v, check_finite=False)) if zero == 0 else None
+        return (u, a, lower_upper.T, pivots) if zero == 0 else None
 
     @cached_property
     def coarse(self) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
@@ -368,12 +362,8 @@ class Linearisation:
         r, m = u.shape[1], self._shape[1]
         if r == 0:
             return None
-        n, n_comp = len(self.active), len(self.rows) // len(self.active)
-        single = u.astype(np.float32)
-        d = self._dg.reshape(n, n_comp, m, n_comp, m).transpose(0, 1, 2, 4, 3).astype(np.float32, order="C")
-        through = np.matmul(d.reshape(n, -1, n_comp), single.reshape(n, n_comp, r)).reshape(n * n_comp, -1)
-        projected = (single.T @ through).reshape(r, m, m, r).transpose(0, 1, 3, 2).reshape(r * m, r * m)
-        return u, a, np.eye(r * m) - a @ projected
+        inside = pair_slopes.projected(self._dg, u.astype(np.float32), m)
+        return u, a, np.eye(r * m) - a @ inside
 
     def spread(self, d: np.ndarray, rhs: np.ndarray) -> np.ndarray:
         """The solution of (I - G dg/dx) d = rhs in all rows (n_contact, n_coeff) from that in the active rows."""

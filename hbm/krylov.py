@@ -22,7 +22,7 @@ def gmres(
 
     product : A times a vector (n,); precondition : an approximate inverse of A, applied from the right
     flexible : the preconditioner is no linear map, such as an iteration of its own
-    Returns x, products spent, relative residual reached
+    Returns x, products spent, relative residual reached: infinite where a product is no number
     Source  Saad and Schultz 1986; flexible: Saad 1993, doi 10.1137/0914028
     """
     beta = float(np.linalg.norm(b))
@@ -50,6 +50,8 @@ def gmres(
         column = h[:, k - 1]
         column[:k] = coefficients + again
         norm = float(np.sqrt(w @ w))
+        if not np.isfinite(norm):  # a product beyond all numbers, as single precision has them
+            return np.zeros_like(b), k, np.inf
         radius = _rotate(column, cs, sn, rhs, k, norm)
         if radius == 0.0:
             k -= 1

@@ -27,6 +27,7 @@ POINTS_KEPT = 4  # frequencies at hand, for the duties of a mission that are sol
 # preconditioner. Its matrix has the modes times the coefficients: so many rows at most, unless these are FEWEST_COARSE
 # modes. 0 to 31 on 20 pairs of a wheel: 0.09 s with 6 modes, 10 s with all 60
 PRECONDITIONED_SHARE, MOST_COARSE, FEWEST_COARSE = 0.1, 1000, 8
+NONE = np.zeros((0, 0), np.float32)
 UNBALANCED = 1e-7  # of the static loads, on a motion that nothing resists, taken for rounding
 
 
@@ -83,7 +84,7 @@ class ContactCompliance:
         self.shared_real = self._one_real()
         self.coarse = self._coarse_modes()
         self._points: dict[float, CompliancePoint] = {}
-        self._active: tuple[np.ndarray, list[tuple[np.ndarray | None, np.ndarray]]] | None = None
+        self._active: tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray, np.ndarray]]] | None = None
 
     def _one_real(self) -> bool:
         """Whether one real symmetric system serves all harmonics."""
@@ -132,17 +133,19 @@ class ContactCompliance:
         left, size, _ = np.linalg.svd(columns, full_matrices=False)
         return np.ascontiguousarray(left[:, size**2 > PRECONDITIONED_SHARE * len(self.groups)])
 
-    def on_rows(self, rows: np.ndarray) -> list[tuple[np.ndarray | None, np.ndarray]]:
-        """W_0, if any, and modes of each group at some contact rows, single precision; the last ones are kept."""
+    def on_rows(self, rows: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """W_0, empty where there is none, modes and these transposed of each group at some contact rows.
+
+        In single precision; the last ones are kept.
+        """
         if self._active is None or not np.array_equal(self._active[0], rows):
-            n, of = self.n_contact, [e for e, _ in self.groups]
-            if len(rows) == n:
-                self._active = (rows, [(e.w0_single, e.b_single) for e in of])
-            else:
-                self._active = (
-                    rows,
-                    [(None if e.w0_single is None else e.w0_single[np.ix_(rows, rows)], e.b_single[rows]) for e in of],
-                )
+            parts = []
+            for e, _ in self.groups:
+                w0, b = NONE if e.w0_single is None else e.w0_single, e.b_single
+                if len(rows) < self.n_contact:
+                    w0, b = w0[np.ix_(rows, rows)] if len(w0) else w0, b[rows]
+                parts.append((w0, b, np.ascontiguousarray(b.T)))
+            self._active = (rows, parts)
         return self._active[1]
 
     def at(self, omega: float) -> CompliancePoint:
@@ -272,7 +275,8 @@ class CompliancePoint:
         if self.compliance.residual is None:
             return self.apply(g)
         b = self.compliance.groups[0][0].b[: self.compliance.n_contact]
-        return (self.modal(np.ascontiguousarray(g.T) @ b, 0) @ b.T).T
+        found: np.ndarray = (all_harmonics.modal(np.ascontiguousarray(g.T) @ b, 0, *self.core) @ b.T).T
+        return found
 
     def _apply_shared_real(self, g: np.ndarray) -> np.ndarray:
         """The same for one real system: every matrix meets all harmonics in one real product."""
@@ -282,25 +286,20 @@ class CompliancePoint:
 
     def _from_rows(self, moved: np.ndarray, higher: np.ndarray, left: np.ndarray, n: int | None = None) -> np.ndarray:
         """(n, n_coeff) displacement of the first n ports of `left` from forces times [W_0, modes] and W_k, as rows."""
-        x, n_port = self.compliance.groups[0][0], left.shape[1]
-        y = self.modal(moved[:, n_port:], len(x.e))
-        still = self.compliance.basis.has_static
-        return all_harmonics.gathered(
-            y @ left, moved, higher, n_port if n is None else n, n_port, x.unit, self._ratio, still
-        )
+        x, n = self.compliance.groups[0][0], left.shape[1] if n is None else n
+        found: np.ndarray = all_harmonics.displaced(moved, higher, left, n, len(x.e), x.unit, *self.core)
+        return found
 
     @cached_property
-    def _ratio(self) -> np.ndarray:
-        """(n_dynamic,) h w over the largest one asked for."""
-        return self.omega / self.compliance.groups[0][0].s_unit * np.array(self.compliance.basis.dynamic)
-
-    def modal(self, forces: np.ndarray, n_e: int) -> np.ndarray:
-        """Modal displacements (n_coeff, m + n_e m) from modal forces, of one real system; see `all_harmonics`."""
-        has_static = self.compliance.basis.has_static
-        z = all_harmonics.modal_forces(forces, n_e, self._ratio, has_static)
-        for amplitude, port in zip(z, self.ports[0], strict=True):
-            amplitude[:] = port.through_core(amplitude)
-        return all_harmonics.modal_rows(z, n_e, self._ratio, has_static)
+    def core(self) -> tuple[np.ndarray, bool, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Of one real system: h w over the largest one asked for, and the factors of its core; see `all_harmonics`."""
+        x, basis = self.compliance.groups[0][0], self.compliance.basis
+        lower_upper = [port.factor.T for port in self.ports[0] if port.factor is not None]  # at rest there are none
+        factors = np.array(lower_upper, complex).reshape(-1, x.n_mode, x.n_mode)
+        pivots = np.array([p.pivots for p in self.ports[0] if p.pivots is not None], np.int32).reshape(-1, x.n_mode)
+        ratio = self.omega / x.s_unit * np.array(basis.dynamic)
+        real, imag = (np.ascontiguousarray(part) for part in (factors.real, factors.imag))
+        return ratio, basis.has_static, real, imag, pivots, x.static_lam
 
     def outputs(self, g: np.ndarray) -> np.ndarray:
         """(n_output, n_coeff) outputs under contact forces g alone [m]."""
@@ -365,15 +364,11 @@ class JacobianProduct:
         """G d for d (n_active, n_coeff)."""
         c = self._compliance
         if c.shared_real:
-            w0, b = self._parts[0]
-            rows = d.T.astype(np.float32, order="C")
-            y = self._point.modal(rows @ b, 0)
-            moved = y.astype(np.float32) @ b.T
-            return (moved if w0 is None else rows @ w0 + moved).T
+            found: np.ndarray = all_harmonics.nearly_displaced(d, *self._parts[0], *self._point.core)
+            return found
         force = c.basis.to_complex(d).astype(np.complex64)
         moved = np.empty_like(force)
-        for (w0, b), ports, (_, positions) in zip(self._parts, self._point.ports, c.groups, strict=True):
-            assert w0 is not None
+        for (w0, b, _), ports, (_, positions) in zip(self._parts, self._point.ports, c.groups, strict=True):
             for port, p in zip(ports, positions, strict=True):
                 f = force[:, p]
                 moved[:, p] = w0 @ f + b @ port.through_core(b.conj().T @ f)

@@ -1,4 +1,8 @@
-"""The slope of the contact forces, one block for each pair, in one pass: at many harmonics nothing is larger."""
+"""The slope of the contact forces, one block for each pair, in one pass: at many harmonics nothing is larger.
+
+D is block diagonal, with `slopes` (n_active, m, m) for its blocks, m = n_component * n_coeff, coefficients innermost.
+U (n_active * n_component, r) and A (r * n_coeff, same) are the coarse part of the compliance, G ~ U A U^T.
+"""
 
 from __future__ import annotations
 
@@ -30,3 +34,66 @@ def departures(jacobian, stiffness):
             active[n] = i
             n += 1
     return active[:n].copy(), slopes[:n]
+
+
+@numba.njit(cache=True)
+def projected(slopes, u, n_coeff):
+    """(r n_coeff, r n_coeff) U^T D U, in the single precision of u."""
+    n, m, _ = slopes.shape
+    r, n_comp = u.shape[1], m // n_coeff
+    through = np.zeros((n * n_comp, n_coeff * n_coeff * r), u.dtype)
+    for i in range(n):
+        for c in range(n_comp):
+            row = through[i * n_comp + c]
+            for a in range(n_coeff):
+                for d in range(n_comp):
+                    shape = u[i * n_comp + d]
+                    for b in range(n_coeff):
+                        slope = slopes[i, c * n_coeff + a, d * n_coeff + b]
+                        if slope != 0.0:
+                            first = (a * n_coeff + b) * r
+                            value = u.dtype.type(slope)
+                            for q in range(r):
+                                row[first + q] += value * shape[q]
+    inside = np.dot(u.T, through)
+    found = np.empty((r, n_coeff, r, n_coeff))
+    for p in range(r):
+        for a in range(n_coeff):
+            for b in range(n_coeff):
+                for q in range(r):
+                    found[p, a, q, b] = inside[p, (a * n_coeff + b) * r + q]
+    return found.reshape(r * n_coeff, r * n_coeff)
+
+
+@numba.njit(cache=True)
+def preconditioned(d, slope, u, a, lower_upper, pivots):
+    """d + U (I - A U^T D U)^-1 A U^T D d for d and slope = D d, both (n_active * n_component, n_coeff).
+
+    lower_upper, pivots : factors of the matrix in brackets; row j of the first holds column j of L and U
+    """
+    n_row, n_coeff = d.shape
+    r = u.shape[1]
+    pulled = np.zeros((r, n_coeff))
+    for i in range(n_row):
+        for p in range(r):
+            for b in range(n_coeff):
+                pulled[p, b] += u[i, p] * slope[i, b]
+    x = np.dot(a, pulled.ravel())
+    for j in range(len(x)):
+        x[j], x[pivots[j]] = x[pivots[j]], x[j]
+    for j in range(len(x)):
+        column, value = lower_upper[j], x[j]
+        for i in range(j + 1, len(x)):
+            x[i] -= column[i] * value
+    for j in range(len(x) - 1, -1, -1):
+        column = lower_upper[j]
+        x[j] /= column[j]
+        value = x[j]
+        for i in range(j):
+            x[i] -= column[i] * value
+    found = d.copy()
+    for i in range(n_row):
+        for p in range(r):
+            for b in range(n_coeff):
+                found[i, b] += u[i, p] * x[p * n_coeff + b]
+    return found
