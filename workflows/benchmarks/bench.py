@@ -82,6 +82,7 @@ def run(quick: bool, say: Callable[[str], None]) -> list[Timing]:
         say(f"harmonics {harmonics}")
         with limited(1):
             rows.append(_measure(problem(harmonics), harmonics, windows))
+        say(_line(rows[-1]))  # what is measured is not lost where a later row is ended
     return rows
 
 
@@ -210,23 +211,26 @@ def as_records(rows: list[Timing]) -> list[dict[str, object]]:
     return [asdict(row) for row in rows]
 
 
+def _line(r: Timing) -> str:
+    thesis = f"{r.thesis_seconds:.0f} s" if r.thesis_seconds else "-"
+    shares = f"{100 * r.contact:.0f}/{100 * r.balance:.0f}/{100 * r.direction:.0f}"
+    published = THESIS_SHARES.get(r.harmonics)
+    if published:
+        shares += " (thesis " + "/".join(f"{v:.0f}" for v in published) + ")"
+    ratio = "-" if r.ratio is None else f"{r.ratio:.1f}"
+    return (
+        f"{r.harmonics:>9} {r.converged:4d}/{r.points:<4d} {r.seconds:8.2f} {r.again:6.0%} "
+        f"{r.newton_steps:7d} {ratio:>8} {r.max_difference:19.1e} {thesis:>14}   {shares}"
+    )
+
+
 def as_text(rows: list[Timing]) -> str:
     """The rows for people, the thesis's figures beside ours."""
     lines = [
         "harmonics   points   seconds  again  Newton    ratio  largest difference  thesis 1 core   "
-        "contact/balance/direction %"
+        "contact/balance/direction %",
+        *map(_line, rows),
     ]
-    for r in rows:
-        thesis = f"{r.thesis_seconds:.0f} s" if r.thesis_seconds else "-"
-        shares = f"{100 * r.contact:.0f}/{100 * r.balance:.0f}/{100 * r.direction:.0f}"
-        published = THESIS_SHARES.get(r.harmonics)
-        if published:
-            shares += " (thesis " + "/".join(f"{v:.0f}" for v in published) + ")"
-        ratio = "-" if r.ratio is None else f"{r.ratio:.1f}"
-        lines.append(
-            f"{r.harmonics:>9} {r.converged:4d}/{r.points:<4d} {r.seconds:8.2f} {r.again:6.0%} "
-            f"{r.newton_steps:7d} {ratio:>8} {r.max_difference:19.1e} {thesis:>14}   {shares}"
-        )
     lines.append(f"least of {REPEATS} repeats for each point; again: the same from every second one, the difference")
     lines.append(
         "ratio: seconds of the dense algorithm over ours on the same points "
