@@ -16,14 +16,12 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.time import time_integration, wave_in_time
 from tribodyn.hbm.time.period_search import Period, PeriodSearch
+from tribodyn.hbm.time.push import push
 from tribodyn.hbm.time.time_integration import PeriodicMotion, TimeStepper
 from tribodyn.hbm.time.time_step import Moving
 
 REPEATED = 1e-2  # distance of two states, relative to the vibration, up to which the motion has come back
 PERIODIC = 1e-5  # drift over a period, relative, of a motion that counts as periodic
-# push of a periodic motion, relative to its vibration; share of it down to which it must die away; distance, relative
-# to the vibration, at which the motion has left
-PUSH, DECAYED, LEFT = 1e-3, 0.3, 0.1
 SAME_SCATTER = 2.0  # standard errors by which the means of two blocks may differ and still be those of one motion
 
 
@@ -133,20 +131,10 @@ class Follower:
             return None, search.periods
         self._motion = found.end
         plain = PeriodSearch(stepper, replace(stepper.options, max_periods=o.block * o.most_blocks), False)
-        motion = plain.vector.unpack(plain.vector.pushed(found.image, PUSH * found.size), found.end)
-        furthest = 0.0
-        while plain.periods < o.block * o.most_blocks:
-            later = plain.step(motion)
-            motion = later.end
-            away = plain.vector.apart(later.image, found.image) / (PUSH * found.size)
-            furthest = max(furthest, away)
-            if plain.periods % o.block == 0 and away <= DECAYED:
-                return found, search.periods + plain.periods
-            if away * PUSH >= LEFT:
-                break
-        if furthest * PUSH < LEFT:  # a push that neither dies away nor grows
+        pushed = push(plain, found, o.block)
+        if not pushed.away:
             return found, search.periods + plain.periods
-        self._motion = motion
+        self._motion = pushed.motion
         return None, search.periods + plain.periods
 
     def _settled(

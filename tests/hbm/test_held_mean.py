@@ -15,6 +15,7 @@ from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.stability import exponents, floquet
+from tribodyn.hbm.stability.stays import PUSHED, stays
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.mean_motion import Follower, MeanOptions
 from tribodyn.hbm.time.time_integration import Options, TimeStepper
@@ -134,6 +135,20 @@ def test_what_drives_a_motion_away_in_time_is_seen(monkeypatch: pytest.MonkeyPat
         whole = np.exp(floquet.exponents(balance, state, options).real.max() * 2 * np.pi / OMEGA)
         assert (whole < 1) == stable
         assert floquet.largest(balance, state, options) == pytest.approx(whole, rel=0.2 if stable else 0.02)
+
+
+def test_a_push_decides_where_sliders_just_reach_their_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """There differences have a kink: their largest multiplier is above 1 at a motion that is stable."""
+    model = prescribe(two_bodies(), PLATFORM, "height", support=4e5)
+    kink = problem(model, HEIGHT, 6.0, (0.0, 1.0, -1e-5), tuple(range(8)))
+    options = Options(STEPS, tolerance=1e-9)
+    whole = floquet.largest(kink, solved(kink), options)
+    monkeypatch.setattr(floquet, "DENSE", 0)
+    assert whole < 0.9
+    assert floquet.largest(kink, solved(kink), options) > 1.1
+    for balance, stable in ((kink, True), (held(12.0, 7, 4e-5), False), (held(30.0, 7), False)):
+        state = solved(balance)
+        assert stays(balance, state, verify(balance, state, options), options) == (stable, PUSHED)
 
 
 def test_life_in_time_is_that_of_many_harmonics() -> None:

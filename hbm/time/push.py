@@ -1,0 +1,38 @@
+"""Whether a small push drives a periodic motion away: what a machine would do, without a derivative."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from tribodyn.hbm.time.period_search import Period, PeriodSearch
+from tribodyn.hbm.time.time_step import Moving
+
+# push of a periodic motion, relative to its vibration; share of it down to which it must die away; times of it that
+# tell growth at the end; distance, relative to the vibration, at which the motion has left
+PUSH, DECAYED, GROWN, LEFT = 1e-3, 0.3, 5.0, 0.1
+
+
+class Pushed(NamedTuple):
+    """away : whether the motion has left; motion : after the last period that was marched."""
+
+    away: bool
+    motion: Moving
+
+
+def push(plain: PeriodSearch, found: Period, every: int) -> Pushed:
+    """March on from a periodic motion that is pushed, until it has come back or left, or no more periods are allowed.
+
+    plain : of plain periods; found : the periodic motion; every : periods after which to see whether it came back
+    A push that neither dies away nor grows counts as not away
+    Raises  IntegrationFailed
+    """
+    away, motion = 0.0, plain.vector.unpack(plain.vector.pushed(found.image, PUSH * found.size), found.end)
+    while plain.periods < plain.options.max_periods:
+        later = plain.step(motion)
+        motion = later.end
+        away = plain.vector.apart(later.image, found.image) / found.size
+        if away >= LEFT:
+            return Pushed(True, motion)
+        if plain.periods % every == 0 and away <= DECAYED * PUSH:
+            break
+    return Pushed(away > GROWN * PUSH, motion)
