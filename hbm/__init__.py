@@ -4,7 +4,8 @@ harmonics, excitation                 basis and loads
 balance, newton, krylov, anderson     the balance and how it is solved; reference: the dense algorithm
 rest                                  the preloaded state that friction begins from
 mistuning                             wheels whose blades differ
-outcome, threads                      how a solve or a run ended; threads of BLAS
+outcome                               how a solve or a run ended
+threads, processes                    how many threads may work, and a second process that shares the work
 contact/                              joints and their laws
 linear/                               compliance of the structure where it touches
 continuation/                         response curves, folds, peaks, nonlinear modes

@@ -19,14 +19,9 @@ what it caches.
 from __future__ import annotations
 
 import os
-import signal
-import sys
-import warnings
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
-from multiprocessing import current_process, get_context
 from multiprocessing.connection import Connection
 from queue import SimpleQueue
 from threading import Thread
@@ -35,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm import newton, threads
+from tribodyn.hbm import newton, processes
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation import parameter
 from tribodyn.hbm.continuation.branch import Branch, BranchBuilder, BranchPoint, Walk
@@ -46,7 +41,6 @@ from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd, Outcome
 from tribodyn.hbm.threads import single
 
-FORKS = hasattr(os, "fork") and sys.platform != "darwin"  # whose BLAS does not bear a fork
 SAME_SHARE = 1e-3  # distance of two solutions that are one, in steps of the curve
 SAME_ERROR = 1e3  # the same where the curve hardly moves, in Newton's tolerances of the solution
 TOLD_EVERY = 16  # evaluations after which the other process tells how far it is
@@ -77,7 +71,12 @@ def follow(
     path, work = parameter.of(counted), counted.work
     meeting = _Meeting(parameter.of(balance), options)
     own, theirs = deque[_Stride](), deque[_Stride]()
-    with _from_stop(lambda: method.begin(path, stop, start, options), path, options.newton, work) as other:
+
+    def from_stop(writer: Connection) -> None:
+        _send(_way_back(lambda: method.begin(path, stop, start, options), path, options.newton, work), work, writer)
+
+    with processes.forked(from_stop) as reader:
+        other = _Other(reader)
         walk = method.begin(path, start, stop, options)
         strides = _strides(walk, work)
         while meeting.goes_on:
@@ -95,8 +94,7 @@ def follow(
 def _may_share(method: ModuleType, options: Any) -> bool:
     """Whether two processes may work here, and nothing in the options asks for one way."""
     free = all(getattr(options, name, None) is None for name in ("guess", "bounds", "patience"))
-    alone = current_process().daemon  # such a process may have none of its own
-    return threads.asked() > 1 and FORKS and hasattr(method, "begin") and free and not alone
+    return processes.two() and hasattr(method, "begin") and free
 
 
 class _Work:
@@ -318,58 +316,28 @@ class _Other:
                 self.work = told
 
 
-@contextmanager
-def _from_stop(begin: Callable[[], Walk], path: Parameter, options: NewtonOptions, work: _Work) -> Iterator[_Other]:
-    """The way from the stop in a fork of this process, which ends with the context."""
-    context = get_context("fork")
-    reader, writer = context.Pipe(duplex=False)
-    process = context.Process(target=_walk_back, args=(begin, path, options, work, reader, writer), daemon=True)
-    other = _Other(reader)
-    try:
-        try:
-            with warnings.catch_warnings():  # threads that draw a bar or compute: this fork needs none of them
-                warnings.simplefilter("ignore", DeprecationWarning)
-                process.start()
-        except OSError:  # no room for another process: this one goes on alone
-            other.work = np.inf
-        writer.close()
-        yield other
-    finally:
-        if process.pid is not None:
-            process.kill()
-            process.join()
-        reader.close()
+def _send(strides: Iterator[_Stride], work: _Work, writer: Connection) -> None:
+    """Send strides and the work so far as they come; the walk does not wait until they are read."""
+    waiting: SimpleQueue[_Stride | int | None] = SimpleQueue()
+    work.tell = waiting.put
+    feeder = Thread(target=_feed, args=(waiting, writer), daemon=True)
+    feeder.start()
+    for stride in strides:
+        waiting.put(stride)
+    waiting.put(None)
+    feeder.join()
 
 
-def _walk_back(
-    begin: Callable[[], Walk],
-    path: Parameter,
-    options: NewtonOptions,
-    work: _Work,
-    reader: Connection,
-    writer: Connection,
-) -> None:
-    """The body of the other process: it ends where its walk does, or where nobody reads any more."""
-    try:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started it ends it
-        reader.close()
-        waiting: SimpleQueue[_Stride | int | None] = SimpleQueue()
-        work.tell = waiting.put
-        feeder = Thread(target=_feed, args=(waiting, writer), daemon=True)
-        feeder.start()
-        walk = begin()
-        for stride in _strides(walk, work):
-            if stride.parts is None and not _leads_back(path, walk.builder, max(stride.kept, 1), options):
-                break
-            waiting.put(stride)
-        waiting.put(None)
-        feeder.join()
-    finally:
-        os._exit(0)  # whatever went wrong: the walk from the start meets it too, and tells it
+def _way_back(begin: Callable[[], Walk], path: Parameter, options: NewtonOptions, work: _Work) -> Iterator[_Stride]:
+    """The way from the stop; of a sweep, up to a step that does not lead back."""
+    walk = begin()
+    for stride in _strides(walk, work):
+        if stride.parts is None and not _leads_back(path, walk.builder, max(stride.kept, 1), options):
+            return
+        yield stride
 
 
 def _feed(waiting: SimpleQueue[_Stride | int | None], writer: Connection) -> None:
-    """Send strides and the work so far, so that the walk does not wait until they are read."""
     while (told := waiting.get()) is not None:
         try:
             writer.send(told)

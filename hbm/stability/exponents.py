@@ -15,12 +15,14 @@ elimination of the contact is ours
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from tribodyn.hbm import processes
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import STICKS
 from tribodyn.hbm.continuation import parameter
@@ -158,25 +160,32 @@ def mark(
     path = parameter.of(problem)
     if path.name != branch.parameter_name:
         raise ValueError(f"the branch was followed in the {branch.parameter_name}, not in the {path.name}")
-    found: list[Stability | None] = []
-    changes = []
-    for i, (value, flat, outcome) in enumerate(zip(branch.parameter, branch.contact, branch.outcome, strict=True)):
-        now = None
-        if outcome == CONVERGED:
-            balance, omega = path.place(value)
-            state = balance.evaluate(omega, flat.reshape(balance.contact.n_pair, -1, flat.shape[1]))
-            now = stability(balance, state, method, n_modes)
-        before = found[-1] if found else None
-        if before is not None and now is not None and before.n_unstable != now.n_unstable:
-            ends = [Direction(branch.contact[j], float(branch.parameter[j])) for j in (i - 1, i)]
-            changes.append(_locate(path, i - 1, (before, now), (ends[0], ends[1]), method, n_modes))
-        found.append(now)
-        if on_point is not None:
-            on_point(i + 1, len(branch.outcome))
+    count = len(branch.outcome)
+
+    def at(i: int) -> Stability | None:
+        if branch.outcome[i] != CONVERGED:
+            return None
+        balance, omega = path.place(float(branch.parameter[i]))
+        flat = branch.contact[i]
+        state = balance.evaluate(omega, flat.reshape(balance.contact.n_pair, -1, flat.shape[1]))
+        return stability(balance, state, method, n_modes)
+
+    found = processes.shared(at, count, None if on_point is None else lambda done: on_point(done, count))
+    changes = [
+        (i, (before, now))
+        for i, (before, now) in enumerate(itertools.pairwise(found))
+        if before is not None and now is not None and before.n_unstable != now.n_unstable
+    ]
+
+    def located(k: int) -> Bifurcation:
+        i, sides = changes[k]
+        ends = [Direction(branch.contact[j], float(branch.parameter[j])) for j in (i, i + 1)]
+        return _locate(path, i, sides, (ends[0], ends[1]), method, n_modes)
+
     return BranchStability(
         stable=np.array([s is not None and s.stable for s in found]),
         leading=np.array([np.nan if s is None else s.exponents[0] for s in found], complex),
-        bifurcations=tuple(changes),
+        bifurcations=tuple(processes.shared(located, len(changes))),
     )
 
 

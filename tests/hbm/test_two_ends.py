@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 from tests.helpers.continuation_models import Duffing, Lifting, rubbing_mass
-from tribodyn.hbm import newton, threads
+from tribodyn.hbm import newton, processes, threads
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import two_ends
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import adaptive, arc_length, natural
 from tribodyn.hbm.outcome import BranchEnd
 
-pytestmark = pytest.mark.skipif(not two_ends.FORKS, reason="this system cannot fork")
+pytestmark = pytest.mark.skipif(not processes.FORKS, reason="this system cannot fork")
 POINTS = {natural: natural.Options(n_points=80)}
 
 
@@ -147,7 +147,7 @@ def test_one_end_alone_is_todays_answer(shares, monkeypatch):
         raise OSError("no room")
 
     balance = rubbing_mass()
-    monkeypatch.setattr(two_ends.get_context("fork").Process, "start", refused)
+    monkeypatch.setattr(processes.get_context("fork").Process, "start", refused)
     assert equal(arc_length.follow(balance, 0.3, 4.0), both(arc_length, balance, 0.3, 4.0))
 
 

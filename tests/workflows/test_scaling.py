@@ -99,12 +99,15 @@ def test_a_response_is_measured_on_one_core_and_on_two(
     monkeypatch.setattr(threads.os, "sched_getaffinity", lambda process: {0, 1}, raising=False)
     code, out, err = leave(["bench", "--two-cores", "--json"], capsys)
     assert code == 0, err
-    (row,) = json.loads(out)
+    row, back = json.loads(out)
+    assert row["upwards"]
+    assert not back["upwards"]
     assert row["contact_dofs"] == 27
     assert row["reached"]
     assert row["points"][0] >= 30
     assert row["difference"] < 1e-8
     assert row["processor"][2] > 0  # the other process has worked
+    assert 0 < row["own_bytes"] < 1e9
     assert row["ratio"] == pytest.approx(row["one"] / row["two"])
     assert "least of 3 repeats" in two_cores.as_text([two_cores.CoresCost(27, "0+1", *row_fields(row))])
     monkeypatch.setattr(threads.os, "sched_getaffinity", lambda process: {0}, raising=False)
@@ -112,5 +115,16 @@ def test_a_response_is_measured_on_one_core_and_on_two(
 
 
 def row_fields(row: dict[str, Any]) -> tuple[Any, ...]:
-    names = ("points", "newton_steps", "one", "two", "processor", "from_rest", "difference", "reached")
+    names = (
+        "upwards",
+        "points",
+        "newton_steps",
+        "one",
+        "two",
+        "processor",
+        "from_rest",
+        "difference",
+        "own_bytes",
+        "reached",
+    )
     return tuple(row[name] for name in names)
