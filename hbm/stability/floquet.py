@@ -13,13 +13,15 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import STICKS
-from tribodyn.hbm.time.period_search import DIFFERENCE, PeriodSearch
+from tribodyn.hbm.time.period_search import DIFFERENCE, Period, PeriodSearch
+from tribodyn.hbm.time.push import push
 from tribodyn.hbm.time.time_integration import Options, PeriodicMotion, TimeStepper, integrate
 
 GROWTH = 1e-3  # of a perturbation over a period, below which the multipliers of so many steps cannot tell it from none
 ACCURACY = 5e-3  # of the largest multiplier of a large model, where it is above 1
 FEWEST_PRODUCTS, MOST_PRODUCTS = 12, 60  # periods marched for it
 DENSE = 400  # state variables up to which the largest multiplier is taken from the whole monodromy matrix
+PUSHED = 120  # periods in which a push must die away, where differences tell that it grows
 MAX_STATES = 900  # up to which the monodromy matrix is formed, whose eigenvalues are dense work
 LEAST_MULTIPLIER = 1e-10  # smaller ones belong to the time stepping, not to the structure
 
@@ -54,6 +56,31 @@ def largest(balance: HarmonicBalance, state: State, options: Options | None = No
     if _size(stepper) <= DENSE:
         growth = exponents(balance, state, options).real * 2 * np.pi / state.omega
         return float(np.exp(growth.max(initial=-np.inf)))
+    return _by_differences(stepper, state, options)[0]
+
+
+def leaves(balance: HarmonicBalance, state: State, options: Options | None = None) -> bool:
+    """Whether the periodic motion near a balance state is left: a multiplier is above 1.
+
+    Of a large model it is that of differences. Where sliders just reach their limit these have a kink, and what seems
+    to grow may be a combination of both sides that no motion has: a push in its direction or one against it must grow
+    in a plain march, which a multiplier of 1.01 does just so.
+    Raises  as `largest`
+    """
+    options = options or Options()
+    stepper = TimeStepper(balance, state.omega, options)
+    if _size(stepper) <= DENSE:
+        return largest(balance, state, options) > 1 + GROWTH
+    modulus, direction, period = _by_differences(stepper, state, options)
+    if modulus <= 1 + GROWTH:
+        return False
+    plain = replace(options, accelerate=False, max_periods=PUSHED)
+    return any(push(PeriodSearch(stepper, plain, False), period, 8, s * direction).away for s in (1.0, -1.0))
+
+
+def _by_differences(stepper: TimeStepper, state: State, options: Options) -> tuple[float, np.ndarray, Period]:
+    """Modulus of the largest multiplier and its direction as a state vector, and the periodic motion."""
+    balance = stepper.balance
     search = PeriodSearch(stepper, replace(options, accelerate=True), False)
     period = search.mix(stepper.start_from(state))
     if period.drift > options.tolerance:
@@ -70,11 +97,12 @@ def largest(balance: HarmonicBalance, state: State, options: Options | None = No
         there = plain.step(plain.vector.unpack(base.start + size * v, period.end))
         return np.where(moves, (there.image - base.image) / size, 0.0)
 
-    return _largest_ritz(product, np.where(moves, np.random.default_rng(0).normal(size=len(moves)), 0.0))
+    start = np.where(moves, np.random.default_rng(0).normal(size=len(moves)), 0.0)
+    return *_largest_ritz(product, start), period
 
 
-def _largest_ritz(product: Callable[[np.ndarray], np.ndarray], start: np.ndarray) -> float:
-    """Modulus of the largest eigenvalue of a map, by Arnoldi's method; of one below 1 a bound is enough."""
+def _largest_ritz(product: Callable[[np.ndarray], np.ndarray], start: np.ndarray) -> tuple[float, np.ndarray]:
+    """Modulus of the largest eigenvalue of a map and its vector, by Arnoldi's method; of one below 1 a bound does."""
     v = [start / np.linalg.norm(start)]
     h = np.zeros((MOST_PRODUCTS + 1, MOST_PRODUCTS))
     for k in range(1, MOST_PRODUCTS + 1):
@@ -88,7 +116,7 @@ def _largest_ritz(product: Callable[[np.ndarray], np.ndarray], start: np.ndarray
         top = int(np.argmax(np.abs(values)))
         found, miss = float(np.abs(values[top])), float(h[k, k - 1] * np.abs(vectors[-1, top]))
         if miss <= ACCURACY * found or (k >= FEWEST_PRODUCTS and found + miss < 1):
-            return found
+            return found, np.real(np.array(v).T @ vectors[:, top])
         v.append(w / h[k, k - 1])
     raise ValueError(f"the largest multiplier did not converge: {found:.3g}, off by up to {miss:.1g}")
 

@@ -160,11 +160,13 @@ class StateVector:
         n = 2 * self._stepper.n_dynamic
         return float(np.linalg.norm((a - b)[:n]))
 
-    def pushed(self, vector: np.ndarray, length: float) -> np.ndarray:
-        """A state vector with a push of all modes alike, the same each time."""
+    def pushed(self, vector: np.ndarray, length: float, along: np.ndarray | None = None) -> np.ndarray:
+        """A state vector pushed along another, or in all modes alike, the same each time; length : of its modes."""
         n = 2 * self._stepper.n_dynamic
-        push = np.random.default_rng(0).normal(size=n)
-        return vector + np.concatenate([push * (length / np.linalg.norm(push)), np.zeros(len(vector) - n)])
+        if along is None:
+            along = np.concatenate([np.random.default_rng(0).normal(size=n), np.zeros(len(vector) - n)])
+        moved: np.ndarray = vector + along * (length / np.linalg.norm(along[:n]))
+        return moved
 
     def unpack(self, vector: np.ndarray, near: Moving) -> Moving:
         n = len(self._weight)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from tribodyn.hbm.time.period_search import Period, PeriodSearch
 from tribodyn.hbm.time.time_step import Moving
 
 # push of a periodic motion, relative to its vibration; share of it down to which it must die away; times of it that
 # tell growth at the end; distance, relative to the vibration, at which the motion has left
-PUSH, DECAYED, GROWN, LEFT = 1e-3, 0.3, 5.0, 0.1
+PUSH, DECAYED, GROWN, LEFT = 1e-3, 0.3, 3.0, 0.1
 
 
 class Pushed(NamedTuple):
@@ -19,14 +21,15 @@ class Pushed(NamedTuple):
     motion: Moving
 
 
-def push(plain: PeriodSearch, found: Period, every: int) -> Pushed:
+def push(plain: PeriodSearch, found: Period, every: int, along: np.ndarray | None = None) -> Pushed:
     """March on from a periodic motion that is pushed, until it has come back or left, or no more periods are allowed.
 
     plain : of plain periods; found : the periodic motion; every : periods after which to see whether it came back
-    A push that neither dies away nor grows counts as not away
+    along : direction of the push as a state vector, by default all modes alike
+    Sliders that come to rest elsewhere leave a part of the push, which does not count as away
     Raises  IntegrationFailed
     """
-    away, motion = 0.0, plain.vector.unpack(plain.vector.pushed(found.image, PUSH * found.size), found.end)
+    away, motion = 0.0, plain.vector.unpack(plain.vector.pushed(found.image, PUSH * found.size, along), found.end)
     while plain.periods < plain.options.max_periods:
         later = plain.step(motion)
         motion = later.end
