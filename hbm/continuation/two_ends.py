@@ -86,7 +86,7 @@ def follow(
             theirs.extend(other.arrived(wait=stride is None))
             while meeting.goes_on and (side := _next_side(own, theirs, other.work)) is not None:
                 meeting.take(side, (own, theirs)[side].popleft())
-            if on_point is not None:
+            if on_point is not None and meeting.sides[0].points:
                 _tell(on_point, meeting, start, stop)
     return meeting.joined(stop) or walk.builder.finish(meeting.alone(stop))
 

@@ -41,6 +41,7 @@ NEUTRAL_GROWTH = 1e-6  # over omega: real parts up to it count as zero, for the 
 FEWEST_MODES, MOST_MODES = 20, 30  # friction makes modes far above the excitation flutter, too
 _WAVES: WeakKeyDictionary[ContactCompliance, WaveModes] = WeakKeyDictionary()  # for all solutions of one wheel
 COPY_DISTANCE = 0.02  # over omega: how far truncation may drive copies of one exponent apart
+EQUALLY_CENTRAL = 1e-5  # difference of the mean harmonics of two perturbations that is rounding
 
 
 @dataclass(frozen=True)
@@ -268,7 +269,7 @@ def _hill(balance: HarmonicBalance, state: State, n_modes: int | None, top: int 
     constant = turn @ turn + damping @ turn + spring / state.omega**2
     companion = np.block([[np.zeros_like(turn), np.eye(len(turn))], [-constant, -2 * turn - damping]])
     values, vectors = np.linalg.eig(companion)
-    return _central(values, _centre(vectors[: m * nc], m, basis), 2 * m) * state.omega
+    return _central(values, *_centre(vectors[: m * nc], m, basis), 2 * m) * state.omega
 
 
 def _departure_slope(balance: HarmonicBalance, state: State, basis: HarmonicBasis) -> np.ndarray:
@@ -309,24 +310,29 @@ def _contact_in_modes(slope: np.ndarray, phi: np.ndarray, static: np.ndarray) ->
     return modal.T @ (d.reshape(len(active), c * nc, c * nc) @ moved).reshape(n * nc, m * nc)
 
 
-def _centre(vectors: np.ndarray, m: int, basis: HarmonicBasis) -> np.ndarray:
-    """Mean harmonic of each perturbation, weighted with its square; copies of one exponent are one apart."""
+def _centre(vectors: np.ndarray, m: int, basis: HarmonicBasis) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and mean square of the harmonics of each perturbation, weighted with its square.
+
+    Copies of one exponent have means one apart
+    """
     shape = vectors.reshape(m, basis.n_coeff, -1)
     a, b = shape[:, 1::2], shape[:, 2::2]
     plus = (np.abs(a - 1j * b) ** 2).sum(axis=0) / 4
     minus = (np.abs(a + 1j * b) ** 2).sum(axis=0) / 4
     still = (np.abs(shape[:, 0]) ** 2).sum(axis=0)
-    h = np.asarray(basis.dynamic)
-    return h @ (plus - minus) / (still + plus.sum(axis=0) + minus.sum(axis=0))
+    h, size = np.asarray(basis.dynamic), still + plus.sum(axis=0) + minus.sum(axis=0)
+    return h @ (plus - minus) / size, h**2 @ (plus + minus) / size
 
 
-def _central(values: np.ndarray, centre: np.ndarray, wanted: int) -> np.ndarray:
+def _central(values: np.ndarray, centre: np.ndarray, spread: np.ndarray, wanted: int) -> np.ndarray:
     """The `wanted` exponents, in units of omega, with the most central perturbations, none of them twice.
 
-    (lambda + i k, centre - k) is the same perturbation as (lambda, centre), for every whole k.
+    (lambda + i k, centre - k) is the same perturbation as (lambda, centre), for every whole k. Where even and odd
+    harmonics do not meet, each set has all exponents with perturbations as central: those that reach further are
+    truncated later.
     """
     chosen: list[int] = []
-    for i in np.argsort(np.abs(centre), kind="stable"):
+    for i in np.lexsort((-spread, np.round(np.abs(centre) / EQUALLY_CENTRAL))):
         shift = np.round(values[i].imag - values[chosen].imag)
         same = np.abs(values[i] - values[chosen] - 1j * shift) < COPY_DISTANCE
         if not np.any(same & (shift != 0) & (np.abs(centre[i] - centre[chosen] + shift) < 0.25)):

@@ -115,6 +115,7 @@ def test_a_sweep_jumps_as_it_does_in_its_own_sense(method, start, stop, shares):
 
 def test_it_is_the_same_whichever_process_is_late(shares, monkeypatch):
     balance = Duffing().balance()
+    told: list[float] = []
     for method in (natural, arc_length):
         prompt = both(method, balance, 0.5, 5.0)
         late_here = both(method, balance, 0.5, 5.0, on_point=lambda done, wanted: time.sleep(0.005))
@@ -126,10 +127,11 @@ def test_it_is_the_same_whichever_process_is_late(shares, monkeypatch):
                 feed(*given)
 
             patch.setattr(two_ends, "_feed", late)
-            late_there = both(method, balance, 0.5, 5.0)
+            late_there = both(method, balance, 0.5, 5.0, on_point=lambda done, wanted: told.append(done / wanted))
         assert equal(prompt, late_here)
         assert equal(prompt, late_there)
     assert None not in shares
+    assert all(0 < share <= 1 for share in told)
 
 
 def test_one_end_alone_is_todays_answer(shares, monkeypatch):
