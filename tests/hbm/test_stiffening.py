@@ -17,7 +17,9 @@ from tribodyn.workflows.benchmarks.extremes_march import held
 from tribodyn.workflows.benchmarks.extremes_models import Setting, lattice
 
 
-@pytest.mark.parametrize(("stiffness", "transitions"), [(1e10, "sampled"), (1e12, "located")])
+@pytest.mark.parametrize(
+    ("stiffness", "transitions"), [pytest.param(1e10, "sampled", marks=pytest.mark.slow), (1e12, "located")]
+)
 def test_a_stiff_contact_that_lifts_is_solved(stiffness: float, transitions: str) -> None:
     body = lattice(3, 3)
     setting = replace(body.ordinary, tangential=stiffness, normal=stiffness, transitions=transitions)
