@@ -15,7 +15,8 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import STICKS
 from tribodyn.hbm.time.period_search import DIFFERENCE, Period, PeriodSearch
 from tribodyn.hbm.time.push import push
-from tribodyn.hbm.time.time_integration import Options, PeriodicMotion, TimeStepper, integrate
+from tribodyn.hbm.time.stepper import Options, TimeStepper
+from tribodyn.hbm.time.time_integration import PeriodicMotion, integrate
 
 GROWTH = 1e-3  # of a perturbation over a period, below which the multipliers of so many steps cannot tell it from none
 ACCURACY = 5e-3  # of the largest multiplier of a large model, where it is above 1

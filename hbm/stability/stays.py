@@ -5,7 +5,7 @@ from __future__ import annotations
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.stability import exponents, floquet
 from tribodyn.hbm.time import wave_in_time
-from tribodyn.hbm.time.time_integration import Options
+from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.verify import Verification
 
 MULTIPLIERS = "its Floquet multipliers in time"

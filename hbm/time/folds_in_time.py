@@ -20,7 +20,8 @@ from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.time import time_integration
-from tribodyn.hbm.time.time_integration import Options, PeriodicMotion
+from tribodyn.hbm.time.stepper import Options
+from tribodyn.hbm.time.time_integration import PeriodicMotion
 
 SEARCH_OPTIONS = Options(steps=512, tolerance=1e-7, max_periods=400)
 MARCH_OPTIONS = replace(SEARCH_OPTIONS, accelerate=False, max_periods=800, patience=800)

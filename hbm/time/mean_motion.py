@@ -17,7 +17,8 @@ from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.time import time_integration, wave_in_time
 from tribodyn.hbm.time.period_search import Period, PeriodSearch
 from tribodyn.hbm.time.push import push
-from tribodyn.hbm.time.time_integration import PeriodicMotion, TimeStepper
+from tribodyn.hbm.time.stepper import Options, TimeStepper
+from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.time.time_step import Moving
 
 REPEATED = 1e-2  # distance of two states, relative to the vibration, up to which the motion has come back
@@ -205,7 +206,7 @@ class Follower:
         if before is not None and before.omega == omega:
             self._stepper = before.worn(balance)
             return self._stepper
-        options = time_integration.Options(self.options.steps, accelerate=False)
+        options = Options(self.options.steps, accelerate=False)
         stepper = TimeStepper(balance, omega, options, None if before is None else before.modes)
         if before is not None and self._motion is not None:
             self._motion = _carried(self._motion, before, stepper)

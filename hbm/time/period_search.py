@@ -8,16 +8,13 @@ Source  Newton-Krylov shooting: Sanchez, Net, Garcia-Archilla and Simo 2004
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from tribodyn.hbm.anderson import Anderson
+from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.hbm.time.time_step import Moving, Record
-
-if TYPE_CHECKING:
-    from tribodyn.hbm.time.time_integration import Options, TimeStepper
 
 THROWN_OFF = 4.0  # drift, over the smallest one, from which on past periods no longer tell where to go
 LOST = 100.0  # ... from which on mixing does not come back by itself: the motion leaves the periodic one

@@ -18,7 +18,7 @@ import numpy as np
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone
 from tribodyn.hbm.threads import single
-from tribodyn.hbm.time.time_integration import IntegrationFailed, Options, TimeStepper
+from tribodyn.hbm.time.stepper import IntegrationFailed, Options, TimeStepper
 
 WINDOW = 4  # periods of a window
 MULTIPLES = (2, 3)  # of the frequency, fitted along

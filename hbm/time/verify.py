@@ -10,7 +10,8 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.outcome import Outcome, SolveEnd
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.time import time_integration
-from tribodyn.hbm.time.time_integration import Options, PeriodicMotion
+from tribodyn.hbm.time.stepper import Options
+from tribodyn.hbm.time.time_integration import PeriodicMotion
 
 ENERGY_FLOOR = 1e-6  # of (largest force x travel, summed over pairs), below which energies do not differ
 

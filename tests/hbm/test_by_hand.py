@@ -21,7 +21,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.expansion import Expansion
 from tribodyn.hbm.time import time_integration, verify
-from tribodyn.hbm.time.time_integration import Options
+from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.step_control import Tolerance
 from tribodyn.workflows.benchmarks.extremes_models import lattice, rigid

@@ -14,7 +14,8 @@ from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.stability.exponents import stability
-from tribodyn.hbm.time.time_integration import Options, leave_alone
+from tribodyn.hbm.time.stepper import Options
+from tribodyn.hbm.time.time_integration import leave_alone
 from tribodyn.reduction.cyclic import travelling_wave, wheel_model
 from tribodyn.reduction.damping import modal_damping
 from tribodyn.reduction.flow import Flow, aeroelastic, wheel_with_flow, with_flow

@@ -17,7 +17,7 @@ from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.stability import exponents, floquet
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.mean_motion import Follower, MeanOptions
-from tribodyn.hbm.time.time_integration import Options, TimeStepper
+from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.hbm.time.verify import verify
 from tribodyn.hbm.wear import error_controlled_rule, in_time
 from tribodyn.hbm.wear.evolution import Duty, WearProblem

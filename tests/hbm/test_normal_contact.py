@@ -17,6 +17,7 @@ from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.stability.chatter import chatter, sign_changes
 from tribodyn.hbm.time import time_integration
+from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.wear.law import Exposure
 from tribodyn.hbm.wear.laws.impact import impact_work, loading_work
 from tribodyn.reduction.model import ReducedModel
@@ -92,7 +93,7 @@ def _coordinates(balance, state):
 def test_rigid_modes_agree_with_time_integration():
     balance = shaken(shake=0.25, harmonics=tuple(range(14)))
     solution = newton.solve_from_rest(balance, OMEGA)
-    motion = time_integration.integrate(balance, OMEGA, solution.state, time_integration.Options(steps=2048))
+    motion = time_integration.integrate(balance, OMEGA, solution.state, Options(steps=2048))
     theirs = motion.coefficients(motion.outputs, balance.basis)
     ours = balance.outputs(solution.state)
     assert np.abs(ours - theirs).max() < 2e-3 * np.abs(theirs).max()
@@ -150,7 +151,7 @@ def test_moving_ground_agrees_with_time_integration():
     )
     solution = newton.solve_from_rest(balance, OMEGA)
     assert (solution.state.cycle.status & SEPARATES).any()
-    motion = time_integration.integrate(balance, OMEGA, solution.state, time_integration.Options(steps=2048))
+    motion = time_integration.integrate(balance, OMEGA, solution.state, Options(steps=2048))
     theirs = motion.coefficients(motion.outputs, balance.basis)
     assert np.abs(balance.outputs(solution.state) - theirs).max() < 2e-3 * np.abs(theirs).max()
 

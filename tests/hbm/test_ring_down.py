@@ -14,7 +14,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.time.decrement import decrement
 from tribodyn.hbm.time.ring_down import from_decay, ring_down
-from tribodyn.hbm.time.time_integration import IntegrationFailed
+from tribodyn.hbm.time.stepper import IntegrationFailed
 
 MASS, STIFFNESS, RATIO = 1.3, 4.0e4, 0.003
 

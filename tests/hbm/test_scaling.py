@@ -19,7 +19,7 @@ from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.stability.exponents import stability
 from tribodyn.hbm.time import time_integration
-from tribodyn.hbm.time.time_integration import Options
+from tribodyn.hbm.time.stepper import Options
 
 OMEGA = 305.3
 GIGA = 2.0**30  # rounding is the same in both units, so that even a long way to the solution is the same

@@ -19,7 +19,7 @@ from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.stability.exponents import Stability, mark, stability
 from tribodyn.hbm.stability.floquet import monodromy
 from tribodyn.hbm.time import time_integration
-from tribodyn.hbm.time.time_integration import Options, TimeStepper
+from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.reduction.model import ReducedModel
 
 

@@ -15,7 +15,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.time import time_integration
-from tribodyn.hbm.time.time_integration import Options, TimeStepper
+from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.reduction.model import ReducedModel
 
 OMEGA = 300.0

@@ -15,7 +15,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.time.time_integration import Options
+from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.verify import verify
 from tribodyn.reduction.model import ReducedModel
 

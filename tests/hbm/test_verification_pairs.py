@@ -16,7 +16,7 @@ from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.time.time_integration import Options
+from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.verify import Verification, verify
 
 BESIDE_RESONANCE = (900.0, 60.0, 12.0)  # frequency [Hz], shaking and rocking force [N]: all pairs slip, most lift

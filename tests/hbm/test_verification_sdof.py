@@ -16,7 +16,7 @@ from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.time.time_integration import Options
+from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.verify import verify
 
 MASS, STIFFNESS, RATIO = 1.3, 4.0e4, 0.01

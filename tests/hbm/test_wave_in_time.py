@@ -10,7 +10,8 @@ import pytest
 from tests.helpers import tiny_wheel as tiny
 from tribodyn.hbm import newton
 from tribodyn.hbm.contact.law import SLIPS
-from tribodyn.hbm.time.time_integration import Options, integrate, leave_alone
+from tribodyn.hbm.time.stepper import Options
+from tribodyn.hbm.time.time_integration import integrate, leave_alone
 from tribodyn.hbm.time.verify import verify
 from tribodyn.reduction.cyclic import travelling_wave
 from tribodyn.reduction.unrolled import period, unrolled

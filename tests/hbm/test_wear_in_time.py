@@ -15,7 +15,7 @@ from tribodyn.hbm.stability import floquet
 from tribodyn.hbm.stability.stays import HILL, MULTIPLIERS, stays
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.mean_motion import Follower, MeanOptions
-from tribodyn.hbm.time.time_integration import Options
+from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.verify import verify
 from tribodyn.hbm.wear import error_controlled_rule, in_time
 from tribodyn.hbm.wear import law as wear_law

@@ -18,7 +18,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.recovery import full_displacement
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.stability.exponents import stability
-from tribodyn.hbm.time.time_integration import Options, TimeStepper
+from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.residual_flexibility import clustered, residual_flexibility
 from tribodyn.workflows.run import joints, modelling, part_reduction

@@ -10,7 +10,7 @@ import numpy as np
 
 from tribodyn.hbm.outcome import Outcome, SolveEnd
 from tribodyn.hbm.stability.stays import stays
-from tribodyn.hbm.time.time_integration import IntegrationFailed, Options
+from tribodyn.hbm.time.stepper import IntegrationFailed, Options
 from tribodyn.hbm.time.verify import verify
 from tribodyn.workflows.accuracy.probes import State
 from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds

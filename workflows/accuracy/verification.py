@@ -18,7 +18,8 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.stability.stays import stays
 from tribodyn.hbm.threads import limited
-from tribodyn.hbm.time.time_integration import LeftAlone, Options, leave_alone
+from tribodyn.hbm.time.stepper import Options
+from tribodyn.hbm.time.time_integration import LeftAlone, leave_alone
 from tribodyn.hbm.time.verify import Verification, verify
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.workflows.pictures.plots import axes_of, force_unit, length_unit

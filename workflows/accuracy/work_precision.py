@@ -24,7 +24,8 @@ from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.time import time_integration
-from tribodyn.hbm.time.time_integration import IntegrationFailed, PeriodicMotion
+from tribodyn.hbm.time.stepper import IntegrationFailed, Options
+from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_share
 from tribodyn.workflows.accuracy import probes
 from tribodyn.workflows.accuracy.limit import Limit, limit_of
@@ -293,7 +294,7 @@ def _balanced(start: _Start, located: bool, size: int) -> tuple[HarmonicBalance,
 
 def _integrated(start: _Start, steps: int) -> PeriodicMotion:
     """The periodic motion; raises IntegrationFailed where none is found from any of the starts."""
-    options = time_integration.Options(steps, tolerance=DRIFT, max_periods=PERIODS)
+    options = Options(steps, tolerance=DRIFT, max_periods=PERIODS)
     why = "no balance to start from"
     for top in [top for top in start.problems if top in BEFORE_TIME] or list(start.problems)[-1:]:
         try:

@@ -11,7 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tribodyn.hbm.threads import limited
-from tribodyn.hbm.time.time_integration import IntegrationFailed, LeftAlone
+from tribodyn.hbm.time.stepper import IntegrationFailed
+from tribodyn.hbm.time.time_integration import LeftAlone
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.accuracy import verification
 from tribodyn.workflows.accuracy.verification import Comparison

@@ -29,6 +29,7 @@ from tribodyn.hbm.stability import exponents as floquet
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time import time_integration as time
 from tribodyn.hbm.time import verify
+from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import WearHistory, WearRow
@@ -255,15 +256,13 @@ class Balance:
     def integrate(self, frequency: float, start: Cycle | None = None, **options: Any) -> time.PeriodicMotion:
         """The periodic motion at a frequency [Hz] by integration in time, from a cycle of the balance or from rest.
 
-        options : of hbm.time.time_integration.Options, such as steps=1024 a period
+        options : of hbm.time.stepper.Options, such as steps=1024 a period
         """
-        return time.integrate(
-            self.problem, HZ * frequency, None if start is None else start.state, time.Options(**options)
-        )
+        return time.integrate(self.problem, HZ * frequency, None if start is None else start.state, Options(**options))
 
     def verify(self, cycle: Cycle, **options: Any) -> verify.Verification:
         """A cycle beside integration in time from it; options : as `integrate`."""
-        return verify.verify(self.problem, cycle.state, time.Options(**options))
+        return verify.verify(self.problem, cycle.state, Options(**options))
 
     def wear(
         self,

@@ -21,7 +21,7 @@ from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.stability.exponents import stability
-from tribodyn.hbm.time.time_integration import Options
+from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.verify import verify
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import Duty, WearProblem

@@ -13,7 +13,7 @@ from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.outcome import SolveEnd
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time.folds_in_time import FoldInTime, fold_in_time
-from tribodyn.hbm.time.time_integration import IntegrationFailed
+from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress

@@ -13,7 +13,7 @@ from tribodyn.hbm.contact.law import SEPARATES, STICKS
 from tribodyn.hbm.linear.recovery import coordinates
 from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.time import time_integration
-from tribodyn.hbm.time.time_integration import Options
+from tribodyn.hbm.time.stepper import Options
 from tribodyn.workflows.accuracy.statement import loaded
 from tribodyn.workflows.cases.leaf_seal import figures as leaf_figures
 from tribodyn.workflows.cases.leaf_seal import fit as leaf_fit
