@@ -74,8 +74,8 @@ def modal(forces, n_e, ratio, has_static, real, imag, pivots, static):
 @numba.njit(cache=True)
 def displaced(moved, higher, left, n, n_e, unit, ratio, has_static, real, imag, pivots, static):
     """Displacement (n, n_coeff) from forces times [W_0, modes] and the W_k, as rows; left : (m + n_e m, n_port)."""
-    n_port = left.shape[1]
-    y = modal(moved[:, n_port:], n_e, ratio, has_static, real, imag, pivots, static)
+    n_port = left.shape[1]  # the copy makes one kernel of `modal` serve here and below: each takes seconds to compile
+    y = modal(moved[:, n_port:].copy(), n_e, ratio, has_static, real, imag, pivots, static)
     return gathered(np.dot(y, left), moved, higher, n, n_port, unit, ratio, has_static)
 
 
@@ -91,7 +91,7 @@ def nearly_displaced(force, w0, b, b_turned, ratio, has_static, real, imag, pivo
     for i in range(n):
         for c in range(n_coeff):
             rows[c, i] = force[i, c]
-    y = modal(np.dot(rows, b)[:n_coeff], 0, ratio, has_static, real, imag, pivots, static)
+    y = modal(np.dot(rows, b)[:n_coeff].astype(np.float64), 0, ratio, has_static, real, imag, pivots, static)
     moved = np.dot(y.astype(b.dtype), b_turned)
     out = np.empty((n, n_coeff))
     if len(w0):

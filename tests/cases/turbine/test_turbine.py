@@ -62,6 +62,7 @@ def worn() -> td.Result:
     return td.result_of(file, model.part, model.balance, td.wear(file, model.balance))
 
 
+@pytest.mark.slow  # the report of another wheel, the blade, is always clicked
 def test_the_report_is_clicked_zoomed_and_turned(
     worn: td.Result, chromium: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
