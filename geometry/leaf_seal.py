@@ -18,7 +18,7 @@ MESH = ("n_column", "n_row", "n_web", "n_thickness")  # numbers of elements or n
 
 @dataclass(frozen=True)
 class Parameters:
-    """Annular sector; dimensions are not published, the defaults come from "tribodyn leaf fit" (ours).
+    """Annular sector; dimensions are not published, the defaults come from "./tribodyn prove leaf fit" (ours).
 
     radius : at mid-height [m]; angle : of the sector [rad]; height : radial [m]; thickness : [m]
     patch_height : radial width of each contact patch, at the lower and the upper edge [m]

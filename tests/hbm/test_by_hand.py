@@ -9,6 +9,7 @@ import pytest
 
 from tests.helpers.pressed_body import wear_problem
 from tests.helpers.verification_models import oscillator, random_structure
+from tests.proof.extremes_models import lattice, rigid
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
@@ -24,7 +25,6 @@ from tribodyn.hbm.time import time_integration, verify
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.step_control import Tolerance
-from tribodyn.workflows.benchmarks.extremes_models import lattice, rigid
 
 
 @pytest.mark.parametrize("way", ["located", "sampled"])

@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from tests.proof.extremes_models import rigid
 from tribodyn.hbm.continuation.methods import arc_length
-from tribodyn.workflows.benchmarks.extremes_models import rigid
 
 MASS_SPRING, FORCE, NORMAL, FRICTION = 1e6, 60.0, 100.0, 0.2  # N/m, N, N; natural frequency 1000 rad/s
 

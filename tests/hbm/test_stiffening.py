@@ -8,13 +8,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from tests.proof.extremes_march import held
+from tests.proof.extremes_models import Setting, lattice
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.continuation.stiffening import solve_along_stiffness
 from tribodyn.hbm.newton import NewtonOptions, Solution
-from tribodyn.workflows.benchmarks.extremes_march import held
-from tribodyn.workflows.benchmarks.extremes_models import Setting, lattice
 
 
 @pytest.mark.parametrize(

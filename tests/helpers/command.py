@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
 from tribodyn.workflows.command import main as cli
 
 
-def leave(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+def leave(
+    arguments: list[str], capsys: pytest.CaptureFixture[str], main: Callable[[list[str]], None] = cli.main
+) -> tuple[int, str, str]:
     """Exit code, standard output and standard error of the command."""
     code = 0
     try:
-        cli.main(arguments)
+        main(arguments)
     except SystemExit as stop:
         code = int(stop.code or 0)
     out, err = capsys.readouterr()

@@ -28,7 +28,7 @@ from tests.helpers import compiled
 
 ROOT = Path(__file__).parents[2]
 LOADED = ("matplotlib.pyplot", "pyvista", "gmsh", "skfem", "PIL.Image", "scipy.stats", "scipy.interpolate")
-LEFT_OUT = ("tribodyn.workflows.benchmarks", "tribodyn.workflows.cases")
+LEFT_OUT = ("tribodyn.workflows.cases",)
 THREADS = {name: "1" for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")}
 
 CLIENT = """

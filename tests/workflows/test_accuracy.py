@@ -442,7 +442,7 @@ def test_where_one_step_tells_nothing_of_the_harmonics_the_trade_does(tmp_path: 
         entries = pipeline.run(file, tmp_path, Progress()).budget
     found = {entry.quantity: entry for entry in entries if entry.source == "harmonics"}
     assert {entry.by for entry in found.values()} == {"trade: kept=[0, 1]"}
-    # one harmonic overstates the peak by a quarter, as time integration finds too (tribodyn leaf accuracy)
+    # one harmonic overstates the peak by a quarter, as time integration finds too (./tribodyn prove leaf accuracy)
     assert found["amplitude"].error == pytest.approx(0.24, abs=0.01)
 
 

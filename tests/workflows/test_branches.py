@@ -1,4 +1,4 @@
-"""`tribodyn branches`: random friction problems followed both ways, and a judge that sees what is wrong."""
+"""`./tribodyn prove branches`: random friction problems followed both ways, and a judge that sees what is wrong."""
 
 from __future__ import annotations
 
@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 
 from tests.helpers.command import leave
+from tests.proof import branches
+from tests.proof.__main__ import main
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import arc_length
-from tribodyn.workflows.benchmarks import branches
 
 FOLDS_OF_168 = (209.0526659, 209.0735379, 214.7464873, 214.7524408)  # [rad/s], as the way down finds them
 FOLDS_OF_18 = (182.3982312, 182.3994060)  # [rad/s], as the way up finds them; 6e-6 of the frequency apart
 
 
 def test_curves_that_slip_lift_and_fold_are_followed_both_ways(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = leave(["branches", "--problems", "3", "--first", "5", "--json"], capsys)
+    code, out, err = leave(["branches", "--problems", "3", "--first", "5", "--json"], capsys, main)
     assert code == 0, err
     rows = json.loads(out)
     assert [row["outcome"] for row in rows] == ["followed"] * 3

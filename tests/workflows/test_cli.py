@@ -75,8 +75,7 @@ WRITING = {
     "a folder at a file": (["run", "beam"], "file", "no folder can be made at .*file, file exists"),
     "a folder in a file": (["converge", "beam"], "file/folder", "no folder can be made"),
     "a table that is none": (["trade", "beam"], "table.png", "give a file that ends with .json"),
-    "a picture at a folder": (["extremes"], "folder.png", "a folder is there, give a file"),
-    "a picture of no kind": (["bench", "--scaling"], "picture", "give a file that ends with .png or .pdf or .svg"),
+    "a table at a folder": (["trade", "beam"], "folder.json", "a folder is there, give a file"),
 }
 
 
@@ -85,7 +84,7 @@ def test_what_cannot_be_written_is_refused_before_long_work(
     case: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     (tmp_path / "file").touch()
-    (tmp_path / "folder.png").mkdir()
+    (tmp_path / "folder.json").mkdir()
     words, out, says = WRITING[case]
     code, _, err = leave([*words, "--out", str(tmp_path / out)], capsys)
     assert code == 2

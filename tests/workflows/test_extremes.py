@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.proof import __main__ as cli
+from tests.proof import extremes, extremes_march, extremes_wear
+from tests.proof.extremes_judge import judged, sampled_honestly, tried
+from tests.proof.extremes_march import held
+from tests.proof.extremes_models import lattice, rigid
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.wear.step_error import step_error
-from tribodyn.workflows.benchmarks import extremes, extremes_march, extremes_wear
-from tribodyn.workflows.benchmarks.extremes_judge import judged, sampled_honestly, tried
-from tribodyn.workflows.benchmarks.extremes_march import held
-from tribodyn.workflows.benchmarks.extremes_models import lattice, rigid
-from tribodyn.workflows.command import main as cli
 
 
 def test_no_cell_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.proof import fuzz, fuzz_result, fuzz_runs
 from tribodyn.workflows.accuracy.statement import Statement, Verdict
 from tribodyn.workflows.api import scenes
-from tribodyn.workflows.benchmarks import fuzz, fuzz_result, fuzz_runs
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.result import store
 

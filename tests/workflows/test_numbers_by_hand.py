@@ -8,6 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tests.proof.extremes_march import held
+from tests.proof.extremes_models import lattice, rigid
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation import operating_point
@@ -24,8 +26,6 @@ from tribodyn.workflows.accuracy import mesh_probe, probes, verdict
 from tribodyn.workflows.accuracy.limit import limit_of
 from tribodyn.workflows.accuracy.statement import Contribution
 from tribodyn.workflows.accuracy.time_probe import Checked
-from tribodyn.workflows.benchmarks.extremes_march import held
-from tribodyn.workflows.benchmarks.extremes_models import lattice, rigid
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.references import delta_max
 from tribodyn.workflows.scene import scene_file

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 
 import tribodyn as td
+from tests.proof.scoreboard_scenes import draw
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.operating_point import AtFrequency, OperatingPoint
 from tribodyn.workflows.accuracy import motion_probe, other_meshes, probes, verdict
 from tribodyn.workflows.accuracy.probes import Answers, Climbed, State
 from tribodyn.workflows.accuracy.time_limit import TimeUp
-from tribodyn.workflows.benchmarks.scoreboard_scenes import draw
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.proof import planted_faults, planting, reference_runs
+from tests.proof.planted_faults import Fault, Seen
 from tribodyn.hbm.wear.history import cycles_to_share
 from tribodyn.workflows.accuracy.limit import limit_of
-from tribodyn.workflows.benchmarks import planted_faults, planting, reference_runs
-from tribodyn.workflows.benchmarks.planted_faults import Fault, Seen
 
 TREE = Path(__file__).parents[2]
 LIMIT = "workflows/accuracy/limit.py"

@@ -1,4 +1,4 @@
-"""`tribodyn bench --scaling`: every size in its own process, every point converged, the slope that of its rows."""
+"""`prove bench --scaling`: every size in its own process, every point converged, the slope that of its rows."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from tests.helpers.command import leave
+from tests.proof import large_contact, large_fe, scaling, two_cores
+from tests.proof.__main__ import main
 from tribodyn.hbm import threads
-from tribodyn.workflows.benchmarks import large_contact, large_fe, scaling, two_cores
 
 
 def test_small_sizes_converge_and_memory_is_their_own(
@@ -21,7 +22,7 @@ def test_small_sizes_converge_and_memory_is_their_own(
     monkeypatch.setattr(scaling, "QUICK", (5, 3))
     monkeypatch.setenv("PYTHONPATH", str(Path(scaling.__file__).parents[3]))  # the measured processes start afresh
     picture = tmp_path / "scaling.png"
-    code, out, err = leave(["bench", "--scaling", "--quick", "--json", "--out", str(picture)], capsys)
+    code, out, err = leave(["bench", "--scaling", "--quick", "--json", "--out", str(picture)], capsys, main)
     assert code == 0, err
     numbers = json.loads(out)
     assert [row["contact_dofs"] for row in numbers["rows"]] == [27, 75]
@@ -97,7 +98,7 @@ def test_a_response_is_measured_on_one_core_and_on_two(
     monkeypatch.setattr(two_cores, "POINTS", 30)
     monkeypatch.setattr(two_cores, "COMPARED", 1)
     monkeypatch.setattr(threads.os, "sched_getaffinity", lambda process: {0, 1}, raising=False)
-    code, out, err = leave(["bench", "--two-cores", "--json"], capsys)
+    code, out, err = leave(["bench", "--two-cores", "--json"], capsys, main)
     assert code == 0, err
     row, back = json.loads(out)
     assert row["upwards"]
@@ -111,7 +112,7 @@ def test_a_response_is_measured_on_one_core_and_on_two(
     assert row["ratio"] == pytest.approx(row["one"] / row["two"])
     assert "least of 3 repeats" in two_cores.as_text([two_cores.CoresCost(27, "0+1", *row_fields(row))])
     monkeypatch.setattr(threads.os, "sched_getaffinity", lambda process: {0}, raising=False)
-    assert "two cores are needed" in leave(["bench", "--two-cores"], capsys)[2]
+    assert "two cores are needed" in leave(["bench", "--two-cores"], capsys, main)[2]
 
 
 def row_fields(row: dict[str, Any]) -> tuple[Any, ...]:

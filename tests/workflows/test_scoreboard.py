@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import tribodyn as td
+from tests.proof import scoreboard, scoreboard_scenes, scoreboard_table
+from tests.proof.scoreboard import Judged, Row
 from tribodyn.workflows.accuracy import reference
-from tribodyn.workflows.benchmarks import scoreboard, scoreboard_scenes, scoreboard_table
-from tribodyn.workflows.benchmarks.scoreboard import Judged, Row
 
 SEED = 2
 SCENES = (12, 7)  # a beam and a plate that take a second each
@@ -72,7 +71,8 @@ def test_rows_are_kept_and_taken_up_again(rows: list[Row], tmp_path: Path, monke
         return replace(rows[0], number=number, seed=seed)
 
     monkeypatch.setattr(scoreboard, "measured", measured)
-    assert td.scoreboard(2, tmp_path, seed=SEED, seconds=1.0) == [replace(rows[0], number=n) for n in range(2)]
+    assert scoreboard.run(2, SEED, tmp_path, 1.0, lambda said: None) == [replace(rows[0], number=n) for n in range(2)]
+    scoreboard_table.write(rows, tmp_path)
     assert (tmp_path / "scoreboard.png").exists()
     with (tmp_path / scoreboard.ROWS).open("a") as file:
         file.write('{"number": 7, "se')  # killed while it wrote

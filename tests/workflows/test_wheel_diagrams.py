@@ -10,7 +10,7 @@ import pytest
 
 from tests.helpers.pictures import assert_not_blank
 from tests.helpers.synthetic_result import result
-from tribodyn.workflows.cases.blade.few_sectors import FEW_SECTORS
+from tests.proof.cases.blade.few_sectors import FEW_SECTORS
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.designs import life_picture
 from tribodyn.workflows.designs.table import StudyTable

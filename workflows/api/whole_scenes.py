@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike, fspath
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from tribodyn.fem.material import Material
 from tribodyn.workflows.accuracy import converge as grids
@@ -20,7 +20,6 @@ from tribodyn.workflows.accuracy import (
     reference,
     verification,
     wear_steps,
-    work_precision,
     worn_in_time,
     worn_states,
 )
@@ -31,7 +30,6 @@ from tribodyn.workflows.accuracy.refinement import Promise
 from tribodyn.workflows.accuracy.trade_table import Trade
 from tribodyn.workflows.accuracy.verification import Comparison
 from tribodyn.workflows.accuracy.wear_steps import WearStepTable
-from tribodyn.workflows.accuracy.work_precision import WorkPrecision
 from tribodyn.workflows.accuracy.worn_in_time import LifeInTime
 from tribodyn.workflows.accuracy.worn_states import WornState
 from tribodyn.workflows.api.scenes import (
@@ -52,14 +50,6 @@ from tribodyn.workflows.studies.identification import Identification
 from tribodyn.workflows.studies.inspection import Inspection
 from tribodyn.workflows.studies.posterior import Posterior
 from tribodyn.workflows.studies.tracking import Track
-
-if TYPE_CHECKING:  # what takes long to import is imported where it is needed
-    from tribodyn.workflows.benchmarks.bench import Timing
-    from tribodyn.workflows.benchmarks.extremes import Trial
-    from tribodyn.workflows.benchmarks.fuzz_runs import Tried
-    from tribodyn.workflows.benchmarks.planted_faults import Seen
-    from tribodyn.workflows.benchmarks.scaling import SizeCost
-    from tribodyn.workflows.benchmarks.scoreboard import Row
 
 Place = str | PathLike[str]
 
@@ -172,24 +162,6 @@ def compare_wear_steps(scene: Place, *, overrides: Overrides = (), progress: Rep
     return wear_steps.compare(fspath(scene), reporter(progress).say, override_texts(overrides))
 
 
-def compare_motions(
-    scene: Place,
-    at: float | None = None,
-    *,
-    overrides: Overrides = (),
-    progress: Report = None,
-    keep: Callable[[WorkPrecision], None] = lambda found: None,
-    earlier: WorkPrecision | None = None,
-) -> WorkPrecision:
-    """Error and seconds of one motion and of the life, by more harmonics and by more time steps.
-
-    at : frequency [Hz]; where the scene wears, or the highest point of its response, where None
-    keep : called with what is there after each candidate; earlier : whose candidates of the same scene are taken over
-    """
-    omega, texts = None if at is None else 2 * math.pi * at, override_texts(overrides)
-    return work_precision.run(fspath(scene), omega, texts, reporter(progress).say, keep, earlier)
-
-
 def check_promise(
     scene: Place, accuracy: str, *, table: Place | None = None, overrides: Overrides = (), progress: Report = None
 ) -> Check:
@@ -244,87 +216,6 @@ def posterior(
     """
     asked = fit_file.parse(task) if isinstance(task, Mapping) else fit_file.read(Path(task))
     return fit_file.sample(fspath(scene), override_texts(overrides), asked, reporter(progress).say, trials, seed)
-
-
-def benchmark(quick: bool = True, *, progress: Report = None) -> list[Timing]:
-    """Time the solver beside the dense algorithm of the thesis on the beam scene.
-
-    quick : harmonics 0+1 and 0+3 alone
-    """
-    from tribodyn.workflows.benchmarks import bench
-
-    return bench.run(quick, reporter(progress).say)
-
-
-def extremes(quick: bool = True, *, progress: Report = None) -> tuple[Trial, ...]:
-    """Try the solver at its numerical extremes: each setting converged and checked, or refused with a sentence.
-
-    quick : every eighth setting, on smaller models
-    """
-    from tribodyn.workflows.benchmarks import extremes as table
-
-    return table.run(quick, reporter(progress).say)
-
-
-def faults(tree: Place, folder: Place, *, seconds: float = 20.0, progress: Report = None) -> list[Seen]:
-    """Plant faults in the sources, one at a time: which test or setting of `extremes` sees each, and what it changes.
-
-    tree : root of a clone of the repository; folder : of the rows, those that it holds are taken
-    seconds : of the processor, for the tests of one fault
-    Raises  ValueError where the tree is no clone; RuntimeError where planting ends before its time
-    """
-    from tribodyn.workflows.benchmarks import planted_faults
-
-    return planted_faults.run(Path(tree).resolve(), Path(folder).resolve(), reporter(progress).say, seconds)
-
-
-def scaling(sizes: Sequence[int] = (7, 13), *, progress: Report = None) -> list[SizeCost]:
-    """Set-up, memory and seconds of a response of the beam scene on n x n contact nodes, for each n."""
-    from tribodyn.workflows.benchmarks import scaling as table
-
-    return table.run(sizes, reporter(progress).say)
-
-
-def scoreboard(
-    scenes: int, folder: Place, *, seed: int = 1, seconds: float = 60.0, progress: Report = None
-) -> list[Row]:
-    """Hold verdicts on scenes drawn at random against references that are finer in every knob.
-
-    scenes : how many; 0: none, all rows of the seed that are kept are counted again
-    folder : where rows, table and histogram are kept: the same call goes on where it was ended
-    seconds : of the processor, that the run of a scene may take, and its reference again
-    """
-    from tribodyn.workflows.benchmarks import scoreboard as board
-    from tribodyn.workflows.benchmarks import scoreboard_table
-
-    rows = board.run(scenes, seed, Path(folder), seconds, reporter(progress).say)
-    scoreboard_table.write(rows, Path(folder))
-    return rows
-
-
-def fuzz(
-    scene: Place,
-    *,
-    values: int | None = None,
-    runs: int | None = None,
-    seed: int = 0,
-    seconds: float = 10.0,
-    workers: int = 1,
-    folder: Place | None = None,
-    overrides: Overrides = (),
-    progress: Report = None,
-) -> list[Tried]:
-    """Give every key of a scene thirty nasty values, one at a time; run what is accepted, each in a process of its own.
-
-    values : how many pairs of key and value, runs : how many of the scenes that are accepted, both drawn with `seed`,
-    all by default; seconds : of the processor a run may take; folder : keeps the runs
-    """
-    from tribodyn.workflows.benchmarks import fuzz as tries
-    from tribodyn.workflows.command import main
-
-    changed, say = override_texts(overrides), reporter(progress).say
-    place = None if folder is None else Path(folder)
-    return tries.fuzz(fspath(scene), changed, values, runs, seed, seconds, workers, say, place, command=main.main)
 
 
 def inspect(

@@ -14,84 +14,6 @@ from tribodyn.workflows.command.words import PICTURE, Flag, Json, Overrides, asi
 Knobs = Annotated[tuple[str, ...], Parameter(name="--knob", negative=(), consume_multiple=False)]
 
 
-def bench(
-    *,
-    quick: Flag = False,
-    scaling: Flag = False,
-    fe: Annotated[tuple[str, ...], Parameter(name="--fe", negative=(), consume_multiple=False)] = (),
-    way: Annotated[tuple[str, ...], Parameter(name="--way", negative=(), consume_multiple=False)] = (),
-    contact: Annotated[tuple[str, ...], Parameter(name="--contact", negative=(), consume_multiple=False)] = (),
-    two_cores: Flag = False,
-    out: Path = Path("scaling.png"),
-    as_json: Json = False,
-) -> None:
-    """Measure the solver beside the dense algorithm of the thesis on the beam scene (tables 7.1 to 7.3).
-
-    Parameters
-    ----------
-    quick
-        Harmonics 0+1 and 0+3 alone, in under a minute; with --scaling up to 13 x 13 contact nodes.
-    scaling
-        Time and memory of one response at 0+3 from 5 x 5 to 31 x 31 contact nodes instead, with a plot.
-    fe
-        Time and memory of a reduction at "30k", "100k", "300k" or "1M" DOFs instead, beside plain statements of the
-        same library and beside multigrid, or of an "assembly" of 200 000 DOFs with three joints; can be repeated.
-    way
-        One way of --fe alone: "product", "by hand", "multigrid", "single precision" (a factor of half the size),
-        "flexibility" (no contact DOFs in the model) or "single flexibility" (both); can be repeated.
-    contact
-        Set-up, memory and seconds of one response at 0+3 on "500", "3k", "12k" or "48k" contact DOFs instead, with
-        residual flexibility and, up to 3k, beside the dense compliance; can be repeated.
-    two_cores
-        Seconds of one response on one core and on two instead, followed from both ends, on 507 and 1587 contact DOFs.
-    out
-        File of the plot of --scaling.
-    as_json
-        Print JSON for machines.
-    """
-    if fe:
-        from tribodyn.workflows.benchmarks import large_fe
-
-        costs = large_fe.run(fe, aside, way)
-        print(json.dumps(large_fe.as_records(costs), indent=2) if as_json else large_fe.as_text(costs))
-        return
-    if contact:
-        from tribodyn.workflows.benchmarks import large_contact
-
-        sizes = large_contact.run(contact, aside)
-        print(json.dumps(large_contact.as_records(sizes), indent=2) if as_json else large_contact.as_text(sizes))
-        return
-    if two_cores:
-        from tribodyn.workflows.benchmarks import two_cores as both
-
-        cores = both.run(aside)
-        print(json.dumps(both.as_records(cores), indent=2) if as_json else both.as_text(cores))
-        return
-    if scaling:
-        make_room(out, PICTURE)
-        _scaling(quick, out, as_json)
-        return
-    from tribodyn.workflows.api.whole_scenes import benchmark
-    from tribodyn.workflows.benchmarks import bench as shown
-
-    rows = benchmark(quick, progress=aside)
-    print(json.dumps(shown.as_records(rows), indent=2) if as_json else shown.as_text(rows))
-
-
-def _scaling(quick: bool, out: Path, as_json: bool) -> None:
-    from tribodyn.workflows.benchmarks import scaling as measured
-    from tribodyn.workflows.run.progress import Progress, console_progress
-
-    progress = Progress() if as_json else console_progress()
-    rows = measured.run(measured.QUICK if quick else measured.FULL, progress.say)
-    measured.picture(rows).savefig(out)
-    if as_json:
-        print(json.dumps({**measured.as_records(rows), "picture": str(out)}, indent=2))
-    else:
-        print(measured.as_text(rows))
-        print(out)
-
-
 def trade(
     scene: str,
     *,
@@ -100,7 +22,6 @@ def trade(
     most: int = 99,
     out: Path | None = None,
     check: str | None = None,
-    at: str | None = None,
     as_json: Json = False,
 ) -> None:
     """Measure what each knob costs and what it is worth, against where it tends to on the same scene.
@@ -111,8 +32,7 @@ def trade(
         Name of a scene or a .toml file.
     knob
         Knob to measure, can be repeated; the other knobs of an earlier table stay. All knobs by default.
-        wear_step alone is table 4.2 of the thesis with life added. motion alone: error against seconds of one motion,
-        by more harmonics and by more time steps, and of life by more harmonics.
+        wear_step alone is table 4.2 of the thesis with life added.
     most
         Settings of each knob, the finest ones.
     out
@@ -121,9 +41,6 @@ def trade(
         Measure no table, but run what `run --accuracy` would choose for this accuracy, such as "1 %" or "1 % of
         life", against a run that is finer in every knob; exit code 1 where the promise is broken. --out: the table
         to go by.
-    at
-        Frequency of --knob motion, such as "150 Hz"; where the scene wears, or the highest point of its response, by
-        default.
     as_json
         Print JSON for machines.
     """
@@ -138,11 +55,6 @@ def trade(
         if out is not None:
             wear_steps.picture(table).savefig(out)
         print(json.dumps(wear_steps.as_records(table), indent=2) if as_json else wear_steps.as_text(table))
-        return
-    if at is not None and knob != ("motion",):
-        raise ValueError("--at goes with --knob motion alone")
-    if knob == ("motion",):
-        _motion(scene, at, overrides, out, as_json)
         return
     if check is not None:
         kept = whole_scenes.check_promise(scene, check, table=out, overrides=overrides, progress=aside)
@@ -164,24 +76,6 @@ def trade(
     else:
         print(knob_trade.as_text(found))
         print(*accuracy.advice(found), path, path.with_suffix(".png"), sep="\n")
-
-
-def _motion(scene: str, at: str | None, overrides: tuple[str, ...], out: Path | None, as_json: bool) -> None:
-    from tribodyn.workflows.accuracy import work_precision_table as shown
-    from tribodyn.workflows.api import whole_scenes
-
-    make_room(out, (".json",))
-    path = out or Path("results") / Path(scene).stem / "motion.json"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    earlier = shown.load(path) if path.exists() else None
-    hertz = None if at is None else quantity("--at", at, "Hz")
-    found = whole_scenes.compare_motions(
-        scene, hertz, overrides=overrides, progress=aside, keep=lambda there: shown.save(there, path), earlier=earlier
-    )
-    shown.picture(found).savefig(path.with_suffix(".png"))
-    print(json.dumps(shown.as_records(found), indent=2) if as_json else shown.as_text(found))
-    if not as_json:
-        print(path, path.with_suffix(".png"), sep="\n")
 
 
 def converge(
@@ -214,30 +108,6 @@ def converge(
         print(json.dumps(study.as_records(found), indent=2))
     else:
         print(study.as_text(found), *pictures, sep="\n")
-
-
-def extremes(*, quick: Flag = False, out: Path = Path("extremes.png"), as_json: Json = False) -> None:
-    """Try the solver at its numerical extremes: each cell converged and checked, or refused with a sentence.
-
-    Parameters
-    ----------
-    quick
-        Every eighth cell, on smaller models and up to 1e9 N/m.
-    out
-        File of the picture.
-    as_json
-        Print JSON for machines.
-    """
-    from tribodyn.workflows.benchmarks import extremes as table
-    from tribodyn.workflows.benchmarks import extremes_picture
-
-    make_room(out, PICTURE)
-    rows = table.run(quick, aside)
-    extremes_picture.picture(rows).savefig(out)
-    print(json.dumps(table.as_records(rows), indent=2) if as_json else table.as_text(rows))
-    wrong = table.counts(rows)["wrong"]
-    if wrong:
-        raise RuntimeError(f"{wrong} of {len(rows)} extreme settings ended with a wrong number, see the table")
 
 
 def track(
@@ -348,4 +218,4 @@ def identify(
         print(found.report(), "", "to go on with what was found:", *(f'  --set "{c}"' for c in changes), sep="\n")
 
 
-COMMANDS = (bench, trade, converge, extremes, track, identify)
+COMMANDS = (trade, converge, track, identify)

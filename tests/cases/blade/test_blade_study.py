@@ -9,14 +9,14 @@ import pytest
 
 from tests.helpers.coarse_scenes import BLADE as COARSE
 from tests.helpers.pictures import assert_not_blank
+from tests.proof import __main__ as cli
+from tests.proof.cases.blade import study as blade_study
+from tests.proof.cases.blade.few_sectors import FEW_SECTORS
+from tests.proof.cases.blade.study import Extent
 from tribodyn import build_wheel, critical_speeds
 from tribodyn.hbm import newton
 from tribodyn.hbm.linear import travelling_wave as waves
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.workflows.cases.blade import study as blade_study
-from tribodyn.workflows.cases.blade.few_sectors import FEW_SECTORS
-from tribodyn.workflows.cases.blade.study import Extent
-from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene import scene_file
 
 SHORT = Extent(

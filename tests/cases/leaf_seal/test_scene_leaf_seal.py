@@ -8,6 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.proof.cases.leaf_seal import figures as leaf_figures
+from tests.proof.cases.leaf_seal import fit as leaf_fit
+from tests.proof.cases.leaf_seal import record as leaf_record
+from tests.proof.cases.leaf_seal import study as leaf_study
+from tests.proof.cases.leaf_seal.cases import Case, cases, liner
+from tests.proof.cases.leaf_seal.response import LINER_NODE, respond
+from tests.proof.cases.leaf_seal.study import KEPT
 from tribodyn.hbm import newton
 from tribodyn.hbm.contact.law import SEPARATES, STICKS
 from tribodyn.hbm.linear.recovery import coordinates
@@ -15,13 +22,6 @@ from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.workflows.accuracy.statement import loaded
-from tribodyn.workflows.cases.leaf_seal import figures as leaf_figures
-from tribodyn.workflows.cases.leaf_seal import fit as leaf_fit
-from tribodyn.workflows.cases.leaf_seal import record as leaf_record
-from tribodyn.workflows.cases.leaf_seal import study as leaf_study
-from tribodyn.workflows.cases.leaf_seal.cases import Case, cases, liner
-from tribodyn.workflows.cases.leaf_seal.response import LINER_NODE, respond
-from tribodyn.workflows.cases.leaf_seal.study import KEPT
 from tribodyn.workflows.run import modelling, pipeline, planning
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import linear_references

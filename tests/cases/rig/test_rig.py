@@ -12,19 +12,19 @@ from scipy.linalg import eigh
 
 from tests.helpers.coarse_scenes import QUICK_RIG as QUICK
 from tests.helpers.coarse_scenes import RIG as COARSE
+from tests.proof import __main__ as cli
+from tests.proof.cases.rig import fit as rig_fit
+from tests.proof.cases.rig import published
+from tests.proof.cases.rig import table as rig_table
+from tests.proof.cases.rig import time as rig_time
+from tests.proof.cases.rig.cases import apart
+from tests.proof.cases.rig.joints import Modes, joints_of
+from tests.proof.cases.rig.model import Rig
+from tests.proof.cases.rig.time import in_time
+from tests.proof.cases.rig.wear import RigWear, wear_down
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.reduction.linear import stuck_stiffness
-from tribodyn.workflows.cases.rig import fit as rig_fit
-from tribodyn.workflows.cases.rig import published
-from tribodyn.workflows.cases.rig import table as rig_table
-from tribodyn.workflows.cases.rig import time as rig_time
-from tribodyn.workflows.cases.rig.cases import apart
-from tribodyn.workflows.cases.rig.joints import Modes, joints_of
-from tribodyn.workflows.cases.rig.model import Rig
-from tribodyn.workflows.cases.rig.time import in_time
-from tribodyn.workflows.cases.rig.wear import RigWear, wear_down
-from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.joints import contact_stiffness
 from tribodyn.workflows.run.references import linear_references

@@ -1,0 +1,294 @@
+"""The proofs of the program, from the root of a checkout: ./tribodyn prove WORD ..."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import cyclopts
+from cyclopts import Parameter
+
+from tests.proof.cases.blade.commands import blade
+from tests.proof.cases.leaf_seal.commands import leaf
+from tests.proof.cases.rig.commands import rig
+from tribodyn.workflows.command import exits
+from tribodyn.workflows.command.words import PICTURE, Flag, Json, Overrides, aside, make_room, quantity
+
+
+def bench(
+    *,
+    quick: Flag = False,
+    scaling: Flag = False,
+    fe: Annotated[tuple[str, ...], Parameter(name="--fe", negative=(), consume_multiple=False)] = (),
+    way: Annotated[tuple[str, ...], Parameter(name="--way", negative=(), consume_multiple=False)] = (),
+    contact: Annotated[tuple[str, ...], Parameter(name="--contact", negative=(), consume_multiple=False)] = (),
+    two_cores: Flag = False,
+    out: Path = Path("scaling.png"),
+    as_json: Json = False,
+) -> None:
+    """Measure the solver beside the dense algorithm of the thesis on the beam scene (tables 7.1 to 7.3).
+
+    Parameters
+    ----------
+    quick
+        Harmonics 0+1 and 0+3 alone, in under a minute; with --scaling up to 13 x 13 contact nodes.
+    scaling
+        Time and memory of one response at 0+3 from 5 x 5 to 31 x 31 contact nodes instead, with a plot.
+    fe
+        Time and memory of a reduction at "30k", "100k", "300k" or "1M" DOFs instead, beside plain statements of the
+        same library and beside multigrid, or of an "assembly" of 200 000 DOFs with three joints; can be repeated.
+    way
+        One way of --fe alone: "product", "by hand", "multigrid", "single precision" (a factor of half the size),
+        "flexibility" (no contact DOFs in the model) or "single flexibility" (both); can be repeated.
+    contact
+        Set-up, memory and seconds of one response at 0+3 on "500", "3k", "12k" or "48k" contact DOFs instead, with
+        residual flexibility and, up to 3k, beside the dense compliance; can be repeated.
+    two_cores
+        Seconds of one response on one core and on two instead, followed from both ends, on 507 and 1587 contact DOFs.
+    out
+        File of the plot of --scaling.
+    as_json
+        Print JSON for machines.
+    """
+    if fe:
+        from tests.proof import large_fe
+
+        costs = large_fe.run(fe, aside, way)
+        print(json.dumps(large_fe.as_records(costs), indent=2) if as_json else large_fe.as_text(costs))
+        return
+    if contact:
+        from tests.proof import large_contact
+
+        sizes = large_contact.run(contact, aside)
+        print(json.dumps(large_contact.as_records(sizes), indent=2) if as_json else large_contact.as_text(sizes))
+        return
+    if two_cores:
+        from tests.proof import two_cores as both
+
+        cores = both.run(aside)
+        print(json.dumps(both.as_records(cores), indent=2) if as_json else both.as_text(cores))
+        return
+    if scaling:
+        make_room(out, PICTURE)
+        _scaling(quick, out, as_json)
+        return
+    from tests.proof import bench as shown
+
+    rows = shown.run(quick, aside)
+    print(json.dumps(shown.as_records(rows), indent=2) if as_json else shown.as_text(rows))
+
+
+def _scaling(quick: bool, out: Path, as_json: bool) -> None:
+    from tests.proof import scaling as measured
+    from tribodyn.workflows.run.progress import Progress, console_progress
+
+    progress = Progress() if as_json else console_progress()
+    rows = measured.run(measured.QUICK if quick else measured.FULL, progress.say)
+    measured.picture(rows).savefig(out)
+    if as_json:
+        print(json.dumps({**measured.as_records(rows), "picture": str(out)}, indent=2))
+    else:
+        print(measured.as_text(rows))
+        print(out)
+
+
+def scoreboard(
+    *, scenes: int = 40, seed: int = 1, seconds: float = 60.0, out: Path = Path("scoreboard"), as_json: Json = False
+) -> None:
+    """Hold verdicts and promises on scenes drawn at random against references that are finer in every knob.
+
+    Exit code 3 where a true error is above the stated one. Rows are kept: the same command goes on where it was ended.
+
+    Parameters
+    ----------
+    scenes
+        How many are drawn. 0: none, all rows of the seed that are kept are counted again.
+    seed
+        Of the draw.
+    seconds
+        Processor seconds that the run of a scene may take, and its reference again.
+    out
+        Folder of the rows, the table and the histogram.
+    as_json
+        Print JSON for machines.
+    """
+    from tests.proof import scoreboard as board
+    from tests.proof import scoreboard_table as table
+
+    make_room(out)
+    rows = board.run(scenes, seed, out, seconds, aside)
+    table.write(rows, out)
+    print(json.dumps([asdict(row) for row in rows], indent=2) if as_json else table.summary(rows))
+    broken = sum(one.broken for row in rows for one in (*row.judged, *row.promise))
+    if broken:
+        raise RuntimeError(f"{broken} promises are broken, see {out / 'scoreboard.csv'}")
+
+
+def faults(*, tree: Path = Path(), seconds: float = 20.0, out: Path = Path("faults"), as_json: Json = False) -> None:
+    """Plant faults in the sources, one at a time: what each changes in results, and which test or setting sees it.
+
+    Parameters
+    ----------
+    tree
+        Root of a clone of the repository.
+    seconds
+        Processor seconds for the tests of one fault, and again for the judge of extremes.
+    out
+        Folder of the rows and the table. Rows are kept: the same command goes on where it was ended.
+    as_json
+        Print JSON for machines.
+    """
+    from tests.proof import planted_faults
+
+    make_room(out)
+    rows = planted_faults.run(tree.resolve(), out.resolve(), aside, seconds)
+    text = planted_faults.as_markdown(rows)
+    (out / "faults.md").write_text(text, encoding="utf-8")
+    print(json.dumps([asdict(row) for row in rows], indent=2) if as_json else text)
+
+
+def fuzz(
+    scene: str,
+    *,
+    values: int | None = None,
+    runs: int | None = None,
+    seed: int = 0,
+    seconds: float = 10.0,
+    workers: int = 1,
+    out: Path | None = None,
+    overrides: Overrides = (),
+    as_json: Json = False,
+) -> None:
+    """Give every key of a scene thirty nasty values, one at a time, and tell how the runs end.
+
+    All are read; the scenes that come out of those which reading accepts are run. Each ends well, is refused, or fails
+    with a sentence; exit code 3 where one does not.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene or a .toml file; make it small with --set, so that a run takes a second.
+    values
+        How many pairs of key and value, drawn at random; all of them by default.
+    runs
+        How many of the scenes that are accepted are run, drawn at random; all of them by default.
+    seed
+        Of the draws.
+    seconds
+        Processor seconds that a run may take.
+    workers
+        Runs at a time.
+    out
+        Folder that keeps the runs: the same command goes on where it was ended, and runs again what ended wrong.
+    as_json
+        Print JSON for machines.
+    """
+    from tests.proof import fuzz as measured
+    from tribodyn.workflows.command import main as command
+
+    make_room(out)
+    tried = measured.fuzz(scene, overrides, values, runs, seed, seconds, workers, aside, out, command=command.main)
+    wrong = [one for one in tried if not one.good and not one.like]
+    if as_json:
+        print(json.dumps({"counts": measured.counts(tried), "wrong": [one.record() for one in wrong]}, indent=2))
+    else:
+        print(measured.as_text(tried))
+    if wrong:
+        raise RuntimeError(f"{len(wrong)} of {sum(not one.like for one in tried)} values did not end as they may")
+
+
+def branches(*, problems: int = 20, first: int = 0, as_json: Json = False) -> None:
+    """Follow response curves of random friction problems, with lift-off and impacts, from both ends.
+
+    Each is followed to its end with the same folds both ways, its points checked by a march of the friction law, or
+    refused with a sentence; exit code 3 where one is wrong.
+
+    Parameters
+    ----------
+    problems
+        How many.
+    first
+        Number of the first one; problem 7 is the same one always.
+    as_json
+        Print JSON for machines.
+    """
+    from tests.proof import branches as tried
+
+    rows = tried.run(range(first, first + problems), aside)
+    print(json.dumps(tried.as_records(rows), indent=2) if as_json else tried.as_text(rows))
+    wrong = sum(row.outcome == tried.WRONG for row in rows)
+    if wrong:
+        raise RuntimeError(f"{wrong} of {len(rows)} curves are wrong, see the table")
+
+
+def extremes(*, quick: Flag = False, out: Path = Path("extremes.png"), as_json: Json = False) -> None:
+    """Try the solver at its numerical extremes: each cell converged and checked, or refused with a sentence.
+
+    Parameters
+    ----------
+    quick
+        Every eighth cell, on smaller models and up to 1e9 N/m.
+    out
+        File of the picture.
+    as_json
+        Print JSON for machines.
+    """
+    from tests.proof import extremes as table
+    from tests.proof import extremes_picture
+
+    make_room(out, PICTURE)
+    rows = table.run(quick, aside)
+    extremes_picture.picture(rows).savefig(out)
+    print(json.dumps(table.as_records(rows), indent=2) if as_json else table.as_text(rows))
+    wrong = table.counts(rows)["wrong"]
+    if wrong:
+        raise RuntimeError(f"{wrong} of {len(rows)} extreme settings ended with a wrong number, see the table")
+
+
+def motion(
+    scene: str, *, at: str | None = None, overrides: Overrides = (), out: Path | None = None, as_json: Json = False
+) -> None:
+    """Error against seconds of one motion, by more harmonics and by more time steps, and of life by more harmonics.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene or a .toml file.
+    at
+        Frequency, such as "150 Hz"; where the scene wears, or the highest point of its response, by default.
+    out
+        Table to write (.json), its plot beside it (.png); results/NAME/motion.json by default.
+    as_json
+        Print JSON for machines.
+    """
+    from tests.proof import work_precision
+    from tests.proof import work_precision_table as shown
+
+    make_room(out, (".json",))
+    path = out or Path("results") / Path(scene).stem / "motion.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    earlier = shown.load(path) if path.exists() else None
+    omega = None if at is None else 2 * math.pi * quantity("--at", at, "Hz")
+    found = work_precision.run(scene, omega, overrides, aside, lambda there: shown.save(there, path), earlier)
+    shown.picture(found).savefig(path.with_suffix(".png"))
+    print(json.dumps(shown.as_records(found), indent=2) if as_json else shown.as_text(found))
+    if not as_json:
+        print(path, path.with_suffix(".png"), sep="\n")
+
+
+app = cyclopts.App(name="prove", help="Proofs of tribodyn: speed, extremes, faults, errors of unseen scenes.")
+for word in (bench, extremes, faults, scoreboard, branches, fuzz, motion, blade, leaf, rig):
+    app.command(word)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run a proof and leave with its exit code."""
+    exits.guard(lambda: app(arguments, exit_on_error=False, print_error=False))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Shrouded bladed disk: Tamatam 2021, section 4.3."""

@@ -1,0 +1,1 @@
+"""Leaf seal with unilateral contact: Tamatam 2021, chapter 6."""

@@ -1,0 +1,1 @@
+"""Fretting rig with prescribed platform height: Tamatam 2021, chapter 5."""
