@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import tribodyn as td
-from tribodyn.workflows.accuracy.verification import rebuilt
 from tribodyn.workflows.command import main as cli
+from tribodyn.workflows.result.provenance import rebuilt
 
 SMALL = {
     "harmonics.kept": [0, 1],

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from tests.helpers.command import leave
-from tribodyn.workflows.accuracy.published import published_backbone
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies import modes
+from tribodyn.workflows.studies.published import published_backbone
 
 TABLE = """[backbone]
 source = "others"

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from tests.helpers.command import leave
-from tribodyn.workflows.accuracy import verification, worn_in_time
 from tribodyn.workflows.result import store
 from tribodyn.workflows.run import pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import read
+from tribodyn.workflows.studies import verification, worn_in_time
 
 SMALL = [
     "verdict.enabled=false",

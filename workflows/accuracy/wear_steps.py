@@ -16,12 +16,12 @@ from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import WearProblem
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
 from tribodyn.hbm.wear.step_control import Tolerance
-from tribodyn.workflows.accuracy.published import WearStep, published_wear_steps
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE, STYLE
 from tribodyn.workflows.run import modelling, wear_run
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import delta_max, free_deflection
 from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies.published import WearStep, published_wear_steps
 
 THESIS_STEPS = (0.1, 0.05, 0.02, 0.01, 0.005)  # of delta_max, tables 4.2 and 4.4
 FINER_STEPS = (0.0025, 0.001, 0.0005)  # ours

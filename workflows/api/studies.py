@@ -30,7 +30,6 @@ from tribodyn.hbm.wear.law import Exposure
 from tribodyn.hbm.wear.laws import impact
 from tribodyn.reduction.mode_matching import mac, match_kinds, match_modes
 from tribodyn.reduction.model import ReducedModel
-from tribodyn.workflows.accuracy.published import published_wear_steps
 from tribodyn.workflows.pictures.maps import draw_field, draw_status, patch_maps
 from tribodyn.workflows.pictures.plots import axes_of as plot_axes
 from tribodyn.workflows.pictures.plots import length_unit
@@ -57,6 +56,7 @@ from tribodyn.workflows.studies.mistuning import picture as plot_mistuned
 from tribodyn.workflows.studies.mistuning import write as write_mistuned
 from tribodyn.workflows.studies.modes import follow_backbone
 from tribodyn.workflows.studies.modes import picture as plot_backbone
+from tribodyn.workflows.studies.published import published_wear_steps
 from tribodyn.workflows.studies.supports import support_wear, support_work
 from tribodyn.workflows.studies.variation import Varied, changed, vary
 from tribodyn.workflows.studies.wheel import Wheel, campbell, critical_speeds

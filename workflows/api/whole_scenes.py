@@ -14,24 +14,13 @@ from typing import Any, Literal
 
 from tribodyn.fem.material import Material
 from tribodyn.workflows.accuracy import converge as grids
-from tribodyn.workflows.accuracy import (
-    knob_trade,
-    promise,
-    reference,
-    verification,
-    wear_steps,
-    worn_in_time,
-    worn_states,
-)
+from tribodyn.workflows.accuracy import knob_trade, promise, reference, wear_steps
 from tribodyn.workflows.accuracy.converge import Study as GridStudy
 from tribodyn.workflows.accuracy.promise import Check
 from tribodyn.workflows.accuracy.reference import Held
 from tribodyn.workflows.accuracy.refinement import Promise
 from tribodyn.workflows.accuracy.trade_table import Trade
-from tribodyn.workflows.accuracy.verification import Comparison
 from tribodyn.workflows.accuracy.wear_steps import WearStepTable
-from tribodyn.workflows.accuracy.worn_in_time import LifeInTime
-from tribodyn.workflows.accuracy.worn_states import WornState
 from tribodyn.workflows.api.scenes import (
     Overrides,
     Report,
@@ -43,13 +32,16 @@ from tribodyn.workflows.api.scenes import (
     result_file,
 )
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.studies import fit_file, inspection, tracking
+from tribodyn.workflows.studies import fit_file, inspection, tracking, verification, worn_in_time, worn_states
 from tribodyn.workflows.studies import folds as fold_study
 from tribodyn.workflows.studies.folds import FoldsFound
 from tribodyn.workflows.studies.identification import Identification
 from tribodyn.workflows.studies.inspection import Inspection
 from tribodyn.workflows.studies.posterior import Posterior
 from tribodyn.workflows.studies.tracking import Track
+from tribodyn.workflows.studies.verification import Comparison
+from tribodyn.workflows.studies.worn_in_time import LifeInTime
+from tribodyn.workflows.studies.worn_states import WornState
 
 Place = str | PathLike[str]
 

@@ -237,10 +237,10 @@ def verify(
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.accuracy import verification, worn_in_time, worn_states
     from tribodyn.workflows.api import scenes, whole_scenes
     from tribodyn.workflows.run.failure import SolveFailed
     from tribodyn.workflows.run.progress import Progress, console_progress
+    from tribodyn.workflows.studies import verification, worn_in_time, worn_states
 
     make_room(out)
     if sum((states is not None, wear, at is not None or row is not None)) > 1:

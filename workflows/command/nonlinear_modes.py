@@ -52,10 +52,10 @@ def backbone(
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.accuracy.published import published_backbone
     from tribodyn.workflows.pictures import backbone_maps
     from tribodyn.workflows.run.progress import Progress, console_progress
     from tribodyn.workflows.studies import changed_backbones, modes
+    from tribodyn.workflows.studies.published import published_backbone
 
     file, asked, folder = _asked(scene, overrides, start, stop, mode, points, out)
     published, others = published_backbone(file), changed_backbones.changed_scenes(file, change)

@@ -21,7 +21,7 @@ def reduced_model(result: Result) -> ReducedModel:
 
     Raises  ValueError where its parts are not there any more
     """
-    from tribodyn.workflows.accuracy.verification import rebuilt
+    from tribodyn.workflows.result.provenance import rebuilt
 
     return modelling.build(rebuilt(result), None, Progress(), result.harmonics).reduced
 

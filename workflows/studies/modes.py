@@ -13,7 +13,6 @@ from scipy.interpolate import PchipInterpolator
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone, BackboneOptions, backbone
 from tribodyn.hbm.threads import limited
-from tribodyn.workflows.accuracy.published import PublishedBackbone
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, named
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
 from tribodyn.workflows.result.columns import write_columns
@@ -21,6 +20,7 @@ from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.studies.published import PublishedBackbone
 
 
 @dataclass(frozen=True)

@@ -14,14 +14,15 @@ from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.hbm.time.time_integration import LeftAlone
 from tribodyn.hbm.wear.history import WearHistory
-from tribodyn.workflows.accuracy import verification
-from tribodyn.workflows.accuracy.verification import Comparison
 from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREEN, ORANGE
+from tribodyn.workflows.result.provenance import rebuilt
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.studies import verification
+from tribodyn.workflows.studies.verification import Comparison
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ def compare(
         raise ValueError("the result has no wear run: take a scene with [wear]")
     if count < 1:
         raise ValueError(f"--states must be at least 1, not {count}")
-    file = verification.rebuilt(result, overrides)
+    file = rebuilt(result, overrides)
     with limited(file.scene.solver.threads):
         unworn = modelling.build(file, None, progress, result.harmonics).balance
     found = []

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,11 +23,11 @@ from tribodyn.hbm.time.verify import Verification, verify
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.workflows.pictures.plots import axes_of, force_unit, length_unit
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
+from tribodyn.workflows.result.provenance import rebuilt
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.schema import Scene
 
 STEPS, STEPS_PER_HARMONIC = 256, 32  # per period; per period of the highest harmonic kept
@@ -217,15 +216,6 @@ def alone(result: Result, scene: Scene, unworn: HarmonicBalance, row: int, steps
 def steps_of(balance: HarmonicBalance) -> int:
     """Time steps per period that suit the harmonics of a balance."""
     return max(STEPS, STEPS_PER_HARMONIC * balance.basis.harmonics[-1])
-
-
-def rebuilt(result: Result, overrides: Sequence[str] = ()) -> scene_file.SceneFile:
-    """The scene that a result was computed from, with further overrides."""
-    given = result.provenance
-    before = [text for text in given["overrides"].split("\n") if text]
-    return scene_file.parse(
-        given["scene_text"], f"{given['scene_name']}.toml", [*before, *overrides], Path(given["folder"])
-    )
 
 
 def _start(

@@ -19,12 +19,13 @@ from tribodyn.hbm.wear import in_time
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_share
 from tribodyn.hbm.wear.in_time import PlacesOfRun, TimeRow, WearInTime
 from tribodyn.hbm.wear.step_control import Tolerance
-from tribodyn.workflows.accuracy import verification
 from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
+from tribodyn.workflows.result.provenance import rebuilt
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import modelling, wear_run
 from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.studies import verification
 
 TOLERANCE = 0.05  # of a wear step in time
 SHARES = (0.9, 0.75, 0.5, 0.25, 0.1, 0.01, LIFE_SHARE)  # of the first preload, that are told
@@ -135,7 +136,7 @@ def compare(
     if result.wear is None or not result.wear.depth[-1].max() > 0:
         raise ValueError("the result has no wear run in which something wears: take a scene with [wear]")
     start = time.perf_counter()
-    file = verification.rebuilt(result, overrides)
+    file = rebuilt(result, overrides)
     scene = file.scene
     assert scene.wear is not None
     with limited(scene.solver.threads):

@@ -1,0 +1,18 @@
+"""The scene that a result was computed from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.scene import scene_file
+
+
+def rebuilt(result: Result, overrides: Sequence[str] = ()) -> scene_file.SceneFile:
+    """The scene that a result was computed from, with further overrides."""
+    given = result.provenance
+    before = [text for text in given["overrides"].split("\n") if text]
+    return scene_file.parse(
+        given["scene_text"], f"{given['scene_name']}.toml", [*before, *overrides], Path(given["folder"])
+    )
