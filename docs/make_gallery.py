@@ -19,7 +19,7 @@ from tempfile import TemporaryDirectory
 from PIL import Image
 
 import tribodyn as td
-from tribodyn.workflows.api import scenes
+from tribodyn.workflows.studies import scenes
 
 HERE = Path(__file__).parent
 PICTURES = HERE / "gallery" / "pictures"

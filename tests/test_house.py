@@ -32,7 +32,7 @@ ORDER = (
     ("workflows.errors", "workflows.accuracy"),
     ("workflows.pictures",),
     ("workflows.report", "workflows.export"),
-    ("workflows.designs", "workflows.lives", "workflows.studies", "workflows.api", "workflows.benchmarks"),
+    ("workflows.studies", "workflows.api", "workflows.benchmarks"),
     ("workflows.command",),
     ("workflows.cases",),
 )

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from tribodyn.reduction.foreign import ForeignMatrices as Matrices
     from tribodyn.reduction.foreign import from_arrays, read_matrices
     from tribodyn.workflows.api.designs import lives, optimise, study
-    from tribodyn.workflows.api.own_matrices import Balance, Contact, Cycle, Structure, reduce, wear_law
-    from tribodyn.workflows.api.scenes import build, load, plan, read_scene, run, run_to_accuracy, scene_names
     from tribodyn.workflows.api.studies import (
         CONVERGED,
         OUTPUT,
@@ -120,7 +118,6 @@ if TYPE_CHECKING:
         write_mistuned,
         write_whole,
     )
-    from tribodyn.workflows.api.surfaces import Asperities, HeightMap, asperities
     from tribodyn.workflows.api.whole_scenes import (
         check_accuracy,
         check_promise,
@@ -138,53 +135,56 @@ if TYPE_CHECKING:
         verify_wear,
         wear_in_time,
     )
-    from tribodyn.workflows.designs.optimum import Optimum
-    from tribodyn.workflows.designs.table import StudyTable
-    from tribodyn.workflows.lives.lives import Lives
     from tribodyn.workflows.result.result import Result
     from tribodyn.workflows.result.store import ResultError
     from tribodyn.workflows.run.failure import SolveFailed
     from tribodyn.workflows.run.modelling import Model
     from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
-    from tribodyn.workflows.studies.posterior import Posterior
+    from tribodyn.workflows.studies.fits.posterior import Posterior
+    from tribodyn.workflows.studies.many.lives import Lives
+    from tribodyn.workflows.studies.many.optimum import Optimum
+    from tribodyn.workflows.studies.many.table import StudyTable
+    from tribodyn.workflows.studies.matrices import Balance, Contact, Cycle, Structure, reduce, wear_law
+    from tribodyn.workflows.studies.scenes import build, load, plan, read_scene, run, run_to_accuracy, scene_names
+    from tribodyn.workflows.studies.surfaces import Asperities, HeightMap, asperities
 
 # name here -> module, and name there where it is another one
 _HOME: dict[str, tuple[str, ...]] = {
-    "Asperities": ("tribodyn.workflows.api.surfaces",),
-    "Balance": ("tribodyn.workflows.api.own_matrices",),
-    "Contact": ("tribodyn.workflows.api.own_matrices",),
-    "Cycle": ("tribodyn.workflows.api.own_matrices",),
-    "HeightMap": ("tribodyn.workflows.api.surfaces",),
-    "Lives": ("tribodyn.workflows.lives.lives",),
+    "Asperities": ("tribodyn.workflows.studies.surfaces",),
+    "Balance": ("tribodyn.workflows.studies.matrices",),
+    "Contact": ("tribodyn.workflows.studies.matrices",),
+    "Cycle": ("tribodyn.workflows.studies.matrices",),
+    "HeightMap": ("tribodyn.workflows.studies.surfaces",),
+    "Lives": ("tribodyn.workflows.studies.many.lives",),
     "Matrices": ("tribodyn.reduction.foreign", "ForeignMatrices"),
     "Model": ("tribodyn.workflows.run.modelling",),
-    "Optimum": ("tribodyn.workflows.designs.optimum",),
-    "Posterior": ("tribodyn.workflows.studies.posterior",),
+    "Optimum": ("tribodyn.workflows.studies.many.optimum",),
+    "Posterior": ("tribodyn.workflows.studies.fits.posterior",),
     "Result": ("tribodyn.workflows.result.result",),
     "ResultError": ("tribodyn.workflows.result.store",),
     "SceneError": ("tribodyn.workflows.scene.scene_file",),
     "SceneFile": ("tribodyn.workflows.scene.scene_file",),
     "SolveFailed": ("tribodyn.workflows.run.failure",),
-    "Structure": ("tribodyn.workflows.api.own_matrices",),
-    "StudyTable": ("tribodyn.workflows.designs.table",),
+    "Structure": ("tribodyn.workflows.studies.matrices",),
+    "StudyTable": ("tribodyn.workflows.studies.many.table",),
     "__version__": ("tribodyn.version",),
-    "asperities": ("tribodyn.workflows.api.surfaces",),
-    "build": ("tribodyn.workflows.api.scenes",),
+    "asperities": ("tribodyn.workflows.studies.surfaces",),
+    "build": ("tribodyn.workflows.studies.scenes",),
     "contact_laws": ("tribodyn.hbm.contact.law", "names"),
     "continuations": ("tribodyn.hbm.continuation", "names"),
     "from_arrays": ("tribodyn.reduction.foreign",),
     "lives": ("tribodyn.workflows.api.designs",),
     "optimise": ("tribodyn.workflows.api.designs",),
-    "load": ("tribodyn.workflows.api.scenes",),
-    "plan": ("tribodyn.workflows.api.scenes",),
+    "load": ("tribodyn.workflows.studies.scenes",),
+    "plan": ("tribodyn.workflows.studies.scenes",),
     "read_matrices": ("tribodyn.reduction.foreign",),
-    "read_scene": ("tribodyn.workflows.api.scenes",),
-    "reduce": ("tribodyn.workflows.api.own_matrices",),
-    "run": ("tribodyn.workflows.api.scenes",),
-    "run_to_accuracy": ("tribodyn.workflows.api.scenes",),
-    "scene_names": ("tribodyn.workflows.api.scenes",),
+    "read_scene": ("tribodyn.workflows.studies.scenes",),
+    "reduce": ("tribodyn.workflows.studies.matrices",),
+    "run": ("tribodyn.workflows.studies.scenes",),
+    "run_to_accuracy": ("tribodyn.workflows.studies.scenes",),
+    "scene_names": ("tribodyn.workflows.studies.scenes",),
     "study": ("tribodyn.workflows.api.designs",),
-    "wear_law": ("tribodyn.workflows.api.own_matrices",),
+    "wear_law": ("tribodyn.workflows.studies.matrices",),
     "wear_laws": ("tribodyn.hbm.wear.law", "names"),
 }
 

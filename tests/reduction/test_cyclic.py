@@ -16,7 +16,7 @@ from tribodyn.reduction.damping import modal_damping
 from tribodyn.reduction.linear import linear_modes, stuck_stiffness, system_modes
 from tribodyn.reduction.store import load, save
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies import wheel as wheels
+from tribodyn.workflows.studies.wheels import wheel as wheels
 
 
 @pytest.fixture(scope="module", params=[0.0, 0.02], ids=["rigid disk", "flexible disk"])

@@ -16,9 +16,9 @@ from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies import fit_file
-from tribodyn.workflows.studies.fit_file import Known, Task, predict
-from tribodyn.workflows.studies.identification import Measured, Parameter, fit
+from tribodyn.workflows.studies.fits import fit_file
+from tribodyn.workflows.studies.fits.fit_file import Known, Task, predict
+from tribodyn.workflows.studies.fits.identification import Measured, Parameter, fit
 
 BEAM = (
     "harmonics.kept=[0, 1]",

@@ -11,9 +11,9 @@ import pytest
 
 from tests.proof import fuzz, fuzz_result, fuzz_runs
 from tribodyn.workflows.accuracy.statement import Statement, Verdict
-from tribodyn.workflows.api import scenes
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.result import store
+from tribodyn.workflows.studies import scenes
 
 TINY = (
     "harmonics.kept=[0, 1]",

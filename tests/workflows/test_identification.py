@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from tribodyn.workflows.studies.identification import Measured, Parameter, fit
+from tribodyn.workflows.studies.fits.identification import Measured, Parameter, fit
 
 
 def springs_in_a_row(values):

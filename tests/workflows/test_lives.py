@@ -15,14 +15,13 @@ from scipy import stats
 
 import tribodyn as td
 from tests.helpers.command import leave
-from tribodyn.workflows.designs import design, pool, sensitivity_picture, study_file
-from tribodyn.workflows.designs import study as studies
-from tribodyn.workflows.designs.sensitivity import influences
-from tribodyn.workflows.designs.space import Space
-from tribodyn.workflows.designs.surrogate import Level, Surrogate
-from tribodyn.workflows.designs.task import Row, Task
-from tribodyn.workflows.lives import quantiles
-from tribodyn.workflows.lives.quantiles import Sample
+from tribodyn.workflows.studies.many import design, pool, quantiles, sensitivity_picture, study_file
+from tribodyn.workflows.studies.many import study as studies
+from tribodyn.workflows.studies.many.quantiles import Sample
+from tribodyn.workflows.studies.many.sensitivity import influences
+from tribodyn.workflows.studies.many.space import Space
+from tribodyn.workflows.studies.many.surrogate import Level, Surrogate
+from tribodyn.workflows.studies.many.task import Row, Task
 
 pytest.importorskip("sklearn")
 

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 import tribodyn as td
-from tribodyn.workflows.designs import study_file
-from tribodyn.workflows.designs.space import Space
-from tribodyn.workflows.designs.surrogate import Surrogate
-from tribodyn.workflows.lives import quantiles
-from tribodyn.workflows.lives.quantiles import Sample
+from tribodyn.workflows.studies.many import quantiles, study_file
+from tribodyn.workflows.studies.many.quantiles import Sample
+from tribodyn.workflows.studies.many.space import Space
+from tribodyn.workflows.studies.many.surrogate import Surrogate
 
 pytest.importorskip("sklearn")
 

@@ -13,8 +13,8 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.branch import amplitude
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies import mistuning
-from tribodyn.workflows.studies import wheel as wheels
+from tribodyn.workflows.studies.wheels import mistuning
+from tribodyn.workflows.studies.wheels import wheel as wheels
 
 
 @pytest.fixture(scope="module")

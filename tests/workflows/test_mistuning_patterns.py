@@ -14,7 +14,7 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.wheel import Mistuning
-from tribodyn.workflows.studies import mistuned_motion, mistuned_wear, patterns
+from tribodyn.workflows.studies.wheels import mistuned_motion, mistuned_wear, patterns
 
 CHANGED = {
     '["400 Hz", "404 Hz"]': '["750 Hz", "880 Hz"]',

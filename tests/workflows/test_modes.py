@@ -15,7 +15,7 @@ from tribodyn.workflows.pictures import backbone_maps
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import read
-from tribodyn.workflows.studies import modes
+from tribodyn.workflows.studies.curves import backbones as modes
 
 SMALL = [
     "harmonics.kept=[0, 1]",

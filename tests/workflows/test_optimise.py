@@ -12,11 +12,11 @@ from scipy.stats import qmc
 
 import tribodyn as td
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.designs import study_file
-from tribodyn.workflows.designs.optimum import values_of
-from tribodyn.workflows.designs.proposal import Known, best_trades, propose
-from tribodyn.workflows.designs.table import StudyTable
 from tribodyn.workflows.scene.scene_file import SceneError
+from tribodyn.workflows.studies.many import study_file
+from tribodyn.workflows.studies.many.optimum import values_of
+from tribodyn.workflows.studies.many.proposal import Known, best_trades, propose
+from tribodyn.workflows.studies.many.table import StudyTable
 
 pytest.importorskip("sklearn")
 

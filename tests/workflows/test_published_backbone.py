@@ -11,7 +11,7 @@ import pytest
 
 from tests.helpers.command import leave
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies import modes
+from tribodyn.workflows.studies.curves import backbones as modes
 from tribodyn.workflows.studies.published import published_backbone
 
 TABLE = """[backbone]

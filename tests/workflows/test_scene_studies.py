@@ -13,7 +13,8 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.workflows.accuracy import measure
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies import fit_file, variation
+from tribodyn.workflows.studies import variation
+from tribodyn.workflows.studies.fits import fit_file
 from tribodyn.workflows.studies.supports import support_work
 
 TINY = (

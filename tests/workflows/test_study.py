@@ -21,11 +21,11 @@ from scipy import stats
 import tribodyn as td
 from tests.helpers import dying
 from tests.helpers.command import leave
-from tribodyn.workflows.designs import design, parallel_picture, pool, study_file, task
-from tribodyn.workflows.designs.journal import Journal
-from tribodyn.workflows.designs.task import Row, Task
 from tribodyn.workflows.run import reuse
 from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies.many import design, parallel_picture, pool, study_file, task
+from tribodyn.workflows.studies.many.journal import Journal
+from tribodyn.workflows.studies.many.task import Row, Task
 
 TINY = [
     "harmonics.kept=[0, 1]",

@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 
 import tribodyn as td
-from tribodyn.workflows.designs import pool
-from tribodyn.workflows.designs.journal import Journal
+from tribodyn.workflows.studies.many import pool
+from tribodyn.workflows.studies.many.journal import Journal
 
 pytest.importorskip("distributed")
 

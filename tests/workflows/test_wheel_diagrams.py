@@ -12,9 +12,9 @@ from tests.helpers.pictures import assert_not_blank
 from tests.helpers.synthetic_result import result
 from tests.proof.cases.blade.few_sectors import FEW_SECTORS
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.designs import life_picture
-from tribodyn.workflows.designs.table import StudyTable
 from tribodyn.workflows.pictures import wheel_diagrams
+from tribodyn.workflows.studies.many import life_picture
+from tribodyn.workflows.studies.many.table import StudyTable
 
 
 @pytest.mark.parametrize("n_sectors", [7, 8])

@@ -7,15 +7,15 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from tribodyn.workflows.api.scenes import Report, reporter
-from tribodyn.workflows.designs import optimum as designs
-from tribodyn.workflows.designs import study as studies
-from tribodyn.workflows.designs import study_file
-from tribodyn.workflows.designs.optimum import Optimum
-from tribodyn.workflows.designs.study_file import Study
-from tribodyn.workflows.designs.table import StudyTable
-from tribodyn.workflows.lives import lives as distributions
-from tribodyn.workflows.lives.lives import Lives
+from tribodyn.workflows.studies.many import lives as distributions
+from tribodyn.workflows.studies.many import optimum as designs
+from tribodyn.workflows.studies.many import study as studies
+from tribodyn.workflows.studies.many import study_file
+from tribodyn.workflows.studies.many.lives import Lives
+from tribodyn.workflows.studies.many.optimum import Optimum
+from tribodyn.workflows.studies.many.study_file import Study
+from tribodyn.workflows.studies.many.table import StudyTable
+from tribodyn.workflows.studies.scenes import Report, reporter
 
 
 def study(

@@ -46,20 +46,21 @@ from tribodyn.workflows.run.reuse import Bench, reaction
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import PartScene, Scene
-from tribodyn.workflows.studies import forces, mistuned_wear, mistuning, patterns
-from tribodyn.workflows.studies import wheel as wheels
-from tribodyn.workflows.studies.identification import Identification, Measured, Parameter
-from tribodyn.workflows.studies.identification import fit as identify
-from tribodyn.workflows.studies.joint_springs import JointSprings, joint_springs
-from tribodyn.workflows.studies.mistuning import Mistuned
-from tribodyn.workflows.studies.mistuning import picture as plot_mistuned
-from tribodyn.workflows.studies.mistuning import write as write_mistuned
-from tribodyn.workflows.studies.modes import follow_backbone
-from tribodyn.workflows.studies.modes import picture as plot_backbone
+from tribodyn.workflows.studies import forces
+from tribodyn.workflows.studies.curves.backbones import follow_backbone
+from tribodyn.workflows.studies.curves.backbones import picture as plot_backbone
+from tribodyn.workflows.studies.fits.identification import Identification, Measured, Parameter
+from tribodyn.workflows.studies.fits.identification import fit as identify
+from tribodyn.workflows.studies.fits.joint_springs import JointSprings, joint_springs
 from tribodyn.workflows.studies.published import published_wear_steps
 from tribodyn.workflows.studies.supports import support_wear, support_work
 from tribodyn.workflows.studies.variation import Varied, changed, vary
-from tribodyn.workflows.studies.wheel import Wheel, campbell, critical_speeds
+from tribodyn.workflows.studies.wheels import mistuned_wear, mistuning, patterns
+from tribodyn.workflows.studies.wheels import wheel as wheels
+from tribodyn.workflows.studies.wheels.mistuning import Mistuned
+from tribodyn.workflows.studies.wheels.mistuning import picture as plot_mistuned
+from tribodyn.workflows.studies.wheels.mistuning import write as write_mistuned
+from tribodyn.workflows.studies.wheels.wheel import Wheel, campbell, critical_speeds
 
 __all__ = [
     "CONVERGED",

@@ -21,7 +21,17 @@ from tribodyn.workflows.accuracy.reference import Held
 from tribodyn.workflows.accuracy.refinement import Promise
 from tribodyn.workflows.accuracy.trade_table import Trade
 from tribodyn.workflows.accuracy.wear_steps import WearStepTable
-from tribodyn.workflows.api.scenes import (
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.studies import inspection, verification, worn_in_time, worn_states
+from tribodyn.workflows.studies.curves import folds as fold_study
+from tribodyn.workflows.studies.curves import tracking
+from tribodyn.workflows.studies.curves.folds import FoldsFound
+from tribodyn.workflows.studies.curves.tracking import Track
+from tribodyn.workflows.studies.fits import fit_file
+from tribodyn.workflows.studies.fits.identification import Identification
+from tribodyn.workflows.studies.fits.posterior import Posterior
+from tribodyn.workflows.studies.inspection import Inspection
+from tribodyn.workflows.studies.scenes import (
     Overrides,
     Report,
     Source,
@@ -31,14 +41,6 @@ from tribodyn.workflows.api.scenes import (
     reporter,
     result_file,
 )
-from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.studies import fit_file, inspection, tracking, verification, worn_in_time, worn_states
-from tribodyn.workflows.studies import folds as fold_study
-from tribodyn.workflows.studies.folds import FoldsFound
-from tribodyn.workflows.studies.identification import Identification
-from tribodyn.workflows.studies.inspection import Inspection
-from tribodyn.workflows.studies.posterior import Posterior
-from tribodyn.workflows.studies.tracking import Track
 from tribodyn.workflows.studies.verification import Comparison
 from tribodyn.workflows.studies.worn_in_time import LifeInTime
 from tribodyn.workflows.studies.worn_states import WornState

@@ -43,7 +43,7 @@ def animate(
     out
         Folder of the films; pictures/ beside the result by default.
     """
-    from tribodyn.workflows.api import scenes
+    from tribodyn.workflows.studies import scenes
 
     make_room(out)
     loaded, folder = scenes.load(result), out or scenes.result_file(result).parent / "pictures"

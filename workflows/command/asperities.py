@@ -50,7 +50,7 @@ def asperities(
     out
         File of the table (.csv) for the key `table` of the contact.
     """
-    from tribodyn.workflows.api.surfaces import asperities as find
+    from tribodyn.workflows.studies.surfaces import asperities as find
 
     make_room(out, (".csv",))
     lengths = {

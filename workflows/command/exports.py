@@ -27,7 +27,8 @@ def export(result: Path, *, to: Formats, out: Path | None = None, mesh_ending: s
     mesh_ending
         Format of the mesh by its ending, such as .vtu, .exo, .msh or .bdf.
     """
-    from tribodyn.workflows.api import scenes, whole_scenes
+    from tribodyn.workflows.api import whole_scenes
+    from tribodyn.workflows.studies import scenes
 
     make_room(out)
     for written in whole_scenes.export(result, to, out or scenes.result_file(result).parent / "export", mesh_ending):

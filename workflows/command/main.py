@@ -94,9 +94,9 @@ def run(
         File to which every line of progress is added, with its time.
     """
     from tribodyn.workflows.accuracy.accuracy import tuned
-    from tribodyn.workflows.api import scenes
     from tribodyn.workflows.run.failure import SolveFailed
     from tribodyn.workflows.run.progress import console_progress
+    from tribodyn.workflows.studies import scenes
 
     make_room(out)
     progress = console_progress(quiet, log)
@@ -171,7 +171,7 @@ def show(result: Path, *, as_json: Json = False) -> None:
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.api import scenes
+    from tribodyn.workflows.studies import scenes
 
     loaded = scenes.load(result)
     if as_json:
@@ -195,7 +195,7 @@ def render(result: Path, *, out: Path | None = None, formats: Formats = ("png",)
     dpi
         Dots per inch of png.
     """
-    from tribodyn.workflows.api import scenes
+    from tribodyn.workflows.studies import scenes
 
     make_room(out)
     if not 20 <= dpi <= 2400:
@@ -237,10 +237,10 @@ def verify(
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.api import scenes, whole_scenes
+    from tribodyn.workflows.api import whole_scenes
     from tribodyn.workflows.run.failure import SolveFailed
     from tribodyn.workflows.run.progress import Progress, console_progress
-    from tribodyn.workflows.studies import verification, worn_in_time, worn_states
+    from tribodyn.workflows.studies import scenes, verification, worn_in_time, worn_states
 
     make_room(out)
     if sum((states is not None, wear, at is not None or row is not None)) > 1:
@@ -290,7 +290,7 @@ def plan(scene: str, *, overrides: Overrides = ()) -> None:
     scene
         Name of a scene (see `tribodyn list`) or a .toml file.
     """
-    from tribodyn.workflows.api import scenes
+    from tribodyn.workflows.studies import scenes
 
     print_lines(scenes.plan(scene, overrides).lines())
 
@@ -308,7 +308,7 @@ def _draw(
     dpi: int | None = None,
     tell: Callable[[str], None] = print,
 ) -> None:
-    from tribodyn.workflows.api import scenes
+    from tribodyn.workflows.studies import scenes
 
     written, missing = scenes.draw(result, folder, formats, dpi)
     for line in (*([missing] if missing else []), *map(str, written)):

@@ -12,8 +12,8 @@ from tribodyn.workflows.command.words import Changes, Json, Overrides, Start, St
 
 if TYPE_CHECKING:  # the program starts sooner without them
     from tribodyn.workflows.scene.scene_file import SceneFile
-    from tribodyn.workflows.studies.changed_backbones import Changed
-    from tribodyn.workflows.studies.modes import Way
+    from tribodyn.workflows.studies.curves.backbones import Way
+    from tribodyn.workflows.studies.curves.changed_backbones import Changed
 
 
 def backbone(
@@ -54,7 +54,8 @@ def backbone(
     """
     from tribodyn.workflows.pictures import backbone_maps
     from tribodyn.workflows.run.progress import Progress, console_progress
-    from tribodyn.workflows.studies import changed_backbones, modes
+    from tribodyn.workflows.studies.curves import backbones as modes
+    from tribodyn.workflows.studies.curves import changed_backbones
     from tribodyn.workflows.studies.published import published_backbone
 
     file, asked, folder = _asked(scene, overrides, start, stop, mode, points, out)
@@ -105,7 +106,7 @@ def _beside(others: dict[str, Any] | None) -> Iterator[tuple[str, str]]:
 
 def _changed(changed: Sequence[Changed]) -> Iterator[tuple[str, str]]:
     """What changes of the scene do, as lines: at the first, a middle and the last amplitude."""
-    from tribodyn.workflows.studies.changed_backbones import summed
+    from tribodyn.workflows.studies.curves.changed_backbones import summed
 
     for one in changed:
         at = [0, len(one.modal_amplitude) // 2, -1]
@@ -153,7 +154,7 @@ def ring_down(
         Print JSON for machines.
     """
     from tribodyn.workflows.run.progress import Progress, console_progress
-    from tribodyn.workflows.studies import decay
+    from tribodyn.workflows.studies.curves import decay
 
     file, asked, folder = _asked(scene, overrides, start, stop, mode, points, out)
     found = decay.follow(file, asked, periods, steps, Progress() if as_json else console_progress())
@@ -189,7 +190,7 @@ def _asked(
 ) -> tuple[SceneFile, Way, Path]:
     """The scene, what of its nonlinear mode is asked for, and the folder for what is found, which is made."""
     from tribodyn.workflows.scene import scene_file
-    from tribodyn.workflows.studies import modes
+    from tribodyn.workflows.studies.curves import backbones as modes
 
     make_room(out)
     file = scene_file.read(scene, overrides)

@@ -22,7 +22,8 @@ def report(*result: Path, out: Path | None = None) -> None:
     out
         The .html file; report.html beside the first result by default.
     """
-    from tribodyn.workflows.api import scenes, whole_scenes
+    from tribodyn.workflows.api import whole_scenes
+    from tribodyn.workflows.studies import scenes
 
     if not result:
         raise ValueError("report: give the folder or file of a result")

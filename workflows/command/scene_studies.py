@@ -35,7 +35,8 @@ def vary(
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.studies import fit_file, variation
+    from tribodyn.workflows.studies import variation
+    from tribodyn.workflows.studies.fits import fit_file
 
     if not change:
         raise ValueError('--change: say what is to change, such as --change "damping.modal=2 %"')
@@ -107,7 +108,7 @@ def mistuned(
         Print JSON for machines.
     """
     from tribodyn.workflows.scene import scene_file
-    from tribodyn.workflows.studies import mistuning as one_wheel
+    from tribodyn.workflows.studies.wheels import mistuning as one_wheel
 
     make_room(out)
     factors = None if stiffness is None else [quantity("--stiffness", one, "") for one in stiffness.split(",")]
@@ -161,7 +162,7 @@ def mistuning(
     from tribodyn.workflows.pictures.render import RenderingUnavailable
     from tribodyn.workflows.run.progress import Progress, console_progress
     from tribodyn.workflows.scene import scene_file
-    from tribodyn.workflows.studies import mistuned_motion, mistuned_wear, patterns
+    from tribodyn.workflows.studies.wheels import mistuned_motion, mistuned_wear, patterns
 
     make_room(out)
     file = scene_file.read(scene, overrides)
@@ -226,7 +227,7 @@ def supports(
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.api import scenes
+    from tribodyn.workflows.studies import scenes
     from tribodyn.workflows.studies import supports as study
 
     make_room(out, (".csv",))

@@ -150,7 +150,7 @@ def track(
     from tribodyn.workflows.api import whole_scenes
     from tribodyn.workflows.run.progress import Progress, console_progress
     from tribodyn.workflows.scene import scene_file
-    from tribodyn.workflows.studies import tracking
+    from tribodyn.workflows.studies.curves import tracking
 
     make_room(out)
     unit = tracking.UNITS[against]

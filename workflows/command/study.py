@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 from tribodyn.workflows.command.words import Flag, Json, make_room, quantity
 
 if TYPE_CHECKING:
-    from tribodyn.workflows.designs.study_file import Study
-    from tribodyn.workflows.designs.table import StudyTable
     from tribodyn.workflows.run.progress import Progress
+    from tribodyn.workflows.studies.many.study_file import Study
+    from tribodyn.workflows.studies.many.table import StudyTable
 
 TOLD = 5  # runs that are not complete, before the rest is only counted
 
@@ -48,7 +48,7 @@ def study(
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.designs import study as studies
+    from tribodyn.workflows.studies.many import study as studies
 
     read, folder, progress = _begun(file, out, as_json)
     try:
@@ -107,7 +107,7 @@ def lives(
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.lives import lives as distributions
+    from tribodyn.workflows.studies.many import lives as distributions
 
     share = None if rare is None else quantity("--rare", rare, "")
     read, folder, progress = _begun(file, out, as_json)
@@ -147,7 +147,7 @@ def optimise(
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.designs import optimum
+    from tribodyn.workflows.studies.many import optimum
 
     read, folder, progress = _begun(file, out, as_json)
     try:
@@ -162,8 +162,8 @@ def optimise(
 
 def _begun(file: Path, out: Path | None, as_json: bool) -> tuple[Study, Path, Progress]:
     """A study, the folder that it leaves its tables in, and who is told how far it is."""
-    from tribodyn.workflows.designs import study_file
     from tribodyn.workflows.run.progress import Progress, console_progress
+    from tribodyn.workflows.studies.many import study_file
 
     make_room(out)
     read = study_file.read(file)

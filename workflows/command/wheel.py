@@ -53,7 +53,7 @@ def wheel(
         Print JSON for machines.
     """
     from tribodyn.workflows.scene import scene_file
-    from tribodyn.workflows.studies import wheel_modes
+    from tribodyn.workflows.studies.wheels import modes as wheel_modes
 
     make_room(out)
     if slow is not None and fast is None:
@@ -97,7 +97,7 @@ def flutter(
         Print JSON for machines.
     """
     from tribodyn.workflows.scene import scene_file
-    from tribodyn.workflows.studies import flutter as study
+    from tribodyn.workflows.studies.wheels import flutter as study
 
     make_room(out)
     low = None if start is None else quantity("--from", start, "m")

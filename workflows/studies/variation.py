@@ -17,7 +17,7 @@ from tribodyn.workflows.accuracy import measure
 from tribodyn.workflows.accuracy.trade_table import ANSWERED
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.studies import fit_file
+from tribodyn.workflows.studies.fits import fit_file
 
 Answers = Mapping[str, float | None]
 

@@ -20,7 +20,7 @@ from tribodyn.workflows.run import modelling, tightening
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies import decay
+from tribodyn.workflows.studies.curves import decay
 
 __all__ = ["chromium"]
 

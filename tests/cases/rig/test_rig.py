@@ -29,8 +29,8 @@ from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.joints import contact_stiffness
 from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies.fits.identification import Measured, Parameter, fit
 from tribodyn.workflows.studies.forces import study as body_forces
-from tribodyn.workflows.studies.identification import Measured, Parameter, fit
 
 
 @pytest.fixture(scope="module")

@@ -34,7 +34,7 @@ def blade(
     from tests.proof.cases.blade import study as blade_study
     from tests.proof.cases.blade.few_sectors import FEW_SECTORS
     from tribodyn.workflows.scene import scene_file
-    from tribodyn.workflows.studies import mistuning
+    from tribodyn.workflows.studies.wheels import mistuning
 
     highest = None if speed is None else quantity("--speed", speed, "Hz")
     make_room(out)

@@ -21,14 +21,14 @@ from tests.proof.problems import wear as wear_down
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.wear.history import WearHistory, cycles_to_preload
-from tribodyn.workflows.api.scenes import read_scene
 from tribodyn.workflows.pictures.wheel_diagrams import campbell as plot_campbell
 from tribodyn.workflows.result.result import References
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.studies.published import published_wear_steps
-from tribodyn.workflows.studies.wheel import Wheel, campbell, critical_speeds
-from tribodyn.workflows.studies.wheel import build as build_wheel
+from tribodyn.workflows.studies.scenes import read_scene
+from tribodyn.workflows.studies.wheels.wheel import Wheel, campbell, critical_speeds
+from tribodyn.workflows.studies.wheels.wheel import build as build_wheel
 
 FULL_DIAMETERS = (0, 1, 2, 5, 10, 20)  # that are held against the full sector
 FAMILIES = 4

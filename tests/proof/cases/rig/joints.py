@@ -14,7 +14,7 @@ import numpy as np
 from tests.proof.cases.rig.published import OPEN, STUCK
 from tribodyn.reduction.mode_matching import match_kinds
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.studies.joint_springs import JointSprings, joint_springs
+from tribodyn.workflows.studies.fits.joint_springs import JointSprings, joint_springs
 
 KINDS = ("tangential", "normal", "twisting")
 STATIONS = (1, 2, 3, 4)

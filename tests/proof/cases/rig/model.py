@@ -9,12 +9,12 @@ import numpy as np
 from tests.proof.problems import cycle_at
 from tribodyn.hbm.balance import State
 from tribodyn.reduction.model import ReducedModel
-from tribodyn.workflows.api.scenes import read_scene
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.reuse import Bench, reaction
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.studies.scenes import read_scene
 
 PLATFORM, SHAKER = "platform", "shaker"  # names in the scene
 TIED = {

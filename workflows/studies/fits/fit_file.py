@@ -1,0 +1,314 @@
+"""A fit that a file asks for: which numbers of a scene are looked for, and what was measured (tribodyn identify).
+
+The file names keys of the scene with bounds, and measured frequencies, preload, energies, amplitudes, life or work with
+their values. A scene is built anew for every trial, as far as the trial changes it.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, StrictBool, StrictInt, model_validator
+from threadpoolctl import threadpool_limits
+
+from tribodyn.hbm import newton
+from tribodyn.hbm.continuation.operating_point import OperatingPoint
+from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
+from tribodyn.reduction.linear import linear_modes
+from tribodyn.workflows.run import joints, modelling, settings, wear_run
+from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.reuse import Bench
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.fields import Number, Table
+from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
+from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.scene.units import to_si
+from tribodyn.workflows.scene.wear import At, Place
+from tribodyn.workflows.studies.fits import posterior
+from tribodyn.workflows.studies.fits.identification import Identification, Measured, Parameter, fit
+from tribodyn.workflows.studies.fits.posterior import Posterior
+from tribodyn.workflows.studies.many.distributions import Distribution, Marginal
+
+UNITS = ("m", "N", "N/m", "Pa", "kg/m3", "m3/J", "Hz", "rad", "s", "1/s", "")  # of keys of a scene
+MEASURED_IN = {
+    "open frequency": "Hz", "stuck frequency": "Hz", "preload": "N", "energy": "J", "amplitude": "m",
+    "peak frequency": "Hz", "life": "", "work": "J",
+}  # fmt: skip
+Quantity = float | str
+
+
+class Looked(Table):
+    """A number that is looked for.
+
+    keys : of the scene, section.key; several get the same value
+    low, high : bounds, with a unit or in SI; start : one or more to begin from, the scene's own value by default
+    ratio : count in ratios, for a positive number known to its order only; by default where both bounds are above 0
+    prior : distribution that was known before, for a posterior; evenly between the bounds by default, of its logarithm
+        where it counts in ratios
+    """
+
+    keys: Annotated[tuple[str, ...], Field(min_length=1)]
+    low: Quantity
+    high: Quantity
+    start: tuple[Quantity, ...] = ()
+    ratio: StrictBool | None = None
+    prior: Distribution | None = None
+
+
+class Asked(Table):
+    """A number that a scene answers.
+
+    of : what it is
+    mode : number of a frequency, from 1
+    at : of energy, amplitude and preload: a frequency, "peak" or a share of it; a preload without it is that at rest
+    load : factor on the harmonic loads of the scene
+    left : share of the first preload at which a life and its work end
+    """
+
+    of: Literal["open frequency", "stuck frequency", "preload", "energy", "amplitude", "peak frequency", "life", "work"]
+    mode: Annotated[StrictInt, Field(ge=1)] | None = None
+    at: At | None = None
+    load: Annotated[Number, Field(gt=0)] = 1.0
+    left: Annotated[Number, Field(gt=0, lt=1)] = LIFE_SHARE
+
+    @model_validator(mode="after")
+    def _only_what_it_needs(self) -> Self:
+        cycle = self.of in ("energy", "amplitude") or (self.of == "preload" and self.at is not None)
+        mode = self.of in ("open frequency", "stuck frequency")
+        for name, may, must in (
+            ("mode", mode, mode),
+            ("at", cycle, cycle),
+            ("load", cycle or self.of == "peak frequency", False),
+            ("left", self.of in ("life", "work"), False),
+        ):
+            given = name in self.model_fields_set
+            if (given and not may) or (must and not given):
+                raise ValueError(f'expected {"" if may else "no "}{name} for of = "{self.of}"')
+        return self
+
+
+class Known(Asked):
+    """A measured number.
+
+    value : with a unit or in SI; weight : of its relative error in a fit
+    error : its standard deviation, relative, for a posterior
+    """
+
+    value: Quantity
+    weight: Annotated[Number, Field(gt=0)] = 1.0
+    error: Annotated[Number, Field(gt=0)] | None = None
+
+
+class Task(Table):
+    """What is looked for, what is known, and what is to follow from it, by names of one's own."""
+
+    parameters: Annotated[dict[str, Looked], Field(min_length=1)]
+    measured: Annotated[dict[str, Known], Field(min_length=1)]
+    predict: dict[str, Asked] = Field(default_factory=dict)
+
+
+def read(path: Path) -> Task:
+    """Read and check the file of a fit; raises SceneError with one sentence."""
+    if not path.is_file():
+        raise SceneError(f'there is no file of a fit "{path}"')
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise SceneError(f"{path.name} is not valid TOML: {error}") from None
+    return parse(data, path.name)
+
+
+def parse(tables: Mapping[str, Any], name: str = "fit") -> Task:
+    """Check the tables of a fit; name : for the sentence of a SceneError."""
+    return scene_file.checked(Task, dict(tables), name)
+
+
+def run(
+    scene: str, overrides: tuple[str, ...], task: Task, tell: Callable[[str], None]
+) -> tuple[Identification, list[str]]:
+    """The fit, and the overrides "section.key=value" that put what it found into the scene.
+
+    tell : called with a sentence at every trial
+    Raises  SceneError for a key that is no number of the scene, ValueError for bounds that cannot be, SolveFailed
+    """
+    looked = _Looking(scene, overrides, task, tell)
+    own = {name: value_of(looked.file.part_scene, one.keys[0]) for name, one in task.parameters.items()}
+    before = {name: value for name, value in own.items() if value is not None}
+    with threadpool_limits(1):
+        known = before if len(before) == len(looked.parameters) else None
+        found = fit(looked.parameters, looked.measured, lambda values: looked.trial(values, task.measured), known)
+    return found, looked.changes(found.named(), digits=6)
+
+
+def sample(
+    scene: str, overrides: tuple[str, ...], task: Task, tell: Callable[[str], None], most: int = 100, seed: int = 0
+) -> Posterior:
+    """What the measured numbers leave of the parameters, and what follows from them for the numbers in `predict`.
+
+    tell : called with a sentence at every trial; most : trials
+    Raises  as `run`
+    """
+    looked = _Looking(scene, overrides, task, tell)
+    asked = {**task.measured, **task.predict}
+    units = {name: MEASURED_IN[one.of] for name, one in task.predict.items()}
+    priors = {name: looked.prior(name, one.prior) for name, one in task.parameters.items() if one.prior is not None}
+    with threadpool_limits(1):
+        return posterior.sample(
+            looked.parameters, looked.measured, lambda values: looked.trial(values, asked), units, priors, most, seed
+        )
+
+
+class _Looking:
+    """A scene whose numbers are looked for."""
+
+    def __init__(self, scene: str, overrides: tuple[str, ...], task: Task, tell: Callable[[str], None]):
+        both = set(task.measured) & set(task.predict)
+        if both:
+            raise SceneError(f"predict.{min(both)}: a measured number has this name, give another one")
+        self._scene, self._overrides, self._task, self._tell = scene, overrides, task, tell
+        self.file = scene_file.read(scene, overrides)
+        self.parameters = [parameter(name, one, self.file.part_scene) for name, one in task.parameters.items()]
+        self.measured = [
+            Measured(name, _si(f"measured.{name}.value", known.value, (MEASURED_IN[known.of],))[0],
+                     MEASURED_IN[known.of], known.weight, known.error)
+            for name, known in task.measured.items()
+        ]  # fmt: skip
+        self._bench, self._count = Bench(), 0
+
+    def changes(self, values: Mapping[str, float], digits: int = 17) -> list[str]:
+        """Overrides that put values into the scene."""
+        said = {p.name: f"{values[p.name]:.{digits}g} {p.unit}".rstrip() for p in self.parameters}
+        return [f"{key}={text}" for name, text in said.items() for key in self._task.parameters[name].keys]
+
+    def trial(self, values: Mapping[str, float], asked: Mapping[str, Asked]) -> np.ndarray:
+        """What the scene says with values."""
+        self._count += 1
+        trial = scene_file.read(self._scene, (*self._overrides, *self.changes(values)))
+        found = predict(self._bench, trial, asked)
+        self._tell(f"trial {self._count}: " + ", ".join(f"{name} {value:.6g}" for name, value in values.items()))
+        return found
+
+    @staticmethod
+    def prior(name: str, table: Distribution) -> Marginal:
+        """A distribution that was known before."""
+        try:
+            return Marginal.of(table)
+        except ValueError as error:
+            raise SceneError(f"parameters.{name}.prior: {error}") from None
+
+
+def parameter(name: str, looked: Looked, scene: PartScene) -> Parameter:
+    """A number that is looked for, in SI units."""
+    low, unit = _si(f"parameters.{name}.low", looked.low, UNITS)
+    same = (unit,) if isinstance(looked.low, str) else UNITS
+    high, unit = _si(f"parameters.{name}.high", looked.high, same)
+    starts = tuple(_si(f"parameters.{name}.start", start, (unit,))[0] for start in looked.start)
+    ratio = min(low, high) > 0 if looked.ratio is None else looked.ratio
+    own = value_of(scene, looked.keys[0])
+    if not starts:
+        what = f"parameters.{name}: the scene has no {looked.keys[0]}"
+        if own is None:
+            raise SceneError(f"{what}: give start")
+        if not low <= own <= high:
+            raise SceneError(f"{what} between {low:g} and {high:g} but {own:g}: give start, or other bounds low < high")
+        starts = (own,)
+    return Parameter(name, low, high, starts, unit, ratio)
+
+
+def value_of(scene: PartScene, key: str) -> float | None:
+    """The number of a scene at a key "section.key" in SI units; None for a key that is left out.
+
+    Raises  SceneError for a key that is not a number
+    """
+    table: Any = scene.model_dump()
+    table["geometry"] |= table["geometry"]["parameters"]
+    for word in key.split("."):
+        table = table.get(word) if isinstance(table, dict) else None
+    if table is not None and (isinstance(table, bool) or not isinstance(table, (int, float))):
+        raise SceneError(f"{key} is not a number that can be looked for")
+    return None if table is None else float(table)
+
+
+def _si(key: str, value: Quantity, units: tuple[str, ...]) -> tuple[float, str]:
+    """A quantity in the first of the units that it can be counted in; a bare number in the last one."""
+    problem = ValueError()
+    for unit in units if isinstance(value, str) else units[-1:]:
+        try:
+            return to_si(value, unit), unit
+        except ValueError as error:
+            problem = error
+    raise SceneError(f"{key}: {problem}")
+
+
+def predict(bench: Bench, file: SceneFile, measured: Mapping[str, Asked]) -> np.ndarray:
+    """(n_measured,) what a scene says to each measured number."""
+    answers = Answers(file, bench.model(file))
+    return np.array([answers.to(name, known) for name, known in measured.items()])
+
+
+class Answers:
+    """What one scene says; cycles and wear runs that several numbers share are solved once."""
+
+    def __init__(self, file: SceneFile, model: modelling.Model):
+        self.file, self.model = file, model
+        self._points: dict[tuple[Place, float], OperatingPoint] = {}
+        self._runs: dict[float, WearHistory] = {}
+
+    def to(self, name: str, known: Asked) -> float:
+        """The scene's number beside a measured one; raises SolveFailed, naming it, where there is none."""
+        try:
+            if known.mode is not None:
+                return self._frequency(known.of == "stuck frequency", known.mode)
+            if known.of in ("life", "work"):
+                return self._wear(known)
+            if known.of == "preload" and known.at is None:
+                return self._at_rest()
+            point = self._point(known.at or Place(peak=1.0), known.load)
+        except SolveFailed as failure:
+            raise SolveFailed(f"measured.{name}: {failure}") from None
+        balance = self.model.balance
+        return {
+            "peak frequency": point.state.omega / (2 * np.pi),
+            "amplitude": point.amplitude,
+            "preload": balance.preload(point.state),
+            "energy": float(balance.energy(point.state).sum()),
+        }[known.of]
+
+    def _frequency(self, stuck: bool, mode: int) -> float:
+        reduced = self.model.reduced
+        if mode > reduced.system.n_dof:
+            raise ValueError(f"there is no mode {mode}: the model has {reduced.system.n_dof}")
+        springs = joints.contact_stiffness(self.file.scene, reduced) if stuck else None
+        return float(linear_modes(reduced, springs, mode)[0][mode - 1])
+
+    def _at_rest(self) -> float:
+        still = self.model.balance.with_load(0.0)
+        found = newton.solve_from_rest(still, still.omega_max, settings.newton_options(self.file.scene))
+        if not found.converged:
+            raise SolveFailed(f"the contact at rest: {found.outcome}")
+        return still.preload(found.state)
+
+    def _point(self, where: Place, load: float) -> OperatingPoint:
+        if (where, load) not in self._points:
+            site = settings.site_of(self.file.scene, where)
+            point = site.first(self.model.balance.with_load(load))
+            if not point.solution.converged:
+                raise SolveFailed(point.solution.outcome)
+            self._points[where, load] = point
+        return self._points[where, load]
+
+    def _wear(self, known: Asked) -> float:
+        if self.file.scene.wear is None:
+            raise SceneError("a life or its work is measured, but the scene has no [wear]")
+        if known.left not in self._runs:
+            self._runs[known.left] = wear_run.worn_out(self.file, self.model, known.left)
+        run = self._runs[known.left]
+        life = cycles_to_preload(run, known.left)
+        if life is None:
+            raise SolveFailed(f"the preload did not fall to {known.left:.3g} of its start: {run.end}")
+        spent = np.concatenate([[0.0], np.cumsum(run.work.sum(axis=1))[:-1]])
+        return life if known.of == "life" else float(np.interp(life, run.cycles, spent))

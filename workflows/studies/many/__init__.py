@@ -1,0 +1,1 @@
+"""Many runs of one scene: grids, life distributions, optima."""

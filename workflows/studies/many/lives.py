@@ -1,0 +1,345 @@
+"""The distribution of a life, or of another number, over what scatters: runs, quantiles, and what to measure next."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy import stats
+
+from tribodyn.workflows.accuracy.statement import QUANTITIES
+from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.scene_file import SceneError
+from tribodyn.workflows.studies.many import quantiles
+from tribodyn.workflows.studies.many import study as studies
+from tribodyn.workflows.studies.many.journal import Journal
+from tribodyn.workflows.studies.many.quantiles import RARE, Sample
+from tribodyn.workflows.studies.many.sensitivity import Influence, influences
+from tribodyn.workflows.studies.many.space import Space
+from tribodyn.workflows.studies.many.study_file import LISTED, Study
+from tribodyn.workflows.studies.many.surrogate import Surrogate
+from tribodyn.workflows.studies.many.table import LIFE, StudyTable
+from tribodyn.workflows.studies.many.task import solve
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+BATCH = 8  # runs that are added at a time
+COLUMNS = {  # of the table -> quantity of a verdict
+    "peak_hz_first": "peak_frequency", "peak_m_first": "amplitude", "preload_N_first": "preload",
+    "depth_max_m": "depth", LIFE: "life",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Quantile:
+    """The value that a share of the parts falls below.
+
+    low, high : of the wanted confidence, from the surrogate and the runs that are missing
+    low_in_all, high_in_all : with the model's own error as well; the same where that is not known
+    at_least : runs ended before what they were to tell, or survived, and the quantile may be one of theirs
+    """
+
+    share: float
+    value: float
+    low: float
+    high: float
+    low_in_all: float
+    high_in_all: float
+    at_least: bool
+
+    @property
+    def name(self) -> str:
+        """Such as P10."""
+        return f"P{100 * self.share:.6g}"
+
+
+@dataclass(frozen=True)
+class Lives:
+    """A number as a distribution.
+
+    table : of the full runs; runs : that have the number; open : of them, those with only a lower bound of it
+    cheap_runs : cheap ones; missing : runs that lack the number
+    explained : share of the variance that the surrogate explains where runs are left out
+    scatter : standard deviation of the number's logarithm; of the number itself where it is not always above 0
+    model_error : relative, None where it is not known; model_error_of : where it is from, or why it is not known
+    values, weights : (n,) in order: the expected distribution
+    """
+
+    name: str
+    number: str
+    table: StudyTable
+    quantiles: tuple[Quantile, ...]
+    influences: tuple[Influence, ...]
+    confidence: float
+    runs: int
+    open: int
+    cheap_runs: int
+    missing: int
+    explained: float
+    scatter: float
+    logarithmic: bool
+    model_error: float | None
+    model_error_of: str
+    values: np.ndarray
+    weights: np.ndarray
+
+    def record(self) -> dict[str, Any]:
+        """Plain data for machines."""
+        own = ("name", "number", "confidence", "runs", "open", "cheap_runs", "missing", "explained", "scatter",
+               "logarithmic", "model_error", "model_error_of")  # fmt: skip
+        return {
+            **{name: getattr(self, name) for name in own},
+            "quantiles": [{"name": q.name, **asdict(q)} for q in self.quantiles],
+            "influences": [{**asdict(i), "left": i.left} for i in self.influences],
+        }
+
+    def lines(self) -> list[str]:
+        """What a reader is told."""
+        runs = f"{self.runs} runs" + (f" ({self.open} of them survived, or ended before)" if self.open else "")
+        runs += f" and {self.cheap_runs} cheap ones" if self.cheap_runs else ""
+        known = "not known: " + self.model_error_of if self.model_error is None else self.model_error_of
+        error = "" if self.model_error is None else f"{100 * self.model_error:.2g} %, "
+        found = [
+            f"{self.number} from {runs}" + (f", {self.missing} more have none" if self.missing else ""),
+            f"surrogate explains {100 * self.explained:.2f} % of the variance of runs that are left out",
+            f"error of the model itself: {error}{known}",
+            f"{'':8}{'value':>12}   {100 * self.confidence:g} % sure{'':17}with the model's error",
+        ]
+        for q in self.quantiles:
+            ends = f"{q.low:.4g} .. {q.high:.4g}"
+            own = "" if self.model_error is None else f"{q.low_in_all:.4g} .. {q.high_in_all:.4g}"
+            least = "  at least: some parts survive, or their runs ended before" if q.at_least else ""
+            found.append(f"{q.name:8}{q.value:12.4g}   {ends:26}{own}{least}".rstrip())
+        scatter = f"{100 * self.scatter:.3g} %" if self.logarithmic else f"{self.scatter:.3g}"
+        found.append(f"scatter {scatter}; measured exactly, a key leaves of it (first and total Sobol index):")
+        found += [f"  {i.key:32}{100 * i.left:6.1f} %   ({i.first:.3f}, {i.total:.3f})" for i in self.influences]
+        return found
+
+    def plot(self) -> Figure:
+        """The distribution with its quantiles, and what it depends on."""
+        from tribodyn.workflows.studies.many import lives_picture as picture
+
+        return picture.picture(self)
+
+
+def run(
+    study: Study,
+    folder: Path,
+    progress: Progress,
+    workers: int | None = None,
+    scheduler: str = "",
+    resume: bool = False,
+    rare: float | None = None,
+) -> Lives:
+    """Do the runs that the distribution of a number takes, and leave lives.json and lives.png with the study's tables.
+
+    rare : a share whose value is wanted as well, and that runs are added for, such as 1e-4
+    Raises  SceneError, ValueError: what is asked for cannot be; SolveFailed: no run has the number, a lost scheduler
+    """
+    wanted = study.lives
+    if study.settings.design in LISTED:
+        raise SceneError(f'{study.name}: lives are drawn, give design = "sobol" and distributions instead of lists')
+    if rare is not None and not 0 < rare < 1:
+        raise ValueError(f"rare {rare}: give a share between 0 and 1")
+    space = Space.of(study)
+    ends = folder, progress, workers, scheduler
+    cheap = None
+    if wanted.cheap:
+        rough = _cheap(study)
+        progress.say(f"{rough.settings.runs} cheap runs")
+        cheap = studies.run(rough, folder / "cheap", progress, workers, scheduler, resume, drawn=False)
+    shares = wanted.shares if rare is None else (rare, *wanted.shares)
+    added: list[dict[str, Any]] = []
+    while True:
+        table = studies.run(study, *ends, resume or bool(added), more=added, drawn=False)
+        found = _Fit.of(space, table, cheap, wanted.number, study.settings.runs or 0, shares[0])
+        sample = Sample.of(space, found.surrogate, shares[0] < RARE)
+        half = _half_width(found, sample, shares[0], wanted.confidence)
+        done = len(table.columns["run"])
+        if wanted.within is None or half <= wanted.within or done >= wanted.most:
+            break
+        progress.say(f"after {done} runs P{100 * shares[0]:.6g} is known within {100 * half:.2g} %: runs are added")
+        points = quantiles.next_runs(sample, found.surrogate, shares[0], min(BATCH, wanted.most - done))
+        added += [space.run_of(point) for point in points]
+    studies.draw(study, table, folder)
+    error, source = _model_error(study, space, table, folder, progress)
+    told = _told(study, table, cheap, space, found, sample, shares, error, source)
+    (folder / "lives.json").write_text(json.dumps(told.record(), indent=2) + "\n", encoding="utf-8")
+    told.plot().savefig(folder / "lives.png")
+    return told
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """A surrogate of a number.
+
+    drawn : (n,) whether a run was drawn from the distribution, not added where it says most about a quantile
+    asked : the share that runs were added for; None where none were
+    logarithmic : of its logarithm; open : runs of which only a lower bound is known, bound : the lowest of them
+    failed : share of runs without
+    """
+
+    surrogate: Surrogate
+    drawn: np.ndarray
+    asked: float | None
+    logarithmic: bool
+    bound: float
+    open: int
+    runs: int
+    failed: float
+
+    def ends(
+        self, sample: Sample, share: float, at: float, draws: np.ndarray, confidence: float
+    ) -> tuple[float, float]:
+        """Ends of the quantile of a share: the outer ones by the surrogate and by counting runs.
+
+        Where runs were added about a quantile, the surrogate's ends stand alone: those runs have shown it how the
+        number varies there, and counting would take hundreds of drawn runs to be as sure.
+        at : the share among runs that have the number; draws : of the quantile, by the surrogate
+        """
+        low, high = np.quantile(draws, [0.5 - confidence / 2, 0.5 + confidence / 2])
+        if share == self.asked:
+            return float(low), float(high)
+        values, said = (each[self.drawn] for each in self.surrogate.runs)
+        fewest, most = quantiles.counted(sample, values, said, at, confidence)
+        return float(min(low, fewest)), float(max(high, most))
+
+    def at_least(self, share: float, high: float, confidence: float) -> bool:
+        """Whether a quantile may belong to values of which only a lower bound is known.
+
+        So where its upper end reaches one of them, and where as many parts as its share leaves may have such values:
+        the surrogate is smooth, and a part that survives is not a part that lives a little longer
+        """
+        if not self.open:
+            return False
+        most = stats.beta.ppf(0.5 + confidence / 2, self.open + 1, self.runs - self.open)  # Clopper and Pearson 1934
+        return bool(high >= self.bound or share >= 1 - most)
+
+    @classmethod
+    def of(
+        cls, space: Space, table: StudyTable, cheap: StudyTable | None, number: str, drawn: int, asked: float
+    ) -> _Fit:
+        values, bounds = table.bounded(number)
+        open_ = np.isfinite(bounds)
+        good = np.isfinite(values)
+        if not good.any():
+            raise SolveFailed(f"no run has a {number}; the first: {table.columns['sentence'][0]}")
+        logarithmic = bool((values[good] > 0).all())
+        below = None
+        if cheap is not None:
+            rough, _ = cheap.bounded(number)
+            fine = np.isfinite(rough) & ((rough > 0) if logarithmic else True)
+            below = space.coordinates(space.points_of(cheap.columns)[fine]), _scaled(rough[fine], logarithmic)
+        points = space.coordinates(space.points_of(table.columns)[good])
+        surrogate = Surrogate.fitted(points, _scaled(values[good], logarithmic), below)
+        bound = float(np.min(bounds, initial=np.inf, where=open_))
+        own = table.columns["run"][good] <= drawn
+        added = None if own.all() else asked
+        return cls(
+            surrogate, own, added, logarithmic, bound, int(open_.sum()), int(good.sum()), 1 - float(np.mean(good))
+        )
+
+
+def _scaled(values: np.ndarray, logarithmic: bool) -> np.ndarray:
+    return np.log(values) if logarithmic else values
+
+
+def _cheap(study: Study) -> Study:
+    """The study of the cheap runs."""
+    wanted, own = study.lives, study.settings
+    changed = {"set": (*own.set, *wanted.cheap), "runs": wanted.cheap_runs or 4 * (own.runs or 0), "verdict": False}
+    return replace(study, settings=own.model_copy(update=changed))
+
+
+def _half_width(found: _Fit, sample: Sample, share: float, confidence: float) -> float:
+    """Half the confidence interval of a quantile, relative."""
+    low, high = found.ends(sample, share, share, quantiles.drawn(sample, found.surrogate, share), confidence)
+    if found.logarithmic:
+        return float(np.exp(0.5 * (high - low)) - 1)
+    return float(0.5 * (high - low) / max(abs(sample.quantile(share)), 1e-300))
+
+
+def _model_error(
+    study: Study, space: Space, table: StudyTable, folder: Path, progress: Progress
+) -> tuple[float | None, str]:
+    """Relative error of the model itself, and where it is from."""
+    given, quantity = study.lives.model_error, COLUMNS.get(study.lives.number, "")
+    if given is not None:
+        return given, "given"
+    if quantity not in QUANTITIES:
+        return None, f"a verdict says nothing about {study.lives.number}"
+    errors = np.asarray(table.columns.get(f"{quantity}_error", np.empty(0)), float)
+    if np.isfinite(errors).any():
+        return float(np.nanmedian(errors)), f"median of the verdicts on {np.isfinite(errors).sum()} runs"
+    medians = space.values(np.full((1, len(space.keys)), 0.5))[0]
+    task, journal = studies.task_at(study, space.run_of(medians)), Journal(folder / "medians")
+    row = journal.rows().get(task.key)
+    if row is None:
+        with progress.stage("verdict on the run at the medians"):
+            row = solve(task)
+        journal.path.parent.mkdir(exist_ok=True)
+        journal.begin([row], resume=True)
+    error = row.numbers.get(f"{quantity}_error")
+    if error is None:
+        return None, f"the verdict on the run at the medians has none ({row.sentence})"
+    return error, "verdict on the run at the medians"
+
+
+def _told(
+    study: Study, table: StudyTable, cheap: StudyTable | None, space: Space, found: _Fit, sample: Sample,
+    shares: Sequence[float], error: float | None, source: str,
+) -> Lives:  # fmt: skip
+    wanted, body = study.lives, sample
+    if shares[0] < RARE:
+        body = Sample.of(space, found.surrogate)
+    back = np.exp if found.logarithmic else np.asarray
+    told = []
+    for share in sorted(shares):
+        of = sample if share < RARE else body
+        told.append(_quantile(found, of, share, wanted.confidence, error))
+    middle = float(body.mean @ body.weight)
+    scatter = float(np.sqrt((body.mean - middle) ** 2 @ body.weight))
+    return Lives(
+        study.name, wanted.number, table, tuple(told), influences(space, found.surrogate.mean), wanted.confidence,
+        found.runs, found.open, 0 if cheap is None else cheap.count("complete"), len(table.columns["run"]) - found.runs,
+        found.surrogate.explained, scatter, found.logarithmic, error, source, back(body.mean), body.weight,
+    )  # fmt: skip
+
+
+def _quantile(found: _Fit, sample: Sample, share: float, confidence: float, error: float | None) -> Quantile:
+    """One quantile; runs that are missing may all lie below it or all above it."""
+    fewest = max((share - found.failed) / (1 - found.failed), 0.0)
+    most = min(share / (1 - found.failed), 1.0)
+    ends = []
+    for at, side in ((fewest, 0), (most, 1)):
+        draws = quantiles.drawn(sample, found.surrogate, at)
+        end = found.ends(sample, share, at, draws, confidence)[side]
+        shares = 0.5 - confidence / 2, 0.5 + confidence / 2
+        moved = np.quantile(_shifted(draws, error, found.logarithmic), shares[side]) - np.quantile(draws, shares[side])
+        ends.append((end, end + float(moved)))
+    back = np.exp if found.logarithmic else float
+    (own_low, all_low), (own_high, all_high) = ([float(back(end)) for end in side] for side in ends)
+    if fewest == 0 and found.failed:
+        own_low = all_low = 0.0 if found.logarithmic else -np.inf
+    # the median of the draws: the expected function is smoother than what it stands for, and its own quantiles too near
+    value = float(back(np.median(quantiles.drawn(sample, found.surrogate, share))))
+    least = found.at_least(share, own_high, confidence)
+    return Quantile(share, value, own_low, own_high, all_low, all_high, least)
+
+
+def _shifted(draws: np.ndarray, error: float | None, logarithmic: bool) -> np.ndarray:
+    """Draws of a quantile with the model's own error as well: one unknown factor for all of them.
+
+    Its size is evenly distributed, as a verdict's error is a sum of parts without their signs: between 1 - error and
+    1 + error, or, where draws are logarithms, between 1 and 1 + error or the reciprocal of that, which stays positive
+    """
+    if not error:
+        return draws
+    off = np.random.default_rng(1).uniform(-1, 1, len(draws))
+    return draws + (np.sign(off) * np.log1p(error * np.abs(off)) if logarithmic else error * off * np.abs(draws))

@@ -1,0 +1,103 @@
+"""Runs of a study on this machine, each in a process of a pool; a process that dies takes no other run with it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context, parent_process
+from typing import Protocol, TypeVar
+
+from threadpoolctl import threadpool_limits
+
+from tribodyn.workflows.studies.many.task import Row
+
+ATTEMPTS = 3  # of a run whose process dies, such as for want of memory
+
+
+def cores() -> int:
+    """Processor cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Numbered(Protocol):
+    """A run, from 1, and the hash of all that its row depends on."""
+
+    @property
+    def number(self) -> int: ...
+
+    @property
+    def key(self) -> str: ...
+
+
+Work = TypeVar("Work", bound=Numbered)
+
+
+def finished(tasks: Sequence[Work], workers: int, solve: Callable[[Work], Row]) -> Iterator[Row]:
+    """Rows as they come, made by `solve` of a module; a run whose process died ATTEMPTS times is lost.
+
+    The death of one process ends the whole pool. Nobody tells which run killed it, so all that were under way are
+    repeated one at a time: a run is lost by a death of its own only.
+    """
+    # Gmsh, once used in this process, sets this to the default: a pipe to a dead process would end the study
+    if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # as Python begins
+    waiting, deaths = deque(tasks), Counter[int]()
+    while waiting:
+        alone = deaths[waiting[0].number] > 0
+        limit = 1 if alone else min(workers, len(waiting))
+        pool = ProcessPoolExecutor(limit, get_context("spawn"), _begin)
+        under_way: dict[Future[Row], Work] = {}
+        try:
+            while under_way or (waiting and (deaths[waiting[0].number] > 0) == alone):
+                # no more than there are processes: what is under way when one dies is then known
+                while waiting and len(under_way) < limit and (deaths[waiting[0].number] > 0) == alone:
+                    task = waiting.popleft()
+                    try:
+                        under_way[pool.submit(solve, task)] = task
+                    except BrokenProcessPool:
+                        waiting.appendleft(task)
+                        raise
+                done, _ = wait(under_way, return_when=FIRST_COMPLETED)
+                for future in sorted(done, key=lambda one: isinstance(one.exception(), BrokenProcessPool)):
+                    row = future.result()
+                    del under_way[future]
+                    yield row
+        except BrokenProcessPool:
+            for task in reversed(under_way.values()):
+                deaths[task.number] += 1
+                if deaths[task.number] < ATTEMPTS:
+                    waiting.appendleft(task)
+                else:
+                    told = f"the process that worked on it died {ATTEMPTS} times, it was killed or short of memory"
+                    yield Row(task.number, task.key, "lost", told)
+        finally:
+            _stop(pool)
+
+
+def _begin() -> None:
+    """In every process of the pool: processes and threads do not multiply, and none outlives the study."""
+    threadpool_limits(1)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """A study that is killed cannot end its processes: they would wait for its next task for ever."""
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def _stop(pool: ProcessPoolExecutor) -> None:
+    """End the processes at once: who leaves early does not wait for runs that nobody will read."""
+    processes = list((getattr(pool, "_processes", None) or {}).values())
+    pool.shutdown(wait=False, cancel_futures=True)
+    for process in processes:
+        process.terminate()
+    for process in processes:
+        process.join()

@@ -1,0 +1,128 @@
+"""Quantiles of a number over a distribution of what it depends on, with the confidence that a surrogate has in them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from tribodyn.workflows.studies.many.space import Space
+from tribodyn.workflows.studies.many.surrogate import Surrogate
+
+EXPONENT = 14  # of two: points that a distribution is made of
+RARE = 0.01  # shares below this are drawn from a wider distribution
+WIDE = 1.6  # how much wider
+DRAWS = 300  # functions that the surrogate may stand for
+ZONE = 4.0  # standard deviations: points further than this from a quantile lie on their side for sure
+MOST = 1000  # points whose values are drawn jointly
+GRID = 1024  # values among which ends are looked for
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Points of the distribution with what the surrogate expects there, in the order of that.
+
+    points : (n, k) values; coordinates : (n, k); weight : (n,), sums to 1; mean, deviation : (n,)
+    """
+
+    points: np.ndarray
+    coordinates: np.ndarray
+    weight: np.ndarray
+    mean: np.ndarray
+    deviation: np.ndarray
+
+    @classmethod
+    def of(cls, space: Space, surrogate: Surrogate, rare: bool = False, seed: int = 0) -> Sample:
+        """Points of a space; rare : spread wider, for shares below RARE."""
+        points, weight = space.draw(EXPONENT, seed, WIDE if rare else 1.0)
+        coordinates = space.coordinates(points)
+        mean, deviation = surrogate.mean_and_deviation(coordinates)
+        order = np.argsort(mean, kind="stable")
+        return cls(*(each[order] for each in (points, coordinates, weight, mean, deviation)))
+
+    def quantile(self, share: float) -> float:
+        """The expected value that a share of the weight lies below."""
+        return weighted_quantile(self.mean, self.weight, share)
+
+
+def weighted_quantile(ordered: np.ndarray, weight: np.ndarray, share: float) -> float:
+    """The value that a share of the weight of ordered values (n,) lies below, at the middles of their weights."""
+    return float(np.interp(share, np.cumsum(weight) - 0.5 * weight, ordered))
+
+
+def drawn(sample: Sample, surrogate: Surrogate, share: float, draws: int = DRAWS, seed: int = 0) -> np.ndarray:
+    """(draws,) values of a quantile, one for each function that the surrogate may stand for.
+
+    Points that lie on their side of the quantile for sure keep their expected values; of the others MOST, evenly over
+    their order, are drawn jointly.
+    """
+    middle = sample.quantile(share)
+    near = np.flatnonzero(np.abs(sample.mean - middle) < ZONE * sample.deviation)
+    if len(near) < 2:
+        return np.full(draws, middle)
+    step = -(-len(near) // MOST)
+    chosen = near[step // 2 :: step]
+    sure = np.ones(len(sample.mean), bool)
+    sure[near] = False
+    below = float(sample.weight[sure & (sample.mean < middle)].sum())
+    weight = sample.weight[chosen] * (sample.weight[near].sum() / sample.weight[chosen].sum())
+    own = np.clip((share - below) / weight.sum(), 0.0, 1.0)
+    values = sample.mean[chosen] + surrogate.departures(sample.coordinates[chosen], draws, seed)
+    # thinned out, the chosen points have a quantile of their own: only how the draws differ from it counts
+    offset = middle - weighted_quantile(sample.mean[chosen], weight / weight.sum(), own)
+    found = np.empty(draws)
+    for i, row in enumerate(values):
+        order = np.argsort(row)
+        found[i] = offset + weighted_quantile(row[order], weight[order] / weight.sum(), own)
+    return found
+
+
+def counted(
+    sample: Sample, values: np.ndarray, said: np.ndarray, share: float, confidence: float
+) -> tuple[float, float]:
+    """Ends of a quantile that hold however the runs depend on the points, also where they jump.
+
+    A surrogate smooths a jump, and is then surer of a quantile beside it than it may be. So the share below a value is
+    what the surrogate says, corrected by the runs of the design: by those of them that lie below it less those that
+    the others put there. The ends are the next values to either side whose corrected share is not as wanted, by the
+    scatter of that count.
+
+    values, said : (n,) runs drawn from the distribution, and what the others say of each; none were added on purpose
+    Source  Angelopoulos et al. 2023, doi 10.1126/science.adi6000: prediction-powered quantiles
+    """
+    thinned = sample.mean[:: max(len(sample.mean) // GRID, 1)]
+    at = np.unique(np.concatenate([thinned, values, said]))
+    off = np.subtract(values[:, None] <= at, said[:, None] <= at, dtype=float)  # runs x values
+    below = np.interp(at, sample.mean, np.cumsum(sample.weight)) + off.mean(axis=0)
+    width = stats.norm.ppf(0.5 + confidence / 2) * off.std(axis=0, ddof=1) / np.sqrt(len(values))
+    low = high = int(np.argmax(below >= share))
+    while low > 0 and below[low] + width[low] >= share:
+        low -= 1
+    while high < len(at) - 1 and below[high] - width[high] <= share:
+        high += 1
+    return float(at[low]), float(at[high])
+
+
+def next_runs(sample: Sample, surrogate: Surrogate, share: float, count: int) -> np.ndarray:
+    """(count, k) points whose runs would say most about a quantile: on either side of it, and not near each other.
+
+    Source  active learning with the chance of a wrong sign, as in Echard, Gayton, Lemaire 2011, doi
+    10.1016/j.strusafe.2011.01.002; several at a time by taking expected values as found (kriging believer)
+    """
+    middle = sample.quantile(share)
+    candidates = np.argsort(-_gain(sample.weight, sample.mean, sample.deviation, middle))[:MOST]
+    chosen: list[int] = []
+    for _ in range(count):
+        mean, deviation = surrogate.mean_and_deviation(sample.coordinates[candidates])
+        own = _gain(sample.weight[candidates], mean, deviation, middle)
+        own[chosen] = -1.0
+        best = int(np.argmax(own))
+        chosen.append(best)
+        surrogate = surrogate.with_run(sample.coordinates[candidates[best]], float(mean[best]))
+    return sample.points[candidates[chosen]]
+
+
+def _gain(weight: np.ndarray, mean: np.ndarray, deviation: np.ndarray, middle: float) -> np.ndarray:
+    """How much a run would say: weight, times how uncertain its side of the quantile is."""
+    return np.asarray(weight * deviation * np.exp(-0.5 * ((mean - middle) / np.maximum(deviation, 1e-12)) ** 2))

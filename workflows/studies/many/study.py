@@ -1,0 +1,147 @@
+"""A study from its file to its table: what is done already is not done again, and what is finished is on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from tribodyn.hbm.threads import limited
+from tribodyn.workflows.run.checkpoint import alone_in
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.reuse import early_of
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.scene_file import SceneError
+from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.studies.many import cluster, design, life_picture, parallel_picture, pool, sensitivity_picture
+from tribodyn.workflows.studies.many.journal import Journal
+from tribodyn.workflows.studies.many.shared_models import shared
+from tribodyn.workflows.studies.many.space import Space
+from tribodyn.workflows.studies.many.study_file import Study
+from tribodyn.workflows.studies.many.table import StudyTable, table, write
+from tribodyn.workflows.studies.many.task import Row, Task, solve
+
+
+def run(
+    study: Study,
+    folder: Path,
+    progress: Progress,
+    workers: int | None = None,
+    scheduler: str = "",
+    resume: bool = False,
+    retry: bool = False,
+    more: Sequence[dict[str, Any]] = (),
+    drawn: bool = True,
+    inside: bool = False,
+) -> StudyTable:
+    """Do the runs of a study, and leave its tables and pictures in a folder.
+
+    workers : processes, as many as there are cores by default; scheduler : see cluster.finished, none by default
+    resume : take the rows that `folder` holds of the same runs; retry : but those of failed runs
+    more : values of runs beyond those of the design; drawn : whether pictures are wanted
+    inside : one worker is this process itself, where few runs are done at a time and starting another would cost more
+    Raises  SceneError, ValueError: the study asks for what cannot be; SolveFailed: the scheduler was lost
+    """
+    if workers is not None and workers < 1:
+        raise ValueError(f"workers {workers}: give at least 1")
+    varied = [*design.runs(study), *more]
+    tasks, refused = _tasks(study, varied)
+    folder.mkdir(parents=True, exist_ok=True)
+    with alone_in(folder):
+        journal, rows = Journal(folder), dict(refused)
+        earlier, again = journal.rows() if resume or retry else {}, ("lost", "failed") if retry else ("lost",)
+        for task in tasks:
+            row = earlier.get(task.key)
+            if row is not None and row.status not in again:
+                rows[task.number] = replace(row, run=task.number)
+        known = [row for number, row in sorted(rows.items()) if number not in refused]
+        # rows that this study does not ask for stay too: one that is larger may
+        previous = journal.begin((earlier | {row.key: row for row in known}).values(), resume or retry)
+        if previous:
+            progress.say(f"the rows that were here are now {previous}")
+        if resume or retry:
+            progress.say(f"{len(known)} of {len(varied)} runs are done already")
+        # runs that share mesh and reduction come one after the other
+        left = sorted((task for task in tasks if task.number not in rows), key=lambda task: task.early)
+        count = workers or pool.cores()
+        if left:
+            where = f"the workers of {scheduler}" if scheduler else f"{min(count, len(left))} processes"
+            progress.say(f"{len(left)} runs on {where}, one thread for each run")
+        try:
+            with progress.track(f"{len(left)} runs") as advance, shared(left, folder, count, scheduler) as (ready, end):
+                for done, row in enumerate(_finished(ready, count, scheduler, inside), 1):
+                    journal.add(row)
+                    rows[row.run] = row
+                    end(row.run)
+                    bad = sum(one.status != "complete" for one in rows.values())
+                    advance(done / len(left), f"{done} of {len(left)}{f', {bad} not complete' if bad else ''}")
+        finally:
+            found = table(study.name, varied, rows) if rows else None
+            if found is not None:
+                write(found, folder)
+        assert found is not None
+        if drawn:
+            draw(study, found, folder)
+    return found
+
+
+def draw(study: Study, found: StudyTable, folder: Path) -> None:
+    """Pictures of a study, as far as its runs make any."""
+    if found.count("complete"):
+        found.plot().savefig(folder / "study.png")
+        if parallel_picture.possible(found):
+            found.plot_parallel().savefig(folder / "parallel.png")
+        if life_picture.possible(found):
+            found.plot_distribution().savefig(folder / "life.png")
+        try:
+            told = sensitivity_picture.indices(Space.of(study, lists=True), found)
+        except SceneError:  # a key that is no number
+            told = {}
+        if told:
+            sensitivity_picture.picture(found.name, told).savefig(folder / "sensitivity.png")
+
+
+def _finished(tasks: Sequence[Task], workers: int, scheduler: str, inside: bool) -> Iterator[Row]:
+    if not tasks:
+        return iter(())
+    if inside and workers == 1 and not scheduler:
+        return _here(tasks)
+    return cluster.finished(tasks, scheduler, workers) if scheduler else pool.finished(tasks, workers, solve)
+
+
+def _here(tasks: Sequence[Task]) -> Iterator[Row]:
+    with limited(1):
+        for task in tasks:
+            yield solve(task)
+
+
+def task_at(study: Study, values: Mapping[str, Any]) -> Task:
+    """One run of a study by itself, with a verdict on what it finds."""
+    base = scene_file.read(study.scene, always := ("solver.threads=1", *study.settings.set))
+    return Task(1, base.name, base.text, (*always, *_overrides(study, values)), base.folder)
+
+
+def _overrides(study: Study, values: Mapping[str, Any]) -> list[str]:
+    every = {**values, **{copy: values[original] for copy, original in study.settings.same.items()}}
+    return [f"{key}={tomli_w.dumps({'v': value}).partition('=')[2].strip()}" for key, value in every.items()]
+
+
+def _tasks(study: Study, varied: Sequence[dict[str, Any]]) -> tuple[list[Task], dict[int, Row]]:
+    """The runs, and rows for those whose scene is refused; raises SceneError where every one is."""
+    always = ["solver.threads=1", *([] if study.settings.verdict else ["verdict.enabled=false"]), *study.settings.set]
+    base = scene_file.read(study.scene, always)
+    tasks, refused = [], {}
+    for number, values in enumerate(varied, 1):
+        task = Task(number, base.name, base.text, (*always, *_overrides(study, values)), base.folder)
+        try:
+            scene = task.scene().scene
+        except SceneError as error:
+            refused[number] = Row(number, "", "refused", str(error))
+        else:
+            tasks.append(replace(task, early=early_of(scene) if isinstance(scene, PartScene) else ""))
+    if not tasks:
+        raise SceneError(f"every run is refused, the first: {refused[1].sentence}")
+    return tasks, refused

@@ -1,0 +1,229 @@
+"""The file of a study: which scene, which of its keys vary and how, and what is asked of every run."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, StrictBool, StrictInt, model_validator
+
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.fields import Number, Table
+from tribodyn.workflows.scene.scene_file import SceneError
+from tribodyn.workflows.studies.many.distributions import Distribution, Given, Marginal, si
+
+LISTED = ("grid", "list")
+"""Designs made of listed values; the others draw."""
+
+
+class Settings(Table):
+    """The table [study]."""
+
+    scene: str
+    """Name of a scene, or the path of a .toml file, from the folder of the study."""
+    design: Literal["grid", "list", "sobol", "latin_hypercube"]
+    """Every combination of the lists, the lists side by side, or points that are drawn."""
+    runs: Annotated[StrictInt, Field(ge=1)] | None = None
+    """Number of runs that are drawn; a grid and a list have as many as their values make."""
+    seed: StrictInt = 0
+    """Of what is drawn: the same seed gives the same runs."""
+    verdict: StrictBool = False
+    """Measure the errors of every run, which costs more than most runs do."""
+    set: tuple[str, ...] = ()
+    """Keys that every run changes, as "section.key=value"."""
+    same: dict[str, str] = Field(default_factory=dict)
+    """Keys that take the value of one that varies, such as those of two contacts that are made alike."""
+
+    @model_validator(mode="after")
+    def _runs_are_drawn(self) -> Settings:
+        if self.design in LISTED and self.runs is not None:
+            raise ValueError(f"study.runs: a {self.design} has as many runs as its values make, leave it out")
+        if self.design not in LISTED and self.runs is None:
+            raise ValueError(f'study.runs: design = "{self.design}" draws, say how many runs')
+        return self
+
+
+class Correlation(Table):
+    """One entry of [[correlations]]."""
+
+    keys: tuple[str, str]
+    """Two keys that vary by distributions."""
+    value: Annotated[float, Field(gt=-1, lt=1)]
+    """Correlation of the normal variables behind both, Gaussian copula; Spearman's is 6/pi asin(value/2)."""
+
+
+Share = Annotated[Number, Field(gt=0, lt=1)]
+
+
+class Lives(Table):
+    """The table [lives]: what `tribodyn lives` asks of the runs."""
+
+    number: str = "life_cycles"
+    """Column of the study's table whose distribution is wanted."""
+    shares: Annotated[tuple[Share, ...], Field(min_length=1)] = (0.1, 0.5, 0.9)
+    """Shares of the parts that fall below the wanted values: 0.1 gives P10, which 90 % of the parts outlive."""
+    confidence: Share = 0.9
+    """Chance that a true quantile lies between the ends that are told."""
+    within: Annotated[Number, Field(gt=0)] | None = None
+    """Runs are added near the first share until its ends are within this of it, such as "5 %"; none are by default."""
+    most: Annotated[StrictInt, Field(ge=1)] = 200
+    """Largest number of full runs, those of the design and those that are added."""
+    cheap: tuple[str, ...] = ()
+    """Keys that make a run cheap, as "section.key=value"; the full runs then correct what the cheap ones say."""
+    cheap_runs: Annotated[StrictInt, Field(ge=1)] | None = None
+    """Number of cheap runs; four times as many as full ones by default."""
+    model_error: Annotated[Number, Field(ge=0)] | None = None
+    """Relative error of the model itself; by default that of the verdict on a run at the medians."""
+
+    @model_validator(mode="after")
+    def _cheap_has_runs(self) -> Lives:
+        if self.cheap_runs is not None and not self.cheap:
+            raise ValueError("lives.cheap_runs: say in lives.cheap what makes a run cheap")
+        return self
+
+
+class Aim(Table):
+    """One entry of optimise.aims."""
+
+    number: str
+    """Column of the study's table."""
+    want: Literal["low", "high"]
+    """Which of its values are better."""
+
+
+class Limit(Table):
+    """One entry of optimise.limits."""
+
+    number: str
+    """Column of the study's table."""
+    low: Given | None = None
+    """Least value that may be."""
+    high: Given | None = None
+    """Largest value that may be."""
+
+    @model_validator(mode="after")
+    def _has_an_end(self) -> Limit:
+        if self.low is None and self.high is None:
+            raise ValueError(f"a limit of {self.number} needs low or high")
+        for end in (self.low, self.high):
+            if end is not None and si(end) is None:
+                raise ValueError(f'"{end}" is not a number with a unit')
+        return self
+
+
+AIMS = (Aim(number="peak_m_first", want="low"), Aim(number="life_cycles", want="high"))
+
+
+class Optimise(Table):
+    """The table [optimise]: what `tribodyn optimise` asks of the runs."""
+
+    aims: Annotated[tuple[Aim, ...], Field(min_length=1, max_length=3)] = AIMS
+    """What is wanted; of several aims the best trades are looked for."""
+    limits: tuple[Limit, ...] = ()
+    """What a run must keep to."""
+    evaluations: Annotated[StrictInt, Field(ge=8)] = 40
+    """Number of runs, those of the design and those that are added where they promise most."""
+    batch: Annotated[StrictInt, Field(ge=1)] = 2
+    """Runs that are added at a time."""
+    finer: tuple[str, ...] = ()
+    """Keys of the finer settings that the best runs are solved with again, as "section.key=value"; their verdict is
+    asked for by default."""
+
+
+class StudyFile(Table):
+    """A study as its file has it."""
+
+    study: Settings
+    vary: dict[str, Any]
+    correlations: tuple[Correlation, ...] = ()
+    lives: Lives = Lives()
+    optimise: Optimise = Optimise()
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study that was read and checked.
+
+    varied : key of the scene -> values, or the distribution that they are drawn from
+    folder : where the path of its scene begins
+    """
+
+    name: str
+    settings: Settings
+    varied: Mapping[str, tuple[Any, ...] | Marginal]
+    correlations: tuple[Correlation, ...]
+    folder: Path
+    lives: Lives
+    optimise: Optimise
+
+    @property
+    def scene(self) -> str:
+        """Name or path of the scene."""
+        beside = self.folder / self.settings.scene
+        return str(beside) if beside.suffix == ".toml" and beside.is_file() else self.settings.scene
+
+
+def read(path: Path) -> Study:
+    """Read and check the file of a study; raises SceneError, one sentence that names the file and the key."""
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise SceneError(f'the study file "{path}" cannot be read ({error})') from None
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{path.name} is not valid TOML: {str(error)[0].lower()}{str(error)[1:]}") from None
+    return parse(data, path.name, path.resolve().parent)
+
+
+def parse(data: Mapping[str, Any], label: str, folder: Path) -> Study:
+    """Check the tables of a study; label names it in errors. Raises SceneError."""
+    file = scene_file.checked(StudyFile, dict(data), label)
+    leaves = dict(_leaves(file.vary))
+    if not leaves:
+        raise SceneError(f'{label}: vary is empty, give keys of the scene such as "contact.friction" = [0.3, 0.5]')
+    given = (*leaves, *file.study.set, *file.study.same, *file.lives.cheap, *file.optimise.finer)
+    if any(key.replace(" ", "").startswith("solver.threads") for key in given):
+        raise SceneError(f"{label}: solver.threads: every run has one thread, say by --workers how many run at a time")
+    varied = {key: _read(key, value, file.study.design, label) for key, value in leaves.items()}
+    design, lengths = file.study.design, {key: len(v) for key, v in varied.items() if isinstance(v, tuple)}
+    if design == "list" and len(set(lengths.values())) > 1:
+        told = ", ".join(f"{key} {count}" for key, count in lengths.items())
+        raise SceneError(f"{label}: lists side by side need one length, but have {told}")
+    for at, correlation in enumerate(file.correlations):
+        for key in correlation.keys:
+            if not isinstance(varied.get(key), Marginal):
+                raise SceneError(f'{label}: correlations[{at}]: "{key}" does not vary by a distribution')
+        if correlation.keys[0] == correlation.keys[1]:
+            raise SceneError(f'{label}: correlations[{at}]: give two keys, not "{correlation.keys[0]}" twice')
+    for copy, original in file.study.same.items():
+        if original not in varied or copy in varied:
+            raise SceneError(
+                f'{label}: study.same: "{copy}" = "{original}": give a key that does not vary, and one that does'
+            )
+    name = Path(label).name.removesuffix(".toml")
+    return Study(name, file.study, varied, file.correlations, folder, file.lives, file.optimise)
+
+
+def _leaves(table: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:
+    """Dotted keys with their values: `contact.friction = ...` and `"contact.friction" = ...` are the same."""
+    found = []
+    for name, value in table.items():
+        inner = isinstance(value, Mapping) and "distribution" not in value
+        found += _leaves(value, f"{before}{name}.") if inner else [(f"{before}{name}", value)]
+    return found
+
+
+def _read(key: str, value: Any, design: str, label: str) -> tuple[Any, ...] | Marginal:
+    if isinstance(value, Mapping):
+        if design in LISTED:
+            raise SceneError(f'{label}: vary.{key}: a {design} has lists of values, draw with design = "sobol"')
+        table = scene_file.checked(Distribution, dict(value), f"{label}: vary.{key}")
+        try:
+            return Marginal.of(table)
+        except ValueError as error:
+            raise SceneError(f"{label}: vary.{key}: {error}") from None
+    if not isinstance(value, list) or not value:
+        raise SceneError(f"{label}: vary.{key}: expected a list of values or a distribution, got {value!r}")
+    return tuple(value)

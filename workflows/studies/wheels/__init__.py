@@ -1,0 +1,1 @@
+"""Wheels: modes, flutter, and sectors that differ."""

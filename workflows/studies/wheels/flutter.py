@@ -1,0 +1,134 @@
+"""Flutter of a scene's wheel: eigenvalues by nodal diameter in the flow, and limit cycles by friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tribodyn.hbm.continuation.limit_cycles import LimitCycle, limit_cycles
+from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions
+from tribodyn.hbm.threads import limited
+from tribodyn.reduction.cyclic import travelling_wave
+from tribodyn.reduction.flow import Flow, aeroelastic, with_flow
+from tribodyn.workflows.pictures.plots import axes_of
+from tribodyn.workflows.pictures.style import BLUE, GREY, RED
+from tribodyn.workflows.result.columns import write_columns
+from tribodyn.workflows.run import modelling, settings
+from tribodyn.workflows.run.settings import OUTPUT
+from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
+from tribodyn.workflows.studies.wheels import wheel as wheels
+
+
+@dataclass(frozen=True)
+class Flutter:
+    """What a flow does to a wheel.
+
+    eigenvalues : index of the wave, above 0 with the rotation -> eigenvalue with contacts stuck [1/s]
+    cycles : index of a wave that flutters -> its limit cycles, or why they were not found
+    """
+
+    name: str
+    eigenvalues: dict[int, complex]
+    cycles: dict[int, list[LimitCycle] | str]
+
+    @property
+    def damping(self) -> dict[int, float]:
+        """Damping ratio of every wave, structural and aerodynamic."""
+        return {index: -value.real / abs(value) for index, value in self.eigenvalues.items()}
+
+    def record(self) -> dict[str, Any]:
+        """For machines."""
+        return {
+            "waves": [
+                {"index": j, "hz": value.imag / (2 * np.pi), "damping": self.damping[j]}
+                for j, value in self.eigenvalues.items()
+            ],
+            "limit_cycles": [
+                {"index": j, "m": one.amplitude, "hz": one.frequency, "attracts": one.attracts}
+                for j, found in self.cycles.items()
+                if not isinstance(found, str)
+                for one in found
+            ],
+            "not_found": {str(j): why for j, why in self.cycles.items() if isinstance(why, str)},
+        }
+
+    def lines(self) -> list[str]:
+        """For people."""
+        said = [
+            f"wave {j:3}: {value.imag / (2 * np.pi):.6g} Hz, damping {self.damping[j]:+.4%}"
+            + (", flutters" if value.real > 0 else "")
+            for j, value in self.eigenvalues.items()
+        ]
+        for j, found in self.cycles.items():
+            if isinstance(found, str):
+                said.append(f"limit cycles of wave {j}: {found}")
+            elif not found:
+                said.append(f"limit cycles of wave {j}: none between these amplitudes")
+            else:
+                said += [
+                    f"limit cycle of wave {j}: {one.amplitude:.4g} m at {one.frequency:.6g} Hz, "
+                    + ("attracts" if one.attracts else "repels")
+                    for one in found
+                ]
+        return said
+
+
+def study(file: SceneFile, start: float | None = None, stop: float | None = None, points: int = 40) -> Flutter:
+    """Eigenvalues of all waves, and the limit cycles of those that flutter between two amplitudes [m].
+
+    start, stop : of the response; no limit cycles by default; points : of the backbone that is followed
+    Raises  SceneError for a scene without [wheel] or [flow]; ValueError where one end alone is given
+    """
+    scene = file.mesh_scene
+    if scene.flow is None:
+        raise SceneError(f"{file.name} has no [flow]: give its influence coefficients")
+    if (start is None) != (stop is None):
+        raise ValueError("--from and --to: give both amplitudes, or none")
+    with limited(scene.solver.threads):
+        wheel = wheels.build(file)
+        flow = Flow(scene.flow.coefficients(wheel.n_sectors), scene.flow.mode)
+        springs = wheel.springs
+        calm = modelling.damped(scene, travelling_wave(wheel.reduced, 1))
+        eigenvalues = aeroelastic(calm, springs, flow)
+        cycles: dict[int, list[LimitCycle] | str] = {}
+        for index, value in sorted(eigenvalues.items(), key=lambda item: -item[1].real):
+            if start is None or stop is None or value.real <= 0:
+                break
+            assert scene.wheel is not None
+            there = scene.model_copy(update={"wheel": scene.wheel.model_copy(update={"engine_order": index})})
+            wave = with_flow(modelling.damped(there, travelling_wave(wheel.reduced, index)), springs, flow)
+            balance = modelling.make_model(there, wheel.part, wave).balance
+            options = BackboneOptions(points, newton=settings.newton_options(scene))
+            try:
+                cycles[index] = limit_cycles(balance, start, stop, None, OUTPUT, options)
+            except ValueError as error:
+                cycles[index] = str(error)
+    return Flutter(file.name, eigenvalues, cycles)
+
+
+def write(found: Flutter, path: Path) -> None:
+    """Index, frequency and damping ratio of every wave as comma-separated values."""
+    values = found.eigenvalues
+    write_columns(
+        {
+            "index": np.array(list(values)),
+            "frequency_Hz": np.array([value.imag / (2 * np.pi) for value in values.values()]),
+            "damping": np.array(list(found.damping.values())),
+        },
+        path,
+    )
+
+
+def picture(found: Flutter) -> Figure:
+    """Damping ratio of every wave; those that flutter in red."""
+    index, damping = np.array(list(found.damping)), 100 * np.array(list(found.damping.values()))
+    with axes_of(7.0, 4.0) as (figure, axes):
+        axes.bar(index, damping, color=[RED if value < 0 else BLUE for value in damping])
+        axes.axhline(0.0, color=GREY, lw=0.8)
+        axes.set(xlabel="wave (positive with the rotation)", ylabel="damping ratio / %")
+        axes.set_title(f"{found.name}: waves of the stuck wheel in the flow")
+    return figure

@@ -1,0 +1,131 @@
+"""The modes of a wheel as tables and pictures: nodal diameters, SAFE and Campbell diagrams."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tribodyn.hbm.threads import limited
+from tribodyn.workflows.pictures import wheel_diagrams
+from tribodyn.workflows.pictures.figures import save
+from tribodyn.workflows.result.columns import write_columns
+from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.studies.wheels.wheel import build, campbell, critical_speeds
+
+
+@dataclass(frozen=True)
+class WheelModes:
+    """Modes of a wheel with its contact free and stuck.
+
+    families : "free" and "stuck" (n_diameter, family) [Hz]; slow, fast : range of speeds [Hz], None for none
+    speeds : (n_speed,) of the Campbell diagram [Hz]; waves : "free" and "stuck" (n_speed, n_order, family) [Hz]
+    """
+
+    name: str
+    n_sectors: int
+    families: dict[str, np.ndarray]
+    slow: float | None
+    fast: float | None
+    orders: tuple[int, ...]
+    speeds: np.ndarray
+    waves: dict[str, np.ndarray]
+
+    @property
+    def critical(self) -> dict[int, list[float]]:
+        """Engine order -> speeds [Hz] at which it meets its first stuck frequency."""
+        if not len(self.speeds):
+            return {}
+        first = self.waves["stuck"][:, :, 0]
+        return {order: critical_speeds(self.speeds, first[:, i], order) for i, order in enumerate(self.orders)}
+
+    def meetings(self) -> dict[str, list[wheel_diagrams.Meeting]]:
+        """Modes that engine orders meet in the range of speeds, by the state of the contact."""
+        if self.slow is None or self.fast is None:
+            return {}
+        slow, fast = self.slow, self.fast
+        return {s: wheel_diagrams.meetings(v, self.n_sectors, slow, fast) for s, v in self.families.items()}
+
+    def figures(self) -> dict[str, Figure]:
+        """The pictures by name."""
+        found = {"nodal_diameters": wheel_diagrams.nodal_diameters(self.families, self.name)}
+        if self.slow is not None and self.fast is not None:
+            found["safe"] = wheel_diagrams.safe(self.families, self.n_sectors, self.slow, self.fast, self.name)
+        if len(self.speeds):
+            found["campbell"] = wheel_diagrams.campbell(self.speeds, self.waves, self.orders, self.critical, self.name)
+        return found
+
+    def record(self) -> dict[str, Any]:
+        """What was found, for machines."""
+        return {
+            "sectors": self.n_sectors,
+            "families_hz": {state: values.tolist() for state, values in self.families.items()},
+            "met": {state: [asdict(m) for m in met] for state, met in self.meetings().items()},
+            "critical_hz": {str(order): at for order, at in self.critical.items()},
+        }
+
+    def lines(self) -> list[str]:
+        """What was found, for people."""
+        said = []
+        for state, values in self.families.items():
+            if np.isnan(values).all():
+                said.append(f"contact {state}: rotation carries away what only the contact holds")
+                continue
+            low, high = values[:, 0].min(), values[:, 0].max()
+            said.append(f"first family, contact {state}: {low:.6g} to {high:.6g} Hz")
+        for state, met in self.meetings().items():
+            said += [
+                f"engine order {m.engine_order} meets nodal diameter {m.diameter}, family {m.family + 1}, contact "
+                f"{state}, at {60 * m.speed:.5g} rpm, {m.frequency:.6g} Hz"
+                for m in met
+            ]
+        for order, at in self.critical.items():
+            said.append(
+                f"engine order {order}: critical at {', '.join(f'{60 * s:.0f}' for s in at) or 'no'} rpm, stuck"
+            )
+        return said
+
+
+def study(
+    file: SceneFile, slow: float | None, fast: float | None, orders: Sequence[int], families: int, count: int
+) -> WheelModes:
+    """Modes of all nodal diameters of a scene's wheel, and those of some engine orders' waves up to a speed.
+
+    slow, fast : ends of the range of speeds [Hz], None for no diagram; count : speeds of the Campbell diagram
+    Raises  SceneError for a scene without a wheel; ValueError for what cannot be
+    """
+    if families < 1:
+        raise ValueError(f"--families {families}: ask for 1 at least")
+    if fast is not None and (fast <= 0 or (slow is not None and not 0 < slow < fast)):
+        raise ValueError("--from and --to: give speeds above 0, the lower one first")
+    if count < 2:
+        raise ValueError(f"--speeds {count}: a Campbell diagram needs 2 at least")
+    if 0 in orders:
+        raise ValueError("--order: engine orders are 1 or more, or -1 or less for waves against the rotation")
+    with limited(file.scene.solver.threads):
+        wheel = build(file)
+        own = wheel.scene.wheel
+        assert own is not None
+        diameters = range(wheel.n_sectors // 2 + 1)
+        found = {state: wheel.diagram(diameters, families, state == "stuck") for state in ("free", "stuck")}
+        chosen = tuple(orders) or (own.engine_order or 1,)
+        speeds, waves = np.zeros(0), dict[str, np.ndarray]()
+        if fast is not None:
+            speeds, waves = campbell(wheel, fast, count, chosen, 1)
+    return WheelModes(file.name, wheel.n_sectors, found, slow, fast, chosen, speeds, waves)
+
+
+def write(found: WheelModes, folder: Path, formats: Sequence[str] = ("png",)) -> list[Path]:
+    """Write nodal_diameters.csv and the pictures; returns their paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    columns = {"nodal_diameter": np.arange(len(found.families["stuck"]))}
+    for state, values in found.families.items():
+        columns |= {f"{state}_{i + 1}_Hz": values[:, i] for i in range(values.shape[1])}
+    table = folder / "nodal_diameters.csv"
+    write_columns(columns, table)
+    pictures = [path for name, figure in found.figures().items() for path in save(figure, folder / name, formats)]
+    return [table, *pictures]

@@ -1,0 +1,392 @@
+"""Patterns of blades that differ, drawn at random: the amplification of each, with contact on every blade.
+
+Each pattern is a run of the studies' engine: rows are on disk as they come, and a killed study resumes. The wheel is
+meshed and reduced once in every process.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+import tomllib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tribodyn.fem.constraints import named
+from tribodyn.fem.part import Part
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.continuation import highest_peak
+from tribodyn.hbm.continuation.branch import amplitude
+from tribodyn.hbm.continuation.methods import adaptive, arc_length
+from tribodyn.hbm.continuation.operating_point import OperatingPoint
+from tribodyn.hbm.linear.travelling_wave import at_sector
+from tribodyn.hbm.mistuning import MistunedWheel, spread
+from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.outcome import BranchEnd
+from tribodyn.hbm.threads import limited
+from tribodyn.reduction import mistuning as reduction
+from tribodyn.reduction.cyclic import ReducedSector
+from tribodyn.version import __version__
+from tribodyn.workflows.pictures.plots import axes_of
+from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, RED
+from tribodyn.workflows.result.columns import write_columns
+from tribodyn.workflows.run import settings
+from tribodyn.workflows.run.checkpoint import alone_in
+from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.settings import OUTPUT
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.content import digests
+from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
+from tribodyn.workflows.scene.wheel import Mistuning
+from tribodyn.workflows.scene.words import unknown_key
+from tribodyn.workflows.studies.many import pool
+from tribodyn.workflows.studies.many.journal import Journal
+from tribodyn.workflows.studies.many.task import Row, Status
+from tribodyn.workflows.studies.wheels import wheel as wheels
+
+FURTHEST = 3.0  # standard deviations at which what is drawn is cut off
+SHORTEST, LONGEST = 2e-3, 0.15  # steps of a scan, of its range: beyond a jump it continues
+SCANNED_TO = 1e-4  # residual of the points of a scan
+FOUND_TO = 1e-6  # residual of a peak
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """How the blades of one wheel differ, each (N,): relative stiffness and friction, and gap added [m]."""
+
+    number: int
+    stiffness: np.ndarray
+    friction: np.ndarray
+    gap: np.ndarray
+
+
+def drawn(asked: Mistuning, n_sectors: int, number: int) -> Pattern:
+    """One of the patterns of a scene; it depends on the seed and its number alone."""
+    normal = np.random.default_rng([asked.seed, number]).normal(size=(3, n_sectors))
+    frequency, friction, gap = np.clip(normal, -FURTHEST, FURTHEST)
+    stiffness = (1 + asked.frequency * frequency) ** 2 - 1
+    return Pattern(number, stiffness, asked.friction * friction, asked.gap * gap)
+
+
+def whitehead(n_sectors: int) -> float:
+    """Largest amplification of a linear wheel, (1 + sqrt(N)) / 2; Whitehead 1966."""
+    return 0.5 * (1 + float(np.sqrt(n_sectors)))
+
+
+@dataclass(frozen=True)
+class Blades:
+    """The wheel of a scene, ready for any pattern.
+
+    part : the sector; reduced : its reduction, with the shapes in which sectors may deviate among its outputs
+    wheel : sectors alike, ready to deviate in these
+    """
+
+    file: SceneFile
+    part: Part
+    reduced: ReducedSector
+    wheel: MistunedWheel
+
+    @classmethod
+    def of(cls, file: SceneFile) -> Blades:
+        """Mesh and reduce; raises SceneError for a scene without [wheel] or [mistuning]."""
+        asked = asked_of(file)
+        wheel = wheels.build(file)
+        K = deviating(wheel, asked.body)
+        loads = sorted({name for _, name in wheel.wave().excitation.loads})
+        shapes = reduction.nominal_shapes(wheel.reduced, wheel.springs, K, asked.families, loads, asked.left_out)
+        reduced = reduction.with_ports(wheel.reduced, K, shapes)
+        wave = replace(wheel, reduced=reduced).wave()
+        if asked.friction and not any("friction" in joint.parameters.numbers for joint in wave.contact.joints):
+            raise SceneError("mistuning.friction: no contact of this scene has friction: leave it out")
+        ports = tuple(reduction.port_name(k) for k in range(shapes.shape[1]))
+        return cls(file, wheel.part, reduced, MistunedWheel(wave, ports))
+
+    @cached_property
+    def alike(self) -> OperatingPoint:
+        """The peak of the wheel of sectors alike; raises SolveFailed."""
+        return _converged(settings.peak_of(self.file.scene).first(self.wheel.wave), "sectors alike")
+
+    @cached_property
+    def _scanned(self) -> NewtonOptions:
+        return replace(settings.newton_options(self.file.scene), tolerance=SCANNED_TO)
+
+    @cached_property
+    def beginning(self) -> np.ndarray:
+        """(n_pair, n_component, n_coeff) of sectors alike at the lowest frequency, from which every pattern begins."""
+        low, _ = settings.response_range(self.file.scene)
+        one, info = self.wheel.wave, self.wheel.wave.model.info
+        assert info.engine_order is not None
+        x = arc_length.solve_along_load(one, low, self._scanned).state.x
+        n = self.wheel.n_sectors
+        return np.concatenate([at_sector(one.basis, x, info.engine_order, n, k) for k in range(n)])
+
+    def balance(self, pattern: Pattern) -> HarmonicBalance:
+        """The whole wheel of a pattern."""
+
+        def change(own: ContactParameters, sector: np.ndarray) -> ContactParameters:
+            made = replace(own, gap=own.gap + spread(pattern.gap, sector))
+            if not pattern.friction.any() or "friction" not in own.numbers:
+                return made
+            factor = 1 + spread(pattern.friction, sector)
+            return replace(made, numbers={**own.numbers, "friction": factor * own.numbers["friction"]})
+
+        return self.wheel.balance(pattern.stiffness, change)
+
+    def peak(self, pattern: Pattern) -> tuple[OperatingPoint, int]:
+        """The highest peak of any blade, and which blade; solves of the whole search are counted.
+
+        Raises  SolveFailed where the response is not followed to its end, rises there, or its peak is not found
+        """
+        scene = self.file.scene
+        balance, names = self.balance(pattern), [f"{OUTPUT}@{n}" for n in range(self.wheel.n_sectors)]
+        low, high = settings.response_range(scene)
+        scan = adaptive.Options(
+            tolerance=asked_of(self.file).tolerance,
+            step=0.02,
+            max_step=LONGEST,
+            min_step=SHORTEST,
+            newton=self._scanned,
+            guess=self.beginning,
+        )
+        branch = adaptive.follow(balance, low, high, scan)
+        if branch.ended is not BranchEnd.REACHED:
+            raise SolveFailed(f"the frequency response {branch.end}")
+        heights = amplitude(branch.response[:, [branch.output_names.index(name) for name in names]])
+        if heights.argmax() // len(names) in (0, len(heights) - 1):
+            raise SolveFailed("the response still rises at an end of response.frequency: extend it")
+        exact = replace(settings.newton_options(scene), tolerance=max(FOUND_TO, scene.solver.tolerance))
+        site = replace(settings.peak_of(scene), newton=exact)
+        best, blade = highest_peak.highest(balance, branch, names, site)
+        if best is None or best.amplitude < (1 - asked_of(self.file).tolerance) * heights.max():
+            raise SolveFailed(f"the highest peak, near {_hertz(branch.omega[heights.argmax() // len(names)])}, is lost")
+        return best, blade
+
+
+def asked_of(file: SceneFile) -> Mistuning:
+    """The table [mistuning]; raises SceneError for a scene without it."""
+    if file.mesh_scene.mistuning is None:
+        raise SceneError(f"{file.name} has no [mistuning]: say how far its blades differ, such as frequency = '1 %'")
+    return file.mesh_scene.mistuning
+
+
+def deviating(wheel: wheels.Wheel, body: str | None) -> np.ndarray:
+    """The stiffness (n, n) of the reduced sector that deviates: all of it, or that of one body."""
+    reduced: ReducedSector = wheel.reduced
+    if body is None:
+        return np.asarray(reduced.sector.system.stiffness)
+    bodies = [one.name for one in getattr(wheel.part.mesh, "bodies", ()) if one.name]
+    if body not in bodies:
+        raise SceneError(unknown_key(f"mistuning.body: {body}", bodies))
+    if wheel.part.follow is not None:
+        raise SceneError("mistuning.body: bodies that are glued or tied have no stiffness of their own: leave it out")
+    nodes = np.zeros(len(wheel.part.points), bool)
+    nodes[named(wheel.part.node_sets, body)] = True
+    own = np.flatnonzero(np.repeat(nodes, 3)[wheel.part.free])
+    basis = reduced.basis[own]
+    return np.asarray(basis.T @ (wheel.full.system.stiffness[own][:, own] @ basis))
+
+
+def _converged(point: OperatingPoint, what: str) -> OperatingPoint:
+    if not point.solution.converged:
+        raise SolveFailed(f"the peak of {what}: {point.solution.outcome}")
+    return point
+
+
+def _hertz(omega: float) -> str:
+    return f"{omega / (2 * np.pi):.5g} Hz"
+
+
+@dataclass(frozen=True)
+class PatternTask:
+    """One pattern of a scene, for any process; key : hash of all that its row depends on."""
+
+    number: int
+    name: str
+    text: str
+    overrides: tuple[str, ...]
+    folder: Path
+    key: str
+
+    @property
+    def wheel(self) -> tuple[object, ...]:
+        """What the wheel is made of."""
+        return self.text, self.overrides, self.folder
+
+
+_ready: tuple[tuple[object, ...], Blades] | None = None  # of the process
+
+
+def solve(task: PatternTask) -> Row:
+    """The row of one pattern; whatever goes wrong in it becomes its row."""
+    global _ready
+    start = time.process_time()
+    with limited(1):
+        try:
+            if _ready is None or _ready[0] != task.wheel:
+                file = scene_file.parse(task.text, f"{task.name}.toml", task.overrides, task.folder)
+                _ready = task.wheel, Blades.of(file)
+            blades = _ready[1]
+            alike, _ = blades.alike, blades.beginning  # of all patterns
+            start = time.process_time()
+            pattern = drawn(asked_of(blades.file), blades.wheel.n_sectors, task.number)
+            found, blade = blades.peak(pattern)
+        except (ValueError, RuntimeError, np.linalg.LinAlgError, MemoryError) as error:
+            status: Status = "refused" if isinstance(error, SceneError) else "failed"
+            return Row(task.number, task.key, status, " ".join(str(error).split()), {}, time.process_time() - start)
+    numbers = {
+        "amplification": found.amplitude / alike.amplitude,
+        "peak_m": found.amplitude,
+        "peak_hz": found.state.omega / (2 * np.pi),
+        "blade": float(blade),
+        "peak_alike_m": alike.amplitude,
+        "solves": float(found.solves),
+    }
+    return Row(task.number, task.key, "complete", "complete", numbers, time.process_time() - start)
+
+
+@dataclass(frozen=True)
+class Patterns:
+    """What the patterns of a scene came to.
+
+    rows : by number, of all that were asked for; n_sectors : of the wheel
+    """
+
+    name: str
+    n_sectors: int
+    rows: tuple[Row, ...]
+
+    @cached_property
+    def complete(self) -> tuple[Row, ...]:
+        """Rows of the patterns that were solved."""
+        return tuple(row for row in self.rows if row.status == "complete")
+
+    def column(self, name: str) -> np.ndarray:
+        """A number of all complete rows."""
+        return np.array([row.numbers[name] for row in self.complete])
+
+    def record(self) -> dict[str, object]:
+        """For machines."""
+        found = self.column("amplification")
+        if not len(found):
+            return {"patterns": len(self.rows), "complete": 0}
+        p50, p95, p99 = np.percentile(found, (50, 95, 99))
+        worst = self.complete[int(found.argmax())]
+        return {
+            "patterns": len(self.rows),
+            "complete": len(found),
+            "p50": float(p50),
+            "p95": float(p95),
+            "p99": float(p99),
+            "largest": float(found.max()),
+            "largest_pattern": worst.run,
+            "largest_blade": int(worst.numbers["blade"]),
+            "whitehead": whitehead(self.n_sectors),
+            "peak_alike_m": worst.numbers["peak_alike_m"],
+            "seconds": float(sum(row.seconds for row in self.rows)),
+        }
+
+    def lines(self) -> list[str]:
+        """For people."""
+        said = self.record()
+        lines = [f"{said['complete']} of {said['patterns']} patterns of {self.n_sectors} blades solved"]
+        lines += [f"pattern {row.run}: {row.status}, {row.sentence}" for row in self.rows if row.status != "complete"]
+        if "p50" in said:
+            lines += [
+                "largest amplitude of any blade over that of blades alike:",
+                f"  half of the wheels below {said['p50']:.4f}, 95 % below {said['p95']:.4f}, "
+                f"99 % below {said['p99']:.4f}",
+                f"  largest {said['largest']:.4f}, pattern {said['largest_pattern']}, blade {said['largest_blade']}; "
+                f"no linear wheel passes {said['whitehead']:.4f} (Whitehead 1966)",
+                f"{said['seconds']:.4g} s of processor",
+            ]
+        return lines
+
+
+def tasks_of(file: SceneFile, count: int) -> list[PatternTask]:
+    """The patterns 1 to `count` of a scene."""
+    values = [tomllib.loads(file.text), *(one.partition("=")[2].strip(" \"'") for one in file.overrides)]
+    content = repr((__version__, file.text, _but_count(file.overrides), digests(values, file.folder)))
+    return [
+        PatternTask(n, file.name, file.text, file.overrides, file.folder, _key(content, n)) for n in range(1, count + 1)
+    ]
+
+
+def run(
+    file: SceneFile,
+    folder: Path,
+    progress: Progress,
+    workers: int | None = None,
+    resume: bool = False,
+) -> Patterns:
+    """Solve the patterns of a scene and leave their table in a folder.
+
+    workers : processes, as many as there are cores by default; resume : take the rows that the folder holds
+    Raises  SceneError
+    """
+    asked, wheel = asked_of(file), file.mesh_scene.wheel
+    if wheel is None:
+        raise SceneError(f"{file.name} has no [wheel]: this study is for a sector of one")
+    if workers is not None and workers < 1:
+        raise ValueError(f"workers {workers}: give at least 1")
+    folder.mkdir(parents=True, exist_ok=True)
+    with alone_in(folder):
+        tasks = tasks_of(file, asked.patterns)
+        journal = Journal(folder)
+        earlier = {key: row for key, row in journal.rows().items() if row.status == "complete"} if resume else {}
+        rows = {task.number: earlier[task.key] for task in tasks if task.key in earlier}
+        journal.begin(earlier.values(), resume)
+        left = [task for task in tasks if task.number not in rows]
+        if resume:
+            progress.say(f"{len(rows)} of {len(tasks)} patterns are done already")
+        count = workers or pool.cores()
+        with progress.track(f"{len(left)} patterns") as advance:
+            for done, row in enumerate(_finished(left, count), 1):
+                journal.add(row)
+                rows[row.run] = row
+                advance(done / len(left), f"{done} of {len(left)}")
+    found = Patterns(file.name, wheel.sectors, tuple(rows[task.number] for task in tasks))
+    names = ("amplification", "peak_m", "peak_hz", "blade", "solves")
+    columns = {name: [row.numbers.get(name, np.nan) for row in found.rows] for name in names}
+    every = {"pattern": [row.run for row in found.rows], "status": [row.status for row in found.rows], **columns}
+    write_columns({**every, "seconds": [row.seconds for row in found.rows]}, folder / "patterns.csv")
+    return found
+
+
+def _finished(tasks: Sequence[PatternTask], workers: int) -> Iterator[Row]:
+    if workers == 1:
+        return map(solve, tasks)
+    return pool.finished(tasks, workers, solve) if tasks else iter(())
+
+
+def _key(content: str, number: int) -> str:
+    return hashlib.sha256(f"{content} {number}".encode()).hexdigest()
+
+
+def _but_count(overrides: tuple[str, ...]) -> list[str]:
+    """Overrides but the number of patterns, on which no pattern depends."""
+    return [one for one in overrides if one.partition("=")[0].strip() != "mistuning.patterns"]
+
+
+def picture(found: Patterns) -> Figure:
+    """How often which amplification was met, with its percentiles and what no linear wheel passes."""
+    values, said = found.column("amplification"), found.record()
+    with axes_of(7.6, 4.2) as (figure, axes):
+        axes.hist(values, bins="auto" if len(values) > 20 else 10, color=BLUE, alpha=0.8)
+        for name, colour in (("p50", INK), ("p95", ORANGE), ("p99", RED)):
+            axes.axvline(said[name], color=colour, lw=1.5, label=f"{name.upper()} {said[name]:.3f}")
+        bound = whitehead(found.n_sectors)
+        shown = [bound] if bound < 1.5 * values.max() else []  # further out it would squeeze the distribution
+        axes.vlines(
+            shown, 0, 1, GREY, "--", transform=axes.get_xaxis_transform(), label=f"bound {bound:.3f}, Whitehead"
+        )
+        axes.set(xlabel="largest amplitude of any blade over that of blades alike", ylabel="patterns")
+        axes.set_title(f"{found.name}: {len(values)} patterns of {found.n_sectors} blades")
+        axes.legend(fontsize=9)
+    return figure
