@@ -4,7 +4,7 @@
 
     result = td.run("beam")                 # or a path, or a dict; td.scene_names() lists those that come along
     print(result.summary()["peak_hz"])
-    result.plot_response().savefig("response.png")
+    td.plot.response(result).savefig("response.png")
 
     matrices = td.read_matrices("part.npz")         # or td.from_arrays(M, K)
     rows = matrices.contact_rows([[1, 0, -1]], ("t1",), area=1e-4)  # x = q_0 - q_2
@@ -21,6 +21,7 @@ imported when they are first used, so that this import takes no time.
 from __future__ import annotations
 
 import importlib
+import sys
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -446,6 +447,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name in ("plot", "style"):
+        return importlib.import_module(f"tribodyn.{name}")
     if name not in _HOME:
         raise AttributeError(f"module 'tribodyn' has no attribute '{name}'")
     module, *there = _HOME[name]
@@ -456,3 +459,17 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
+
+
+def _show_results_in(shell: Any) -> None:
+    """Let a shell of IPython show a Result by its numbers, its response and its part to turn."""
+    if shell is not None:
+        shell.display_formatter.formatters["text/html"].for_type_by_name(
+            "tribodyn.workflows.result.result",
+            "Result",
+            lambda result: importlib.import_module("tribodyn.workflows.report.notebook").shown(result),
+        )
+
+
+if "IPython" in sys.modules:
+    _show_results_in(sys.modules["IPython"].get_ipython())

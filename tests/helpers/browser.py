@@ -89,7 +89,7 @@ def clicked_zoomed_and_turned(
     from selenium.webdriver.support.select import Select
 
     monkeypatch.setattr(page, "_renders", lambda found: {})
-    monkeypatch.setattr(plots, "figures", lambda found: {"frf": plots.frequency_response})
+    monkeypatch.setattr(plots, "figures", lambda found: {"frf": plots.response})
     path = page.write([(name, result, None)], folder / f"{name}.html")
     assert path.stat().st_size < page.LARGEST
     opened(driver, path)

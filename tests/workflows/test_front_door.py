@@ -118,7 +118,7 @@ def test_resume_and_pictures_need_a_folder() -> None:
 
 
 def test_fields_on_the_mesh_are_those_of_the_result(worn: td.Result) -> None:
-    grid, patch = worn.mesh_fields(), worn.patch_fields()
+    grid, patch = td.plot.mesh_fields(worn), td.plot.patch_fields(worn)
     assert worn.part is not None
     assert worn.patch is not None
     assert worn.fields is not None
@@ -133,22 +133,22 @@ def test_fields_on_the_mesh_are_those_of_the_result(worn: td.Result) -> None:
     long = np.linalg.svd(np.stack([a, b], axis=-1), compute_uv=False)[:, 0]
     assert np.allclose(grid["amplitude"], long, rtol=5e-3)
     with pytest.raises(ValueError, match="no field at wear row 77"):
-        worn.mesh_fields(77)
+        td.plot.mesh_fields(worn, 77)
 
 
 def test_every_plot_is_a_figure(worn: td.Result, tmp_path: Path) -> None:
     courses = ("depth", "peak", "preload", "energy", "cycles_per_step")
-    figures = [worn.plot_response(), worn.plot_hysteresis(), worn.plot_patch(), worn.plot_patch([0])]
-    figures += [worn.plot_motion(), worn.plot_motion([0])]
-    figures += [worn.plot_wear(what) for what in courses]  # type: ignore[arg-type]
+    figures = [td.plot.response(worn), td.plot.hysteresis(worn), td.plot.patch(worn), td.plot.patch(worn, [0])]
+    figures += [td.plot.motion(worn), td.plot.motion(worn, [0])]
+    figures += [td.plot.wear(worn, what) for what in courses]
     assert all(figure.axes for figure in figures)
     with pytest.raises(ValueError, match='no wear plot "life"'):
-        worn.plot_wear("life")  # type: ignore[arg-type]
+        td.plot.wear(worn, "life")
     unworn = td.run("beam", overrides={**SMALL, "wear.max_steps": 0})
-    assert unworn.plot_hysteresis().axes
-    for draw in (unworn.plot_wear, unworn.plot_patch, unworn.plot_motion):
+    assert td.plot.hysteresis(unworn).axes
+    for draw in (td.plot.wear, td.plot.status, td.plot.motion):
         with pytest.raises(ValueError, match="the result holds no"):
-            draw()
+            draw(unworn)
 
 
 def test_a_list_among_changes_stays_on_one_line_of_the_result() -> None:

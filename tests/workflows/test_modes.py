@@ -11,7 +11,7 @@ import pytest
 
 from tests.helpers.command import leave
 from tribodyn.reduction.linear import linear_modes
-from tribodyn.workflows.pictures import backbone_maps
+from tribodyn.workflows.pictures.maps import backbone_motion
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import read
@@ -80,7 +80,7 @@ def test_maps_along_the_backbone_hold_its_friction_work_and_its_motion() -> None
     model, found = modes.follow_with_model(read("beam", SMALL), modes.Way(1e-7, 2e-4, points=6), Progress())
     balance, slides = model.balance, []
     for at in range(len(found.omega)):
-        slide, gap, work = backbone_maps.fields(balance, found, at)
+        slide, gap, work = backbone_motion(balance, found, at)
         assert work @ balance.model.interface.area == pytest.approx(found.energy[at], rel=1e-12)
         x = found.contact[at].reshape(len(gap), 3, -1)
         phase = np.linspace(0, 2 * np.pi, 721)

@@ -14,9 +14,10 @@ from PIL import Image
 
 from tests.helpers.pictures import assert_not_blank
 from tests.helpers.synthetic_result import result
-from tribodyn.workflows.pictures import animation, plots, render, view
+from tribodyn.workflows.pictures import film, offscreen, plots, render, view
 from tribodyn.workflows.pictures.film_of_cycle import CycleFilm
 from tribodyn.workflows.pictures.film_of_wear import WearFilm
+from tribodyn.workflows.pictures.style import SIZES
 
 COARSE = 60  # dots per inch: what is drawn is the same, in a tenth of the time
 
@@ -43,9 +44,9 @@ def test_renders(tmp_path: Path) -> None:
 
 
 def test_missing_libraries_are_said_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(render, "PROBE", "import os; os.abort()")
-    with pytest.raises(render.RenderingUnavailable, match=r"install the system libraries .*libegl1"):
-        render.check()
+    monkeypatch.setattr(offscreen, "PROBE", "import os; os.abort()")
+    with pytest.raises(offscreen.RenderingUnavailable, match=r"install the system libraries .*libegl1"):
+        offscreen.check()
 
 
 def test_shares_of_the_patch_have_the_area_of_its_faces() -> None:
@@ -81,11 +82,11 @@ def test_factors_are_round(value: float, nice: float) -> None:
 
 @pytest.mark.parametrize("over", ["wear", "cycle"])
 def test_a_film_is_written_whole(over: Literal["wear", "cycle"], tmp_path: Path) -> None:
-    paths = {path.suffix: path for path in result().animate(over, tmp_path, formats=("mp4", "gif"), images=3)}
+    paths = {path.suffix: path for path in film.film(result(), tmp_path, over, formats=("mp4", "gif"), images=3)}
     assert {path.stem for path in paths.values()} == {"wear" if over == "wear" else "cycle_8"}
     counted, seconds = imageio_ffmpeg.count_frames_and_secs(str(paths[".mp4"]))
     assert counted == 3
-    assert seconds == pytest.approx(3 / animation.RATE, rel=0.01)
+    assert seconds == pytest.approx(3 / SIZES.rate, rel=0.01)
     with Image.open(paths[".gif"]) as gif:
         assert gif.n_frames == 3
         pages = []
@@ -94,8 +95,8 @@ def test_a_film_is_written_whole(over: Literal["wear", "cycle"], tmp_path: Path)
             pages.append(np.asarray(gif.convert("RGB"), int))
     reader = imageio_ffmpeg.read_frames(str(paths[".mp4"]))
     width, height = next(reader)["size"]
-    film = [np.frombuffer(image, np.uint8).reshape(height, width, 3).astype(int) for image in reader]
-    for page, image in zip(pages, film, strict=True):  # both show the same
+    shown = [np.frombuffer(image, np.uint8).reshape(height, width, 3).astype(int) for image in reader]
+    for page, image in zip(pages, shown, strict=True):  # both show the same
         assert page.shape == image.shape
         assert np.abs(page - image).mean() < 4
     assert np.abs(pages[2] - pages[0]).mean() > 0.05  # and something moves
@@ -106,13 +107,13 @@ def test_colours_and_camera_of_a_film_are_those_of_its_largest_values() -> None:
     given = result()
     assert given.wear is not None
     made = WearFilm(given, 2)
-    images = list(animation.drawn(made))
+    images = list(film.drawn(made))
     assert len({image.shape for image in images}) == 1
     bars = [axes for axes in made.figure.findobj(Axes) if "wear depth" in axes.get_xlabel()]
     assert bars[0].get_xlim() == (0.0, pytest.approx(1e3 * given.wear.depth.max()))
     # the view of the unworn contact in the first image is what is drawn for it alone with the same camera
     again = WearFilm(given, 3)
-    assert np.abs(images[0].astype(int) - next(iter(animation.drawn(again))).astype(int)).mean() < 0.01
+    assert np.abs(images[0].astype(int) - next(iter(film.drawn(again))).astype(int)).mean() < 0.01
 
 
 def test_a_cycle_is_drawn_at_its_instants() -> None:

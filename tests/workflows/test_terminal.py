@@ -6,11 +6,14 @@ import io
 import re
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numba
 import pytest
+from IPython.core.formatters import DisplayFormatter
 from rich.console import Console
 
+import tribodyn
 from tests.helpers.synthetic_result import result
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.command.found import commands
@@ -70,7 +73,9 @@ def test_compiling_does_not_count_for_the_time_left(monkeypatch: pytest.MonkeyPa
 
 
 def test_a_notebook_shows_numbers_response_and_part() -> None:
-    html = result()._repr_html_()
+    shell = SimpleNamespace(display_formatter=DisplayFormatter())
+    tribodyn._show_results_in(shell)
+    html = shell.display_formatter.format(result())[0]["text/html"]
     assert "preload" in html
     assert 'src="data:image/png;base64,' in html
     assert "<iframe" in html

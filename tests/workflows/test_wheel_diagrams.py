@@ -12,7 +12,7 @@ from tests.helpers.pictures import assert_not_blank
 from tests.helpers.synthetic_result import result
 from tests.proof.cases.blade.few_sectors import FEW_SECTORS
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.pictures import wheel_diagrams
+from tribodyn.workflows.pictures import maps, plots, wheel_diagrams
 from tribodyn.workflows.studies.many import life_picture
 from tribodyn.workflows.studies.many.table import StudyTable
 
@@ -107,8 +107,8 @@ def test_lives_are_drawn_on_weibull_paper_and_not_fitted_where_some_are_missing(
 def test_status_over_wear_and_loops_of_chosen_pairs() -> None:
     given = result()
     assert given.wear is not None
-    figure = given.plot_status(5)
+    figure = maps.status_maps(given, 5)
     assert len([axes for axes in figure.axes if axes.collections]) == 5
-    assert len(given.plot_hysteresis([0, 2]).axes) == 6
+    assert len(plots.hysteresis(given, [0, 2]).axes) == 6
     with pytest.raises(ValueError, match="this contact has pairs 0 to"):
-        given.plot_hysteresis([1000])
+        plots.hysteresis(given, [1000])

@@ -296,9 +296,9 @@ def plan(scene: str, *, overrides: Overrides = ()) -> None:
 
 
 def _print_summary(result: Result) -> None:
-    from tribodyn.workflows.result import summary
+    from tribodyn.workflows.report import text
 
-    print_lines(summary.lines(result))
+    print_lines(text.lines(result))
 
 
 def _draw(

@@ -52,7 +52,7 @@ def backbone(
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.pictures import backbone_maps
+    from tribodyn.workflows.pictures.maps import backbone_maps
     from tribodyn.workflows.run.progress import Progress, console_progress
     from tribodyn.workflows.studies.curves import backbones as modes
     from tribodyn.workflows.studies.curves import changed_backbones
@@ -66,7 +66,7 @@ def backbone(
     modes.write(found, written[0])
     modes.picture(found, file.name, published).savefig(written[1])
     printed = None if published is None else modes.beside(found, published)
-    maps = backbone_maps.picture(model.balance, found, file.name)
+    maps = backbone_maps(model.balance, found, file.name)
     if maps is not None:
         written.append(folder / "backbone_maps.png")
         maps.savefig(written[-1])

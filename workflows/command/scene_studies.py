@@ -159,7 +159,7 @@ def mistuning(
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.pictures.render import RenderingUnavailable
+    from tribodyn.workflows.pictures.offscreen import RenderingUnavailable
     from tribodyn.workflows.run.progress import Progress, console_progress
     from tribodyn.workflows.scene import scene_file
     from tribodyn.workflows.studies.wheels import mistuned_motion, mistuned_wear, patterns

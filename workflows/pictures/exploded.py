@@ -8,12 +8,11 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from tribodyn.workflows.pictures import triad
 from tribodyn.workflows.pictures import view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, scale_bar
 from tribodyn.workflows.pictures.opened import Field
-from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot, trimmed
-from tribodyn.workflows.pictures.style import BODIES, PRESSURE_MAP, STYLE, WEAR_MAP
+from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot, show, trimmed, with_room
+from tribodyn.workflows.pictures.style import BODIES, PRESSURE_MAP, SIZES, STYLE, WEAR_MAP
 from tribodyn.workflows.result.faces import bodies, meetings_of
 from tribodyn.workflows.result.result import PartMesh, Result
 from tribodyn.workflows.result.states import shown_states
@@ -21,10 +20,8 @@ from tribodyn.workflows.result.states import shown_states
 GAP = 0.8  # between two bodies, of the size of the faces that touch
 ONE_WAY = 0.3  # of the area of touching faces: a smaller sum of their normals is a bore, which says no direction
 TOUCH = 1e-3  # of the size of the smaller body: faces nearer than this touch
-SIZE = (1100, 760)  # pixels
 FLAT = 2.2  # width over height from which on two views stand one above the other
 RISE = 0.65  # slope that the bodies are looked at with, from above and from below
-LIFT = 4e-3  # of the size of a contact, by which its colours lie above the body
 
 
 def apart(result: Result) -> np.ndarray:
@@ -118,7 +115,7 @@ def exploded_picture(result: Result) -> Figure:
         shell.points += offset[np.flatnonzero(body == b)[0]]
         layers.append(Layer(shell, color=BODIES[b % len(BODIES)]))
     for one in meetings_of(result):
-        lift = LIFT * float(np.sqrt(one.patch.area.sum()))
+        lift = SIZES.lift * float(np.sqrt(one.patch.area.sum()))
         for face in one.faces:
             there = face.points + lift * face.outward + offset[face.nodes[0]]
             layers += Field(values[one.pairs], limits, map_)(one.patch, there)
@@ -129,9 +126,9 @@ def exploded_picture(result: Result) -> Figure:
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         shots, cameras = [], []
         for side in (level + RISE * axis, level - RISE * axis):
-            cameras.append(frame(points, side, up, SIZE[0] / SIZE[1]))
-            shots.append(shoot(View(layers), cameras[-1], SIZE))
-        images, corner = triad.with_room(trimmed(shots))
+            cameras.append(frame(points, side, up, SIZES.apart[0] / SIZES.apart[1]))
+            shots.append(shoot(View(layers), cameras[-1], SIZES.apart))
+        images, corner = with_room(trimmed(shots))
         long = images[0].shape[1] > FLAT * images[0].shape[0]
         wide = 7.0 if long else 5.0
         tall = wide * images[0].shape[0] / images[0].shape[1]
@@ -139,9 +136,7 @@ def exploded_picture(result: Result) -> Figure:
         figure = Figure(figsize=size, layout="constrained")
         grid = figure.subplots(*(2, 1) if long else (1, 2))
         for axes, image, camera in zip(grid, images, cameras, strict=True):
-            axes.imshow(image)
-            axes.axis("off")
-            triad.draw(axes, camera, "xyz", corner, triad.room(image))
+            show(axes, image, camera, "xyz", corner)
         label = f"{'total wear depth' if worn else 'mean pressure'} / {unit}, {state.label}"
         scale_bar(figure, list(grid), map_, *limits, label)
         heading(figure, result, "bodies apart, from two sides")

@@ -15,7 +15,7 @@ from matplotlib.patches import Patch as Swatch
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from tribodyn.hbm.contact.law import SEPARATES
-from tribodyn.workflows.pictures.style import DPI, FORMATS, STATUS, STYLE
+from tribodyn.workflows.pictures.style import FORMATS, SIZES, STATUS, STYLE
 from tribodyn.workflows.result.result import Result
 
 
@@ -61,7 +61,7 @@ def save(figure: Figure, stem: Path, formats: Sequence[str] = ("png",), dpi: int
             if name not in FORMATS:
                 raise ValueError(f'no picture format "{name}": take one of {", ".join(FORMATS)}')
             path = stem.with_name(f"{stem.name}.{name}")
-            figure.savefig(path, dpi=dpi or DPI)
+            figure.savefig(path, dpi=dpi or SIZES.dpi)
             written.append(path)
     return written
 
@@ -97,6 +97,12 @@ def force_unit(largest: float) -> tuple[str, float]:
     if largest >= 1e3:
         return "kN", 1e-3
     return ("mN", 1e3) if 0 < largest < 1 else ("N", 1.0)
+
+
+def area_energy_unit(largest: float) -> tuple[str, float]:
+    """Unit and factor in which energies per area [J/m2] of this size read well."""
+    units = [("J/m²", 1.0), ("mJ/m²", 1e3), ("µJ/m²", 1e6), ("nJ/m²", 1e9)]
+    return next((one for one in units if one[1] * largest >= 0.5), units[-1] if largest > 0 else units[0])
 
 
 def scale_bar(figure: Figure, axes: Any, map_: str, low: float, high: float, label: str) -> None:

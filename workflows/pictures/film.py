@@ -1,31 +1,100 @@
-"""Films from images: MP4 by the encoder that comes with imageio-ffmpeg, GIF by Pillow."""
+"""Films of a result: its contact over wear, and its part and contact over one cycle of a state.
+
+Camera, factors of exaggeration and colour scales are the same in all images of a film. MP4 is written by the encoder
+that comes with imageio-ffmpeg, GIF by Pillow.
+"""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
+from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, Protocol
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from PIL import Image
 
+from tribodyn.workflows.pictures.film_of_cycle import CycleFilm
+from tribodyn.workflows.pictures.film_of_wear import WearFilm
+from tribodyn.workflows.pictures.offscreen import check
+from tribodyn.workflows.pictures.style import SIZES, STYLE
+from tribodyn.workflows.result.result import Result
+
 FORMATS = ("mp4", "gif")
-COLOURS = 256  # of an image of a GIF, the most that it can have: small patches of status keep their colours
 
 
-def write(images: Iterable[np.ndarray], stem: Path, formats: Sequence[str], rate: float) -> list[Path]:
+class Filmed(Protocol):
+    """A figure that shows one image of a film after the other."""
+
+    figure: Figure
+
+    @property
+    def count(self) -> int: ...
+    def show(self, number: int) -> None: ...
+
+
+def film(
+    result: Result,
+    folder: str | PathLike[str],
+    over: Literal["wear", "cycle"],
+    row: int | None = None,
+    formats: Sequence[str] = ("mp4",),
+    images: int = SIZES.images,
+    dpi: int = SIZES.film_dpi,
+    deformation: float | None = None,
+    wear: float | None = None,
+) -> list[Path]:
+    """Write a film of a result into a folder, named wear or cycle_ROW; returns its paths.
+
+    over : "wear" shows depth, status and pressure of the opened contact at the wear steps; "cycle" shows part and
+        status by pair over one cycle of a state
+    row : of the wear history, or point of the response, whose cycle is shown; that whose contact works most by default
+    dpi : dots per inch; a film is 12.8 by 7.2 inches
+    deformation, wear : factors by which displacement and depth are exaggerated, chosen by size where None
+    Raises  ValueError: the result has nothing of the kind to show; RenderingUnavailable
+    """
+    if images < 2:
+        raise ValueError(f"a film of {images} images: ask for 2 at least")
+    if not 20 <= dpi <= 400:
+        raise ValueError(f"--dpi {dpi}: give a film 20 to 400 dots per inch")
+    if over not in ("wear", "cycle"):
+        raise ValueError(f'no film over "{over}": take wear or cycle')
+    check()
+    made = WearFilm(result, images, wear) if over == "wear" else CycleFilm(result, row, images, deformation, wear)
+    place = Path(folder)
+    place.mkdir(parents=True, exist_ok=True)
+    return encode(drawn(made, dpi), place / made.name, formats)
+
+
+def drawn(made: Filmed, dpi: int = SIZES.film_dpi) -> Iterator[np.ndarray]:
+    """The images (height, width, 3) of a film, all with the layout of the first."""
+    with mpl.rc_context(STYLE):
+        canvas = FigureCanvasAgg(made.figure)
+        made.figure.set_dpi(dpi)
+        for number in range(made.count):
+            made.show(number)
+            canvas.draw()
+            if number == 0:
+                made.figure.set_layout_engine("none")
+            yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+def encode(images: Iterable[np.ndarray], stem: Path, formats: Sequence[str]) -> list[Path]:
     """Write a film in some formats, each image drawn once.
 
-    images : (height, width, 3), 8 bits a colour, all of one size; rate : images per second
+    images : (height, width, 3), 8 bits a colour, all of one size
     Returns the paths. Raises ValueError: a format that is not known, or no encoder for MP4
     """
     for name in formats:
         if name not in FORMATS:
             raise ValueError(f'no film format "{name}": take {" or ".join(FORMATS)}')
     paths = {name: stem.with_name(f"{stem.name}.{name}") for name in dict.fromkeys(formats)}
-    kept = []
+    kept, rate = [], SIZES.rate
     flow = _even(images)
     first = next(flow)
     with ExitStack() as stack:
@@ -36,7 +105,7 @@ def write(images: Iterable[np.ndarray], stem: Path, formats: Sequence[str], rate
             if "gif" in paths:
                 kept.append(Image.fromarray(image))
     if kept:
-        pages = [image.quantize(COLOURS, dither=Image.Dither.NONE) for image in kept]
+        pages = [image.quantize(dither=Image.Dither.NONE) for image in kept]
         # hundredths of a second are the unit of the format
         pages[0].save(
             paths["gif"], save_all=True, append_images=pages[1:], duration=10 * max(round(100 / rate), 2), loop=0

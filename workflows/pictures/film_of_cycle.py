@@ -12,17 +12,14 @@ from matplotlib.patches import Patch as Swatch
 
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
 from tribodyn.workflows.pictures import opened as book
-from tribodyn.workflows.pictures import triad
 from tribodyn.workflows.pictures.figures import force_unit, heading, length_unit, scale_bar, status_name
 from tribodyn.workflows.pictures.plots import has_friction, loop_size, pair_name
-from tribodyn.workflows.pictures.render import Moving, show
-from tribodyn.workflows.pictures.shots import shoot
-from tribodyn.workflows.pictures.style import BLUE, INK, MOTION_MAP, RED, STATUS, STYLE
+from tribodyn.workflows.pictures.render import Moving
+from tribodyn.workflows.pictures.shots import shoot, show, with_room
+from tribodyn.workflows.pictures.style import BLUE, INK, MOTION_MAP, RED, SIZES, STATUS, STYLE
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import instant_status, over_a_cycle, shown_states
 
-INCHES = (12.8, 7.2)
-VIEW = (760, 560)  # pixels
 AT_ONCE = (STICKS, SLIPS, SEPARATES)  # what a pair can do at an instant
 
 
@@ -62,7 +59,7 @@ class CycleFilm:
             self._top = float(self._moving.amplitude(self.state).max())
         self._wear = self._moving.wear if self._moving is not None else wear or 1.0
         with mpl.rc_context(STYLE):
-            self.figure = Figure(figsize=INCHES, layout="constrained")
+            self.figure = Figure(figsize=SIZES.film, layout="constrained")
             self._draw(result)
 
     @property
@@ -75,7 +72,7 @@ class CycleFilm:
         sample = number * self._status.shape[1] // self.count
         for axes, image in zip(self._panels, self._shots(number, sample), strict=True):
             padded = np.full(axes.images[0].get_array().shape, 255, np.uint8)
-            padded[: VIEW[1]] = image
+            padded[: SIZES.film_part[1]] = image
             axes.images[0].set_data(padded)
         x, force = self._loop[:2]
         self._mark.set_data(x[sample : sample + 1], force[sample : sample + 1])
@@ -102,7 +99,7 @@ class CycleFilm:
 
     def _start(self, figure: Any, views: list[str]) -> None:
         for axes, name, image in zip(self._panels, views, self._shots(0, 0), strict=True):
-            (shown,), corner = triad.with_room([image])
+            (shown,), corner = with_room([image])
             if name == "part" and self._moving is not None:
                 show(axes, shown, self._moving.camera, "xyz", corner)
                 unit, factor = length_unit(self._top)
@@ -120,11 +117,11 @@ class CycleFilm:
             points = self._moving.points(self.state, self._factor * vibration)
             values = np.linalg.norm(vibration, axis=1)
             view = self._moving.view(points, values, (0.0, self._top))
-            found.append(self._moving.marked(shoot(view, self._moving.camera, VIEW), points))
+            found.append(self._moving.marked(shoot(view, self._moving.camera, SIZES.film_part), points))
         if self._contact is not None:
             own = self._contact.own(self.state)
             paint = book.Status(self._status[self._contact.pairs, sample])
-            found.append(shoot(self._contact.view(own.depth, self._wear, paint), self._contact.camera, VIEW))
+            found.append(shoot(self._contact.view(own.depth, self._wear, paint), self._contact.camera, SIZES.film_part))
         return found
 
     def _draw_loop(self, axes: Any, result: Result) -> None:

@@ -12,19 +12,15 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from tribodyn.workflows.pictures import opened as book
-from tribodyn.workflows.pictures import triad
 from tribodyn.workflows.pictures.figures import force_unit, heading, length_unit, pressure_unit, status_legend
 from tribodyn.workflows.pictures.plots import cycle_axis
-from tribodyn.workflows.pictures.render import show
-from tribodyn.workflows.pictures.shots import shoot
-from tribodyn.workflows.pictures.style import BLUE, ORANGE, PRESSURE_MAP, RED, STYLE, WEAR_MAP
+from tribodyn.workflows.pictures.shots import shoot, show, with_room
+from tribodyn.workflows.pictures.style import BLUE, ORANGE, PRESSURE_MAP, RED, SIZES, STYLE, WEAR_MAP
 from tribodyn.workflows.pictures.view import wear_scale
 from tribodyn.workflows.result.faces import Meeting
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import State, shown_cycles, state_of
 
-INCHES = (12.8, 7.2)
-VIEW = (640, 490)  # pixels
 ROOT = 1 / 3  # power of the scale of pressure: the first pressures are many times the last
 PANELS = ("depth", "status", "pressure")
 
@@ -50,7 +46,7 @@ class WearFilm:
         self._depth_top = float(depth.max())
         self.scale = wear or wear_scale(self.contact.patch, depth)
         with mpl.rc_context(STYLE):
-            self.figure = Figure(figsize=INCHES, layout="constrained")
+            self.figure = Figure(figsize=SIZES.film, layout="constrained")
             halves: Any = self.figure.subfigures(2, 1, height_ratios=[1.8, 1])
             upper, lower = halves
             self._panels = dict(zip(PANELS, upper.subplots(1, 3), strict=True))
@@ -76,21 +72,21 @@ class WearFilm:
         state = self.states[number]
         for name, axes in self._panels.items():
             image = np.full(axes.images[0].get_array().shape, 255, np.uint8)
-            image[: VIEW[1]] = self._shot(state, name)
+            image[: SIZES.film_contact[1]] = self._shot(state, name)
             axes.images[0].set_data(image)
         self._panels["depth"].set_title(state.label, fontsize=12)
         for mark, x, y in self._marks:
             mark.set_data(x[number : number + 1], y[number : number + 1])
 
     def _start(self) -> None:
-        images, corner = triad.with_room([self._shot(self.states[-1], name) for name in PANELS])
+        images, corner = with_room([self._shot(self.states[-1], name) for name in PANELS])
         for axes, image in zip(self._panels.values(), images, strict=True):
             show(axes, image, self.contact.camera, book.AXES, corner)
             axes.set_title(" ", fontsize=12)
 
     def _shot(self, state: State, name: str) -> np.ndarray:
         view = self.contact.view(state.depth, self.scale, self._paint(state, name))
-        return shoot(view, self.contact.camera, VIEW)
+        return shoot(view, self.contact.camera, SIZES.film_contact)
 
     def _paint(self, state: State, name: str) -> book.Paint:
         if name == "status":

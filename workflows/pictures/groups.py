@@ -8,13 +8,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tribodyn.workflows.pictures import render
+from tribodyn.workflows.pictures import offscreen
 from tribodyn.workflows.pictures.shots import SHADE
-from tribodyn.workflows.pictures.style import BODY, INK, PAPER
+from tribodyn.workflows.pictures.style import BODY, INK, PAPER, SIZES
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#f0e442", "#7f3c8d", "#8c564b", "#17becf")
-MOST = 20  # groups drawn; a colour comes twice beyond ten
-SIZE = (1700, 680)
 
 
 class Solid(Protocol):
@@ -26,23 +24,23 @@ class Solid(Protocol):
     def mesh(self) -> Any: ...
 
 
-def draw(solids: Sequence[Solid], path: Path) -> Path:
-    """Draw every face group of some bodies in a colour of its own. Raises RenderingUnavailable"""
-    render.check()
+def draw(solids: Sequence[Solid], path: Path, most: int = 20) -> Path:
+    """Draw the first face groups of some bodies, each in a colour of its own. Raises RenderingUnavailable"""
+    offscreen.check()
     import pyvista as pv
 
-    view = pv.Plotter(off_screen=True, shape=(1, 3), col_weights=[3, 3, 1.6], window_size=SIZE, border=False)
+    view = pv.Plotter(off_screen=True, shape=(1, 3), col_weights=[3, 3, 1.6], window_size=SIZES.groups, border=False)
     named = [(solid, name, ids) for solid in solids for name, ids in (solid.mesh.boundaries or {}).items()]
     for side in (0, 1):
         view.subplot(0, side)
         view.set_background(PAPER)
         for solid in solids:
             outer = np.flatnonzero(solid.mesh.f2t[1] < 0)
-            covered = np.concatenate([np.asarray(i) for s, _, i in named[:MOST] if s is solid] or [np.empty(0, int)])
+            covered = np.concatenate([np.asarray(i) for s, _, i in named[:most] if s is solid] or [np.empty(0, int)])
             rest = np.setdiff1d(outer, covered)
             if len(rest):
                 view.add_mesh(_surface(pv, solid.mesh, rest), color=BODY, show_edges=True, **SHADE)
-        for i, (solid, _, ids) in enumerate(named[:MOST]):
+        for i, (solid, _, ids) in enumerate(named[:most]):
             face = _surface(pv, solid.mesh, np.asarray(ids))
             view.add_mesh(face, color=COLOURS[i % len(COLOURS)], show_edges=True, **SHADE)
         view.view_isometric()
@@ -53,7 +51,7 @@ def draw(solids: Sequence[Solid], path: Path) -> Path:
     view.subplot(0, 2)
     view.set_background(PAPER)
     if named:
-        labels = [name if len(solids) == 1 else f"{name} of {solid.name}" for solid, name, _ in named[:MOST]]
+        labels = [name if len(solids) == 1 else f"{name} of {solid.name}" for solid, name, _ in named[:most]]
         entries = [(label, COLOURS[i % len(COLOURS)]) for i, label in enumerate(labels)]
         tall = min(0.05 * len(entries) + 0.02, 0.95)
         view.add_legend(entries, bcolor=PAPER, face="rectangle", size=(0.95, tall), loc="center left")

@@ -1,137 +1,151 @@
-"""Maps of the contact patch in its own plane: wear depth, contact status and pressure in chosen states."""
+"""Maps of contact patches in their own plane: depth, status and pressure; slide, gap and friction work of a cycle."""
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections.abc import Sequence
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, NullLocator
 from matplotlib.tri import Triangulation
 
-from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, status_legend
-from tribodyn.workflows.pictures.style import PRESSURE_MAP, STATUS, STYLE, WEAR_MAP
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation.nonlinear_modes import Backbone
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.workflows.pictures.figures import (
+    area_energy_unit,
+    length_unit,
+    named,
+    pressure_unit,
+    status_legend,
+    titled,
+)
+from tribodyn.workflows.pictures.style import MOTION_MAP, PRESSURE_MAP, SIZES, STATUS, STYLE, WEAR_MAP
 from tribodyn.workflows.result.result import Patch, Result
 from tribodyn.workflows.result.states import shown_cycles, shown_states, state_of
 
-LEAST = 5.6  # inches of width: the legend of all states fits below
+Row = tuple[str, Sequence[tuple[str, np.ndarray]]]
+"""A row of maps: colour map, and for each column the label of its scale and the values (n_pair,)."""
+
+Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Largest slide [m], largest gap [m], friction work per cycle and area [J/m2], (n_pair,) each."""
 
 
-def patch_maps(result: Result, rows: np.ndarray | None = None, scale: Literal["column", "shared"] = "column") -> Figure:
-    """Depth, status over the cycle and mean pressure, one column for each state.
+def patch_maps(result: Result, rows: Sequence[int] | np.ndarray | None = None) -> Figure:
+    """Depth, status over the cycle and mean pressure, one column for each state, each map with its own scale.
 
     rows : of the wear history, or points of a response that does not wear; those of the result by default
-    scale : whether each map has its own scale, with its range, or all maps of a row share one
+    Raises  ValueError where the patch has no faces
     """
-    patch = result.patch
-    assert patch is not None
+    patch = _with_faces(result)
     states = shown_states(result) if rows is None else [state_of(result, int(row)) for row in rows]
-    unit, factor = length_unit(max(float(state.depth.max()) for state in states))
-    fields: dict[str, tuple[str, list[np.ndarray]]] = {}
+    fields: list[Row] = []
     if any(state.depth.max() > 0 for state in states):
-        fields[f"total wear depth / {unit}"] = (WEAR_MAP, [factor * state.depth for state in states])
-    if all(state.pressure is not None for state in states):
-        pressures = [s.pressure for s in states if s.pressure is not None]
+        unit, factor = length_unit(max(float(state.depth.max()) for state in states))
+        fields.append((WEAR_MAP, [(f"total wear depth / {unit}", factor * state.depth) for state in states]))
+    if all(state.status is not None for state in states):
+        fields.append(("status", [("", np.asarray(state.status)) for state in states]))
+    pressures = [state.pressure for state in states if state.pressure is not None]
+    if len(pressures) == len(states):
         unit, factor = pressure_unit(max(float(p.max()) for p in pressures))
-        fields[f"mean pressure / {unit}"] = (PRESSURE_MAP, [factor * p for p in pressures])
-    told = all(state.status is not None for state in states)
-    lines = list(fields)[:1] + ["status"] * told + list(fields)[1:]
-    aspect = float(np.clip(np.ptp(patch.flat[:, 1]) / np.ptp(patch.flat[:, 0]), 0.25, 2.0))
-    with mpl.rc_context({**STYLE, "axes.grid": False}):
-        size = (max(3.1 * len(states) + 0.4, LEAST), len(lines) * (2.3 * aspect + 0.75) + 0.9)
-        figure = Figure(figsize=size, layout="constrained")
-        grid = figure.subplots(len(lines), len(states), squeeze=False)
-        for line, name in enumerate(lines):
-            for column, (axes, state) in enumerate(zip(grid[line], states, strict=True)):
-                if name == "status" and state.status is not None:
-                    draw_status(axes, patch, state.status)
-                    continue
-                colors, values = fields[name]
-                low, high = _limits(values if scale == "shared" else [values[column]])
-                shown = draw_field(axes, patch, values[column], colors, high, low)
-                colour_bar(figure, axes, shown, name, high, low)
-        for axes, state in zip(grid[0], states, strict=True):
-            axes.set_title(state.label, fontsize=11)
-        label_axes(grid, patch)
-        _name_contacts(grid[:, 0], result)
-        if told:
-            status_legend(figure, {int(b) for s in states if s.status is not None for b in s.status}, patch.components)
-        heading(figure, result, "contact patch")
+        fields.append((PRESSURE_MAP, [(f"mean pressure / {unit}", factor * p) for p in pressures]))
+    figure, grid = _drawn(patch, fields, [state.label for state in states], titled(result, "contact patch"))
+    _name_contacts(grid[:, 0], result)
     return figure
 
 
 def status_maps(result: Result, count: int = 8) -> Figure:
-    """Status over the cycle at up to `count` wear steps, evenly chosen among the rows that curves show."""
-    patch, wear = result.patch, result.wear
-    assert patch is not None
-    assert wear is not None
+    """Status over the cycle at up to `count` wear steps, evenly chosen among the rows that curves show.
+
+    Raises  ValueError where nothing was worn or the patch has no faces
+    """
+    patch, wear = _with_faces(result), result.wear
+    if wear is None or not result.wear_steps:
+        raise ValueError("the result holds no worn patch with faces to draw a map on")
     last = int(np.flatnonzero(wear.cycles <= shown_cycles(wear))[-1])
     rows = np.unique(np.linspace(0, last, count).round().astype(int))
     columns = min(len(rows), 4)
-    lines = -(-len(rows) // columns)
-    aspect = float(np.clip(np.ptp(patch.flat[:, 1]) / np.ptp(patch.flat[:, 0]), 0.25, 2.0))
     with mpl.rc_context({**STYLE, "axes.grid": False}):
-        figure = Figure(
-            figsize=(max(2.5 * columns + 0.4, LEAST), lines * (2.2 * aspect + 0.6) + 1.0), layout="constrained"
-        )
-        grid = figure.subplots(lines, columns, squeeze=False)
+        figure, grid = _grid(patch, -(-len(rows) // columns), columns)
         for axes, row in zip(grid.ravel(), rows, strict=False):
             draw_status(axes, patch, wear.status[row])
             axes.set_title(state_of(result, int(row)).label, fontsize=10)
+        _label_axes(grid, patch)
         for axes in grid.ravel()[len(rows) :]:
             axes.axis("off")
-        for axes in grid.ravel()[: len(rows)]:
-            axes.locator_params(nbins=4)
-            axes.tick_params(labelsize=9)
-            axes.set(xlabel="t1 / mm", ylabel="t2 / mm")
-            axes.label_outer(remove_inner_ticks=False)
         _name_contacts(grid[:, 0], result)
         status_legend(figure, {int(bits) for row in rows for bits in wear.status[row]}, patch.components)
-        heading(figure, result, "contact status over wear")
+        figure.suptitle(titled(result, "contact status over wear"), x=0.01, ha="left", fontsize=12)
     return figure
 
 
-def label_axes(grid: np.ndarray, patch: Patch) -> None:
-    """Ticks and labels of the axes (n_row, n_column) of maps of one face."""
-    names = [name for name in ("t1", "t2") if name in patch.components] or ["t1", "t2"]
-    for axes in grid.ravel():
-        axes.locator_params(nbins=5)
-        axes.tick_params(labelsize=9)
-        axes.label_outer(remove_inner_ticks=False)
-    for axes in grid[-1]:
-        axes.set_xlabel(f"{names[0]} / mm", fontsize=10)
-    for axes in grid[:, 0]:
-        axes.set_ylabel(f"{names[-1]} / mm", fontsize=10)
+def motion_maps(result: Result, rows: Sequence[int] | np.ndarray | None = None) -> Figure:
+    """What the pairs of a worn contact do in a cycle at wear rows, the first, a middle and the last by default.
+
+    Raises  ValueError where nothing was worn or the patch has no faces
+    """
+    patch, wear = _with_faces(result), result.wear
+    if wear is None or not result.wear_steps:
+        raise ValueError("the result holds no worn patch with faces to draw a map on")
+    n = len(wear.cycles)
+    rows = np.unique([0, (n - 1) // 2, n - 1]) if rows is None else rows
+    basis = HarmonicBasis(result.harmonics, SIZES.samples)
+    columns = []
+    for row in rows:
+        x = wear.displacement[row].reshape(len(patch.area), -1, basis.n_coeff)
+        slide, gap = slide_and_gap(patch.components, x, basis, patch.gap + wear.depth[row])
+        columns.append((slide, gap, wear.energy[row] / patch.area))
+    labels = [state_of(result, int(row)).label for row in rows]
+    return _motion(patch, columns, labels, titled(result, "contact over wear"))
 
 
-def colour_bar(figure: Figure, axes: mpl.axes.Axes, shown: Any, name: str, high: float, low: float) -> None:
-    """The scale below a map from `draw_field`; one value alone is told in words."""
-    bar = figure.colorbar(shown, ax=axes, location="bottom", shrink=0.85, aspect=26)
-    bar.set_label(name if high > low else f"{name}: {low:.3g} everywhere", fontsize=10)
-    bar.ax.tick_params(labelsize=9)
-    bar.locator = MaxNLocator(4) if high > low else mpl.ticker.NullLocator()
-    bar.update_ticks()
+def backbone_maps(balance: HarmonicBalance, found: Backbone, scene: str = "", columns: int = 4) -> Figure | None:
+    """The same at some converged points of a backbone, evenly spaced in the logarithm of the amplitude.
+
+    Returns None where the contact is no face or has no friction; scene : its name, for the title
+    """
+    i = balance.model.interface
+    good = np.flatnonzero(found.converged)
+    if not len(i.faces) or not {"t1", "t2"} & set(i.components) or not len(good):
+        return None
+    none, nowhere = np.zeros(i.n_pair), np.full(i.n_pair, -1)
+    patch = Patch(i.components, nowhere, i.points, i.frames, i.area, i.gap, i.faces, none)
+    level = np.log(found.amplitude[good])
+    wanted = np.linspace(level.min(), level.max(), columns)
+    chosen = list(dict.fromkeys(int(good[np.abs(level - value).argmin()]) for value in wanted))
+    unit, factor = length_unit(float(found.amplitude[chosen].max()))
+    titles = [f"{factor * found.amplitude[at]:.3g} {unit}, {found.frequency[at]:.4g} Hz" for at in chosen]
+    motion = [backbone_motion(balance, found, at) for at in chosen]
+    return _motion(patch, motion, titles, named(scene, "contact along the backbone"))
 
 
-def _name_contacts(columns: np.ndarray, result: Result) -> None:
-    """Names of the contacts beside their faces, where several are drawn one above the other."""
-    patch, named = result.patch, result.facts.pairs_of_joints
-    assert patch is not None
-    if len(named) < 2 or patch.in_one_plane:
-        return
-    height = 1e3 * patch.flat[:, 1]
-    for axes in columns:
-        middles = [(height[pairs].min() + height[pairs].max()) / 2 for pairs in named.values()]
-        axes.set_yticks(middles, [name.replace("_", " ") for name in named])
-        axes.set_ylabel("")
+def backbone_motion(balance: HarmonicBalance, found: Backbone, at: int) -> Motion:
+    """What the pairs do at a point of the backbone; a gap is negative where the faces stay in touch."""
+    contact = balance.contact
+    x = found.contact[at].reshape(contact.n_pair, -1, balance.basis.n_coeff)
+    state = balance.evaluate(float(found.omega[at]), x, jacobian=False)
+    slide, gap = slide_and_gap(balance.model.interface.components, x, balance.basis, contact.gap)
+    return slide, gap, balance.energy(state) / balance.model.interface.area
 
 
-def _limits(values: list[np.ndarray]) -> tuple[float, float]:
-    """Lowest and highest value, from zero where the values spread over half of their size."""
-    low, high = min(float(v.min()) for v in values), max(float(v.max()) for v in values)
-    return (0.0 if 0 < low < 0.5 * high else low), high
+def slide_and_gap(
+    components: Sequence[str], x: np.ndarray, basis: HarmonicBasis, gap: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """What the pairs do in a cycle x (n_pair, n_component, n_coeff) [m], gap (n_pair,) [m].
+
+    Returns the largest distance from the mean place along the face (n_pair,) [m], and the largest gap (n_pair,) [m],
+    negative where the faces stay in touch, -inf where the contact has no normal component
+    """
+    motion = basis.to_time(x)
+    along = [c for c, name in enumerate(components) if name != "n"]
+    slide = motion[:, along] - x[:, along, :1] * basis.has_static
+    opening = np.full(len(x), -np.inf)
+    if "n" in components:
+        opening = gap - motion[:, list(components).index("n")].min(axis=1)
+    return np.linalg.norm(slide, axis=1).max(axis=1), opening
 
 
 def draw_field(axes: Any, patch: Patch, values: np.ndarray, colors: str, largest: float, smallest: float = 0.0) -> Any:
@@ -153,3 +167,94 @@ def draw_status(axes: Any, patch: Patch, status: np.ndarray) -> None:
     axes.add_collection(PolyCollection(list(corners), facecolors=colors, edgecolors=colors, linewidths=0.6))
     axes.autoscale_view()
     axes.set_aspect("equal")
+
+
+def _motion(patch: Patch, columns: Sequence[Motion], titles: Sequence[str], title: str) -> Figure:
+    """Slide, gap and friction work of some states side by side, each in the unit that suits it."""
+    kinds = (
+        ("largest slide along the face", MOTION_MAP, length_unit),
+        ("largest gap", PRESSURE_MAP, length_unit),
+        ("friction work", WEAR_MAP, area_energy_unit),
+    )
+    rows: list[Row] = []
+    for line, (name, colors, unit_of) in enumerate(kinds):
+        scaled = [(*unit_of(float(np.abs(values[line]).max())), values[line]) for values in columns]
+        rows.append((colors, [(f"{name} / {unit}", factor * values) for unit, factor, values in scaled]))
+    return _drawn(patch, rows, titles, title)[0]
+
+
+def _drawn(patch: Patch, rows: Sequence[Row], titles: Sequence[str], title: str) -> tuple[Figure, np.ndarray]:
+    """Rows of maps with a column for each title; a row "status" has no scale, but a legend below them all."""
+    with mpl.rc_context({**STYLE, "axes.grid": False}):
+        figure, grid = _grid(patch, len(rows), len(titles))
+        for line, (colors, fields) in zip(grid, rows, strict=True):
+            for axes, (label, values) in zip(line, fields, strict=True):
+                if colors == "status":
+                    draw_status(axes, patch, values)
+                    continue
+                low, high = _limits(values)
+                _colour_bar(figure, axes, draw_field(axes, patch, values, colors, high, low), label, high, low)
+        for axes, text in zip(grid[0], titles, strict=True):
+            axes.set_title(text, fontsize=11)
+        _label_axes(grid, patch)
+        present = {int(bits) for colors, row in rows if colors == "status" for _, own in row for bits in own}
+        if present:
+            status_legend(figure, present, patch.components)
+        figure.suptitle(title, x=0.01, ha="left", fontsize=12)
+    return figure, grid
+
+
+def _grid(patch: Patch, n_row: int, n_column: int) -> tuple[Figure, np.ndarray]:
+    """A figure with axes (n_row, n_column) of the shape of a patch; the legend of all states fits below."""
+    wide, tall = np.ptp(patch.flat, axis=0)
+    aspect = float(np.clip(tall / max(wide, 1e-12), 0.25, 2.0))
+    size = (max(3.1 * n_column + 0.4, SIZES.narrowest), n_row * (2.3 * aspect + 0.75) + 0.9)
+    figure = Figure(figsize=size, layout="constrained")
+    return figure, figure.subplots(n_row, n_column, squeeze=False)
+
+
+def _with_faces(result: Result) -> Patch:
+    if result.patch is None or not len(result.patch.faces):
+        raise ValueError("the result holds no patch with faces to draw a map on")
+    return result.patch
+
+
+def _label_axes(grid: np.ndarray, patch: Patch) -> None:
+    """Ticks and labels of the axes (n_row, n_column) of maps of one face."""
+    names = [name for name in ("t1", "t2") if name in patch.components] or ["t1", "t2"]
+    for axes in grid.ravel():
+        axes.locator_params(nbins=5)
+        axes.tick_params(labelsize=9)
+        axes.label_outer(remove_inner_ticks=False)
+    for axes in grid[-1]:
+        axes.set_xlabel(f"{names[0]} / mm", fontsize=10)
+    for axes in grid[:, 0]:
+        axes.set_ylabel(f"{names[-1]} / mm", fontsize=10)
+
+
+def _colour_bar(figure: Figure, axes: mpl.axes.Axes, shown: Any, name: str, high: float, low: float) -> None:
+    """The scale below a map from `draw_field`; a single value is given in words."""
+    bar = figure.colorbar(shown, ax=axes, location="bottom", shrink=0.85, aspect=26)
+    bar.set_label(name if high > low else f"{name}: {low:.3g} everywhere", fontsize=10)
+    bar.ax.tick_params(labelsize=9)
+    bar.locator = MaxNLocator(4) if high > low else NullLocator()
+    bar.update_ticks()
+
+
+def _name_contacts(columns: np.ndarray, result: Result) -> None:
+    """Names of the contacts beside their faces, where several are drawn one above the other."""
+    patch, joints = result.patch, result.facts.pairs_of_joints
+    assert patch is not None
+    if len(joints) < 2 or patch.in_one_plane:
+        return
+    height = 1e3 * patch.flat[:, 1]
+    for axes in columns:
+        middles = [(height[pairs].min() + height[pairs].max()) / 2 for pairs in joints.values()]
+        axes.set_yticks(middles, [name.replace("_", " ") for name in joints])
+        axes.set_ylabel("")
+
+
+def _limits(values: np.ndarray) -> tuple[float, float]:
+    """Lowest and highest value, from zero where the values spread over half of their size."""
+    low, high = float(values.min()), float(values.max())
+    return (0.0 if 0 < low < 0.5 * high else low), high

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame
-from tribodyn.workflows.pictures.style import BODY, BODY_2, EDGE, STATUS
+from tribodyn.workflows.pictures.style import BODY, BODY_2, EDGE, SIZES, STATUS
 from tribodyn.workflows.pictures.view import polygons
 from tribodyn.workflows.result.faces import Face, Meeting, bodies, meetings_of
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
@@ -20,7 +20,6 @@ from tribodyn.workflows.result.states import State
 AXES = ("t1", "t2", "n")
 MARGIN = 0.35  # of the size of the patch, what is shown around it
 THICK = 0.5  # of its size, how deep the bodies are cut off
-LIFT = 4e-3  # of its size, by which coloured faces lie above their body
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,9 @@ class Opened:
         for number, share in enumerate((self.split, 1 - self.split)):
             face = self.faces[number] if number < len(self.faces) else None
             block = self._block(face, number == 0, scale * depth)
-            points = np.column_stack([self.flat, (0.0 if face is None else -scale * share) * depth + LIFT * self.size])
+            points = np.column_stack(
+                [self.flat, (0.0 if face is None else -scale * share) * depth + SIZES.lift * self.size]
+            )
             if number:
                 block.points = self._turned(np.asarray(block.points), -1)
                 points = self._turned(points, 1)

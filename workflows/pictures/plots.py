@@ -40,15 +40,10 @@ def figures(result: Result) -> dict[str, Callable[[Result], Figure]]:
     worn = result.wear_steps > 0
     mapped = result.patch is not None and len(result.patch.faces) > 0 and has_states(result)
     every: list[tuple[str, Callable[[Result], Figure], bool]] = [
-        ("frf", frequency_response, result.response is not None or result.wear is not None),
+        ("frf", response, result.response is not None or result.wear is not None),
         ("outputs", output_amplitudes, result.response is not None and len(result.response.output_names) > 1),
-        ("cycles_per_step", cycles_per_step, worn),
-        ("peak", amplitude_against_cycles, worn),
-        ("preload", preload_against_cycles, worn),
-        ("depth", depth_against_cycles, worn),
-        ("energy", energy_against_cycles, worn),
-        ("status", status_against_cycles, worn),
-        ("hysteresis", hysteresis_loops, result.loops is not None and has_friction(result)),
+        *((name, draw, worn) for name, draw in COURSES.items()),
+        ("hysteresis", hysteresis, result.loops is not None and has_friction(result)),
         ("normal", normal_loops, result.loops is not None and not has_friction(result)),
         ("patch", maps.patch_maps, mapped),
         ("status_maps", maps.status_maps, mapped and worn),
@@ -56,7 +51,7 @@ def figures(result: Result) -> dict[str, Callable[[Result], Figure]]:
     return {name: function for name, function, possible in every if possible}
 
 
-def frequency_response(result: Result) -> Figure:
+def response(result: Result) -> Figure:
     """Unworn response between its free and stuck references, and the path of the peak under wear."""
     with axes_of(7.2, 4.6) as (figure, axes):
         unit, scale = length_unit(_largest_amplitude(result))
@@ -118,6 +113,18 @@ def _curve(axes: Any, result: Result, good: np.ndarray, amplitude: np.ndarray, s
         if at:
             x, y = (np.interp(at, np.arange(len(hertz)), values) for values in (hertz, amplitude))
             axes.plot(x, y, marker, color=RED, ms=6, label=kind)
+
+
+def wear(result: Result, what: str = "depth") -> Figure:
+    """Course of the wear against cycles: depth, peak, preload, energy or status, or the cycles_per_step.
+
+    Raises  ValueError where nothing was worn, or for another word
+    """
+    if not result.wear_steps:
+        raise ValueError("the result holds no wear steps: its scene needs [wear] with max_steps above 0")
+    if what not in COURSES:
+        raise ValueError(f'no wear plot "{what}": there are {", ".join(COURSES)}')
+    return COURSES[what](result)
 
 
 def cycles_per_step(result: Result) -> Figure:
@@ -244,10 +251,24 @@ def output_amplitudes(result: Result) -> Figure:
     return figure
 
 
-def hysteresis_loops(result: Result, pairs: Sequence[int] | None = None) -> Figure:
-    """Tangential loops in chosen states (columns) of some pairs (rows), those that dissipate most by default."""
+COURSES: dict[str, Callable[[Result], Figure]] = {
+    "cycles_per_step": cycles_per_step,
+    "peak": amplitude_against_cycles,
+    "preload": preload_against_cycles,
+    "depth": depth_against_cycles,
+    "energy": energy_against_cycles,
+    "status": status_against_cycles,
+}
+
+
+def hysteresis(result: Result, pairs: Sequence[int] | None = None) -> Figure:
+    """Tangential loops in chosen states (columns) of some pairs (rows), those that dissipate most by default.
+
+    Raises  ValueError where no loops are kept, or for a pair that there is not
+    """
     patch = result.patch
-    assert patch is not None
+    if result.loops is None or patch is None:
+        raise ValueError("the result holds no hysteresis loops: its scene needs a contact and pictures.plots = true")
     components = [c for c, name in enumerate(patch.components) if name != "n"] or [0]
     return _loops(result, components, "hysteresis loops by pair", pairs)
 

@@ -1,18 +1,9 @@
-"""Pictures of the part in three dimensions: vibrating in its states, and its contact opened with what wear did to it.
-
-`check` makes sure that off-screen rendering works before pyvista is used.
-"""
+"""Pictures of the part in three dimensions: vibrating in its states, and its worn contact opened."""
 
 from __future__ import annotations
 
-import os
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Callable, Sequence
-from functools import cache, partial
-from importlib import import_module
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,90 +12,15 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image, ImageDraw
 
-from tribodyn.workflows.pictures import exploded, render_wheel, triad
+from tribodyn.workflows.pictures import exploded, offscreen, render_wheel
 from tribodyn.workflows.pictures import opened as book
 from tribodyn.workflows.pictures import view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, save, scale_bar, status_legend
-from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, trimmed
-from tribodyn.workflows.pictures.style import MOTION_MAP, PRESSURE_MAP, RED, STYLE, WEAR_MAP
+from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, show, trimmed, with_room
+from tribodyn.workflows.pictures.style import MOTION_MAP, PRESSURE_MAP, RED, SIZES, STYLE, WEAR_MAP
 from tribodyn.workflows.result.faces import Meeting, bodies, meetings_of, worn_off
 from tribodyn.workflows.result.result import PartMesh, Result
 from tribodyn.workflows.result.states import State, has_states, shown_states
-
-SYSTEM_LIBRARIES = "libgl1 libegl1 libgomp1"
-PROBE = "import pyvista as pv; view = pv.Plotter(off_screen=True); view.add_mesh(pv.Sphere()); view.screenshot()"
-PATIENCE = 30  # seconds for the picture that is tried
-SMOOTH = 2  # subdivisions of the faces of curved elements
-WIDTH, LEAST = 3.4, 6.0  # inches of a column, and of a picture
-SIZE = (900, 760)  # pixels of a view of the part
-SMALL = 0.07  # of its width: a contact smaller than this is ringed
-
-
-class RenderingUnavailable(RuntimeError):
-    """Off-screen rendering does not work on this machine; the message is one sentence that says what to install."""
-
-
-def check() -> None:
-    """Try one picture in a process of its own, because without its libraries VTK kills the process that uses it.
-
-    On Linux that process is a child which need not load pyvista again; this one draws with it next, anyway.
-
-    Raises  RenderingUnavailable
-    """
-    _choose_window()
-    if not _works(PROBE):
-        raise RenderingUnavailable(
-            "rendering without a screen does not work here: install the system libraries "
-            f"{SYSTEM_LIBRARIES} (on Debian: apt-get install -y --no-install-recommends {SYSTEM_LIBRARIES})"
-        )
-
-
-@cache
-def _works(probe: str) -> bool:
-    """Whether a program of pyvista comes to its end here."""
-    if sys.platform.startswith("linux") and _works_in_child(probe):
-        return True
-    try:
-        done = subprocess.run([sys.executable, "-c", probe], capture_output=True, timeout=300, check=False)
-    except (OSError, subprocess.TimeoutExpired):
-        return False
-    return done.returncode == 0
-
-
-def _works_in_child(probe: str) -> bool:
-    """Whether it ends well in a child; that can fail for another reason too: this process has drawn before."""
-    try:
-        import pyvista  # noqa: F401
-
-        pid = os.fork()
-    except (ImportError, OSError):
-        return False
-    if pid == 0:
-        code = 1
-        try:
-            resource = import_module("resource")
-            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-            nowhere = os.open(os.devnull, os.O_RDWR)
-            os.dup2(nowhere, 1)
-            os.dup2(nowhere, 2)
-            exec(probe, {})
-            code = 0
-        finally:
-            os._exit(code)  # nothing that this process would write or remove at its end is written or removed twice
-    ends = time.monotonic() + PATIENCE
-    while time.monotonic() < ends:
-        ended, status = os.waitpid(pid, os.WNOHANG)
-        if ended:
-            return status == 0
-        time.sleep(0.01)
-    os.kill(pid, signal.SIGKILL)
-    os.waitpid(pid, 0)
-    return False
-
-
-def _choose_window() -> None:
-    if sys.platform.startswith("linux"):
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
 
 def draw(
@@ -122,7 +38,7 @@ def draw(
     """
     found = figures(result, deformation, wear)
     if found:
-        check()
+        offscreen.check()
     return [path for name, make in found.items() for path in save(make(), folder / name, formats, dpi)]
 
 
@@ -158,10 +74,10 @@ def part_picture(result: Result, deformation: float | None = None, wear: float |
         bars.append((factor * float(amplitude.max()), f"vibration amplitude / {unit}"))
         points = moving.points(state, scales[-1] * vibration)
         view = moving.view(points, factor * amplitude, (0.0, bars[-1][0]))
-        images.append(moving.marked(shoot(view, moving.camera, SIZE), points))
-    images, corner = triad.with_room(trimmed(images))
+        images.append(moving.marked(shoot(view, moving.camera, SIZES.view), points))
+    images, corner = with_room(trimmed(images))
     with mpl.rc_context({**STYLE, "axes.grid": False}):
-        wide = max(WIDTH, LEAST / len(states))
+        wide = max(SIZES.column, SIZES.least / len(states))
         tall = wide * images[0].shape[0] / images[0].shape[1]
         figure = Figure(figsize=(wide * len(states) + 0.2, tall + 1.7), layout="constrained")
         columns = np.atleast_1d(figure.subplots(1, len(states)))
@@ -182,11 +98,13 @@ def contact_picture(result: Result, contact: Meeting, wear: float | None = None)
     worn, told = bool(depth.max() > 0), [s for s in states if s.status is not None]
     rows = [name for name, there in (("depth", worn), ("status", bool(told)), ("pressure", True)) if there]
     with mpl.rc_context({**STYLE, "axes.grid": False}):
-        figure = Figure(figsize=(max(WIDTH * len(states), LEAST) + 0.2, 2.9 * len(rows) + 0.7), layout="constrained")
+        figure = Figure(
+            figsize=(max(SIZES.column * len(states), SIZES.least) + 0.2, 2.9 * len(rows) + 0.7), layout="constrained"
+        )
         grid = figure.subplots(len(rows), len(states), squeeze=False)
         painted = [[_painted(opened, state, name, wear) for state in states] for name in rows]
-        shots = [shoot(view, opened.camera, (900, 690)) for line in painted for view, _ in line]
-        images, corner = triad.with_room(trimmed(shots))
+        shots = [shoot(view, opened.camera, SIZES.book) for line in painted for view, _ in line]
+        images, corner = with_room(trimmed(shots))
         bars = [bar for line in painted for _, bar in line]
         for axes, image, bar in zip(grid.ravel(), images, bars, strict=True):
             show(axes, image, opened.camera, book.AXES, corner)
@@ -200,13 +118,6 @@ def contact_picture(result: Result, contact: Meeting, wear: float | None = None)
         told_scale = f", depth in relief × {wear:g}" if worn else ""
         heading(figure, result, f"opened {opened.sides}{told_scale}")
     return figure
-
-
-def show(axes: Any, image: np.ndarray, camera: Camera, names: Sequence[str], corner: tuple[float, float]) -> None:
-    """Show an image of a camera with its axes, drawn around a corner [pixels]."""
-    axes.imshow(image)
-    axes.axis("off")
-    triad.draw(axes, camera, names, corner, triad.room(image))
 
 
 def _painted(contact: book.Opened, state: State, name: str, wear: float) -> tuple[View, tuple[Any, ...] | None]:
@@ -251,7 +162,7 @@ class Moving:
         reach = [part.points + self.rest_scale * s for s in static]
         for s in (drawing.swing(d, result.harmonics) for d in fields.displacement):
             reach += [part.points + self.vibration_scale(s) * s, part.points - self.vibration_scale(s) * s]
-        self.camera: Camera = frame(np.concatenate(reach), *drawing.looking(result), SIZE[0] / SIZE[1])
+        self.camera: Camera = frame(np.concatenate(reach), *drawing.looking(result), SIZES.view[0] / SIZES.view[1])
 
     def vibration_scale(self, vibration: np.ndarray) -> float:
         """The factor that a vibration (n_node, 3) is drawn with."""
@@ -276,8 +187,8 @@ class Moving:
             ends = [(at[k][0] * size[0], at[k][1] * size[1]) for k in (i, j)]
             pen.line(ends, fill=RED, width=width)
         low, high = at.min(axis=0) * size, at.max(axis=0) * size
-        if np.linalg.norm(high - low) < SMALL * size[0]:
-            middle, radius = (low + high) / 2, 0.75 * SMALL * size[0]
+        if np.linalg.norm(high - low) < SIZES.ringed * size[0]:
+            middle, radius = (low + high) / 2, 0.75 * SIZES.ringed * size[0]
             pen.ellipse([*(middle - radius), *(middle + radius)], outline=RED, width=width)
         return np.asarray(picture)
 
@@ -309,7 +220,7 @@ class Moving:
 
         grid = pv.UnstructuredGrid({_cell_type(self.part): self.part.cells}, points)
         grid.point_data["shown"] = values
-        body = grid.extract_surface(nonlinear_subdivision=SMOOTH, algorithm="dataset_surface")
+        body = grid.extract_surface(nonlinear_subdivision=SIZES.smooth, algorithm="dataset_surface")
         layers = [Layer(body, values=np.asarray(body.point_data["shown"]), map=MOTION_MAP, limits=limits)]
         return View(layers, [self.outline])
 

@@ -1,19 +1,21 @@
-"""Single views of surfaces, drawn off-screen with pyvista and returned as images; matplotlib adds words and scales.
+"""Single views of surfaces, drawn off-screen with pyvista and returned as images, and their axes drawn by matplotlib.
 
-A coloured surface is drawn without shading, so that its colours are those of its scale; edges show its shape.
-pyvista is imported by the functions here.
+A coloured surface is drawn without shading, so that its colours are those of its scale; edges show its shape. The axes
+of a view stand in a corner of the image that is empty. pyvista is imported by the functions here.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from tribodyn.workflows.pictures.style import BODY, EDGE, PAPER
+from tribodyn.workflows.pictures.style import BLUE, BODY, EDGE, GREEN, PAPER, RED, SIZES
 
 SHADE = {"ambient": 0.45, "diffuse": 0.6, "specular": 0.0}
+OF_AXES = (RED, GREEN, BLUE)
 
 
 @dataclass(frozen=True)
@@ -122,3 +124,68 @@ def place(camera: Camera, point: np.ndarray, size: tuple[int, int]) -> tuple[flo
     right = np.cross(camera.up, camera.towards)
     x, y = (point - camera.centre) @ np.stack([right, camera.up]).T / (2 * camera.reach)
     return 0.5 + x * size[1] / size[0], 0.5 - y
+
+
+def with_room(images: Sequence[np.ndarray]) -> tuple[list[np.ndarray], tuple[float, float]]:
+    """Images of one size with an empty corner for the axes, a strip added below where they have none.
+
+    Returns the images and the middle of the corner's box [pixels]
+    """
+    box = room(images[0])
+    ink = np.any([image.min(axis=2) < 250 for image in images], axis=0)
+    height, width = ink.shape
+    for top, left in ((height - box, 0), (height - box, width - box), (0, 0), (0, width - box)):
+        if not ink[top : top + box, left : left + box].any():
+            return list(images), (left + box / 2, top + box / 2)
+    strip = np.full((box, width, 3), 255, np.uint8)
+    return [np.concatenate([image, strip]) for image in images], (box / 2, height + box / 2)
+
+
+def room(image: np.ndarray) -> int:
+    """Side of the box that the axes of an image stand in [pixels]."""
+    smaller, larger = SIZES.axes_box
+    return round(max(smaller * min(image.shape[:2]), larger * max(image.shape[:2])))
+
+
+def show(axes: Any, image: np.ndarray, camera: Camera, names: Sequence[str], corner: tuple[float, float]) -> None:
+    """Show an image of a camera with its axes, drawn around a corner [pixels]."""
+    axes.imshow(image)
+    axes.axis("off")
+    draw_axes(axes, camera, names, corner, room(image))
+
+
+def draw_axes(axes: Any, camera: Camera, names: Sequence[str], middle: tuple[float, float], box: float) -> None:
+    """Draw the axes of a view on its image; one that is seen from its end is a dot.
+
+    names : of the three axes; middle, box : where they stand, and how much room they have [pixels]
+    """
+    right, towards = np.cross(camera.up, camera.towards), np.asarray(camera.towards)
+    seen = np.column_stack([right, -np.asarray(camera.up)])  # pixels count downwards
+    length = np.linalg.norm(seen, axis=1)[:, None]
+    long = length > SIZES.axes_dot
+    away = -seen.sum(axis=0) / max(float(np.linalg.norm(seen.sum(axis=0))), 1e-9)
+    outwards = np.where(long, seen / np.maximum(length, 1e-9), away)
+    start = np.asarray(middle) - 0.28 * box * np.clip(seen.sum(axis=0), -1, 1)
+    ends = start + 0.5 * box * seen
+    labels = _spread(start + (0.5 * length + 0.17) * box * outwards, 0.24 * box)
+    for i in np.argsort(towards):  # what points to the reader comes last
+        if long[i]:
+            arrow = {"arrowstyle": "-|>", "color": OF_AXES[i], "lw": 1.3, "shrinkA": 0, "shrinkB": 0}
+            axes.annotate("", ends[i], start, arrowprops=arrow, annotation_clip=False)
+        else:
+            axes.plot(*start, "o", color=OF_AXES[i], ms=4)
+        axes.text(*labels[i], names[i], color=OF_AXES[i], fontsize=9, ha="center", va="center", fontstyle="italic")
+
+
+def _spread(places: np.ndarray, least: float) -> np.ndarray:
+    """Places (3, 2) moved until no two are nearer than a distance."""
+    places = places.copy()
+    for _ in range(30):
+        for i, j in ((0, 1), (1, 2), (0, 2)):
+            between = places[j] - places[i]
+            distance = float(np.linalg.norm(between))
+            if distance < least:
+                along = between / distance if distance > 1e-9 else np.array([1.0, 0.0])
+                places[i] -= along * (least - distance) / 2
+                places[j] += along * (least - distance) / 2
+    return places

@@ -6,6 +6,7 @@ maps are viridis and cividis: readable with any colour vision.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
@@ -28,11 +29,56 @@ STATUS = {
 }
 
 FORMATS = ("png", "pdf", "svg")
-DPI = 200
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Sizes of pictures.
+
+    dpi : dots per inch of figures, film_dpi : of films, report_dpi : of figures in a report
+    narrowest : inches of a figure of maps, below which a legend of all states does not fit
+    column, least : inches of a column of views, and of the narrowest figure of them
+    view : pixels of a view of the part, book : of an opened contact, apart : of bodies drawn apart, wheel : of a wheel
+    film : inches of a film; film_part, film_contact : pixels of the views in it; rate : images per second of a film
+    images : of a film, fewer where there are fewer wear steps; samples : instants of a cycle in maps of its motion
+    instants : of a cycle, among which that of the largest swing is found
+    axes_box : side of the box that the axes of a view stand in, of the smaller and of the larger side of its image
+    axes_dot : of its length, below which an axis seen from its end is a dot
+    ringed : of the width of a view, below which a contact is ringed
+    smooth : subdivisions of the faces of curved elements
+    lift : of the size of a contact, by which colours lie above it
+    """
+
+    dpi: int = 200
+    film_dpi: int = 100
+    report_dpi: int = 110
+    narrowest: float = 5.6
+    column: float = 3.4
+    least: float = 6.0
+    view: tuple[int, int] = (900, 760)
+    book: tuple[int, int] = (900, 690)
+    apart: tuple[int, int] = (1100, 760)
+    wheel: tuple[int, int] = (1000, 1000)
+    groups: tuple[int, int] = (1700, 680)
+    film: tuple[float, float] = (12.8, 7.2)
+    film_part: tuple[int, int] = (760, 560)
+    film_contact: tuple[int, int] = (640, 490)
+    rate: float = 12.0
+    images: int = 48
+    samples: int = 256
+    instants: int = 64
+    axes_box: tuple[float, float] = (0.2, 0.14)
+    axes_dot: float = 0.2
+    ringed: float = 0.07
+    smooth: int = 2
+    lift: float = 4e-3
+
+
+SIZES = Sizes()
 
 STYLE: dict[str, Any] = {
-    "figure.dpi": DPI,
-    "savefig.dpi": DPI,
+    "figure.dpi": SIZES.dpi,
+    "savefig.dpi": SIZES.dpi,
     "font.family": ["STIXGeneral", "DejaVu Serif"],  # come with matplotlib; look like the text of a paper
     "mathtext.fontset": "stix",
     "pdf.fonttype": 42,  # text stays text

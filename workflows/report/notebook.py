@@ -10,14 +10,13 @@ import matplotlib as mpl
 
 from tribodyn.workflows.pictures import plots
 from tribodyn.workflows.pictures.style import STYLE
-from tribodyn.workflows.report import page
-from tribodyn.workflows.result import summary
+from tribodyn.workflows.report import page, text
 from tribodyn.workflows.result.result import Result
 
 
 def shown(result: Result) -> str:
     """HTML of a result; the part stands in a frame of its own, which needs nothing from the notebook."""
-    rows = "".join(f"<tr><td>{escape(name)}</td><td>{escape(value)}</td></tr>" for name, value in summary.lines(result))
+    rows = "".join(f"<tr><td>{escape(name)}</td><td>{escape(value)}</td></tr>" for name, value in text.lines(result))
     parts = [f"<p><b>{escape(result.state)}</b></p><table>{rows}</table>"]
     figures = plots.figures(result)
     if "frf" in figures:

@@ -17,11 +17,11 @@ import numpy as np
 
 from tribodyn.version import __version__
 from tribodyn.workflows.accuracy import statement
-from tribodyn.workflows.pictures import plots, render
+from tribodyn.workflows.pictures import offscreen, plots, render
 from tribodyn.workflows.pictures.style import STYLE
+from tribodyn.workflows.report import text
 from tribodyn.workflows.report.charts import charts
 from tribodyn.workflows.report.solid import solid
-from tribodyn.workflows.result import summary
 from tribodyn.workflows.result.result import Result
 
 DPI = 110  # of the figures on the page
@@ -85,11 +85,11 @@ def _html(title: str, body: str, data: dict[str, Any]) -> str:
 
 def write(results: Sequence[tuple[str, Result, Path | None]], path: Path) -> Path:
     """Write the page of results. Raises ValueError where it becomes too large to pass on."""
-    text = page(results)
-    size = len(text.encode())
+    html = page(results)
+    size = len(html.encode())
     if size > LARGEST:
         raise ValueError(f"the report would have {size / 1e6:.0f} MB: report fewer results at once")
-    path.write_text(text, encoding="utf-8")
+    path.write_text(html, encoding="utf-8")
     return path
 
 
@@ -145,17 +145,7 @@ def _verdict(result: Result) -> str:
             ))  # fmt: skip
         head = ("quantity", "value", "total error", "most of it", "may be stated", "why")
         said += _table(rows, head)
-    return said + _table(_not_told_elsewhere(summary.lines(result)))
-
-
-def _not_told_elsewhere(lines: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
-    """The lines of a summary without verdict and error budget, which the page has as tables of their own."""
-    kept, inside = [], False
-    for name, value in lines:
-        inside = name in ("verdict", "error budget") or (inside and name.startswith(" "))
-        if not inside:
-            kept.append((name, value))
-    return kept
+    return said + _table(text.numbers(result))
 
 
 def _number(value: Any) -> str:
@@ -199,8 +189,8 @@ def _inspection(result: Result) -> str:
             many = getattr(value, "ndim", 0) > 0
             if many and not len(value):
                 continue
-            text = ", ".join(_number(v) for v in np.asarray(value).tolist()[:6]) if many else _number(value)
-            rows.append((label, text))
+            shown = ", ".join(_number(v) for v in np.asarray(value).tolist()[:6]) if many else _number(value)
+            rows.append((label, shown))
     if result.patch is not None:
         rows.append(("area of the contact / mm²", f"{1e6 * result.patch.area.sum():.5g}"))
     return _table(rows)
@@ -234,8 +224,8 @@ def _renders(result: Result) -> dict[str, Any]:
     if not found:
         return {}
     try:
-        render.check()
-    except render.RenderingUnavailable:
+        offscreen.check()
+    except offscreen.RenderingUnavailable:
         return {}
     return {name: (lambda _, make=make: make()) for name, make in found.items()}
 

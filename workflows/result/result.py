@@ -1,12 +1,10 @@
-"""What a run leaves behind: everything that the summary and the pictures need, and nothing that needs a solver."""
+"""What a run leaves behind: plain data. `tribodyn.plot` draws it, workflows/report/text.py puts it into words."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from os import PathLike
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -15,10 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.result.facts import BudgetEntry, Facts, Stage
-
-if TYPE_CHECKING:
-    import pyvista as pv
-    from matplotlib.figure import Figure
+from tribodyn.workflows.result.summary import summary
 
 PEAKS = 3  # of a response that does not wear, shown in pictures
 
@@ -215,7 +210,7 @@ class WornResponses:
 
 @dataclass(frozen=True)
 class Result:
-    """A run, finished or not: plain data, and methods that read or draw it and import what they need when called.
+    """A run, finished or not.
 
     provenance : scene text and overrides, versions, seed, start time, threads
     facts : what was modelled and how long it took
@@ -274,115 +269,7 @@ class Result:
 
     def summary(self) -> dict[str, Any]:
         """The numbers of the result as plain data, see result.summary: what `tribodyn show --json` prints."""
-        from tribodyn.workflows.result import summary
-
-        return summary.summary(self)
-
-    def mesh_fields(self, row: int | None = None) -> pv.UnstructuredGrid:
-        """The mesh of the part as a pyvista grid with fields at a wear row, see pictures.mesh_fields."""
-        from tribodyn.workflows.pictures import mesh_fields
-
-        return mesh_fields.mesh_fields(self, row)
-
-    def patch_fields(self, row: int = -1) -> pv.PolyData:
-        """The contact patch as a pyvista surface with fields at a wear row, see pictures.mesh_fields."""
-        from tribodyn.workflows.pictures import mesh_fields
-
-        return mesh_fields.patch_fields(self, row)
-
-    def _repr_html_(self) -> str:
-        """What a notebook shows of the result: its state, its numbers, its response, and its part to turn."""
-        from tribodyn.workflows.report import notebook
-
-        return notebook.shown(self)
-
-    def plot_response(self) -> Figure:
-        """Response between its linear references, and the path of the peak under wear."""
-        from tribodyn.workflows.pictures import plots
-
-        return plots.frequency_response(self)
-
-    def plot_wear(self, what: Literal["depth", "peak", "preload", "energy", "cycles_per_step"] = "depth") -> Figure:
-        """Course of the wear: depth, resonance peak, preload or friction work against cycles, or cycles of each step.
-
-        Raises  ValueError where nothing was worn
-        """
-        from tribodyn.workflows.pictures import plots
-
-        if not self.wear_steps:
-            raise ValueError("the result holds no wear steps: its scene needs [wear] with max_steps above 0")
-        draw = {
-            "depth": plots.depth_against_cycles,
-            "peak": plots.amplitude_against_cycles,
-            "preload": plots.preload_against_cycles,
-            "energy": plots.energy_against_cycles,
-            "cycles_per_step": plots.cycles_per_step,
-        }
-        if what not in draw:
-            raise ValueError(f'no wear plot "{what}": there are {", ".join(draw)}')
-        return draw[what](self)
-
-    def plot_hysteresis(self, pairs: Sequence[int] | None = None) -> Figure:
-        """Force against displacement of some pairs over a cycle, those that dissipate most by default.
-
-        Raises  ValueError where no loops are kept, or for a pair that there is not
-        """
-        from tribodyn.workflows.pictures import plots
-
-        if self.loops is None:
-            raise ValueError("the result holds no hysteresis loops: its scene needs [wear] and pictures.plots = true")
-        return plots.hysteresis_loops(self, pairs)
-
-    def plot_status(self, count: int = 8) -> Figure:
-        """Maps of the contact status over wear; raises ValueError where nothing was worn or the patch has no faces."""
-        from tribodyn.workflows.pictures import maps
-
-        if not self.wear_steps or self.patch is None or not len(self.patch.faces):
-            raise ValueError("the result holds no worn patch with faces to draw a map on")
-        return maps.status_maps(self, count)
-
-    def plot_patch(self, rows: Sequence[int] | None = None) -> Figure:
-        """Maps of wear depth, contact status and pressure on the patch at wear rows, those of the pictures by default.
-
-        Raises  ValueError where nothing was worn or the patch has no faces
-        """
-        from tribodyn.workflows.pictures import maps
-
-        if not self.wear_steps or self.patch is None or not len(self.patch.faces):
-            raise ValueError("the result holds no worn patch with faces to draw a map on")
-        return maps.patch_maps(self, None if rows is None else np.asarray(rows))
-
-    def plot_motion(self, rows: Sequence[int] | None = None) -> Figure:
-        """Maps of slide, gap and friction work of a cycle at wear rows: the first, a middle and the last by default.
-
-        Raises  ValueError where nothing was worn or the patch has no faces
-        """
-        from tribodyn.workflows.pictures import motion_maps
-
-        if not self.wear_steps or self.patch is None or not len(self.patch.faces):
-            raise ValueError("the result holds no worn patch with faces to draw a map on")
-        return motion_maps.motion_maps(self, None if rows is None else np.asarray(rows))
-
-    def animate(
-        self,
-        over: Literal["wear", "cycle"],
-        folder: str | PathLike[str],
-        *,
-        row: int | None = None,
-        formats: Sequence[str] = ("mp4",),
-        images: int = 48,
-        dpi: int = 100,
-        deformation: float | None = None,
-        wear: float | None = None,
-    ) -> list[Path]:
-        """Write a film over wear or over one cycle of a row as MP4 or GIF, see pictures.animation; returns its files.
-
-        deformation, wear : factors of exaggeration, chosen by size where None
-        Raises  ValueError where the result has nothing of the kind to show
-        """
-        from tribodyn.workflows.pictures import animation
-
-        return animation.write(self, Path(folder), over, row, formats, images, dpi, deformation, wear)
+        return summary(self)
 
     def shown_rows(self) -> np.ndarray:
         """What pictures show: rows of the wear history, or points of the response curve where nothing wears.

@@ -1,18 +1,18 @@
-"""What a result says, in numbers: for `tribodyn show`, for machines and for people."""
+"""The numbers of a result as plain data: for `tribodyn show --json`, for machines and for people."""
 
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear.events import events
 from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload, cycles_to_share
-from tribodyn.workflows.accuracy import budget, statement
-from tribodyn.workflows.accuracy.trade_table import plain
-from tribodyn.workflows.result.result import Result
+
+if TYPE_CHECKING:
+    from tribodyn.workflows.result.result import Result
 
 EVENT_SAMPLES = 256  # of a cycle, to see whether a pair opens
 
@@ -42,7 +42,7 @@ def summary(result: Result) -> dict[str, Any]:
 
 
 def numbers(result: Result) -> dict[str, Any]:
-    """What `summary` tells, with nan and inf where they are."""
+    """The same as `summary`, with nan and inf where they are."""
     found: dict[str, Any] = {"state": result.state, "finished": result.finished}
     found |= {"seconds": result.facts.seconds, "wear_steps": result.wear_steps}
     found |= _wear(result) | _peak(result) | _stable_peak(result)
@@ -52,7 +52,7 @@ def numbers(result: Result) -> dict[str, Any]:
     found["joints"] = by_joint(result)
     found["free_hz"] = result.facts.free_hz.tolist()
     found["error_budget"] = [vars(entry) for entry in result.budget]
-    found["verdict"] = statement.record(result.verdict)
+    found["verdict"] = json.loads(result.verdict)["statements"] if result.verdict else None
     return found
 
 
@@ -83,14 +83,14 @@ def life(result: Result) -> float | None:
     """Cycles until the preload had fallen to LIFE_SHARE; with `wear.lost_of` "any" that of the first joint."""
     if result.wear is None:
         return None
-    if _told_of_wear(result).get("lost_of") != "any":
+    if _wear_table(result).get("lost_of") != "any":
         return cycles_to_preload(result.wear)
     return min(_lives(result).values(), default=None)
 
 
 def first_lost(result: Result) -> str | None:
     """The joint whose life is that of a run with `wear.lost_of` "any"; None where none has ended, or all count."""
-    if result.wear is None or _told_of_wear(result).get("lost_of") != "any":
+    if result.wear is None or _wear_table(result).get("lost_of") != "any":
         return None
     lives = _lives(result)
     return min(lives, key=lives.__getitem__, default=None)
@@ -102,14 +102,13 @@ def _lives(result: Result) -> dict[str, float]:
     return {name: life for name, life in lives.items() if life is not None}
 
 
-def _told_of_wear(result: Result) -> dict[str, Any]:
-    told = json.loads(result.provenance.get("scene", "{}")).get("wear") or {}
-    return dict(told)
+def _wear_table(result: Result) -> dict[str, Any]:
+    return dict(json.loads(result.provenance.get("scene", "{}")).get("wear") or {})
 
 
 def _life_share(result: Result) -> float:
     """Share of the first preload where the life of a joint ends: the scene's `wear.lost_below`, else LIFE_SHARE."""
-    return float(_told_of_wear(result).get("lost_below") or LIFE_SHARE)
+    return float(_wear_table(result).get("lost_below") or LIFE_SHARE)
 
 
 def _wear(result: Result) -> dict[str, Any]:
@@ -198,84 +197,10 @@ def _curve(result: Result) -> dict[str, Any]:
     return numbers
 
 
-def lines(result: Result) -> list[tuple[str, str]]:
-    """The summary as pairs of a name and a readable value."""
-    numbers = summary(result)
-
-    def pair(name: str, scale: float, unit: str) -> str:
-        first, last = (float("nan") if value is None else scale * value for value in numbers[name])
-        return f"{first:.5g} {unit}" if numbers["wear_steps"] == 0 else f"{first:.5g} -> {last:.5g} {unit}"
-
-    shown = statement.lines(statement.loaded(result.verdict)) if result.verdict else []
-    shown += [
-        ("scene", result.provenance["scene_name"]),
-        ("state", result.state),
-        ("model", _sizes(numbers["full_dofs"], numbers["model_dofs"])),
-        ("contact", f"{numbers['contact_pairs']} node pairs, {numbers['unknowns']} unknowns"),
-    ]
-    around = result.facts.around
-    if around is not None:
-        shown.append(("wheel", f"{around.sectors} sectors, engine order {around.engine_order}"))
-    if numbers["free_hz"]:
-        shown.append(("free modes", ", ".join(f"{hertz:.2f}" for hertz in numbers["free_hz"][:4]) + " Hz"))
-    if numbers["delta_max_m"] is not None:
-        shown.append(("delta_max", f"{1e3 * numbers['delta_max_m']:.4f} mm"))
-    if numbers["peak_hz"] is not None:
-        shown.append(("frequency", pair("peak_hz", 1, "Hz")))
-        shown.append(("amplitude", pair("peak_m", 1e3, "mm")))
-    if numbers["peak_at_end"]:
-        shown.append(("", "no peak: the response is highest at an end of response.frequency, widen it"))
-    if numbers["peak_is_stable"] is False and not numbers["wear_steps"]:
-        hertz, height = numbers["stable_peak_hz"], numbers["stable_peak_m"]
-        below = "no point is stable" if hertz is None else f"the highest that is: {hertz:.5g} Hz, {1e3 * height:.5g} mm"
-        shown.append(("", f"this peak is unstable, no vibration stays at it; {below}"))
-    if numbers["harmonics"]:
-        error = numbers["harmonics_error"]
-        chosen = "" if error is None else f", chosen: estimated truncation error {error:.1e}"
-        shown.append(("harmonics", ", ".join(map(str, numbers["harmonics"])) + chosen))
-    if numbers["response_end"] is not None:
-        shown.append(("response", numbers["response_end"]))
-    if numbers["bifurcations"] is not None:
-        places = ", ".join(f"{b['kind']} at {b['hz']:.5g} Hz" for b in numbers["bifurcations"])
-        shown.append(("stability", f"{numbers['unstable_points']} unstable points; {places or 'no bifurcations'}"))
-    if numbers["shear_spread"] is not None:
-        spread, peak = numbers["shear_spread"], numbers["shear_spread_at_peak"]
-        shown.append(("load path", f"moves the amplitude by up to {spread:.2%}, {peak:.2%} at the peak"))
-    if numbers["depth_max_m"] is not None:
-        deepest, mean = 1e3 * numbers["depth_max_m"], 1e3 * numbers["depth_mean_m"]
-        life = "contact not lost" if numbers["separated_cycles"] is None else "contact lost"
-        if numbers["life_cycles"] is not None:
-            joint = first_lost(result)
-            lost = f"{100 * LIFE_SHARE:g} % of the preload" if joint is None else f"that of {joint} was lost"
-            life += f"; life until {lost}: {numbers['life_cycles']:.4g}"
-        happened = [("first opening", numbers["first_lift_cycles"]), ("first pair lost", numbers["first_loss_cycles"])]
-        shown += [(name, f"after {count:.4g} cycles") for name, count in happened if count is not None]
-        shown += [
-            ("preload", pair("preload_N", 1, "N")),
-            ("cycles", f"{numbers['cycles']:.4g} ({life})"),
-            ("wear depth", f"{deepest:.4f} mm largest, {mean:.4f} mm mean"),
-            ("worn volume", f"{1e9 * numbers['volume_m3']:.5g} mm3, of it {_volumes(numbers['surface_volumes_m3'])}"),
-            ("friction work", f"{numbers['energy_J']:.5g} J"),
-            ("wear steps", f"{numbers['wear_steps']} with {numbers['hbm_solves']} balance solves"),
-        ]
-    for name, joint in numbers["joints"].items():
-        told = f"{joint['pairs']} pairs on {1e6 * joint['area_m2']:.5g} mm2"
-        if "preload_N" in joint:
-            first, last = joint["preload_N"]
-            told += f", preload {first:.5g} -> {last:.5g} N, {1e6 * joint['depth_max_m']:.4g} um deep at most, "
-            told += f"{1e9 * joint['volume_m3']:.4g} mm3, {joint['energy_J']:.4g} J"
-            if joint["life_cycles"] is not None:
-                told += f", life {joint['life_cycles']:.4g} cycles"
-        shown.append((f"  {name}", told))
-    shown += budget.lines(result)
-    threads = result.provenance.get("threads", "1")
-    shown.append(("computing", f"{numbers['seconds']:.1f} s on {threads} thread{'s' if threads != '1' else ''}"))
-    return shown
-
-
-def _volumes(volumes: list[float]) -> str:
-    return f"{1e9 * volumes[0]:.4g} on the part, {1e9 * volumes[1]:.4g} on what it rubs on"
-
-
-def _sizes(full: int | None, model: int | None) -> str:
-    return f"{full} DOFs, as they came" if full == model else f"{full} DOFs reduced to {model}"
+def plain(value: Any) -> Any:
+    """A value as JSON has it: nan and inf become None."""
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value

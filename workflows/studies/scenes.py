@@ -153,11 +153,11 @@ def draw(
     folder.mkdir(parents=True, exist_ok=True)
     written = plots.draw(result, folder, formats, dpi) if wanted.plots else []
     if wanted.renders:
-        from tribodyn.workflows.pictures import render
+        from tribodyn.workflows.pictures import offscreen, render
 
         try:
             written += render.draw(result, folder, wanted.deformation_scale, wanted.wear_scale, formats, dpi)
-        except render.RenderingUnavailable as reason:
+        except offscreen.RenderingUnavailable as reason:
             missing = f"no renders: {reason}"
     return written, missing
 
@@ -172,15 +172,15 @@ def animate(
     images: int = 48,
     dpi: int = 100,
 ) -> list[Path]:
-    """Make a film of a result with the factors of exaggeration of its scene, see pictures.animation; returns its files.
+    """Make a film of a result with the factors of exaggeration of its scene, see pictures.film; returns its files.
 
     Raises  ValueError: the result has nothing of the kind to show; RenderingUnavailable
     """
-    from tribodyn.workflows.pictures import animation
+    from tribodyn.workflows.pictures.film import film
 
     wanted = scene_file.from_json(result.provenance["scene"]).pictures
     factors = wanted.deformation_scale, wanted.wear_scale
-    return animation.write(result, folder, over, row, formats, images, dpi, *factors)
+    return film(result, folder, over, row, formats, images, dpi, *factors)
 
 
 def reporter(progress: Report) -> Progress:

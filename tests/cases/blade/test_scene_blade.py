@@ -17,7 +17,8 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.travelling_wave import at_sector, left_face
 from tribodyn.reduction.cyclic import nodal_diameters
 from tribodyn.workflows.pictures import render, render_wheel
-from tribodyn.workflows.result import store, summary
+from tribodyn.workflows.report import text
+from tribodyn.workflows.result import store
 from tribodyn.workflows.result.faces import meetings_of
 from tribodyn.workflows.result.facts import Facts
 from tribodyn.workflows.run import modelling, part_reduction, pipeline, planning, sector
@@ -61,8 +62,7 @@ def test_wear_goes_on_until_the_blades_are_free(finished):
 def test_result_is_kept_and_told(finished, folder):
     loaded = store.load(folder / "result.h5")
     assert render_wheel.wheel_of(loaded).n_sectors == 40
-    told = dict(summary.lines(loaded))
-    assert told["wheel"] == "40 sectors, engine order 1"
+    assert dict(text.lines(loaded))["wheel"] == "40 sectors, engine order 1"
     assert render_wheel.wheel_of(replace(loaded, facts=Facts())) is None
 
 

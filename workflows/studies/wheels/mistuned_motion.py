@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.workflows.pictures import animation, film
-from tribodyn.workflows.pictures.mistuned_wheel import MistunedWheelFilm, WheelState
-from tribodyn.workflows.pictures.render_wheel import Wheel
+from tribodyn.workflows.pictures import film
+from tribodyn.workflows.pictures.render_wheel import MistunedWheelFilm, Wheel, WheelState
 from tribodyn.workflows.run.description import part_mesh
 from tribodyn.workflows.studies.wheels.mistuned_wear import MistunedWear
 from tribodyn.workflows.studies.wheels.patterns import OUTPUT, Blades, amplitude, asked_of, drawn
@@ -59,7 +58,7 @@ def write(blades: Blades, states: Sequence[WheelState], folder: Path, formats: S
     made = MistunedWheelFilm(blades.file.name, wheel, mesh, harmonics, states, IMAGES if formats else 1)
     folder.mkdir(parents=True, exist_ok=True)
     made.figure.savefig(drawing := folder / f"{made.name}.png")
-    films = film.write(animation.drawn(made), folder / made.name, formats, animation.RATE) if formats else []
+    films = film.encode(film.drawn(made), folder / made.name, formats) if formats else []
     return [drawing, *films]
 
 

@@ -1,0 +1,44 @@
+"""Pictures of a result: each function returns a matplotlib figure, `film` and `write` write files.
+
+    import tribodyn as td
+
+    td.plot.response(result).savefig("response.png")
+    td.plot.wear(result, "depth").savefig("depth.png")
+
+`axes`, `draw_field`, `draw_status` and `shades` draw one's own figures in the same style, see `tribodyn.style`.
+"""
+
+from tribodyn.workflows.pictures.figures import axes_of as axes
+from tribodyn.workflows.pictures.figures import length_unit
+from tribodyn.workflows.pictures.film import film
+from tribodyn.workflows.pictures.maps import draw_field, draw_status
+from tribodyn.workflows.pictures.maps import motion_maps as motion
+from tribodyn.workflows.pictures.maps import patch_maps as patch
+from tribodyn.workflows.pictures.maps import status_maps as status
+from tribodyn.workflows.pictures.mesh_fields import mesh_fields, patch_fields
+from tribodyn.workflows.pictures.plots import draw as write
+from tribodyn.workflows.pictures.plots import hysteresis, response, wear
+from tribodyn.workflows.pictures.render import draw as render
+from tribodyn.workflows.pictures.wheel_diagrams import campbell, nodal_diameters, safe, shades
+
+__all__ = [
+    "axes",
+    "campbell",
+    "draw_field",
+    "draw_status",
+    "film",
+    "hysteresis",
+    "length_unit",
+    "mesh_fields",
+    "motion",
+    "nodal_diameters",
+    "patch",
+    "patch_fields",
+    "render",
+    "response",
+    "safe",
+    "shades",
+    "status",
+    "wear",
+    "write",
+]

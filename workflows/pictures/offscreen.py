@@ -1,0 +1,80 @@
+"""Whether this machine can draw without a screen, tried once before pyvista is used."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from functools import cache
+from importlib import import_module
+
+SYSTEM_LIBRARIES = "libgl1 libegl1 libgomp1"
+PROBE = "import pyvista as pv; view = pv.Plotter(off_screen=True); view.add_mesh(pv.Sphere()); view.screenshot()"
+
+
+class RenderingUnavailable(RuntimeError):
+    """Off-screen rendering does not work on this machine; the message is one sentence that says what to install."""
+
+
+def check() -> None:
+    """Try one picture in a process of its own, because without its libraries VTK kills the process that uses it.
+
+    On Linux that process is a child which need not load pyvista again; this one draws with it next, anyway.
+
+    Raises  RenderingUnavailable
+    """
+    if sys.platform.startswith("linux"):
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    if not _works(PROBE):
+        raise RenderingUnavailable(
+            "rendering without a screen does not work here: install the system libraries "
+            f"{SYSTEM_LIBRARIES} (on Debian: apt-get install -y --no-install-recommends {SYSTEM_LIBRARIES})"
+        )
+
+
+@cache
+def _works(probe: str) -> bool:
+    """Whether a program of pyvista comes to its end here."""
+    if sys.platform.startswith("linux") and _works_in_child(probe):
+        return True
+    try:
+        done = subprocess.run([sys.executable, "-c", probe], capture_output=True, timeout=300, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return done.returncode == 0
+
+
+def _works_in_child(probe: str, patience: float = 30.0) -> bool:
+    """Whether it ends well in a child within so many seconds.
+
+    That can fail for another reason too: this process has drawn before.
+    """
+    try:
+        import pyvista  # noqa: F401
+
+        pid = os.fork()
+    except (ImportError, OSError):
+        return False
+    if pid == 0:
+        code = 1
+        try:
+            resource = import_module("resource")
+            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+            nowhere = os.open(os.devnull, os.O_RDWR)
+            os.dup2(nowhere, 1)
+            os.dup2(nowhere, 2)
+            exec(probe, {})
+            code = 0
+        finally:
+            os._exit(code)  # nothing that this process would write or remove at its end is written or removed twice
+    ends = time.monotonic() + patience
+    while time.monotonic() < ends:
+        ended, status = os.waitpid(pid, os.WNOHANG)
+        if ended:
+            return status == 0
+        time.sleep(0.01)
+    os.kill(pid, signal.SIGKILL)
+    os.waitpid(pid, 0)
+    return False
