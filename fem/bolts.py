@@ -15,10 +15,9 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from tribodyn.fem.elements import coordinates
+from tribodyn.fem.mortar import MORTAR
 from tribodyn.fem.springs import shares
 from tribodyn.fem.surface import surface
-
-PULLS = 0.3  # cosine between a face's outward normal and the force on it, from which on the face is pulled
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ class Bolt:
         points = coordinates(mesh)
         row = np.zeros(points.shape)
         (head, share_1), (nut, share_2) = (shares(mesh, node_sets, name) for name in (self.head, self.nut))
-        axis = share_2 @ points[nut] - share_1 @ points[head]
+        axis = self._axis(mesh, node_sets)
         length = float(np.linalg.norm(axis))
         if np.intersect1d(head, nut).size or length <= 1e-6 * float(np.linalg.norm(np.ptp(points, axis=0))):
             raise ValueError(
@@ -49,7 +48,7 @@ class Bolt:
                 "under its head and under its nut"
             )
         for name, towards in ((self.head, axis), (self.nut, -axis)):
-            if _outward(mesh, name) @ towards > PULLS * length:
+            if _outward(mesh, name) @ towards > MORTAR.facing * length:
                 raise ValueError(
                     f"bolts.{self.name} would pull at '{name}' instead of pressing on it: give the faces under head "
                     "and nut, which look away from each other"
@@ -60,9 +59,13 @@ class Bolt:
 
     def length(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> float:
         """Distance of the middles of its faces [m]."""
-        points = coordinates(mesh)
+        return float(np.linalg.norm(self._axis(mesh, node_sets)))
+
+    def _axis(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> np.ndarray:
+        """From the middle of the face under the head to that under the nut (3,) [m]."""
         (head, share_1), (nut, share_2) = (shares(mesh, node_sets, name) for name in (self.head, self.nut))
-        return float(np.linalg.norm(share_2 @ points[nut] - share_1 @ points[head]))
+        points = coordinates(mesh)
+        return np.asarray(share_2 @ points[nut] - share_1 @ points[head])
 
     def vector(self, mesh: Any, node_sets: Mapping[str, np.ndarray], mass: Any = None) -> np.ndarray:
         """Force vector (3 n_node,) of 1 N in the shank."""

@@ -1,181 +1,154 @@
-"""Builders of contact interfaces: a patch against the ground, or against the nodes of another patch."""
+"""Contact interfaces of faces: against the ground, against a plane, or against another face."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_matrix, vstack
 
-from tribodyn.fem.interface import COMPONENTS, ContactInterface
+from tribodyn.fem.constraints import named
+from tribodyn.fem.interface import COMPONENTS, ContactInterface, checked_components, contact_frames
 from tribodyn.fem.loads import unit
-from tribodyn.fem.matching import TOLERANCE, facing_partners, partners
-from tribodyn.fem.mortar_contact import ROUNDING, mortar_halves
+from tribodyn.fem.matching import facing_partners, partners
+from tribodyn.fem.mortar import MORTAR, side
+from tribodyn.fem.mortar_contact import mortar_halves
 from tribodyn.fem.surface import Surface, facet_nodes, surface
 
-REACH = 0.1  # default of the farthest opening at which two faces still meet, as a part of the length of the first
 PAIRINGS = ("auto", "nodes", "mortar")
 
 
-def ground_contact(
-    mesh: Any,
-    facets: np.ndarray,
-    t1: Sequence[float],
-    components: Sequence[str] = COMPONENTS,
-    gap: float | np.ndarray = 0.0,
-    vertices_only: bool = False,
-) -> ContactInterface:
-    """Nodes of a face against the ground, which body 1 approaches along its outward normal.
+@dataclass(frozen=True)
+class ContactFaces:
+    """The face of a body and what it touches: the ground, a plane, or another face, meshed alike or not.
 
-    mesh : scikit-fem mesh; facets : facets of the face; t1 : (3,) direction whose part along the face is t1
-    components : those a scene needs, of t1, t2, n; gap : opening before loading [m], one or (n_pair,)
+    face : boundary name of body 1; opposite : boundary name of body 2, None for the ground
+    t1 : (3,) direction whose part along the face is t1; components : those modelled, of t1, t2, n
+    gap : opening before loading [m], one or (n_pair,); None takes that of the geometry between two faces, interference
+        negative, and 0 to the ground
     vertices_only : no pairs at mid-side and mid-face nodes; without, six-node faces have theirs at mid-side nodes only
-    Returns the interface with B over all 3 n_node DOFs of the mesh, pairs in ascending node order
-    Raises  ValueError for an empty face, a t1 along the normal, unknown components, a gap of the wrong length
-    """
-    return _interface(mesh, surface(mesh, facets, vertices_only), t1, components, gap)
-
-
-def plane_contact(
-    mesh: Any,
-    facets: np.ndarray,
-    towards: Sequence[float],
-    t1: Sequence[float],
-    components: Sequence[str] = COMPONENTS,
-    gap: float | np.ndarray = 0.0,
-    vertices_only: bool = False,
-    inclination: float = 0.0,
-) -> ContactInterface:
-    """Nodes of a face against a plane ground that touches the nearest of them, plus a gap.
-
-    towards : (3,) in which every pair closes, across the plane; inclination : of the plane about t1, by the right hand
-        [rad], so small that it does not change the direction. The gap of a pair is its distance from the plane along
-        that direction: what the face is bowed, and what the plane leans away.
-    Other arguments, returns and errors as ground_contact; ValueError too for an inclination of a quarter turn or more
-    """
-    if not abs(inclination) < np.pi / 2:
-        raise ValueError(f"the inclination of a contact is {inclination} rad; keep it far below a quarter turn")
-    face = surface(mesh, facets, vertices_only)
-    normal = unit(towards, "the direction in which a plane contact closes")
-    face = replace(face, normals=np.tile(normal, (len(face.nodes), 1)))
-    along = contact_frames(face.normals, t1)[0, 1]
-    away = np.tan(inclination) * (face.points @ along) - face.points @ normal
-    return _interface(mesh, face, t1, components, gap + away - away.min())
-
-
-def pair_contact(
-    mesh: Any,
-    facets_1: np.ndarray,
-    facets_2: np.ndarray,
-    t1: Sequence[float],
-    components: Sequence[str] = COMPONENTS,
-    gap: float | np.ndarray = 0.0,
-    vertices_only: bool = False,
-    tolerance: float = TOLERANCE,
-) -> ContactInterface:
-    """Nodes of face 1 against the matching nodes of face 2, which may be larger.
-
-    tolerance : largest distance of two matching nodes, as a part of the length of face 1
-    Other arguments, returns and errors as ground_contact; ValueError too where a node of face 1 finds no partner
-    """
-    interface, B_2 = pair_halves(mesh, facets_1, facets_2, t1, components, gap, vertices_only, tolerance)
-    return replace(interface, B=interface.B - B_2)
-
-
-def pair_halves(
-    mesh: Any,
-    facets_1: np.ndarray,
-    facets_2: np.ndarray,
-    t1: Sequence[float],
-    components: Sequence[str] = COMPONENTS,
-    gap: float | np.ndarray = 0.0,
-    vertices_only: bool = False,
-    tolerance: float = TOLERANCE,
-    rotation: np.ndarray | None = None,
-) -> tuple[ContactInterface, csr_matrix]:
-    """Both halves of a contact whose second body is the copy of this mesh turned by a rotation.
-
-    rotation : (3, 3) that carries face 2 of this mesh onto face 1, as the next sector of a cyclic part does
-    Returns interface whose B is the half of body 1, and the half B_2 of the turned body 2 in its own sector
-        coordinates: relative displacement = B q - B_2 q_2
-    """
-    rotation = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
-    face_1 = surface(mesh, facets_1, vertices_only)
-    face_2 = surface(mesh, facets_2, vertices_only)
-    partner = partners(face_1.points, face_2.points @ rotation.T, "the two contact faces", tolerance)
-    interface = _interface(mesh, face_1, t1, components, gap)
-    turned = _rows(interface.frames, components) @ rotation
-    return interface, _map(turned, face_2.nodes[partner], mesh)
-
-
-def facing_halves(
-    mesh: Any,
-    facets_1: np.ndarray,
-    facets_2: np.ndarray,
-    t1: Sequence[float],
-    components: Sequence[str] = COMPONENTS,
-    gap: float | np.ndarray | None = None,
-    vertices_only: bool = False,
-    rotation: np.ndarray | None = None,
-    pairing: str = "auto",
-    reach: float | None = None,
-) -> tuple[ContactInterface, csr_matrix]:
-    """Both halves of a contact of two faces that may be meshed differently and may stand apart or overlap.
-
-    gap : opening before loading [m], one or (n_pair,); None takes that of the geometry, interference negative
+    plane : (3,) direction in which every pair closes, across a plane ground that touches the nearest of them
+    inclination : of the plane about t1, by the right hand [rad], so small that it does not change the direction. The
+        gap of a pair is its distance from the plane along that direction: what the face is bowed, what the plane leans
     pairing : "nodes" pairs matching nodes, "mortar" weighs both faces over the surface they share, "auto" pairs nodes
-        where every facet of face 1 has its like on face 2
-    reach : farthest opening at which the faces still meet [m], a tenth of the length of face 1 by default
-    Other arguments and returns as `pair_halves`
-    Raises  ValueError where the faces do not meet, or do not match where nodes are to be paired
+        where every facet of the first face has its like on the second
+    reach : farthest opening at which two faces still meet [m], a tenth of the length of the first by default
+    joint : name of the joint that it belongs to, that of the face by default
+    turn : (3, 3) rotation from a sector of a wheel to the next one, whose opposite face is met; None for the same body
+    Raises  ValueError, as its methods, for what contradicts itself
     """
-    if pairing not in PAIRINGS:
-        raise ValueError(f"there is no pairing '{pairing}': there are {', '.join(PAIRINGS)}")
-    turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
-    corners = facet_nodes(mesh, facets_1)
-    length = float(np.linalg.norm(np.ptp(np.asarray(mesh.doflocs.T)[np.unique(corners)], axis=0)))
-    farthest = REACH * length if reach is None else reach
-    if pairing != "mortar":
-        matched = _matched(mesh, facets_1, facets_2, turn, vertices_only, farthest)
-        if matched is not None:
-            face_1, nodes_2, opening = matched
-            opening[np.abs(opening) < ROUNDING * length] = 0.0
-            interface = _interface(mesh, face_1, t1, components, opening if gap is None else gap)
-            return interface, _map(_rows(interface.frames, components) @ turn, nodes_2, mesh)
-        if pairing == "nodes":
-            return pair_halves(
-                mesh, facets_1, facets_2, t1, components, 0.0 if gap is None else gap, vertices_only, rotation=turn
-            )
-    interface, B_2 = mortar_halves(mesh, facets_1, facets_2, t1, components, farthest, vertices_only, rotation)
-    if gap is not None:
-        if np.ndim(gap) and np.shape(gap) != interface.area.shape:
-            raise ValueError(f"the contact gap has {np.size(gap)} values for {interface.n_pair} points; give one each")
-        interface = replace(interface, gap=np.broadcast_to(np.asarray(gap, dtype=float), interface.area.shape).copy())
-    return interface, B_2
 
+    face: str
+    t1: Sequence[float]
+    opposite: str | None = None
+    components: Sequence[str] = COMPONENTS
+    gap: float | np.ndarray | None = None
+    vertices_only: bool = False
+    plane: Sequence[float] | None = None
+    inclination: float = 0.0
+    pairing: str = "auto"
+    reach: float | None = None
+    joint: str = ""
+    turn: np.ndarray | None = None
 
-def _matched(
-    mesh: Any, facets_1: np.ndarray, facets_2: np.ndarray, turn: np.ndarray, vertices_only: bool, reach: float
-) -> tuple[Surface, np.ndarray, np.ndarray] | None:
-    """Face 1, the partners of its nodes on face 2 and their opening (n_pair,) [m]; None where facets do not match."""
-    one, two = facet_nodes(mesh, facets_1), facet_nodes(mesh, facets_2)
-    if one.shape[1] != two.shape[1] or len(one) > len(two):
-        return None
-    face_1 = surface(mesh, facets_1, vertices_only)
-    points = np.asarray(mesh.doflocs.T)
-    nodes = np.unique(two)
-    found = facing_partners(face_1.points, face_1.normals, points[nodes] @ turn.T, reach)
-    if found is None:
-        return None
-    partner, opening = nodes[found[0]], found[1]
-    of_facet = slice(3, 6) if one.shape[1] == 6 and not vertices_only else slice(0, 4 if one.shape[1] == 9 else 3)
-    place = np.searchsorted(face_1.nodes, one[:, of_facet])
-    there = {tuple(row) for row in np.sort(two[:, of_facet], axis=1).tolist()}
-    if not all(tuple(row) in there for row in np.sort(partner[place], axis=1).tolist()):
-        return None
-    return face_1, partner, opening
+    def __post_init__(self) -> None:
+        if self.plane is not None and self.opposite is not None:
+            raise ValueError(f"contact '{self.face}': a plane ground and an opposite face exclude each other; drop one")
+        if self.inclination and self.plane is None:
+            raise ValueError(f"contact '{self.face}': an inclination needs a plane ground; give its plane")
+        if not abs(self.inclination) < np.pi / 2:
+            raise ValueError(f"contact '{self.face}': inclination = {self.inclination} rad; keep it below pi / 2")
+        if self.pairing not in PAIRINGS:
+            raise ValueError(f"there is no pairing '{self.pairing}': there are {', '.join(PAIRINGS)}")
+
+    def build(self, mesh: Any) -> ContactInterface:
+        """The interface with B over all 3 n_node DOFs of the mesh, pairs in ascending node order.
+
+        Where the second face is a neighbour's B is the half of the first alone
+        Raises  ValueError for an unknown or empty face, a t1 along the normal, a gap of the wrong length
+        """
+        if self.opposite is not None:
+            interface, B_2 = self.halves(mesh)
+            return interface if self.turn is not None else replace(interface, B=interface.B - B_2)
+        face = surface(mesh, named(mesh.boundaries or {}, self.face, "face"), self.vertices_only)
+        gap: float | np.ndarray = 0.0 if self.gap is None else self.gap
+        if self.plane is not None:
+            normal = unit(self.plane, "the direction in which a plane contact closes")
+            face = replace(face, normals=np.tile(normal, (len(face.nodes), 1)))
+            along = contact_frames(face.normals, self.t1)[0, 1]
+            away = np.tan(self.inclination) * (face.points @ along) - face.points @ normal
+            gap = gap + away - away.min()
+        return self._interface(mesh, face, gap)
+
+    def halves(self, mesh: Any) -> tuple[ContactInterface, csr_matrix]:
+        """Both halves of a contact of two faces, over all DOFs of the mesh.
+
+        Returns interface whose B is the half of the first face, and the half B_2 of the second one in the coordinates
+            of its own sector: relative displacement = B q - B_2 q_2
+        Raises  ValueError, naming the faces, where they do not meet, or do not match where nodes are to be paired
+        """
+        assert self.opposite is not None
+        faces = mesh.boundaries or {}
+        try:
+            first, second = (named(faces, name, "face") for name in (self.face, self.opposite))
+            return self._facing(mesh, first, second)
+        except ValueError as trouble:
+            raise type(trouble)(f"contact of '{self.face}' and '{self.opposite}': {trouble}") from None
+
+    def _facing(self, mesh: Any, first: np.ndarray, second: np.ndarray) -> tuple[ContactInterface, csr_matrix]:
+        turn = np.eye(3) if self.turn is None else np.asarray(self.turn, dtype=float).T
+        corners = np.asarray(mesh.doflocs.T)[np.unique(facet_nodes(mesh, first))]
+        length = float(np.linalg.norm(np.ptp(corners, axis=0)))
+        reach = MORTAR.reach * length if self.reach is None else self.reach
+        matched = None
+        if self.pairing != "mortar":
+            matched = self._matched(mesh, first, second, turn, reach)
+            if matched is None and self.pairing == "nodes":
+                face, other = (surface(mesh, facets, self.vertices_only) for facets in (first, second))
+                partner = partners(face.points, other.points @ turn.T, "the two contact faces")
+                matched = face, other.nodes[partner], np.zeros(len(partner))
+        if matched is None:
+            one, two = side(mesh, first), side(mesh, second, None if self.turn is None else turn)
+            interface, B_2 = mortar_halves(one, two, self.t1, self.components, reach, self.vertices_only)
+            if self.gap is not None:
+                interface = replace(interface, gap=_gaps(self.gap, interface.area))
+            return interface, B_2
+        face, nodes, opening = matched
+        opening[np.abs(opening) < MORTAR.rounding * length] = 0.0
+        interface = self._interface(mesh, face, opening if self.gap is None else self.gap)
+        return interface, _map(_rows(interface.frames, self.components) @ turn, nodes, mesh)
+
+    def _matched(
+        self, mesh: Any, first: np.ndarray, second: np.ndarray, turn: np.ndarray, reach: float
+    ) -> tuple[Surface, np.ndarray, np.ndarray] | None:
+        """The first face, the partners of its nodes on the second and their opening (n_pair,) [m]; None where facets do
+        not match.
+        """
+        one, two = facet_nodes(mesh, first), facet_nodes(mesh, second)
+        if one.shape[1] != two.shape[1] or len(one) > len(two):
+            return None
+        face = surface(mesh, first, self.vertices_only)
+        nodes = np.unique(two)
+        found = facing_partners(face.points, face.normals, np.asarray(mesh.doflocs.T)[nodes] @ turn.T, reach)
+        if found is None:
+            return None
+        partner, opening = nodes[found[0]], found[1]
+        quads = one.shape[1] == 9
+        of_facet = slice(0, 4) if quads else slice(0, 3) if self.vertices_only else slice(3, 6)
+        place = np.searchsorted(face.nodes, one[:, of_facet])
+        there = {tuple(row) for row in np.sort(two[:, of_facet], axis=1).tolist()}
+        if not all(tuple(row) in there for row in np.sort(partner[place], axis=1).tolist()):
+            return None
+        return face, partner, opening
+
+    def _interface(self, mesh: Any, face: Surface, gap: float | np.ndarray) -> ContactInterface:
+        """Interface of the nodes of one face, with B of that face alone."""
+        components = checked_components(self.components)
+        frames = contact_frames(face.normals, self.t1)
+        B = _map(_rows(frames, components), face.nodes, mesh)
+        return ContactInterface(components, face.points, frames, face.area, _gaps(gap, face.area), B, face.faces)
 
 
 def join(interfaces: Sequence[ContactInterface]) -> ContactInterface:
@@ -199,48 +172,17 @@ def join(interfaces: Sequence[ContactInterface]) -> ContactInterface:
     )
 
 
-def no_contact(n_dof: int, components: Sequence[str] = COMPONENTS) -> ContactInterface:
+def no_contact(n_dof: int) -> ContactInterface:
     """The interface of a structure that touches nothing."""
-    none = np.zeros(0)
-    B = csr_matrix((0, n_dof))
-    return ContactInterface(
-        tuple(components), np.zeros((0, 3)), np.zeros((0, 3, 3)), none, none, B, np.zeros((0, 4), int)
-    )
+    none, B = np.zeros(0), csr_matrix((0, n_dof))
+    return ContactInterface(COMPONENTS, np.zeros((0, 3)), np.zeros((0, 3, 3)), none, none, B, np.zeros((0, 4), int))
 
 
-def _interface(
-    mesh: Any, face: Surface, t1: Sequence[float], components: Sequence[str], gap: float | np.ndarray
-) -> ContactInterface:
-    """Interface of the nodes of one face, with B of that face alone."""
-    components = tuple(components)
-    if not components or components != tuple(c for c in COMPONENTS if c in components):
-        raise ValueError(f"contact components {list(components)} must be some of t1, t2, n, in this order")
-    if np.ndim(gap) and np.shape(gap) != face.area.shape:
-        raise ValueError(f"the contact gap has {np.size(gap)} values for {len(face.area)} node pairs; give one each")
-    frames = contact_frames(face.normals, t1)
-    return ContactInterface(
-        components=components,
-        points=face.points,
-        frames=frames,
-        area=face.area,
-        gap=np.broadcast_to(np.asarray(gap, dtype=float), face.area.shape).copy(),
-        B=_map(_rows(frames, components), face.nodes, mesh),
-        faces=face.faces,
-    )
-
-
-def contact_frames(normals: np.ndarray, t1: Sequence[float]) -> np.ndarray:
-    """Right-handed frames (k, 3, 3), rows t1, t2, n, from normals (k, 3) and a direction that t1 follows.
-
-    Raises  ValueError where the direction is along a normal
-    """
-    direction = unit(t1, "the contact direction t1")
-    along = direction - (normals @ direction)[:, None] * normals
-    length = np.linalg.norm(along, axis=1, keepdims=True)
-    if (length < 1e-3).any():
-        raise ValueError(f"the contact direction t1 = {list(t1)} is along the contact normal; give one along the face")
-    first = along / length
-    return np.stack([first, np.cross(normals, first), normals], axis=1)
+def _gaps(gap: float | np.ndarray, area: np.ndarray) -> np.ndarray:
+    """The gap of every pair (n_pair,) [m]."""
+    if np.ndim(gap) and np.shape(gap) != area.shape:
+        raise ValueError(f"the contact gap has {np.size(gap)} values for {len(area)} node pairs; give one each")
+    return np.broadcast_to(np.asarray(gap, dtype=float), area.shape).copy()
 
 
 def _rows(frames: np.ndarray, components: Sequence[str]) -> np.ndarray:

@@ -17,12 +17,10 @@ from scipy.sparse.linalg import splu
 
 from tribodyn.fem.constraints import Following, named
 from tribodyn.fem.elements import coordinates
-from tribodyn.fem.mortar import common, side, tabulate
+from tribodyn.fem.mortar import MORTAR, common, side, tabulate
 from tribodyn.fem.mortar_contact import apart
 from tribodyn.fem.springs import shares
 
-REACH = 0.1  # default of the farthest opening that a tie bridges, as a part of the length of its first face
-COVERED = 1e-3  # part of a node's own share of its face below which it is not tied
 SMALL = 1e-13  # of a coefficient that is left out
 
 
@@ -45,7 +43,7 @@ class Tie:
         """
         faces = mesh.boundaries or {}
         one, two = (side(mesh, named(faces, name, "face")) for name in (self.first, self.second))
-        reach = REACH * one.length if self.reach is None else self.reach
+        reach = MORTAR.reach * one.length if self.reach is None else self.reach
         shared = common(one, two, reach)
         if not len(shared.weight):
             raise ValueError(f"{self.what}: {apart(one, two, reach).replace('contact faces', 'tied faces')}")
@@ -63,7 +61,7 @@ class Tie:
         whole = np.zeros(n)
         edge = one.points[:, 1:3] - one.points[:, :1]
         np.add.at(whole, one.nodes, np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1)[:, None] / 100)
-        tied = nodes[size[nodes] > COVERED * whole[nodes]]
+        tied = nodes[size[nodes] > MORTAR.few * whole[nodes]]
         rest = np.setdiff1d(nodes, tied)
         solve = splu(D[tied][:, tied].tocsc())
         right = csr_matrix(M[tied])

@@ -15,13 +15,12 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix, vstack
 
-from tribodyn.fem import part as fem_part
-from tribodyn.fem.constraints import Clamp, named
+from tribodyn.fem.constraints import named
+from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.interface import ContactInterface
-from tribodyn.fem.loads import Load, NodalForce, unit
+from tribodyn.fem.loads import unit
 from tribodyn.fem.matching import partners
-from tribodyn.fem.material import Material
-from tribodyn.fem.part import Contact, Part
+from tribodyn.fem.part import Part
 from tribodyn.fem.system import SecondOrderSystem
 
 AXIS = (1.0, 0.0, 0.0)
@@ -69,35 +68,10 @@ def rotation(axis: Sequence[float], angle: float) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
-def build(
-    mesh: Any,
-    node_sets: Mapping[str, np.ndarray],
-    material: Material | Mapping[str, Material],
-    clamps: Sequence[Clamp],
-    contacts: Sequence[Contact],
-    loads: Mapping[str, Load],
-    outputs: Mapping[str, NodalForce],
-    n_sectors: int,
-    seam: tuple[str, str] | None = None,
-    axis: Sequence[float] = AXIS,
-    order: int | None = None,
-) -> tuple[Part, Sector]:
-    """Assemble one sector and find what its faces meet in the neighbours.
-
-    contacts : between neighbours: face is on the right, opposite on the left; each meets after a turn by one pitch
-        about the axis
-    seam : names of the right and the left face where sectors are one piece, None where only contacts couple them
-    axis : of the wheel, through the origin. Other arguments as fem.part.build
-    Returns the part of one sector, its interface the half of the right face; and the sector over the same DOFs
-    Raises  ValueError as `cut_from` does
+def turned(contacts: Sequence[ContactFaces], n_sectors: int, axis: Sequence[float] = AXIS) -> list[ContactFaces]:
+    """Contacts of a sector, face on its right, with the opposite faces of its neighbours on the left, which each meets
+    after a turn by one pitch about the axis; raises ValueError as `cut_from` does.
     """
-    right = turned(contacts, n_sectors, axis)
-    part = fem_part.build(mesh, node_sets, material, clamps, right, loads, outputs, order)
-    return part, cut_from(part, right, n_sectors, seam, axis)
-
-
-def turned(contacts: Sequence[Contact], n_sectors: int, axis: Sequence[float] = AXIS) -> list[Contact]:
-    """Contacts of a sector with the faces of its neighbours; raises ValueError as `cut_from` does."""
     if n_sectors < 2:
         raise ValueError(f"a wheel of {n_sectors} sectors has no neighbours; give at least 2")
     missing = [contact.face for contact in contacts if contact.opposite is None]
@@ -109,14 +83,16 @@ def turned(contacts: Sequence[Contact], n_sectors: int, axis: Sequence[float] = 
 
 def cut_from(
     part: Part,
-    contacts: Sequence[Contact],
+    contacts: Sequence[ContactFaces],
     n_sectors: int,
     seam: tuple[str, str] | None = None,
     axis: Sequence[float] = AXIS,
 ) -> Sector:
-    """The sector that a part is; arguments as `build`.
+    """The sector that a part is.
 
     contacts : those that the part was built with; the ones of `turned` meet the neighbour, the others stay inside
+    seam : names of the right and the left face where sectors are one piece, None where only contacts couple them
+    axis : of the wheel, through the origin
     Raises  ValueError where faces do not match after the turn, a seam is held on one side only, or a contact has no
         opposite face
     """
@@ -129,7 +105,7 @@ def cut_from(
     return Sector(part.system, part.interface, left, *seams, turn, n_sectors, part.joints)
 
 
-def _left_halves(part: Part, contacts: Sequence[Contact]) -> csr_matrix:
+def _left_halves(part: Part, contacts: Sequence[ContactFaces]) -> csr_matrix:
     """The halves of the left faces (n_c, n_dof) over all DOFs of the mesh; zero for contacts inside the sector."""
     n_component, n_dof = len(part.interface.components), 3 * len(part.points)
     halves = [csr_matrix((0, n_dof))]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
+from tribodyn.fem.loads import unit
 
 COMPONENTS = ("t1", "t2", "n")
 
@@ -45,3 +48,25 @@ class ContactInterface:
         """
         total = {"t1": tangential, "t2": tangential, "n": normal}
         return np.outer(self.area / self.area.sum(), [total[c] for c in self.components])
+
+
+def checked_components(components: Sequence[str]) -> tuple[str, ...]:
+    """The components; raises ValueError where they are not some of t1, t2, n in this order."""
+    found = tuple(components)
+    if not found or found != tuple(c for c in COMPONENTS if c in found):
+        raise ValueError(f"contact components {list(found)} must be some of t1, t2, n, in this order")
+    return found
+
+
+def contact_frames(normals: np.ndarray, t1: Sequence[float]) -> np.ndarray:
+    """Right-handed frames (k, 3, 3), rows t1, t2, n, from unit normals (k, 3) and a direction that t1 follows.
+
+    Raises  ValueError where the direction is along a normal
+    """
+    direction = unit(t1, "the contact direction t1")
+    along = direction - (normals @ direction)[:, None] * normals
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    if (length < 1e-3).any():
+        raise ValueError(f"the contact direction t1 = {list(t1)} is along the contact normal; give one along the face")
+    first = along / length
+    return np.stack([first, np.cross(normals, first), normals], axis=1)

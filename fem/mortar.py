@@ -22,17 +22,42 @@ from tribodyn.fem.assembly import piece_of_facets
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.surface import facet_nodes, outside
 
-CURVED = 1e-9  # part of its size by which a flat facet may bulge
-EDGE_PIECES = 6  # straight pieces that stand for a curved edge
-FLAT_ORDER, CURVED_ORDER = 8, 12  # of the rule in a triangle; exact for products of two nine-node shape functions
-FACING = -0.3  # cosine between outward normals above which facets do not face each other
-SLIVER = 1e-10  # part of a facet that is too small to be a cut
+
+@dataclass(frozen=True)
+class MortarOptions:
+    """Limits of the cuts of two faces, relative but for orders and counts.
+
+    reach : default of the farthest opening at which faces meet or a tie bridges, over the length of the first face
+    curved : bulge of a facet, over its size, from which on it counts as curved; just above rounding
+    edge_pieces : straight pieces that stand for a curved edge
+    flat_order, curved_order : of the rule in a triangle; 8 is exact for products of two nine-node shape functions
+    facing : cosine between directions from which on they look the same way; facets that face each other have less than
+        its negative, which keeps the rims of bores and rounded edges out
+    sliver : part of a facet that is too small to be a cut
+    whole : part of a facet that counts as all of it; few : part of a point's own area that is too little to carry or to be tied
+    rounding : gap that is rounding of node positions, over the length of the face
+    """
+
+    reach: float = 0.1
+    curved: float = 1e-9
+    edge_pieces: int = 6
+    flat_order: int = 8
+    curved_order: int = 12
+    facing: float = 0.3
+    sliver: float = 1e-10
+    whole: float = 1 - 1e-6
+    few: float = 1e-6
+    rounding: float = 1e-9
+
+
+MORTAR = MortarOptions()
 
 
 @dataclass(frozen=True)
 class Side:
     """A face in space: nodes (n_facet, k), points (n_facet, k, 3) [m], corners first, then mid-sides, then middle;
     centre, normal : (n_facet, 3), the normal outward; sign : (n_facet,) that makes dx/dxi cross dx/deta outward
+    turn : (3, 3) rotation about the origin that brought the mesh here; n_node : of the mesh
     """
 
     nodes: np.ndarray
@@ -40,6 +65,8 @@ class Side:
     centre: np.ndarray
     normal: np.ndarray
     sign: np.ndarray
+    turn: np.ndarray
+    n_node: int
 
     @property
     def corners(self) -> int:
@@ -76,7 +103,8 @@ def side(mesh: Any, facets: np.ndarray, rotation: np.ndarray | None = None) -> S
     normal = np.cross(*np.einsum("aid,dax->idx", slopes, points))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     sign = np.sign(np.einsum("fx,fx->f", normal, centre - inner))
-    return Side(nodes, points, centre, normal * sign[:, None], sign)
+    turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
+    return Side(nodes, points, centre, normal * sign[:, None], sign, turn, mesh.doflocs.shape[1])
 
 
 def tabulate(k: int, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -120,8 +148,8 @@ def common(one: Side, two: Side, reach: float) -> Common:
     """
     i, j = _candidates(one, two, reach)
     frames = _planes(one.normal)[i]
-    curved = one.bulge > CURVED
-    outline = _outline(two, two.bulge > CURVED)[j]
+    curved = one.bulge > MORTAR.curved
+    outline = _outline(two, two.bulge > MORTAR.curved)[j]
     corners = one.points[:, : one.corners]
     if curved:
         region = _reference(one.corners)[None].repeat(len(i), axis=0)
@@ -134,15 +162,15 @@ def common(one: Side, two: Side, reach: float) -> Common:
     whole = _area(region)
     region[whole < 0] = region[whole < 0][:, ::-1]
     polygon = _clip(subject, region)
-    found = np.abs(_area(polygon)) > SLIVER * np.abs(whole)
+    found = np.abs(_area(polygon)) > MORTAR.sliver * np.abs(whole)
     i, j, frames, polygon, whole = i[found], j[found], frames[found], polygon[found], np.abs(whole[found])
 
-    X, w = get_quadrature(ElementTriP1, CURVED_ORDER if curved else FLAT_ORDER)
+    X, w = get_quadrature(ElementTriP1, MORTAR.curved_order if curved else MORTAR.flat_order)
     hub = polygon.mean(axis=1, keepdims=True)
     a, b = polygon - hub, np.roll(polygon, -1, axis=1) - hub
     twice = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
     twice *= np.sign(twice.sum(axis=1, keepdims=True))
-    pair, corner = np.nonzero(np.abs(twice) > SLIVER * whole[:, None])
+    pair, corner = np.nonzero(np.abs(twice) > MORTAR.sliver * whole[:, None])
     s = hub[pair, 0][:, None] + X[0][:, None] * a[pair, corner][:, None] + X[1][:, None] * b[pair, corner][:, None]
     weight = (twice[pair, corner][:, None] * w).ravel()
     s, of = s.reshape(-1, 2).T, np.repeat(pair, len(w))
@@ -186,7 +214,7 @@ def _candidates(one: Side, two: Side, reach: float) -> tuple[np.ndarray, np.ndar
     apart = two.centre[j] - one.centre[i]
     along = np.einsum("px,px->p", apart, one.normal[i])
     across = np.linalg.norm(apart - along[:, None] * one.normal[i], axis=1)
-    facing = np.einsum("px,px->p", one.normal[i], two.normal[j]) < FACING
+    facing = np.einsum("px,px->p", one.normal[i], two.normal[j]) < -MORTAR.facing
     meet = facing & (across <= r_1[i] + r_2[j]) & (np.abs(along) <= reach + r_1[i] + r_2[j])
     return i[meet], j[meet]
 
@@ -209,7 +237,7 @@ def _outline(of: Side, curved: bool) -> np.ndarray:
     corners, middles = of.points[:, :n], of.points[:, n : 2 * n]
     if not curved:
         return corners
-    t = np.arange(EDGE_PIECES)[:, None] / EDGE_PIECES
+    t = np.arange(MORTAR.edge_pieces)[:, None] / MORTAR.edge_pieces
     following = np.roll(corners, -1, axis=1)
     shape = (1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)
     edge = sum(N * p[:, :, None] for N, p in zip(shape, (corners, middles, following), strict=True))

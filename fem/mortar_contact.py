@@ -12,47 +12,33 @@ Source  Puso and Laursen, Computer Methods in Applied Mechanics and Engineering 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
+from scipy.spatial import cKDTree
 
-from tribodyn.fem.interface import COMPONENTS, ContactInterface
+from tribodyn.fem.interface import COMPONENTS, ContactInterface, checked_components, contact_frames
 from tribodyn.fem.matching import Mismatch
-from tribodyn.fem.mortar import Side, common, side, tabulate
+from tribodyn.fem.mortar import MORTAR, Side, common, tabulate
 from tribodyn.fem.surface import NINE_NODE_QUADS, side_functions, side_polygons
-
-WHOLE = 1 - 1e-6  # part of a facet that counts as all of it
-FEW = 1e-6  # part of a point's own area that is too little to carry anything
-ROUNDING = 1e-9  # gap that is rounding of node positions, as a part of the length of the face
 
 
 def mortar_halves(
-    mesh: Any,
-    facets_1: np.ndarray,
-    facets_2: np.ndarray,
-    t1: Sequence[float],
-    components: Sequence[str],
-    reach: float,
-    vertices_only: bool = False,
-    rotation: np.ndarray | None = None,
+    one: Side, two: Side, t1: Sequence[float], components: Sequence[str], reach: float, vertices_only: bool = False
 ) -> tuple[ContactInterface, csr_matrix]:
-    """Both halves of a contact, as `fem.contact.pair_halves` gives them, with the gap of the geometry.
+    """Both halves of a contact, as `ContactFaces.halves` gives them, with the gap of the geometry.
 
+    t1, components, vertices_only : as of `ContactFaces`
     reach : farthest distance along the normal at which the faces still meet [m]
     Raises  Mismatch where they do not meet
     """
-    from tribodyn.fem.contact import contact_frames
-
-    turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
-    one, two = side(mesh, facets_1), side(mesh, facets_2, None if rotation is None else turn)
     shared = common(one, two, reach)
     if not len(shared.weight):
         raise Mismatch(apart(one, two, reach))
     n = one.corners
-    whole = (shared.covered >= WHOLE) & (not vertices_only)
+    whole = (shared.covered >= MORTAR.whole) & (not vertices_only)
     frames = contact_frames(shared.normal, t1)
-    picked = [COMPONENTS.index(c) for c in components]
+    picked = [COMPONENTS.index(c) for c in checked_components(components)]
 
     carriers = _carriers(one, whole)
     nodes = np.unique(np.concatenate(carriers))
@@ -71,7 +57,7 @@ def mortar_halves(
         np.add.at(directions, at, np.einsum("ag,gcx->acx", phi, frames[g]))
         for found, of, xi, frame in (
             (first, one.nodes[i], shared.xi[:, g], frames[g][:, picked]),
-            (second, two.nodes[j], shared.eta[:, g], frames[g][:, picked] @ turn),
+            (second, two.nodes[j], shared.eta[:, g], frames[g][:, picked] @ two.turn),
         ):
             N = tabulate(len(of), xi)[0]
             rows = phi @ np.einsum("gcx,kg->gckx", frame, N).reshape(len(xi[0]), -1)
@@ -80,10 +66,10 @@ def mortar_halves(
             shape = (len(at), len(picked), len(of), 3)
             found.append((rows, np.broadcast_to(lines, shape).ravel(), np.broadcast_to(columns, shape).ravel()))
 
-    kept = area > FEW * _own_area(one, carriers, nodes)
+    kept = area > MORTAR.few * _own_area(one, carriers, nodes)
     area, gap, directions = area[kept], gap[kept] / area[kept], directions[kept]
-    gap[np.abs(gap) < ROUNDING * one.length] = 0.0
-    n_dof = 3 * mesh.doflocs.shape[1]
+    gap[np.abs(gap) < MORTAR.rounding * one.length] = 0.0
+    n_dof = 3 * one.n_node
     B_1, B_2 = (_map(found, kept, area, len(picked), n_dof) for found in (first, second))
     new = np.cumsum(kept) - 1
     polygons = [
@@ -99,7 +85,7 @@ def mortar_halves(
     interface = ContactInterface(
         components=tuple(components),
         points=one.points.reshape(-1, 3)[_first_place(one.nodes, nodes[kept])],
-        frames=_orthonormal(directions),
+        frames=_mean_frames(directions),
         area=area,
         gap=gap,
         B=B_1,
@@ -110,8 +96,6 @@ def mortar_halves(
 
 def apart(one: Side, two: Side, reach: float) -> str:
     """Why two sides do not meet, in a sentence."""
-    from scipy.spatial import cKDTree
-
     distance, other = cKDTree(two.centre).query(one.centre)
     nearest = int(distance.argmin())
     facing = float(one.normal[nearest] @ two.normal[other[nearest]])
@@ -124,11 +108,11 @@ def apart(one: Side, two: Side, reach: float) -> str:
     if facing < 0 and inside < -reach and beside < facet:
         return (
             f"the bodies overlap: the second face lies about {-inside:.3g} m inside the first body, farther than the "
-            f"{reach:.3g} m that are looked; move a body, or give reach"
+            f"{reach:.3g} m where faces are looked for; move a body, or give reach"
         )
     return (
-        f"the two contact faces do not meet: they are about {distance.min():.3g} m apart and the farthest that is "
-        f"looked is {reach:.3g} m; move a body, or give reach"
+        f"the two contact faces do not meet: they are about {distance.min():.3g} m apart, farther than the "
+        f"reach of {reach:.3g} m; move a body, or give reach"
     )
 
 
@@ -169,7 +153,7 @@ def _first_place(nodes: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     return place[np.searchsorted(flat, wanted)]
 
 
-def _orthonormal(directions: np.ndarray) -> np.ndarray:
+def _mean_frames(directions: np.ndarray) -> np.ndarray:
     """Right-handed frames nearest to mean directions (n, 3, 3), the normal kept."""
     normal = directions[:, 2] / np.linalg.norm(directions[:, 2], axis=1, keepdims=True)
     first = directions[:, 0] - np.einsum("nx,nx->n", directions[:, 0], normal)[:, None] * normal

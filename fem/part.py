@@ -10,74 +10,13 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from tribodyn.fem.constraints import AXES, Clamp, Constraint, NoMeanRotation, free_dofs, named, restriction
-from tribodyn.fem.contact import facing_halves, ground_contact, join, no_contact, plane_contact
+from tribodyn.fem.contact import ContactFaces, join, no_contact
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.elements import coordinates
-from tribodyn.fem.interface import COMPONENTS, ContactInterface
+from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.loads import Load
 from tribodyn.fem.springs import Mass
 from tribodyn.fem.system import SecondOrderSystem
-
-
-@dataclass(frozen=True)
-class Contact:
-    """What a scene says about one contact.
-
-    face : boundary name of body 1; opposite : boundary name of body 2, None for the ground
-    t1 : (3,) direction that the first tangent follows; components : those modelled
-    gap : [m], one or per pair; None takes that of the geometry between two faces, and 0 to the ground
-    vertices_only : pairs at the element corners only
-    plane : (3,) towards a ground that is a plane, turned about t1 by inclination [rad]; see `plane_contact`
-    pairing, reach : see `facing_halves`
-    joint : name of the joint that it belongs to, that of the face by default
-    turn : (3, 3) rotation from a sector of a wheel to the next one, whose opposite face is met; None for the same body
-    """
-
-    face: str
-    t1: Sequence[float]
-    opposite: str | None = None
-    components: Sequence[str] = COMPONENTS
-    gap: float | np.ndarray | None = None
-    vertices_only: bool = False
-    plane: Sequence[float] | None = None
-    inclination: float = 0.0
-    pairing: str = "auto"
-    reach: float | None = None
-    joint: str = ""
-    turn: np.ndarray | None = None
-
-    def __post_init__(self) -> None:
-        if self.plane is not None and self.opposite is not None:
-            raise ValueError(f"contact '{self.face}': a plane ground and an opposite face exclude each other; drop one")
-        if self.inclination and self.plane is None:
-            raise ValueError(f"contact '{self.face}': an inclination needs a plane ground; give its plane")
-
-    def build(self, mesh: Any) -> ContactInterface:
-        """The interface over all DOFs of the mesh; that of the first face alone where the second is a neighbour's."""
-        if self.opposite is not None:
-            interface, B_2 = self.halves(mesh)
-            return interface if self.turn is not None else replace(interface, B=interface.B - B_2)
-        first = named(mesh.boundaries or {}, self.face, "face")
-        gap = 0.0 if self.gap is None else self.gap
-        if self.plane is not None:
-            return plane_contact(
-                mesh, first, self.plane, self.t1, self.components, gap, self.vertices_only, self.inclination
-            )
-        return ground_contact(mesh, first, self.t1, self.components, gap, self.vertices_only)
-
-    def halves(self, mesh: Any) -> tuple[ContactInterface, csr_matrix]:
-        """Both halves over all DOFs of the mesh; see `facing_halves`."""
-        assert self.opposite is not None
-        rotation = None if self.turn is None else self.turn.T
-        faces = mesh.boundaries or {}
-        try:
-            first, second = named(faces, self.face, "face"), named(faces, self.opposite, "face")
-            return facing_halves(
-                mesh, first, second, self.t1, self.components, self.gap, self.vertices_only, rotation,
-                self.pairing, self.reach,
-            )  # fmt: skip
-        except ValueError as trouble:
-            raise type(trouble)(f"contact of '{self.face}' and '{self.opposite}': {trouble}") from None
 
 
 class Stiff(Protocol):
@@ -151,24 +90,23 @@ def build(
     node_sets: Mapping[str, np.ndarray],
     material: Any,
     clamps: Sequence[Clamp],
-    contacts: Sequence[Contact],
+    contacts: Sequence[ContactFaces],
     loads: Mapping[str, Load],
     outputs: Mapping[str, Load],
-    order: int | None = None,
     springs: Sequence[Stiff] = (),
     held: Sequence[NoMeanRotation] = (),
     constraints: Sequence[Constraint] = (),
     masses: Sequence[Mass] = (),
 ) -> Part:
-    """Assemble a part or an assembly, hold it, and say where it touches, is loaded and is watched.
+    """Assemble a part or an assembly, hold it, and say where it touches, is loaded and is observed.
 
     mesh, node_sets : as geometry.mesh.read gives them, or an Assembly and its node sets
     material : one, or subdomain name -> material; of an assembly one, or body name -> these
-    order : quadrature order, 5 by default; springs : joints that give way, to the ground or between sets
+    springs : joints that give way, to the ground or between sets
     held : motions that are held besides the clamps; constraints : DOFs that follow others; masses : on points or sets
     Raises  ValueError where a name is unknown or a group is empty, one sentence
     """
-    M, K = assemble(mesh, material, order)
+    M, K = assemble(mesh, material)
     K = sum((spring.matrix(mesh, node_sets) for spring in springs), start=K)
     M = sum((mass.matrix(mesh, node_sets) for mass in masses), start=M)
     points = coordinates(mesh)

@@ -8,15 +8,13 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_matrix, diags_array
-from scipy.spatial import cKDTree
 
 from tribodyn.fem.assembly import Assembly
 from tribodyn.fem.constraints import named
 from tribodyn.fem.elements import coordinates
 from tribodyn.fem.loads import unit
+from tribodyn.fem.matching import partners
 from tribodyn.fem.surface import surface
-
-REACH = 1e-4  # farthest distance of two matching nodes, as a part of the size of their set
 
 
 @dataclass(frozen=True)
@@ -60,20 +58,11 @@ class Spring:
 
         if self.opposite is None:
             return along(nodes), share
-        return csr_matrix(along(nodes) - along(self._partners(mesh, node_sets, nodes))), share
-
-    def _partners(self, mesh: Any, node_sets: Mapping[str, np.ndarray], nodes: np.ndarray) -> np.ndarray:
-        assert self.opposite is not None
-        others = named(node_sets, self.opposite)
-        points = coordinates(mesh)
+        others, points = named(node_sets, self.opposite), coordinates(mesh)
+        what = f"the spring from '{self.nodes}' to '{self.opposite}': its nodes"
         size = np.linalg.norm(np.ptp(points[nodes], axis=0)) or np.linalg.norm(np.ptp(points, axis=0))
-        distance, place = cKDTree(points[others]).query(points[nodes])
-        if distance.max() > REACH * size or len(np.unique(place)) < len(place):
-            raise ValueError(
-                f"the spring from '{self.nodes}' to '{self.opposite}' finds no matching nodes, the farthest pair is "
-                f"{distance.max():.3g} m apart; mesh both with the same grid"
-            )
-        return others[place]
+        place = partners(points[nodes], points[others], what, float(size))
+        return csr_matrix(along(nodes) - along(others[place])), share
 
 
 def shares(mesh: Any, node_sets: Mapping[str, np.ndarray], name: str) -> tuple[np.ndarray, np.ndarray]:

@@ -8,8 +8,8 @@ import pytest
 from tests.helpers import small_wheel as small
 from tribodyn.fem import cyclic, wheel
 from tribodyn.fem.constraints import Clamp
+from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.modes import modes
-from tribodyn.fem.part import Contact
 from tribodyn.reduction.cyclic import nodal_diameters
 from tribodyn.reduction.linear import system_modes
 
@@ -101,7 +101,7 @@ def test_faces_that_do_not_match_are_one_sentence(tmp_path):
     mesh, nodes = small.read(tmp_path / "s.msh", 0.02)
 
     def build(n=small.N, contact=small.CONTACT, clamps=small.CLAMPS, seam=small.SEAM):
-        return cyclic.build(mesh, nodes, small.STEEL, clamps, [contact], small.LOADS, small.OUTPUTS, n, seam)
+        return small.sector_of(mesh, nodes, clamps, [contact], n, seam)
 
     with pytest.raises(ValueError, match=r"the second face lies about 0.01\d+ m inside"):
         build(n=9)
@@ -116,4 +116,4 @@ def test_faces_that_do_not_match_are_one_sentence(tmp_path):
     with pytest.raises(ValueError, match="a wheel of 1 sectors"):
         build(n=1)
     with pytest.raises(ValueError, match="the mesh has no face 'shroud'"):
-        build(contact=Contact("shroud_right", (1, 0, 0), "shroud"))
+        build(contact=ContactFaces("shroud_right", (1, 0, 0), "shroud"))

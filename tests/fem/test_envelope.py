@@ -7,8 +7,8 @@ import pytest
 
 from tribodyn.fem import part as fem_part
 from tribodyn.fem.constraints import Clamp, NoMeanRotation
+from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.material import Material
-from tribodyn.fem.part import Contact
 from tribodyn.fem.springs import Spring
 from tribodyn.geometry import leaf_seal
 from tribodyn.geometry import mesh as mesh_file
@@ -20,7 +20,7 @@ STEEL = Material(210e9, 0.3, 7860.0)
 PARAMETERS = leaf_seal.Parameters(n_column=9, n_web=1, pin_column=1)
 IN_PLANE = [Clamp("left_hole", "xy"), Clamp("right_hole", "y")]
 PATCHES = ("upper_contact", "lower_contact")
-CONTACTS = [Contact(name, (-1, 0, 0), components=("n",), plane=(0, 0, -1)) for name in PATCHES]
+CONTACTS = [ContactFaces(name, (-1, 0, 0), components=("n",), plane=(0, 0, -1)) for name in PATCHES]
 NO_TURN = [NoMeanRotation((0, 1, 0))]
 
 
@@ -80,8 +80,8 @@ def test_springs_hold_a_rigid_leaf_as_a_mass_on_springs(leaf):
 
 def test_envelope_errors_name_the_cure():
     with pytest.raises(ValueError, match="exclude each other"):
-        Contact("a", (1, 0, 0), opposite="b", plane=(0, 0, 1))
+        ContactFaces("a", (1, 0, 0), opposite="b", plane=(0, 0, 1))
     with pytest.raises(ValueError, match="give its plane"):
-        Contact("a", (1, 0, 0), inclination=0.1)
+        ContactFaces("a", (1, 0, 0), inclination=0.1)
     with pytest.raises(ValueError, match="not all zero"):
         NoMeanRotation((0, 0, 0)).row(np.zeros((1, 3)), np.eye(3))

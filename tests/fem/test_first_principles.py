@@ -8,7 +8,7 @@ import skfem
 
 from tribodyn.fem import cyclic
 from tribodyn.fem.bolts import Bolt
-from tribodyn.fem.contact import plane_contact
+from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.loads import NodalForce, Sum
 from tribodyn.fem.material import Material, Orthotropic
@@ -62,9 +62,9 @@ def test_the_gap_of_a_bowed_and_inclined_face_is_its_height_above_the_ground(blo
     at_bottom = bowed[2] < 1e-9
     bowed[2, at_bottom] += 1e-3 * bowed[0, at_bottom] ** 2
     mesh = type(mesh)(bowed, mesh.t).with_boundaries({"bottom": mesh.boundaries["bottom"]})
-    found = plane_contact(mesh, mesh.boundaries["bottom"], (0, 0, -1), (1, 0, 0))
+    found = ContactFaces("bottom", (1, 0, 0), plane=(0, 0, -1)).build(mesh)
     np.testing.assert_allclose(found.gap, 1e-3 * found.points[:, 0] ** 2, atol=1e-15)
-    leaning = plane_contact(mesh, mesh.boundaries["bottom"], (0, 0, -1), (1, 0, 0), inclination=1e-2)
+    leaning = ContactFaces("bottom", (1, 0, 0), plane=(0, 0, -1), inclination=1e-2).build(mesh)
     t2 = found.frames[0, 1]
     away = found.gap + np.tan(1e-2) * found.points @ t2
     np.testing.assert_allclose(leaning.gap, away - away.min(), atol=1e-15)

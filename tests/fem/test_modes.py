@@ -8,12 +8,13 @@ import skfem
 from scipy.sparse import csr_matrix, diags_array
 
 from tribodyn.fem.constraints import Clamp, free_dofs, partition
+from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.factor import factorise, pardiso_available
 from tribodyn.fem.loads import BodyForce, NodalForce, Pressure
 from tribodyn.fem.material import Material
 from tribodyn.fem.modes import modes
-from tribodyn.fem.part import Contact, build
+from tribodyn.fem.part import build
 
 STEEL = Material(210e9, 0.3, 7860.0)
 SOLVERS = ["superlu", pytest.param("pardiso", marks=pytest.mark.skipif(not pardiso_available(), reason="no MKL"))]
@@ -113,7 +114,7 @@ def test_first_bending_of_the_beam(n, error):
 
 
 def part(mesh, sets, **loads):
-    contact = Contact("contact", t1=(1, 0, 0))
+    contact = ContactFaces("contact", t1=(1, 0, 0))
     return build(mesh, sets, STEEL, [Clamp("root")], [contact], loads, {"tip": NodalForce("tip", (0, 0, 1))})
 
 
@@ -149,9 +150,9 @@ def test_tip_deflection():
 def test_part_names_what_is_missing():
     mesh, sets = beam()
     with pytest.raises(ValueError, match="no node set 'wall'; it has mid, root, tip"):
-        build(mesh, sets, STEEL, [Clamp("wall")], [Contact("contact", (1, 0, 0))], {}, {})
+        build(mesh, sets, STEEL, [Clamp("wall")], [ContactFaces("contact", (1, 0, 0))], {}, {})
     with pytest.raises(ValueError, match="no face 'pad'; it has contact, top"):
-        build(mesh, sets, STEEL, [Clamp("root")], [Contact("pad", (1, 0, 0))], {}, {})
+        build(mesh, sets, STEEL, [Clamp("root")], [ContactFaces("pad", (1, 0, 0))], {}, {})
     with pytest.raises(ValueError, match="letters x, y, z"):
         Clamp("root", "xw")
     with pytest.raises(ValueError, match="hold every DOF"):

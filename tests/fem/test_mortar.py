@@ -9,7 +9,7 @@ import pytest
 import skfem
 
 from tribodyn.fem.assembly import Assembly, Body
-from tribodyn.fem.contact import facing_halves, ground_contact
+from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.loads import Pressure
 from tribodyn.fem.material import Material
 
@@ -35,7 +35,7 @@ def pair(tets, bend=0.0, gap=0.0, lower=(6, 5)):
 
 
 def halves(of, first, second, **more):
-    return facing_halves(of, of.boundaries[first], of.boundaries[second], (1, 0, 0), **more)
+    return ContactFaces(first, (1, 0, 0), second, **more).halves(of)
 
 
 @pytest.mark.parametrize("bend", [0.0, 0.2])
@@ -82,12 +82,10 @@ def test_a_face_of_one_element_resists_tilting_as_a_uniform_bedding(tets, pairin
     n = 2 if pairing == "nodes" else 3
     under = block(L(0, 1, n), L(0, 1, n + (n > 2)), L(-0.4, 0, 2), tets)
     both = Assembly([Body("upper", upper, {}, STEEL), Body("lower", under, {}, STEEL)])
-    face = both.boundaries["upper.bottom"]
     if pairing == "ground":
-        interface = ground_contact(both, face, (1, 0, 0), vertices_only=vertices_only)
+        interface = ContactFaces("upper.bottom", (1, 0, 0), vertices_only=vertices_only).build(both)
     else:
-        other = both.boundaries["lower.top"]
-        interface, B_2 = facing_halves(both, face, other, (1, 0, 0), pairing=pairing, vertices_only=vertices_only)
+        interface, B_2 = halves(both, "upper.bottom", "lower.top", pairing=pairing, vertices_only=vertices_only)
         assert (np.abs(B_2).sum(axis=1) > 0).all()
     tilted = np.zeros((both.doflocs.shape[1], 3))
     second = []
@@ -152,5 +150,6 @@ def test_what_does_not_meet_is_one_sentence():
     with pytest.raises(ValueError, match="look the same way"):
         halves(pair(True), "upper.top", "lower.top", reach=0.5)
     faces = np.concatenate([both.boundaries["upper.bottom"], both.boundaries["lower.top"]])
+    both.boundaries["both"] = faces
     with pytest.raises(ValueError, match="several bodies"):
-        facing_halves(both, faces, [0], (1, 0, 0))
+        halves(both, "both", "lower.top")

@@ -7,12 +7,13 @@ import pytest
 import skfem
 
 from tribodyn.fem.constraints import Clamp
+from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.factor import SingularStiffness, factorise
 from tribodyn.fem.loads import Centrifugal, NodalForce
 from tribodyn.fem.material import Material
 from tribodyn.fem.modes import StaticDivergence, modes
-from tribodyn.fem.part import Contact, build
+from tribodyn.fem.part import build
 from tribodyn.fem.prestress import geometric_stiffness, prestressed, spin_softening
 
 SOFT = Material(E=1e9, nu=0.0, rho=1000.0)
@@ -27,7 +28,7 @@ def beam():
     p = mesh.doflocs
     sets = {"root": np.flatnonzero(p[0] < 1e-9), "tip": np.flatnonzero(p[0] > LENGTH - 1e-9)}
     loads = {"pull": NodalForce("tip", (1, 0, 0)), "spin": Centrifugal((0, 0, 1), (0, DEPTH, 0))}
-    return build(mesh, sets, SOFT, [Clamp("root")], [Contact("tip", t1=(0, 1, 0), components=("n",))], loads, {})
+    return build(mesh, sets, SOFT, [Clamp("root")], [ContactFaces("tip", t1=(0, 1, 0), components=("n",))], loads, {})
 
 
 def test_uniform_stress_is_exact():

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import skfem
 
-from tribodyn.fem.contact import contact_frames, ground_contact, join, pair_contact, pair_halves
+from tribodyn.fem.contact import ContactFaces, join
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.elements import batches
+from tribodyn.fem.interface import contact_frames
 from tribodyn.fem.loads import BodyForce, Centrifugal, NodalForce, Pressure
 from tribodyn.fem.material import Material
 from tribodyn.fem.surface import face_integrals, facet_nodes, surface
@@ -104,21 +105,21 @@ def test_curved_surface_converges_to_the_cylinder():
 
 def test_ground_contact_closes_along_the_outward_normal():
     mesh = block()
-    contact = ground_contact(mesh, mesh.boundaries["bottom"], (1, 0, 0.3), gap=1e-6)
+    contact = ContactFaces("bottom", (1, 0, 0.3), gap=1e-6).build(mesh)
     assert contact.n_pair == 15
     assert contact.area.sum() == pytest.approx(2.0)
     assert (contact.gap == 1e-6).all()
     move = np.tile([1.0, 2.0, -3.0], mesh.doflocs.shape[1])
     relative = (contact.B @ move).reshape(-1, 3)
     assert relative == pytest.approx(np.tile([1.0, -2.0, 3.0], (15, 1)))  # t2 = n x t1 = -y; down closes
-    normal = ground_contact(mesh, mesh.boundaries["bottom"], (1, 0, 0), components=("n",))
+    normal = ContactFaces("bottom", (1, 0, 0), components=("n",)).build(mesh)
     assert (contact.B[2::3] != normal.B).nnz == 0
     assert normal.stiffness(1.0, 5.0).sum() == pytest.approx(5.0)
 
 
 def test_pair_contact_sees_relative_motion_only():
     mesh = two_blocks()
-    contact = pair_contact(mesh, mesh.boundaries["upper"], mesh.boundaries["lower"], (1, 0, 0))
+    contact = ContactFaces("upper", (1, 0, 0), "lower", pairing="nodes").build(mesh)
     assert contact.n_pair == 25
     assert contact.area.sum() == pytest.approx(1.0)
     x = mesh.doflocs.T
@@ -132,10 +133,10 @@ def test_pair_contact_sees_relative_motion_only():
 def test_pair_contact_names_what_does_not_match():
     mesh = two_blocks(shift=0.1)
     with pytest.raises(ValueError, match="25 of 25 nodes of the first have no partner"):
-        pair_contact(mesh, mesh.boundaries["upper"], mesh.boundaries["lower"], (1, 0, 0))
+        ContactFaces("upper", (1, 0, 0), "lower", pairing="nodes").build(mesh)
     mesh = two_blocks()
     with pytest.raises(ValueError, match="20 of 45 nodes"):
-        pair_contact(mesh, mesh.boundaries["lower"], mesh.boundaries["upper"], (1, 0, 0))
+        ContactFaces("lower", (1, 0, 0), "upper", pairing="nodes").build(mesh)
 
 
 def test_cyclic_halves():
@@ -145,7 +146,7 @@ def test_cyclic_halves():
     mesh = skfem.MeshHex2(np.stack([r * np.cos(angle), r * np.sin(angle), z]), flat.t)
     mesh = mesh.with_boundaries({"start": lambda x: x[1] < 1e-9, "end": lambda x: x[0] < 1e-9})
     turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])  # carries the start face onto the end face
-    contact, B_2 = pair_halves(mesh, mesh.boundaries["end"], mesh.boundaries["start"], (0, 0, 1), rotation=turn)
+    contact, B_2 = ContactFaces("end", (0, 0, 1), "start", turn=turn.T).halves(mesh)
     spin = np.cross([0, 0, 1.0], mesh.doflocs.T).ravel()
     lift = np.tile([0, 0, 1.0], mesh.doflocs.shape[1])
     for same in (spin, lift):  # every sector does the same in its own coordinates
@@ -155,8 +156,8 @@ def test_cyclic_halves():
 
 def test_contacts_join():
     mesh = block()
-    one = ground_contact(mesh, mesh.boundaries["bottom"], (1, 0, 0))
-    two = ground_contact(mesh, mesh.boundaries["top"], (1, 0, 0), gap=1e-5)
+    one = ContactFaces("bottom", (1, 0, 0)).build(mesh)
+    two = ContactFaces("top", (1, 0, 0), gap=1e-5).build(mesh)
     both = join([one, two])
     assert both.n_pair == 30
     assert both.points[both.faces[8:]][..., 2] == pytest.approx(np.ones((8, 4)))
@@ -168,7 +169,7 @@ def test_contacts_join():
 
 def test_a_face_of_tetrahedra_has_its_pairs_at_its_sides():
     mesh = block(tets=True)
-    contact = ground_contact(mesh, mesh.boundaries["bottom"], (1, 0, 0))
+    contact = ContactFaces("bottom", (1, 0, 0)).build(mesh)
     sides = np.unique(mesh.f2e[:, mesh.boundaries["bottom"]])
     assert contact.n_pair == len(sides)
     assert contact.area.sum() == pytest.approx(2.0, rel=1e-12)
@@ -179,21 +180,27 @@ def test_a_face_of_tetrahedra_has_its_pairs_at_its_sides():
     assert len(np.unique(np.sort(contact.faces, axis=1), axis=0)) == len(contact.faces)
 
 
-def test_contact_refuses():
+@pytest.mark.parametrize(
+    ("face", "t1", "changes", "why"),
+    [
+        ("none", (1, 0, 0), {}, "empty"),
+        ("inner", (1, 0, 0), {}, "inside the body"),
+        ("bottom", (0, 0, 1), {}, "along the contact normal"),
+        ("bottom", (0, 0, 0), {}, "not all zero"),
+        ("bottom", (1, 0, 0), {"components": ("n", "t1")}, "in this order"),
+        ("bottom", (1, 0, 0), {"gap": np.zeros(3)}, "3 values for 15 node pairs"),
+        ("bottom", (1, 0, 0), {"plane": (0, 0, -1), "inclination": np.pi / 2}, "inclination"),
+        ("bottom", (1, 0, 0), {"inclination": 0.1}, "plane ground"),
+        ("bottom", (1, 0, 0), {"opposite": "top", "pairing": "magnets"}, "there are auto, nodes, mortar"),
+        ("bottom", (1, 0, 0), {"opposite": "top", "plane": (0, 0, -1)}, "exclude each other"),
+    ],
+)
+def test_contact_refuses(face, t1, changes, why):
     mesh = block()
-    face = mesh.boundaries["bottom"]
-    with pytest.raises(ValueError, match="no faces"):
-        ground_contact(mesh, face[:0], (1, 0, 0))
-    with pytest.raises(ValueError, match="inside the body"):
-        ground_contact(mesh, np.flatnonzero(mesh.f2t[1] >= 0), (1, 0, 0))
-    with pytest.raises(ValueError, match="along the contact normal"):
-        ground_contact(mesh, face, (0, 0, 1))
-    with pytest.raises(ValueError, match="not all zero"):
-        ground_contact(mesh, face, (0, 0, 0))
-    with pytest.raises(ValueError, match="in this order"):
-        ground_contact(mesh, face, (1, 0, 0), components=("n", "t1"))
-    with pytest.raises(ValueError, match="3 values for 15 node pairs"):
-        ground_contact(mesh, face, (1, 0, 0), gap=np.zeros(3))
+    more = {"none": np.zeros(0, int), "inner": np.flatnonzero(mesh.f2t[1] >= 0)}
+    mesh = mesh.with_boundaries({**mesh.boundaries, **more})
+    with pytest.raises(ValueError, match=why):
+        ContactFaces(face, t1, **changes).build(mesh)
 
 
 @pytest.mark.parametrize("tets", [False, True])

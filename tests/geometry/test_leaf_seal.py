@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tribodyn.fem.contact import plane_contact
+from tribodyn.fem.contact import ContactFaces
 from tribodyn.geometry import leaf_seal
 from tribodyn.geometry import mesh as mesh_file
 
@@ -14,7 +14,7 @@ def read(tmp_path, **changes):
 
 
 def patch(mesh, name, **changes):
-    return plane_contact(mesh, mesh.boundaries[name], (0, 0, -1), (-1, 0, 0), ("n",), **changes)
+    return ContactFaces(name, (-1, 0, 0), components=("n",), plane=(0, 0, -1), **changes).build(mesh)
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_gaps_of_the_flat_inclined_and_bowed_leaf(tmp_path):
         theta = np.arctan2(i.points[:, 0], i.points[:, 1] + p.radius)
         height = bow * (1 - (2 * theta / p.angle) ** 2)
         np.testing.assert_allclose(i.gap, height - height.min(), atol=1e-4 * abs(bow))
-    with pytest.raises(ValueError, match="quarter turn"):
+    with pytest.raises(ValueError, match="inclination"):
         patch(mesh, "lower_contact", inclination=2.0)
 
 

@@ -5,9 +5,9 @@ import pytest
 
 from tribodyn.fem import part as fem_part
 from tribodyn.fem.constraints import Clamp
+from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.loads import NodalForce
 from tribodyn.fem.material import Material
-from tribodyn.fem.part import Contact
 from tribodyn.fem.surface import surface
 from tribodyn.geometry import mesh as mesh_file
 from tribodyn.geometry import rig
@@ -74,7 +74,7 @@ def test_clamped_beam_has_the_frequency_of_a_cantilever(tmp_path):
         node_sets,
         Material(E, 0.29, rho),
         [Clamp("column"), Clamp("beam_root"), Clamp("platform")],
-        [Contact("upper_contact", (0, 1, 0), "lower_contact")],
+        [ContactFaces("upper_contact", (0, 1, 0), "lower_contact")],
         {"shaker": NodalForce("shaker", (0, 1, 0))},
         {},
     )

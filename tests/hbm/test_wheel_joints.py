@@ -9,9 +9,8 @@ import pytest
 from scipy.linalg import eigvalsh
 
 from tests.helpers import small_wheel as small
-from tribodyn.fem import cyclic
+from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.elasticity import assemble
-from tribodyn.fem.part import Contact
 from tribodyn.fem.prestress import coriolis
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
@@ -30,8 +29,10 @@ EXACT = newton.NewtonOptions(tolerance=1e-13, krylov=1e-6)
 
 def outputs(mesh, node_sets, faces, order):
     """Coefficients of all outputs of a wave whose shroud contact is cut into named joints, and what was slipping."""
-    contacts = [Contact(f"right_{i}", (1, 0, 0), f"left_{i}", vertices_only=True, joint=f"joint_{i}") for i in faces]
-    _, sector = cyclic.build(mesh, node_sets, small.STEEL, small.CLAMPS, contacts, small.LOADS, small.OUTPUTS, small.N)
+    contacts = [
+        ContactFaces(f"right_{i}", (1, 0, 0), f"left_{i}", vertices_only=True, joint=f"joint_{i}") for i in faces
+    ]
+    _, sector = small.sector_of(mesh, node_sets, small.CLAMPS, contacts, small.N)
     reduced = reduce_sector(sector, n_modes=10)
     model = travelling_wave(reduced, order).with_damping(lambda system, B: modal_damping(system, 0.01))
     k = model.interface.stiffness(*small.STIFFNESS)

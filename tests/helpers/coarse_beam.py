@@ -4,9 +4,10 @@ import numpy as np
 import skfem
 
 from tribodyn.fem.constraints import Clamp
+from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.loads import NodalForce, Pressure
 from tribodyn.fem.material import Material
-from tribodyn.fem.part import Contact, build
+from tribodyn.fem.part import build
 
 
 def make(nx=8, patch=2, clamped=True):
@@ -27,7 +28,7 @@ def make(nx=8, patch=2, clamped=True):
         sets,
         Material(210e9, 0.3, 7860.0),
         [Clamp("root")] if clamped else [],
-        [Contact("contact", t1=(1, 0, 0))],
+        [ContactFaces("contact", t1=(1, 0, 0))],
         {"point": NodalForce("mid", (0, 1, -1)), "pressure": Pressure("top")},
         {"mid": NodalForce("mid", (0, 1, 0)), "tip": NodalForce("tip", (0, 0, 1))},
     )

@@ -4,9 +4,10 @@ import numpy as np
 
 from tribodyn.fem import cyclic
 from tribodyn.fem.constraints import Clamp
+from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.loads import Couple, NodalForce
 from tribodyn.fem.material import Material
-from tribodyn.fem.part import Contact
+from tribodyn.fem.part import build
 from tribodyn.geometry import blade
 from tribodyn.geometry import mesh as mesh_file
 from tribodyn.hbm.balance import HarmonicBalance
@@ -22,7 +23,7 @@ N = 8
 STEEL = Material(210e9, 0.3, 7860.0)
 AROUND = (0.0, 1.0, 0.0)
 STIFFNESS = (93e6, 113e6)  # tangential and normal, of a whole face
-CONTACT = Contact("shroud_right", (1, 0, 0), "shroud_left", vertices_only=True)
+CONTACT = ContactFaces("shroud_right", (1, 0, 0), "shroud_left", vertices_only=True)
 LOADS = {"couple": Couple("couple_trailing", "couple_leading", AROUND), "shaker": NodalForce("excitation", AROUND)}
 OUTPUTS = {"tip": NodalForce("tip", AROUND), "driven": NodalForce("excitation", AROUND)}
 CLAMPS = (Clamp("clamp"),)
@@ -67,7 +68,14 @@ def full_sector(path, disk_radius=0.0, clamps=CLAMPS, contact=CONTACT):
     """Part and sector of a blade on a rigid disk, or on a flexible one."""
     mesh, node_sets = read(path, disk_radius)
     seam = SEAM if disk_radius else None
-    return cyclic.build(mesh, node_sets, STEEL, clamps, [contact], LOADS, OUTPUTS, N, seam)
+    return sector_of(mesh, node_sets, clamps, [contact], N, seam)
+
+
+def sector_of(mesh, node_sets, clamps, contacts, n_sectors, seam=None, axis=(1.0, 0.0, 0.0)):
+    """Part and sector of any mesh; all contacts are those of neighbours."""
+    right = cyclic.turned(contacts, n_sectors, axis)
+    part = build(mesh, node_sets, STEEL, clamps, right, LOADS, OUTPUTS)
+    return part, cyclic.cut_from(part, right, n_sectors, seam, axis)
 
 
 def reduced_sector(path, disk_radius=0.0):

@@ -8,9 +8,9 @@ import scipy.linalg as sla
 
 from tests.helpers import small_wheel as small
 from tribodyn.fem import cyclic, wheel
+from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.cyclic import at_index, projected
 from tribodyn.fem.hermitian import hermitian_modes
-from tribodyn.fem.part import Contact
 from tribodyn.reduction import cyclic as waves
 from tribodyn.reduction.damping import modal_damping
 from tribodyn.reduction.linear import linear_modes, stuck_stiffness, system_modes
@@ -86,7 +86,7 @@ def test_relative_coordinates_are_the_contact_itself(reduced):
 
 
 def test_contact_of_fewer_components_leaves_the_others_free(tmp_path):
-    contact = Contact("shroud_right", (1, 0, 0), "shroud_left", components=("t1", "n"), vertices_only=True)
+    contact = ContactFaces("shroud_right", (1, 0, 0), "shroud_left", components=("t1", "n"), vertices_only=True)
     _, full = small.full_sector(tmp_path / "s.msh", contact=contact)
     sector = waves.reduce_sector(full, n_modes=4).sector
     T, _ = waves.relative_map(sector, 1)

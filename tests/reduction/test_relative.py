@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tribodyn.fem import part as fem_part
+from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.interface import COMPONENTS
 from tribodyn.fem.loads import NodalForce
 from tribodyn.fem.material import Material
-from tribodyn.fem.part import Contact
 from tribodyn.fem.springs import Spring
 from tribodyn.geometry import blocks
 from tribodyn.geometry import mesh as mesh_file
@@ -45,7 +45,7 @@ def part(tmp_path_factory):
         sets,
         Material(200e9, 0.3, 7900.0),
         [],
-        [Contact("bottom", (1.0, 0.3, 0.0), "top")],
+        [ContactFaces("bottom", (1.0, 0.3, 0.0), "top")],
         {"push": NodalForce("point", (1, 0, 0))},
         {"tip": NodalForce("point", (0, 0, 1))},
         springs=springs,

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from tribodyn.fem import cyclic
-from tribodyn.fem import part as fem_part
 from tribodyn.fem.assembly import pieces
+from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.factor import SingularStiffness
 from tribodyn.fem.interface import COMPONENTS
 from tribodyn.fem.material import Material
@@ -43,12 +43,12 @@ def components(scene: Scene) -> tuple[str, ...]:
     return tuple(c for c in COMPONENTS if c in modelled) or COMPONENTS
 
 
-def contacts(scene: MeshScene) -> list[fem_part.Contact]:
+def contacts(scene: MeshScene) -> list[ContactFaces]:
     """The contact of every face; in a wheel some second faces are those of the next sector."""
     found = []
     for name, c in scene.joints.items():
         own = [
-            fem_part.Contact(
+            ContactFaces(
                 face, c.t1, c.opposite, components(scene), c.gap, c.vertices_only, c.plane, c.inclination,
                 c.pairing, c.reach, name,
             )
