@@ -34,7 +34,8 @@ class MortarOptions:
     facing : cosine between directions from which on they look the same way; facets that face each other have less than
         its negative, which keeps the rims of bores and rounded edges out
     sliver : part of a facet that is too small to be a cut
-    whole : part of a facet that counts as all of it; few : part of a point's own area that is too little to carry or to be tied
+    whole : part of a facet that counts as all of it
+    few : part of a point's own area that is too little to carry, or to be tied
     rounding : gap that is rounding of node positions, over the length of the face
     """
 
