@@ -301,11 +301,11 @@ def test_bodies_are_drawn_apart_along_their_faces() -> None:
     assert patch is not None
     body, moved = faces.bodies(part), exploded.apart(given)
     between = moved[body == body[patch.nodes[0]]][0] - moved[body != body[patch.nodes[0]]][0]
-    np.testing.assert_allclose(between, [0, 0, exploded.GAP * np.sqrt(patch.area.sum())], atol=1e-12)
+    np.testing.assert_allclose(between, [0, 0, exploded.EXPLOSION.gap * np.sqrt(patch.area.sum())], atol=1e-12)
     tied = replace(given, patch=replace(patch, faces=np.zeros((0, 4), int)))  # they touch, and no contact says so
     moved = exploded.apart(tied)
     between = moved[body == body[patch.nodes[0]]][0] - moved[body != body[patch.nodes[0]]][0]
-    np.testing.assert_allclose(between, [0, 0, exploded.GAP * np.sqrt(LENGTH * WIDTH)], atol=1e-12)
+    np.testing.assert_allclose(between, [0, 0, exploded.EXPLOSION.gap * np.sqrt(LENGTH * WIDTH)], atol=1e-12)
     assert not exploded.apart(result()).any()
 
 

@@ -215,7 +215,7 @@ def posterior(
 def inspect(
     what: Place, *, unit: str = "m", material: Material | None = None, modes: int = 0, overrides: Overrides = ()
 ) -> Inspection:
-    """Say what a mesh, a deck, a CAD file or a scene holds: size, mass, bodies, groups, worst element, gaps, oddities.
+    """Say what a mesh, a deck, a CAD file or a scene holds: size, mass, bodies, groups, worst element, gaps, checks.
 
     unit : of length of a file that is no scene; material : of its bodies where the file gives none
     modes : how many natural frequencies are wanted, free of contact

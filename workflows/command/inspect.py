@@ -23,7 +23,7 @@ def inspect(
     overrides: Overrides = (),
     as_json: Json = False,
 ) -> None:
-    """Say what a mesh, a deck, a CAD file or a scene holds: size, mass, bodies, groups, worst element, gaps, oddities.
+    """Say what a mesh, a deck, a CAD file or a scene holds: size, mass, bodies, groups, worst element, gaps, checks.
 
     Parameters
     ----------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,17 @@ from tribodyn.workflows.export.tables import tables, terms
 from tribodyn.workflows.result.columns import write_columns
 from tribodyn.workflows.result.result import Result
 
-GENERAL, TIME, FRF = 0, 1, 4  # function types of dataset 58
-DISPLACEMENT, FREQUENCY, PLAIN, TIME_AXIS, FORCE, EXCITATION = 8, 18, 1, 17, 9, 13  # kinds
+
+class Function(IntEnum):
+    """Function types of dataset 58."""
+
+    GENERAL, TIME, FRF = 0, 1, 4
+
+
+class Quantity(IntEnum):
+    """Kinds of data of dataset 58."""
+
+    PLAIN, DISPLACEMENT, FORCE, EXCITATION, TIME, FREQUENCY = 1, 8, 9, 13, 17, 18
 
 
 def write_csv(result: Result, folder: Path) -> list[Path]:
@@ -88,12 +98,14 @@ def _spectra(result: Result) -> list[dict[str, Any]]:
     for position, output in enumerate(frf.output_names):
         for h in (h for h in result.harmonics if h):
             a, b = (frf.response[:, position, names.index(f"{letter}{h}")] for letter in "ab")
-            value, kind, text = a - 1j * b, GENERAL, f"{output}, harmonic {h}"
+            value, kind, text = a - 1j * b, Function.GENERAL, f"{output}, harmonic {h}"
             if h == 1 and force is not None:
-                value, kind, text = value / force, FRF, f"{output} over force, harmonic 1"
-            entry = _function(kind, text, "frequency", FREQUENCY, "Hz", frf.frequency, DISPLACEMENT, "m", value)
-            if kind == FRF:
-                entry |= {"orddenom_spec_data_type": EXCITATION, "orddenom_axis_lab": "force"}
+                value, kind, text = value / force, Function.FRF, f"{output} over force, harmonic 1"
+            entry = _function(
+                kind, text, "frequency", Quantity.FREQUENCY, "Hz", frf.frequency, Quantity.DISPLACEMENT, "m", value
+            )
+            if kind == Function.FRF:
+                entry |= {"orddenom_spec_data_type": Quantity.EXCITATION, "orddenom_axis_lab": "force"}
                 entry |= {"orddenom_axis_units_lab": "N"}
             found.append(entry)
     return found
@@ -120,7 +132,9 @@ def _histories(result: Result) -> list[dict[str, Any]]:
         ("depth_largest_m", "m"), ("depth_mean_m", "m"), ("volume_m3", "m3"),
     )}  # fmt: skip
     return [
-        _function(GENERAL, name, "cycles", PLAIN, "", table["cycles"], PLAIN, unit, table[name])
+        _function(
+            Function.GENERAL, name, "cycles", Quantity.PLAIN, "", table["cycles"], Quantity.PLAIN, unit, table[name]
+        )
         for name, unit in wanted.items()
     ]
 
@@ -136,12 +150,12 @@ def _loops(result: Result) -> list[dict[str, Any]]:
         pair = int(np.argmax(np.ptp(kept.displacement[at], axis=-1).max(axis=-1)))
         for c, component in enumerate(patch.components):
             for what, values, kind, unit in (
-                ("displacement", kept.displacement, DISPLACEMENT, "m"), ("force", kept.force, FORCE, "N")
+                ("displacement", kept.displacement, Quantity.DISPLACEMENT, "m"),
+                ("force", kept.force, Quantity.FORCE, "N"),
             ):  # fmt: skip
                 text = f"state {row}, pair {pair}, {component}, {what}"
-                found.append(
-                    _function(TIME, text, "phase", TIME_AXIS, "rad", phase, kind, unit, values[at, pair, c], pair)
-                )
+                y = values[at, pair, c]
+                found.append(_function(Function.TIME, text, "phase", Quantity.TIME, "rad", phase, kind, unit, y, pair))
     return found
 
 

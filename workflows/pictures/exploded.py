@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import matplotlib as mpl
@@ -17,11 +18,26 @@ from tribodyn.workflows.result.faces import bodies, meetings_of
 from tribodyn.workflows.result.result import PartMesh, Result
 from tribodyn.workflows.result.states import shown_states
 
-GAP = 0.8  # between two bodies, of the size of the faces that touch
-ONE_WAY = 0.3  # of the area of touching faces: a smaller sum of their normals is a bore, which says no direction
-TOUCH = 1e-3  # of the size of the smaller body: faces nearer than this touch
-FLAT = 2.2  # width over height from which on two views stand one above the other
-RISE = 0.65  # slope that the bodies are looked at with, from above and from below
+
+@dataclass(frozen=True)
+class Explosion:
+    """How bodies are drawn apart.
+
+    gap : between two bodies, of the size of the faces that touch
+    one_way : of the area of touching faces; a smaller sum of their normals is a bore, which has no direction
+    touch : of the size of the smaller body; faces nearer than this touch
+    flat : width over height from which on two views stand one above the other
+    rise : slope that the bodies are looked at with, from above and from below
+    """
+
+    gap: float = 0.8
+    one_way: float = 0.3
+    touch: float = 1e-3
+    flat: float = 2.2
+    rise: float = 0.65
+
+
+EXPLOSION = Explosion()
 
 
 def apart(result: Result) -> np.ndarray:
@@ -40,7 +56,7 @@ def apart(result: Result) -> np.ndarray:
             break
         (first, second), along = max(open_.items(), key=lambda item: float(np.linalg.norm(item[1])))
         area = float(np.linalg.norm(along))
-        step = GAP * np.sqrt(area) * along / area if area > 0 else along
+        step = EXPLOSION.gap * np.sqrt(area) * along / area if area > 0 else along
         if first in placed:
             moved[second] = moved[first] + step
         else:
@@ -72,7 +88,9 @@ def _links(result: Result, part: PartMesh, body: np.ndarray) -> dict[tuple[int, 
                 along, area = _touching(shells[first], shells[second])
                 if area > 0:
                     add(first, second, along, area)
-    return {pair: v if np.linalg.norm(v) > ONE_WAY * whole[pair] else np.zeros(3) for pair, v in found.items()}
+    return {
+        pair: v if np.linalg.norm(v) > EXPLOSION.one_way * whole[pair] else np.zeros(3) for pair, v in found.items()
+    }
 
 
 def _shell(part: PartMesh, mine: np.ndarray) -> Any:
@@ -86,7 +104,7 @@ def _shell(part: PartMesh, mine: np.ndarray) -> Any:
 def _touching(first: Any, second: Any) -> tuple[np.ndarray, float]:
     """Sum of area times normal (3,) of the triangles of a body that lie on another, and their area [m2]."""
     a, b = np.reshape(first.bounds, (3, 2)), np.reshape(second.bounds, (3, 2))
-    reach = TOUCH * min(float(np.ptp(a, axis=1).max()), float(np.ptp(b, axis=1).max()))
+    reach = EXPLOSION.touch * min(float(np.ptp(a, axis=1).max()), float(np.ptp(b, axis=1).max()))
     if (np.maximum(a[:, 0], b[:, 0]) > np.minimum(a[:, 1], b[:, 1]) + reach).any():
         return np.zeros(3), 0.0
     smaller = np.prod(np.ptp(a, axis=1)) < np.prod(np.ptp(b, axis=1))
@@ -125,11 +143,11 @@ def exploded_picture(result: Result) -> Figure:
     level /= np.linalg.norm(level)
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         shots, cameras = [], []
-        for side in (level + RISE * axis, level - RISE * axis):
+        for side in (level + EXPLOSION.rise * axis, level - EXPLOSION.rise * axis):
             cameras.append(frame(points, side, up, SIZES.apart[0] / SIZES.apart[1]))
             shots.append(shoot(View(layers), cameras[-1], SIZES.apart))
         images, corner = with_room(trimmed(shots))
-        long = images[0].shape[1] > FLAT * images[0].shape[0]
+        long = images[0].shape[1] > EXPLOSION.flat * images[0].shape[0]
         wide = 7.0 if long else 5.0
         tall = wide * images[0].shape[0] / images[0].shape[1]
         size = (wide, 2 * tall + 1.6) if long else (2 * wide + 0.2, tall + 1.4)

@@ -15,10 +15,22 @@ from scipy.spatial import cKDTree
 from tribodyn.fem.cyclic import rotation
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
 
-NEAR = 0.05  # of a polygon of pairs: how far above or below its plane a node of the face may lie
-INSIDE = 1e-4  # of its size: how far outside of its edges
-SAME = 1e-4  # a weight that is one within this says that node and pair coincide
-NONE = 1e-9  # a weight below this is none
+
+@dataclass(frozen=True)
+class Near:
+    """When a node of the mesh belongs to a face of pairs.
+
+    plane : how far above or below the plane of a polygon of pairs it may lie, of its size; inside : outside its edges
+    same : how far a weight may be from one where node and pair coincide; none : a weight below this is none
+    """
+
+    plane: float = 0.05
+    inside: float = 1e-4
+    same: float = 1e-4
+    none: float = 1e-9
+
+
+NEAR = Near()
 
 
 @dataclass(frozen=True)
@@ -45,7 +57,7 @@ class Face:
         """(n_pair,) node of the mesh that stands where the pair does, -1 where none does."""
         found = np.full(len(self.points), -1)
         at = self.weights.tocoo()
-        here = at.data > 1 - SAME
+        here = at.data > 1 - NEAR.same
         found[at.col[here]] = self.nodes[at.row[here]]
         return found
 
@@ -135,19 +147,19 @@ def _nodes(
     middle, normal = corner.mean(axis=1), outward[polygons].mean(axis=1)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     size = np.linalg.norm(corner - middle[:, None], axis=2).max(axis=1)
-    near = cKDTree(part.points).query_ball_point(middle, size * (1 + NEAR))
+    near = cKDTree(part.points).query_ball_point(middle, size * (1 + NEAR.plane))
     around = _elements(part, np.setdiff1d(np.concatenate([np.asarray(n, int) for n in near]), taken))
     elements = part.points[part.cells].mean(axis=1)
     found: dict[int, tuple[int, np.ndarray]] = {}
     for face, nodes in enumerate(near):
         here = np.array([n for n in nodes if n in around and n not in found], int)
         height = (part.points[here] - middle[face]) @ normal[face]
-        here = here[np.abs(height) < NEAR * size[face]]
+        here = here[np.abs(height) < NEAR.plane * size[face]]
         weights = _wachspress(corner[face], part.points[here], normal[face])
         for node, weight in zip(here, weights, strict=True):
             behind = (elements[around[int(node)]] - part.points[node]) @ normal[face] < 0
             if np.isfinite(weight).all() and behind.any():
-                found[int(node)] = (face, np.where(weight < NONE, 0.0, weight))
+                found[int(node)] = (face, np.where(weight < NEAR.none, 0.0, weight))
     found = _of_one_body(found, bodies(part), patch.face_of[polygons[:, 0]])
     if not found:
         return None
@@ -195,7 +207,7 @@ def _wachspress(corner: np.ndarray, points: np.ndarray, normal: np.ndarray) -> n
     sign = 1.0 if around > 0 else -1.0
     whole = np.abs(np.cross(np.roll(edge, 1, axis=0), edge) @ normal)
     area = sign * area
-    outside = (area < -INSIDE * whole.sum()).any(axis=1)
+    outside = (area < -NEAR.inside * whole.sum()).any(axis=1)
     area = np.maximum(area, 0.0)
     n = len(corner)
     weights = np.stack(

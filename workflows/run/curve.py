@@ -1,4 +1,4 @@
-"""What a scene may ask about its response curve besides the curve: harmonics, stability, bounds of residual shear."""
+"""The response curve of a scene and what it may ask about it: harmonics, stability, bounds of residual shear, wear."""
 
 from __future__ import annotations
 
@@ -14,12 +14,9 @@ from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.stability import exponents
-from tribodyn.workflows.result.result import CurveStability, ShearBounds
+from tribodyn.workflows.result.result import CurveStability, Result, ShearBounds, WornResponses
 from tribodyn.workflows.run import settings
 from tribodyn.workflows.scene.schema import Scene
-
-CHOICES = 3  # times that harmonics are chosen, at the peak that the last choice has
-SAME_PEAK = 1e-3  # distance of peaks, relative, that is none
 
 
 def follow_response(
@@ -36,22 +33,26 @@ def follow_response(
 
 
 def choose_harmonics(
-    balance: HarmonicBalance, peak: AtPeak, tolerance: float, highest: int, newton: NewtonOptions
+    balance: HarmonicBalance,
+    peak: AtPeak,
+    options: harmonic_choice.ChoiceOptions,
+    most: int = 3,
+    same: float = 1e-3,
 ) -> HarmonicChoice:
-    """Harmonics that make the response of every output right to a tolerance at its resonance.
+    """Harmonics that make the response of every output right to the tolerance of the options at its resonance.
 
     The harmonics chosen move the resonance: it is looked for again with them, and they are chosen anew there.
-    peak : where the resonance is looked for, with the harmonics of the balance at first
+    peak : where the resonance is searched, with the harmonics of the balance at first
+    most : times that harmonics are chosen; same : relative distance of two peaks that counts as none
     Raises  harmonic_choice.NotSolved
     """
-    options = harmonic_choice.ChoiceOptions(tolerance, highest, newton=newton)
     before = 0.0
-    for _ in range(CHOICES):
+    for _ in range(most):
         point = peak.first(balance)
         if not point.solution.converged:
             raise harmonic_choice.NotSolved(f"harmonics cannot be chosen: no peak was found: {point.solution.outcome}")
         omega = point.state.omega
-        if abs(omega - before) <= SAME_PEAK * omega:
+        if abs(omega - before) <= same * omega:
             break
         choice = harmonic_choice.choose(balance, [omega], options)
         balance, before = choice.balance, omega
@@ -90,3 +91,42 @@ def shear_bounds(
             stuck[i] = found.stuck[0].mean()
         advance((i + 1) / n, "")
     return ShearBounds(low[0], high[0], low[1], high[1], stuck, failed)
+
+
+def worn_responses(
+    result: Result,
+    balance: HarmonicBalance,
+    count: int,
+    follow: Callable[[HarmonicBalance], Branch],
+    advance: Callable[[float, str], None],
+) -> WornResponses:
+    """Response curves of the contact as worn as at `count` rows, evenly spread over what is worn, the last included.
+
+    balance : of the unworn contact; follow : what makes a curve of a balance
+    """
+    assert result.wear is not None
+    assert result.patch is not None
+    wear, patch = result.wear, result.patch
+    volume = wear.depth @ patch.area
+    wanted = volume[-1] * np.arange(1, count + 1) / count
+    rows = np.unique([int(np.argmin(np.abs(volume - v))) for v in wanted])
+    branches = []
+    for i, row in enumerate(rows):
+        worn = balance.with_gap(balance.contact.gap + wear.depth[row])
+        advance(i / len(rows), f"{i + 1} of {len(rows)}")
+        branches.append(follow(worn))
+    size = max(len(curve.omega) for curve in branches)
+
+    def padded(values: np.ndarray) -> np.ndarray:
+        return np.concatenate([values, np.full(size - len(values), np.nan)])
+
+    return WornResponses(
+        rows,
+        np.stack([padded(curve.omega) for curve in branches]),
+        np.stack([padded(_amplitude(curve)) for curve in branches]),
+    )
+
+
+def _amplitude(curve: Branch) -> np.ndarray:
+    good = curve.converged
+    return np.where(good, curve.amplitude(curve.output_names[0]), np.nan)

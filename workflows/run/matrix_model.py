@@ -17,7 +17,6 @@ from tribodyn.reduction.model import ReducedModel
 from tribodyn.workflows.scene.matrices import DofOutput, MatrixFiles, MatrixScene, Variable
 
 OUTPUT = "response"
-MODES_TOLD = 10
 
 Take = Callable[[Variable], np.ndarray]
 
@@ -59,7 +58,7 @@ def make(scene: MatrixScene, folder: Path) -> ReducedModel:
     if scene.reduction is not None:
         return craig_bampton(system, interface, scene.reduction.modes, scene.reduction.cutoff)
     model = reduced_model(system, interface)
-    free = linear_modes(model, n=min(MODES_TOLD, model.system.n_dof))[0]
+    free = linear_modes(model, n=min(10, model.system.n_dof))[0]
     return replace(model, info=replace(model.info, free_frequency=free))
 
 

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from tribodyn.fem import part as fem_part
-from tribodyn.fem.assembly import Assembly
 from tribodyn.fem.bolts import Elongation
 from tribodyn.fem.constraints import Clamp, NoMeanRotation
 from tribodyn.fem.elements import coordinates
+from tribodyn.fem.equilibrium import unbalanced_load
 from tribodyn.fem.interface import COMPONENTS
 from tribodyn.fem.loads import BodyForce, Centrifugal, Couple, Load, Moment, NodalForce, Pressure
 from tribodyn.fem.part import Part
@@ -24,9 +24,8 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.fem.thermal import Heating, temperature_at
 from tribodyn.hbm import rest
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.contact.joint import joint_transitions
-from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
-from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.contact.joint import Joint, joint_transitions
+from tribodyn.hbm.continuation.harmonic_choice import ChoiceOptions, HarmonicChoice
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.expansion import SingularStuckSystem, UnbalancedLoad
 from tribodyn.reduction.cyclic import travelling_wave
@@ -46,17 +45,14 @@ from tribodyn.workflows.run import (
     tightening,
 )
 from tribodyn.workflows.run.contact_surfaces import mapped_gap, surface_gap
-from tribodyn.workflows.run.oddities import odd_sizes
 from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.sanity_checks import check_size
 from tribodyn.workflows.scene.loads import StaticLoad
 from tribodyn.workflows.scene.matrices import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, PartScene, Scene
 from tribodyn.workflows.scene.solution import HIGHEST
 from tribodyn.workflows.scene.structure import StructureScene
-
-NO_GAP = 1e-12  # [m], rounding of node positions
-TOLERANCE = 0.01  # of the response, where a scene leaves the choice of harmonics
 
 
 @dataclass(frozen=True)
@@ -103,11 +99,11 @@ def build(file: SceneFile, folder: Path | None, progress: Progress, chosen: tupl
         except UnbalancedLoad as unbalanced:
             if part is None or reduced.basis is None:
                 raise
-            shapes = reduced.basis @ unbalanced.shapes
-            raise ValueError(unbalanced_load(joints.excite(scene, None), part, shapes)) from None
+            force = joints.excite(scene, None).static_force(part.system.loads, len(part.free))
+            raise ValueError(unbalanced_load(force, part, reduced.basis @ unbalanced.shapes)) from None
         except SingularStuckSystem as singular:
-            odd = [] if part is None else odd_sizes(np.ptp(part.points, axis=0), "give its numbers a unit")
-            raise ValueError("; ".join([str(singular), *odd])) from None
+            remarks = [] if part is None else check_size(np.ptp(part.points, axis=0), "give its numbers a unit")
+            raise ValueError("; ".join([str(singular), *remarks])) from None
     if model.choice is not None:
         progress.say(model.choice.outcome)
     return model
@@ -251,50 +247,64 @@ def damping_matrix(scene: Scene, springs: np.ndarray, system: SecondOrderSystem,
     return None
 
 
+@dataclass(frozen=True)
+class Problem:
+    """What the balance of a scene is made of, whatever harmonics it keeps.
+
+    bolts : force that each bolt is tightened by [N]
+    """
+
+    scene: Scene
+    part: Part | None
+    reduced: ReducedModel
+    joints: list[Joint]
+    bolts: Mapping[str, float]
+
+    @classmethod
+    def of(cls, scene: Scene, part: Part | None, reduced: ReducedModel) -> Problem:
+        """The problem of a scene, its bolts tightened."""
+        made, bolts = joints.make_joints(scene, reduced), {}
+        if isinstance(scene, StructureScene) and scene.bolts and part is not None:
+            alone = tightening.BoltsAlone(reduced, made, scene.harmonics.samples, settings.highest_frequency(scene))
+            bolts = tightening.tightened(scene, tightening.rods(scene, part.mesh, part.node_sets), alone)
+        return cls(scene, part, reduced, made, bolts)
+
+    def balance(self, kept: tuple[int, ...]) -> HarmonicBalance:
+        """The balance of some harmonics; raises ValueError where they leave out what the scene has in harmonic 0."""
+        scene, wanted, gap = self.scene, self.scene.harmonics, self.reduced.interface.gap
+        auto = wanted.transitions == "auto"
+        basis = HarmonicBasis(kept, wanted.samples, joint_transitions(self.joints) if auto else wanted.transitions)
+        rounding = 1e-12  # of node positions [m]
+        if not basis.has_static and np.any(np.abs(gap) > rounding):
+            raise ValueError("the contact has gaps, which act in harmonic 0: keep it in harmonics.kept")
+        base = None
+        if isinstance(scene, MeshScene) and self.part is not None:
+            base = ground_motion(scene, self.part, basis)
+        excitation = joints.excite(scene, base)
+        bolts = {(0, name): force for name, force in self.bolts.items()}
+        excitation = replace(excitation, loads={**excitation.loads, **bolts})
+        top = settings.highest_frequency(scene)
+        made = HarmonicBalance.of(self.reduced, self.joints, basis, excitation, top)
+        return preloaded(scene, self.reduced, made) if scene.preload.frictionless else made
+
+    def choice(self) -> HarmonicChoice:
+        """Harmonics chosen at the resonance, beginning with those of the loads."""
+        wanted = self.scene.harmonics
+        options = ChoiceOptions(highest=wanted.highest or HIGHEST, newton=settings.newton_options(self.scene))
+        if wanted.tolerance is not None:
+            options = replace(options, tolerance=wanted.tolerance)
+        first = self.balance(tuple(sorted({0, 1} | {load.harmonic for load in self.scene.loads.harmonic.values()})))
+        return curve.choose_harmonics(first, settings.peak_of(self.scene), options)
+
+
 def make_model(scene: Scene, part: Part | None, reduced: ReducedModel, chosen: tuple[int, ...] = ()) -> Model:
     """The harmonic balance of the scene; harmonics are those it names, else `chosen`, else chosen here."""
-    harmonics, gap = scene.harmonics, reduced.interface.gap
-    all_joints = joints.make_joints(scene, reduced)
-
-    transitions = joint_transitions(all_joints) if harmonics.transitions == "auto" else harmonics.transitions
-
-    turned: dict[str, float] = {}
-    top = settings.highest_frequency(scene)
-    if isinstance(scene, StructureScene) and scene.bolts and part is not None:
-        shanks = tightening.rods(scene, part.mesh, part.node_sets)
-
-        def alone(loads: Mapping[str, float]) -> HarmonicBalance:
-            bolts = Excitation({(0, name): complex(force) for name, force in loads.items()}, None)
-            return HarmonicBalance.of(reduced, all_joints, HarmonicBasis((0, 1), harmonics.samples), bolts, top)
-
-        stiffness = {name: rod.stiffness for name, rod in shanks.items()}
-        turned = tightening.tightened(scene, stiffness, alone, top)
-
-    def balance(kept: tuple[int, ...]) -> HarmonicBalance:
-        basis = HarmonicBasis(kept, harmonics.samples, transitions)
-        if not basis.has_static and np.any(np.abs(gap) > NO_GAP):
-            raise ValueError("the contact has gaps, which act in harmonic 0: keep it in harmonics.kept")
-        base = ground_motion(scene, part, basis) if isinstance(scene, MeshScene) and part is not None else None
-        excitation = joints.excite(scene, base)
-        if turned:
-            excitation = replace(excitation, loads={**excitation.loads, **{(0, n): P for n, P in turned.items()}})
-        made = HarmonicBalance.of(reduced, all_joints, basis, excitation, top)
-        return preloaded(scene, reduced, made) if scene.preload.frictionless else made
-
-    choice = None
-    if harmonics.automatic and not chosen:
-        first = balance(tuple(sorted({0, 1} | {load.harmonic for load in scene.loads.harmonic.values()})))
-        choice = curve.choose_harmonics(
-            first,
-            settings.peak_of(scene),
-            harmonics.tolerance or TOLERANCE,
-            harmonics.highest or HIGHEST,
-            settings.newton_options(scene),
-        )
-        chosen = choice.harmonics
-    final = balance(harmonics.kept or chosen)
+    problem = Problem.of(scene, part, reduced)
+    choice = problem.choice() if scene.harmonics.automatic and not chosen else None
+    kept = scene.harmonics.kept or chosen or (choice.harmonics if choice else ())
+    final = problem.balance(kept)
     if part is not None and isinstance(scene, MeshScene) and scene.other_speeds:
-        final = replace(final, at_speed=_at_speeds(scene, part, harmonics.kept or chosen))
+        final = replace(final, at_speed=_at_speeds(scene, part, kept))
     return Model(part, final.model, final, choice)
 
 
@@ -330,36 +340,6 @@ def preloaded(scene: Scene, reduced: ReducedModel, balance: HarmonicBalance) -> 
         reduced = undamped.with_damping(partial(damping_matrix, scene, springs))
     again = HarmonicBalance.of(reduced, tangent, b.basis, b.excitation, b.omega_max, resting.memory)
     return replace(again, at_rest=x)
-
-
-def unbalanced_load(excitation: Excitation, part: Part, motions: np.ndarray) -> str:
-    """What is wrong with static loads that push the rigid motions (n_free, r) of a structure, with their resultant."""
-    force = excitation.static_force(part.system.loads, len(part.free))
-    moved = np.linalg.norm(part.field(motions), axis=(1, 2))
-    loose = moved > 1e-6 * moved.max()
-    names = [""]
-    if isinstance(part.mesh, Assembly):
-        names = [body.name for body in part.mesh.bodies if body.name and loose[part.node_sets[body.name]].any()]
-    centre = part.points[loose].mean(axis=0)
-    arm = part.points - centre
-    shifts = np.broadcast_to(np.eye(3)[:, None, :], (3, len(arm), 3))
-    turns = np.stack([np.cross(axis, arm) for axis in np.eye(3)])
-    full = np.concatenate([shifts, turns]) * loose[:, None]
-    for node, turn in part.mesh.points.values() if isinstance(part.mesh, Assembly) else ():
-        full[:3, turn], full[3:, turn] = 0.0, np.eye(3) * loose[node]
-    resultant = full.reshape(6, -1)[:, part.free] @ force
-
-    def said(values: np.ndarray, least: float) -> str:
-        return f"({', '.join(f'{v if abs(v) > least else 0.0:.4g}' for v in values)})"
-
-    size, reach = float(np.abs(force).sum()), float(np.abs(arm).max())
-    where = said(1e3 * centre, 1e-6 * reach)
-    it, what = "them" if len(names) > 1 else "it", " and ".join(filter(None, names)) or "the structure"
-    return (
-        f"nothing holds {what}, and the static loads on {it} are not in equilibrium: their resultant is "
-        f"{said(resultant[:3], 1e-9 * size)} N with {said(resultant[3:], 1e-9 * size * reach)} N m about {where} mm: "
-        f"balance them, clamp {it} or add a spring"
-    )
 
 
 def ground_motion(scene: MeshScene, part: Part, basis: HarmonicBasis) -> np.ndarray | None:

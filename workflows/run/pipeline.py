@@ -18,7 +18,7 @@ from tribodyn.workflows.accuracy.budget import with_budget
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.run import curve, head, modelling, references, settings, wear_run, worn_responses
+from tribodyn.workflows.run import curve, modelling, references, sanity_checks, settings, wear_run
 from tribodyn.workflows.run.checkpoint import Clock, Keeper, alone_in
 from tribodyn.workflows.run.description import described
 from tribodyn.workflows.run.failure import SolveFailed
@@ -54,7 +54,7 @@ def run(
         else:
             chosen = () if earlier is None else earlier.harmonics
             model = modelling.build(file, folder or Path(scratch), progress, chosen)
-        for line in () if progress.silent else head.lines(file, model):
+        for line in () if progress.silent else sanity_checks.lines(file, model):
             progress.say(line)
         result = earlier or described(file, model.part, model.balance, model.choice)
         if scene.wears and result.patch is not None:
@@ -87,7 +87,7 @@ def run(
                     return curve.follow_response(scene, worn, lambda done, text: None)
 
                 count = scene.wear.responses
-                curves = worn_responses.curves(result, model.balance, count, again, advance)
+                curves = curve.worn_responses(result, model.balance, count, again, advance)
                 result = keep(replace(result, worn=curves))
         if not row_only or scene.verdict.enabled:
             with progress.stage("error budget"):

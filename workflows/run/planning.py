@@ -1,13 +1,13 @@
 """What a scene will model and what it will cost, from its mesh alone: nothing is assembled, factorised or solved.
 
-The costs are rules of thumb, measured on the beam scene with one thread and on clamped cubes for the factorisation.
-They are meant to tell seconds from hours, and are good to a factor of about three.
+The costs are rules of thumb, good to a factor of about three: they distinguish seconds from hours.
 """
 
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -29,15 +29,33 @@ from tribodyn.workflows.scene.own import is_file
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
 
-FACTOR_SECONDS = 2e-7  # N^1.5 law
-BACK_SUBSTITUTION_SECONDS = 1.5e-7  # for each DOF and right-hand side
-DENSE_SECONDS = 3e-9  # for each cubed coordinate of the reduced model, all eigenvalue problems together
-SOLVE_SECONDS = 6e-8  # of a balance solve, for each squared contact coordinate and harmonic coefficient
-SPARSE_SECONDS = 1.7e-6  # of a balance solve with residual flexibility, for each DOF and harmonic coefficient
-SOLVES_AT_PEAK = {"error_controlled": 40, "thesis": 3}  # a step; the former looks for higher peaks; beam scene
-LIKELY = tuple(range(8))  # harmonics where a scene leaves the choice
-CONTROLLED_STEPS, CONTROLLED_EXPONENT = 23, -0.4  # at a tolerance of 5 %; beam scene
-STEPS_AT_ONE_PERCENT, STEPS_EXPONENT = 411, -0.5  # to loss of contact; Tamatam 2021, table 4.2
+
+@dataclass(frozen=True)
+class Costs:
+    """Rules of thumb, measured on one thread: on the beam scene, and on clamped cubes for the factorisation.
+
+    factor : seconds of a factorisation of N DOFs over N^1.5; back : of a back substitution, for each DOF
+    dense : seconds for each cubed coordinate of the reduced model, all eigenvalue problems together
+    solve : seconds of a balance solve for each squared contact coordinate and harmonic coefficient
+    sparse : the same with residual flexibility, for each DOF and harmonic coefficient
+    at_peak : solves of a wear step at a peak, by rule; the error-controlled one looks for higher peaks
+    harmonics : where a scene leaves the choice
+    controlled : wear steps at a tolerance of 5 %, and the power of the tolerance that they go with
+    thesis : wear steps of 1 % of delta_max to loss of contact, and the power of the step (Tamatam 2021, table 4.2)
+    """
+
+    factor: float = 2e-7
+    back: float = 1.5e-7
+    dense: float = 3e-9
+    solve: float = 6e-8
+    sparse: float = 1.7e-6
+    at_peak: Mapping[str, int] = field(default_factory=lambda: {"error_controlled": 40, "thesis": 3})
+    harmonics: tuple[int, ...] = tuple(range(8))
+    controlled: tuple[float, float] = (23, -0.4)
+    thesis: tuple[float, float] = (411, -0.5)
+
+
+COSTS = Costs()
 
 
 @dataclass(frozen=True)
@@ -119,7 +137,7 @@ def plan(file: SceneFile) -> Plan:
         sparse = without_masters(built, pairs * len(components(scene)), held > 0)
         if sparse:
             masters = CLUSTERS * len(components(scene)) + 5
-    basis = HarmonicBasis(scene.harmonics.kept or LIKELY, scene.harmonics.samples)
+    basis = HarmonicBasis(scene.harmonics.kept or COSTS.harmonics, scene.harmonics.samples)
     n_component = len(components(scene))
     contact = pairs * n_component
     model = masters + (modes if modes is not None else 50) - held
@@ -131,7 +149,7 @@ def plan(file: SceneFile) -> Plan:
         + (0.0 if sparse else 8 * 8.0 * contact**2)
         + 4 * 8.0 * pairs * (n_component * basis.n_coeff) ** 2
     )
-    reduction = FACTOR_SECONDS * full**1.5 + BACK_SUBSTITUTION_SECONDS * full * model + 4 * DENSE_SECONDS * model**3
+    reduction = COSTS.factor * full**1.5 + COSTS.back * full * model + 4 * COSTS.dense * model**3
     steps, solves = _wear(scene)
     return Plan(
         elements=elements,
@@ -145,7 +163,7 @@ def plan(file: SceneFile) -> Plan:
         response_solves=scene.response.points,
         wear_steps=steps,
         wear_solves=solves,
-        solve_seconds=5e-3 + basis.n_coeff * (SPARSE_SECONDS * full if sparse else SOLVE_SECONDS * contact**2),
+        solve_seconds=5e-3 + basis.n_coeff * (COSTS.sparse * full if sparse else COSTS.solve * contact**2),
         verdict=scene.verdict,
     )
 
@@ -185,13 +203,13 @@ def _wear(scene: Scene) -> tuple[int | None, int]:
     most, share = scene.wear.max_steps, None if scene.wear.step is None else scene.wear.step.share
     if scene.wear.rule == "error_controlled":
         share = scene.wear.tolerance
-        likely = round(CONTROLLED_STEPS * (share / 0.05) ** CONTROLLED_EXPONENT)
+        likely = round(COSTS.controlled[0] * (share / 0.05) ** COSTS.controlled[1])
     else:
-        likely = most if share is None else round(STEPS_AT_ONE_PERCENT * (100 * share) ** STEPS_EXPONENT)
+        likely = most if share is None else round(COSTS.thesis[0] * (100 * share) ** COSTS.thesis[1])
     steps = min(most, likely)
     solves = 0
     for place in (duty.at for duty in scene.wear.duties):
-        solves += steps if place.peak is None else steps * SOLVES_AT_PEAK[scene.wear.rule] + scene.response.points
+        solves += steps if place.peak is None else steps * COSTS.at_peak[scene.wear.rule] + scene.response.points
     return (None if share is None else steps), solves
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy.linalg as sla
 
@@ -12,27 +14,40 @@ from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.workflows.result.result import References
 from tribodyn.workflows.scene.schema import MeshScene, Scene
 
-POINTS = 401
-POINTS_BETWEEN = 41  # beside the resonances themselves
-MODES = 100
-BLOCK = 32  # frequencies solved at once
-RIGID = 1e-6  # of the square of the mean frequency: eigenvalues below are those of motions as a rigid body
+
+@dataclass(frozen=True)
+class Linear:
+    """How linear amplitudes are computed.
+
+    points : frequencies of a curve; between : beside the resonances themselves, to find the largest amplitude
+    modes : that are summed; block : frequencies solved at once
+    rigid : of the square of the mean frequency, below which an eigenvalue is that of a motion as a rigid body
+    """
+
+    points: int = 401
+    between: int = 41
+    modes: int = 100
+    block: int = 32
+    rigid: float = 1e-6
+
+
+LINEAR = Linear()
 
 
 def linear_references(balance: HarmonicBalance, output: str, start: float, stop: float) -> References:
     """Amplitudes of an output, free and stuck, between two frequencies [rad/s], under the loads of the balance."""
-    omega = np.linspace(start, stop, POINTS)
+    omega = np.linspace(start, stop, LINEAR.points)
     stuck = _amplitudes(balance, balance.contact.stiffness, output, omega)
     return References(omega, _amplitudes(balance, None, output, omega), stuck)
 
 
 def highest_linear(balance: HarmonicBalance, output: str, start: float, stop: float) -> float:
-    """Largest amplitude of an output from one frequency to another [rad/s], free or stuck [m]; infinite where loose."""
+    """Largest amplitude of an output between two frequencies [rad/s], free or stuck [m]; infinite if unconstrained."""
     states = (None, balance.contact.stiffness)
     found = np.concatenate([_resonances(balance, springs) for springs in states])
-    if (found < np.sqrt(RIGID) * (start + stop) / 2).any():
-        return np.inf  # between loose and stuck a part can have any resonance
-    omega = np.unique(np.clip(np.concatenate([np.linspace(start, stop, POINTS_BETWEEN), found]), start, stop))
+    if (found < np.sqrt(LINEAR.rigid) * (start + stop) / 2).any():
+        return np.inf  # between free and stuck a part can have any resonance
+    omega = np.unique(np.clip(np.concatenate([np.linspace(start, stop, LINEAR.between), found]), start, stop))
     return float(max(_amplitudes(balance, springs, output, omega).max() for springs in states))
 
 
@@ -56,7 +71,7 @@ def _resonances(balance: HarmonicBalance, springs: np.ndarray | None) -> np.ndar
     for h in sorted(orders - {0}):
         system, B = balance.model.at_harmonic(h)
         stiffness = system.stiffness if springs is None else stuck_stiffness(system.stiffness, B, springs)
-        lam = sla.eigvalsh(stiffness, system.mass, subset_by_index=(0, min(MODES, system.n_dof) - 1))
+        lam = sla.eigvalsh(stiffness, system.mass, subset_by_index=(0, min(LINEAR.modes, system.n_dof) - 1))
         found.append(np.sqrt(np.maximum(lam, 0.0)) / h)
     return np.concatenate(found)
 
@@ -82,9 +97,9 @@ def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: st
         if not force.any():
             continue
         stiffness = system.stiffness if springs is None else stuck_stiffness(system.stiffness, B, springs)
-        lam, phi = sla.eigh(stiffness, system.mass, subset_by_index=(0, min(MODES, system.n_dof) - 1))
+        lam, phi = sla.eigh(stiffness, system.mass, subset_by_index=(0, min(LINEAR.modes, system.n_dof) - 1))
         shift = float((h * omega.mean()) ** 2)
-        if lam[0] > RIGID * shift:
+        if lam[0] > LINEAR.rigid * shift:
             shift = 0.0
         factor = sla.cho_factor(stiffness + shift * system.mass if shift else stiffness)
         rate = system.velocity_matrix
@@ -92,19 +107,19 @@ def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: st
         row = system.outputs[output]
         modal = phi.conj().T @ force
         remainder = row @ sla.cho_solve(factor, force) - (row @ phi) @ (modal / (lam + shift))
-        for start in range(0, len(omega), BLOCK):
-            s = 1j * h * omega[start : start + BLOCK, None, None]
+        for start in range(0, len(omega), LINEAR.block):
+            s = 1j * h * omega[start : start + LINEAR.block, None, None]
             dynamic = np.diag(lam) + s**2 * np.eye(len(lam)) + s * damping
             moved = np.linalg.solve(dynamic, modal[:, None])[..., 0]
-            amplitudes[start : start + BLOCK, position] = remainder + moved @ (row @ phi)
+            amplitudes[start : start + LINEAR.block, position] = remainder + moved @ (row @ phi)
     return amplitude(basis.to_real(amplitudes))
 
 
 def free_deflection(balance: HarmonicBalance) -> np.ndarray:
     """Normal approach of the pairs (n_pair,) under the static loads with body 2 absent [m].
 
-    Of a cyclic part: approach of neighbours. It is nan where the part is loose without its contact, or where the normal
-    direction or harmonic 0 is not modelled.
+    Of a cyclic part: approach of neighbours. It is nan where the part is unconstrained without its contact, or where
+    the normal direction or harmonic 0 is not modelled.
     """
     interface = balance.model.interface
     missing = np.full(interface.n_pair, np.nan)

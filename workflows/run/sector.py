@@ -1,13 +1,36 @@
-"""From a part to the sector of a wheel that it is, full and reduced."""
+"""From a part to the sector of a wheel that it is, full and reduced; where it turns, about its equilibrium at speed.
+
+At speed it has the stress of its deformed state of contact, spin softening and Coriolis forces.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
 from tribodyn.fem import cyclic
-from tribodyn.fem.cyclic import Sector
+from tribodyn.fem.constraints import named
+from tribodyn.fem.cyclic import Sector, at_index, seam_map
+from tribodyn.fem.elasticity import assemble
+from tribodyn.fem.factor import SingularStiffness, factorise
 from tribodyn.fem.matching import Mismatch
+from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.part import Part
+from tribodyn.fem.prestress import UNSTABLE, check_stability, coriolis, geometric_stiffness, spin_softening
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation.sliding import solve_along_friction
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.linear.recovery import full_displacement
+from tribodyn.reduction.craig_bampton import POINT_LOAD
 from tribodyn.reduction.cyclic import ReducedSector, reduce_sector
-from tribodyn.workflows.run import part_reduction, rotation
+from tribodyn.reduction.linear import stuck_stiffness
+from tribodyn.reduction.model import ModelInfo, ReducedModel
+from tribodyn.reduction.residual_flexibility import residual_flexibility
+from tribodyn.workflows.run import joints, part_reduction
 from tribodyn.workflows.scene.schema import MeshScene, PartScene
 from tribodyn.workflows.scene.structure import StructureScene
 
@@ -34,7 +57,7 @@ def sector(scene: MeshScene, part: Part) -> Sector:
         raise ValueError(
             f"{miss}, and let wheel.sectors = {wheel.sectors} and wheel.axis be those that the part was made for"
         ) from None
-    return rotation.spun(scene, part, found) if wheel.speed else found
+    return spun(scene, part, found) if wheel.speed else found
 
 
 def check_sectors(scene: MeshScene) -> None:
@@ -58,9 +81,121 @@ def reduced(scene: MeshScene, full: Sector) -> ReducedSector:
     assert scene.wheel is not None
     speed = scene.wheel.speed
     try:
-        kept = rotation.distributed(scene, full) if speed else ()
+        kept = distributed(scene, full) if speed else ()
         return reduce_sector(full, scene.reduction.modes, scene.reduction.cutoff, kept)
     except ValueError as trouble:
         if not speed:
             raise
         raise ValueError(f"at wheel.speed = {60 * speed:.6g} rpm {trouble}, or let it turn slower") from None
+
+
+def spun(scene: MeshScene, part: Part, cut: Sector) -> Sector:
+    """The sector `cut` from a part, vibrating about its equilibrium at the scene's speed.
+
+    The stress is that of the static loads with the contact as it settles: closed, slipped or open, pair by pair
+    Raises  ValueError where the contact does not settle or a body can move rigidly, StaticDivergence where the sector
+        is unstable at rest with its contacts stuck
+    """
+    wheel = scene.wheel
+    assert wheel is not None
+    speed = 2 * np.pi * wheel.speed
+    material = part_reduction.material(scene, part.mesh)
+    mass, _ = assemble(part.mesh, material)
+    soft = csr_matrix(cut.system.stiffness + part.restricted(spin_softening(mass, wheel.axis, speed)))
+    turning = csr_matrix(part.restricted(coriolis(mass, wheel.axis, speed))) if wheel.coriolis else None
+    heat = temperature(scene, part)
+
+    def stiffened(q: np.ndarray) -> Sector:
+        stress = part.restricted(geometric_stiffness(part.mesh, material, part.field(q), heat))
+        return replace(cut, system=replace(cut.system, stiffness=csr_matrix(soft + stress), gyroscopic=turning))
+
+    softened = replace(cut, system=replace(cut.system, stiffness=soft))
+    first = stiffened(stuck_at_rest(scene, softened))
+    found = stiffened(at_rest(scene, first))
+    check_stability(stuck_index_0(scene, found)[0])
+    return found
+
+
+def stuck_index_0(scene: MeshScene, sector: Sector) -> tuple[csr_matrix, csr_matrix, np.ndarray]:
+    """Stiffness (m, m) [N/m] of sectors that move alike with their contacts stuck, contact map (n_c, m), and contact
+    springs (n_pair, n_component) [N/m].
+    """
+    system, B = at_index(sector, 0)
+    model = ReducedModel(sector.system, sector.interface, info=ModelInfo(joints=sector.joints))
+    springs = joints.contact_stiffness(scene, model)
+    return stuck_stiffness(system.stiffness, B, springs), csr_matrix(B), springs
+
+
+def stuck_at_rest(scene: MeshScene, sector: Sector) -> np.ndarray:
+    """Displacement (n_free,) [m] under the static loads with all contacts stuck: where a body would slide away that
+    only its stress holds upright, this is where the stress is first taken from.
+    """
+    stiffness, B, springs = stuck_index_0(scene, sector)
+    T = seam_map(sector, 0)
+    gap = np.zeros(springs.shape)
+    if "n" in sector.interface.components:
+        gap[:, sector.interface.components.index("n")] = sector.interface.gap
+    force = B.T @ (springs * gap).ravel()
+    for name, value in static_loads(scene).items():
+        force = force + value * (T.T @ sector.system.loads[name])
+    return np.asarray(T @ factorise(stiffness, definite=False).solve(force))
+
+
+def at_rest(scene: MeshScene, sector: Sector, tolerance: float = 1e-10, samples: int = 16) -> np.ndarray:
+    """Displacement (n_free,) [m] under the static loads of the scene, the contact settled; the same in every sector.
+
+    Sectors that move alike need no masters on their seams, as waves of other indices do, and statics no masters on the
+    contact: a traction on every pair makes them exact.
+    tolerance : of the balance at rest; samples : of a cycle in which nothing moves
+    """
+    system, B = at_index(sector, 0)
+    static = static_loads(scene)
+    still = replace(system, gyroscopic=None, loads={name: system.loads[name] for name in static}, outputs={})
+    interface = replace(sector.interface, B=csr_matrix(B))
+    springs = joints.contact_stiffness(scene, ReducedModel(still, interface, info=ModelInfo(joints=sector.joints)))
+    try:
+        model = residual_flexibility(still, interface, springs, n_modes=1, clusters=interface.n_pair)
+    except SingularStiffness:
+        raise StaticDivergence(UNSTABLE) from None
+    model = replace(model, info=replace(model.info, joints=dict(sector.joints)))
+    basis = HarmonicBasis((0, 1), samples)
+    made = joints.make_joints(scene, model)
+    omega = 2 * np.pi  # any frequency: nothing vibrates
+    balance = HarmonicBalance.of(model, made, basis, Excitation.of(static), omega)
+    options = newton.NewtonOptions(tolerance=tolerance)
+    solved = newton.solve_from_rest(balance, omega, options)
+    if not solved.converged:
+        solved = solve_along_friction(balance, omega, options) or solved
+    if not solved.converged:
+        raise ValueError(f"the contacts do not settle under the static loads: {solved.outcome}")
+    state = solved.state
+    moved = full_displacement(balance, state.flat, state.cycle.force.reshape(state.flat.shape), omega)[:, 0]
+    return np.asarray(seam_map(sector, 0) @ moved)
+
+
+def distributed(scene: MeshScene, sector: Sector) -> list[str]:
+    """Static loads that act on many nodes, whose statics the reduction is to keep exact."""
+    static, loads = static_loads(scene), sector.system.loads
+    return [name for name in loads if name in static and np.count_nonzero(loads[name]) > POINT_LOAD]
+
+
+def static_loads(scene: MeshScene) -> dict[str, float]:
+    """Static loads by name."""
+    loads = joints.excite(scene, None).loads
+    return {name: float(value.real) for (harmonic, name), value in loads.items() if harmonic == 0}
+
+
+def temperature(scene: MeshScene, part: Part) -> np.ndarray | None:
+    """Change of temperature (n_node,) [K] by the static loads of the scene; None where none heats.
+
+    Raises  ValueError for a field from a file
+    """
+    found = None
+    for name, load in scene.loads.static.items():
+        if load.field is not None:
+            raise ValueError(f"loads.static.{name}: in a wheel that turns, heat whole bodies instead of a field")
+        if load.temperature is not None:
+            found = np.zeros(len(part.points)) if found is None else found
+            heated = [named(part.node_sets, body) for body in load.bodies] or [np.arange(len(found))]
+            found[np.concatenate(heated)] += load.temperature
+    return found

@@ -6,7 +6,8 @@ so that N is the preload where the bolts act alone and the contact has settled.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,13 +16,13 @@ from tribodyn.fem.bolts import Bolt
 from tribodyn.fem.material import Material
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.reduction.model import ReducedModel
 from tribodyn.workflows.run import bodies
 from tribodyn.workflows.run.part_reduction import BOLTS
 from tribodyn.workflows.scene.structure import StructureScene
-
-REACHED = 1e-10  # relative error of a preload
-TURNS = 40
-LARGEST = 1e6  # load over preload from which on a bolt clamps nothing
 
 
 def output(name: str) -> str:
@@ -49,43 +50,63 @@ def rods(scene: StructureScene, mesh: Any, node_sets: Mapping[str, np.ndarray]) 
     return found
 
 
-def tightened(
-    scene: StructureScene,
-    stiffness: Mapping[str, float],
-    balance_of: Callable[[Mapping[str, float]], HarmonicBalance],
-    omega: float,
-) -> dict[str, float]:
-    """P of every bolt [N].
+@dataclass(frozen=True)
+class BoltsAlone:
+    """The model under the loads of its bolts alone, at any frequency omega [rad/s]."""
 
-    stiffness : k of every bolt [N/m]; balance_of : the problem under bolt loads alone; omega : any frequency [rad/s]
-    Raises  ValueError where the contact does not settle or a preload is not reached
-    """
-    wanted = {name: table.preload for name, table in scene.bolts.items()}
-    loads = dict(wanted)
-    locked = [name for name in wanted if stiffness[name] > 0]
-    if not locked:
-        return loads
-    k = np.array([stiffness[name] for name in locked])
-    target = np.array([wanted[name] for name in locked])
-    slope = np.eye(len(locked))
-    before: tuple[np.ndarray, np.ndarray] | None = None
-    for _ in range(TURNS):
-        balance = balance_of(loads)
-        solved = newton.solve(balance, omega, balance.stuck(omega), newton.NewtonOptions(tolerance=1e-12))
+    reduced: ReducedModel
+    joints: list[Joint]
+    samples: int
+    omega: float
+
+    def elongation(self, loads: Mapping[str, float], bolts: Sequence[str]) -> np.ndarray:
+        """Elongations of some bolts where the contact has settled under loads [N] of all of them [m].
+
+        Raises  ValueError where the contact does not settle
+        """
+        excitation = Excitation({(0, name): complex(force) for name, force in loads.items()}, None)
+        basis = HarmonicBasis((0, 1), self.samples)
+        balance = HarmonicBalance.of(self.reduced, self.joints, basis, excitation, self.omega)
+        solved = newton.solve(balance, self.omega, balance.stuck(self.omega), newton.NewtonOptions(tolerance=1e-12))
         if not solved.converged:
             raise ValueError(f"bolts: tightening does not settle ({solved.outcome}); lower the preload or add friction")
         names = balance.compliance.output_names
-        elongation = balance.outputs(solved.state)[[names.index(output(name)) for name in locked], 0]
+        return np.asarray(balance.outputs(solved.state)[[names.index(output(name)) for name in bolts], 0])
+
+
+def tightened(
+    scene: StructureScene,
+    rods: Mapping[str, Bolt],
+    alone: BoltsAlone,
+    reached: float = 1e-10,
+    turns: int = 40,
+    largest: float = 1e6,
+) -> dict[str, float]:
+    """P of every bolt [N].
+
+    rods : the bolts with their stiffness; reached : relative error of a preload; turns : at most
+    largest : load over preload from which on a bolt clamps nothing
+    Raises  ValueError where the contact does not settle or a preload is not reached
+    """
+    loads = {name: table.preload for name, table in scene.bolts.items()}
+    locked = [name for name in loads if rods[name].stiffness > 0]
+    if not locked:
+        return loads
+    k = np.array([rods[name].stiffness for name in locked])
+    target = np.array([loads[name] for name in locked])
+    slope = np.eye(len(locked))
+    before: tuple[np.ndarray, np.ndarray] | None = None
+    for _ in range(turns):
         P = np.array([loads[name] for name in locked])
-        force = P + k * elongation
-        if np.abs(force - target).max() <= REACHED * target.max():
+        force = P + k * alone.elongation(loads, locked)
+        if np.abs(force - target).max() <= reached * target.max():
             return loads
         if before is not None:  # Broyden's update of d force / d P
             dP, dN = P - before[0], force - before[1]
             slope += np.outer(dN - slope @ dP, dP) / (dP @ dP)
         before = P, force
         P = P + np.linalg.solve(slope, target - force)
-        if np.abs(P).max() > LARGEST * target.max():
+        if np.abs(P).max() > largest * target.max():
             break
         loads |= dict(zip(locked, P.tolist(), strict=True))
     raise ValueError(f"bolts: the preload of {', '.join(locked)} is not reached; check what they clamp")

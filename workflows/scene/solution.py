@@ -28,7 +28,7 @@ from tribodyn.workflows.scene.fields import (
 )
 from tribodyn.workflows.scene.own import beside, folder_of, is_file, numbers, own_file
 
-HIGHEST = 15  # harmonic that kept = "auto" may keep
+HIGHEST = 15  # harmonic that kept = "auto" may keep, where the scene does not name one
 
 
 class Output(Table):

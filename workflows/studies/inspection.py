@@ -1,4 +1,4 @@
-"""What a file or a scene holds, before it is computed: sizes, masses, groups, gaps, free modes, oddities."""
+"""What a file or a scene holds, before it is computed: sizes, masses, groups, gaps, free modes, sanity checks."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tribodyn.fem.material import Material
 from tribodyn.fem.modes import modes
 from tribodyn.geometry.facts import area, facts
 from tribodyn.geometry.sources import read as sources
-from tribodyn.workflows.run import head, modelling, oddities, part_reduction
+from tribodyn.workflows.run import modelling, part_reduction, sanity_checks
 from tribodyn.workflows.scene import scene_file
 
 
@@ -98,7 +98,7 @@ class Inspection:
             lines.append(("free modes", ", ".join(f"{f:.5g}" for f in self.frequencies) + " Hz"))
         lines += [("done", sentence) for sentence in self.said]
         lines += [("not used", clause) for clause in self.unused]
-        return lines + [("look again", sentence) for sentence in self.remarks]
+        return lines + [("warning", sentence) for sentence in self.remarks]
 
 
 def inspect(
@@ -138,7 +138,7 @@ def _of_file(path: Path, unit: str, material: Material | None, n_modes: int) -> 
             raise ValueError(f"{path} gives no material to compute modes with: give --young, --poisson and --density")
         found = replace(found, frequencies=_free_frequencies(solids, n_modes))
     hint = 'give --unit mm (in a scene: unit = "mm")'
-    remarks += oddities.odd_sizes(found.size, hint) + _odd_materials(solids)
+    remarks += sanity_checks.check_size(found.size, hint) + _check_materials(solids)
     return replace(found, remarks=tuple(remarks))
 
 
@@ -171,7 +171,7 @@ def of_part(file: scene_file.SceneFile, part: Any) -> Inspection:
     """The facts of a part of a scene that is assembled already."""
     scene = file.mesh_scene
     solids = _solids(file, part)
-    found = measured(solids, head.notes(file, part))
+    found = measured(solids, sanity_checks.notes(file, part))
     gap = np.asarray(part.interface.gap)
     gaps = {
         name: {"least_m": float(gap[pairs].min()), "largest_m": float(gap[pairs].max())}
@@ -179,15 +179,15 @@ def of_part(file: scene_file.SceneFile, part: Any) -> Inspection:
         if gap[pairs].size
     }
     remarks = [
-        *oddities.odd_sizes(found.size, "scale the mesh to metres"),
-        *_odd_materials(solids),
-        *oddities.odd_deflection(scene, part.system, part.largest, float(np.linalg.norm(found.size))),
+        *sanity_checks.check_size(found.size, "scale the mesh to metres"),
+        *_check_materials(solids),
+        *sanity_checks.check_deflection(scene, part.system, part.largest, float(np.linalg.norm(found.size))),
     ]
     return replace(found, gaps=gaps, remarks=tuple(remarks))
 
 
-def _odd_materials(solids: Sequence[Solid]) -> list[str]:
-    return oddities.odd_materials({one.name: one.plain for one in solids if one.plain is not None})
+def _check_materials(solids: Sequence[Solid]) -> list[str]:
+    return sanity_checks.check_materials({one.name: one.plain for one in solids if one.plain is not None})
 
 
 def _solids(file: scene_file.SceneFile, part: Any) -> list[Solid]:

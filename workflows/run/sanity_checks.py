@@ -1,0 +1,189 @@
+"""What a run prints before it computes: sizes, mass, gaps, what is not used, and checks of what may be a wrong unit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
+from scipy.sparse import issparse
+
+from tribodyn.fem.assembly import Assembly, materials_of
+from tribodyn.fem.elasticity import densities
+from tribodyn.fem.factor import factorise
+from tribodyn.fem.material import Material
+from tribodyn.fem.modes import modes
+from tribodyn.fem.part import Part
+from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.geometry import mesh as mesh_reader
+from tribodyn.geometry.facts import facts
+from tribodyn.geometry.sources import cad
+from tribodyn.workflows.run import bodies, part_reduction
+from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.schema import MeshScene, PartScene
+from tribodyn.workflows.scene.structure import StructureScene
+
+if TYPE_CHECKING:
+    from tribodyn.workflows.run.modelling import Model
+
+
+@dataclass(frozen=True)
+class Usual:
+    """What a structure usually is; what lies outside is mentioned, never refused.
+
+    size : of the whole [m]; density : from foams to the heaviest metals [kg/m3]; young : from rubber to diamond [Pa]
+    bent : largest displacement over the size that a linear model describes
+    rigid : of the largest squared frequency, below which the lowest one is rounding
+    modes : whose resonance is checked
+    """
+
+    size: tuple[float, float] = (1e-4, 20.0)
+    density: tuple[float, float] = (50.0, 30_000.0)
+    young: tuple[float, float] = (1e6, 2e12)
+    bent: float = 0.1
+    rigid: float = 1e-12
+    modes: int = 6
+
+
+USUAL = Usual()
+
+
+def lines(file: SceneFile, model: Model) -> Iterator[str]:
+    """Sentences on the structure of a scene; none for one of matrices."""
+    part = model.part
+    if part is None:
+        return
+    scene = file.mesh_scene
+    names = [body.name for body in part.mesh.bodies] if isinstance(part.mesh, Assembly) else [""]
+    material = part_reduction.material(scene, part.mesh)
+    found, plain, counts = [], {}, []
+    for name, (piece, own) in zip(names, materials_of(part.mesh, material), strict=True):
+        found.append(facts(piece.mesh, densities(piece.mesh, own)))
+        if isinstance(own, Material):
+            plain[name or file.name] = own
+        kind = "hexahedra" if piece.mesh.t.shape[0] == 8 else "tetrahedra"
+        counts.append(f"{name}: {piece.mesh.nelements} {kind}" if name else f"{piece.mesh.nelements} {kind}")
+    size = np.max([one.high for one in found], axis=0) - np.min([one.low for one in found], axis=0)
+    masses = [one.mass or 0.0 for one in found]
+    centre = np.average([one.centre for one in found], axis=0, weights=masses)
+    yield f"size {_mm(size, ' x ')} mm, mass {sum(masses):.4g} kg, centre ({_mm(centre)}) mm; {'; '.join(counts)}"
+    worst = min(found, key=lambda one: one.scaled_jacobian)
+    yield f"worst element: scaled Jacobian {worst.scaled_jacobian:.3g} at ({_mm(worst.worst_centre)}) mm"
+    for name, pairs in part.pairs.items():
+        gap = np.asarray(part.interface.gap)[pairs]
+        if gap.size:
+            yield f"gap of {name}: {1e6 * gap.min():.4g} to {1e6 * gap.max():.4g} um"
+    yield from notes(file, part)
+    remarks = [*check_size(size, "scale the mesh to metres"), *check_materials(plain)]
+    if model.reduced.per_harmonic is None:
+        reduced = model.reduced
+        remarks += check_deflection(
+            scene, reduced.system, lambda q: part.largest(reduced.reconstruct(q)), float(np.linalg.norm(size))
+        )
+    yield from (f"warning: {remark}" for remark in remarks)
+
+
+def notes(file: SceneFile, part: Part) -> Iterator[str]:
+    """What was done to the files of a scene, and what of them is not used."""
+    scene = file.mesh_scene
+    if isinstance(part.mesh, Assembly):
+        yield from (note for body in part.mesh.bodies for note in body.notes)
+    if isinstance(scene, StructureScene):
+        for deck in bodies.of_decks(scene, file.folder).values():
+            yield from deck.notes
+    elif isinstance(scene, PartScene) and scene.geometry.mesh is not None:
+        path = file.folder / scene.geometry.mesh
+        if Path(path).suffix.lower() not in cad.ENDINGS:  # which would be meshed again, and loses nothing
+            yield from mesh_reader.read_with_notes(path)[2]
+
+
+def _mm(point: np.ndarray, between: str = ", ") -> str:
+    return between.join(f"{1e3 * c:.4g}" for c in point)
+
+
+def check_size(size: np.ndarray, cure: str) -> list[str]:
+    """A remark on a size (3,) [m] that is not usual; cure : what to do about it."""
+    longest = float(size.max())
+    if longest > USUAL.size[1]:
+        return [f"it is {longest:.4g} m long, as a mesh in millimetres read in metres would be: {cure}"]
+    if longest < USUAL.size[0]:
+        return [
+            f"it is {1e6 * longest:.4g} um long, as a mesh in metres read in millimetres would be: correct its unit"
+        ]
+    return []
+
+
+def check_materials(materials: Mapping[str, Material]) -> list[str]:
+    """Remarks on materials, body -> material, whose numbers are not usual."""
+    remarks = []
+    for name, one in materials.items():
+        if not USUAL.density[0] <= one.rho <= USUAL.density[1]:
+            unit = "g/cm3" if 0.1 < one.rho < USUAL.density[0] else "another unit"
+            remarks.append(
+                f"the density of {name} is {one.rho:.4g} kg/m3, as a value in {unit} without its unit would be: "
+                'write it with its unit, such as "7.86 g/cm3"'
+            )
+        if not USUAL.young[0] <= one.E <= USUAL.young[1]:
+            unit = "GPa" if one.E < 2e3 else "MPa" if USUAL.young[0] > one.E else "another unit"
+            remarks.append(
+                f"Young's modulus of {name} is {one.E:.4g} Pa, as a value in {unit} without its unit would be: "
+                'write it with its unit, such as "210 GPa"'
+            )
+    return remarks
+
+
+def _free(system: SecondOrderSystem) -> bool:
+    """Whether a reduced structure moves as a rigid body but for rounding."""
+    if not isinstance(system.stiffness, np.ndarray):
+        return False
+    squares = eigh(system.stiffness, system.mass, eigvals_only=True, subset_by_index=(0, min(12, len(system.mass) - 1)))
+    return bool(abs(squares[0]) < USUAL.rigid * squares[-1])
+
+
+def check_deflection(
+    scene: MeshScene, system: SecondOrderSystem, largest: Callable[[np.ndarray], float], size: float
+) -> list[str]:
+    """A remark where a load, alone and with the contact open, bends the part beyond a linear model.
+
+    Static loads by their static deflection; harmonic ones by the resonances in the range of the response, with the
+    modal damping of the scene. A structure that contact alone holds is not checked.
+    system : full or reduced, without contact; largest : of its coordinates -> largest displacement [m]; size : [m]
+    """
+    moved: dict[str, tuple[float, str]] = {}
+    try:
+        solve = _solver(system.stiffness)
+    except (ValueError, LinAlgError):  # nothing holds it but the contact
+        return []
+    if _free(system):
+        return []
+    for name, load in {**scene.loads.static, **scene.loads.harmonic}.items():
+        if name in system.loads:
+            moved[name] = (largest(solve(system.loads[name] * load.amplitude)), "at rest")
+    ratio = scene.damping.modal
+    if ratio:
+        omega, phi = modes(system.stiffness, system.mass, min(USUAL.modes, system.mass.shape[0]))
+        low, high = (2 * np.pi * f for f in scene.response.frequency)
+        for name, load in scene.loads.harmonic.items():
+            force = system.loads[name] * load.amplitude if name in system.loads else 0.0 * phi[:, 0]
+            for i in np.flatnonzero((omega * load.harmonic >= low) & (omega <= high * load.harmonic) & (omega > 0)):
+                swing = largest(phi[:, i] * (phi[:, i] @ force) / (2 * ratio * omega[i] ** 2))
+                moved[name] = max(
+                    moved.get(name, (0.0, "")), (swing, f"at its resonance of {omega[i] / (2 * np.pi):.4g} Hz")
+                )
+    name, (most, where) = max(moved.items(), key=lambda item: item[1][0], default=("", (0.0, "")))
+    if most <= USUAL.bent * size:
+        return []
+    return [
+        f"load {name} alone moves the part by {1e3 * most:.3g} mm on {1e3 * size:.3g} mm {where} while the "
+        "contact is open, more than a linear model describes: check its unit, or keep this in mind"
+    ]
+
+
+def _solver(stiffness: Any) -> Callable[[np.ndarray], np.ndarray]:
+    if issparse(stiffness):
+        return factorise(stiffness).solve
+    factor = cho_factor(stiffness)
+    return lambda force: np.asarray(cho_solve(factor, force))
