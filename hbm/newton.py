@@ -9,21 +9,33 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, Linearisation, State
 from tribodyn.hbm.contact.law import ContactCycle
+from tribodyn.hbm.homotopy import SHARES, lead
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
 
-ZERO_SIZE = 1e-6  # size of x, relative to the start, below which a solution counts as zero
-UNRESISTED = 1e-9  # singular value over the largest of a Jacobian whose motion counts as not resisted
-MOST_DENSE = 3000  # unknowns up to which the dense Jacobian serves where Krylov steps fail at rest
-MOST_DIRECT = 25000  # unknowns up to which it serves where Krylov steps fail elsewhere: 5 GB
-MOST_CORRECTIONS, CORRECTED = 8, 0.5  # of a residual flexibility, and what each leaves of the residual at the most
-RAMP_STEPS = 12  # Newton steps in one step of the load ramp; beyond it a shorter step costs less
-RAMP_SLOWEST = 0.9  # residual over that of two Newton steps before, likewise: those that fail mostly stand still
-FORCE_ACCURACY = 1e-4  # of the contact forces, wanted where these stretch their springs far less than x is large
+
+@dataclass(frozen=True)
+class Rules:
+    """What Newton takes for zero, for rounding, and for too large; see docs/accuracy/ablations.md."""
+
+    zero_size: float = 1e-6  # size of x, relative to the start, below which a solution counts as zero
+    unresisted: float = 1e-9  # singular value over the largest of a Jacobian whose motion counts as not resisted
+    most_dense: int = 3000  # unknowns up to which the dense Jacobian serves where Krylov steps fail at rest
+    most_direct: int = 25000  # unknowns up to which it serves where Krylov steps fail elsewhere: 5 GB
+    most_corrections: int = 8  # of a residual flexibility, and what each leaves of the residual at the most
+    corrected: float = 0.5
+    ramp_steps: int = 12  # Newton steps in one step of the load ramp; beyond it a shorter step costs less
+    # residual over that of two Newton steps before, likewise: those that fail mostly stand still
+    ramp_slowest: float = 0.9
+    # of the contact forces, wanted where these stretch their springs far less than x is large
+    force_accuracy: float = 1e-4
+    least_tolerance: float = 1e-12  # residual over displacement that rounding still lets through
+    force_unknown: float = 1e-2  # error of the contact forces from which on a small residual is no solution
+    held: float = 1e-3  # contact force over that of the stuck contact from which on the structure leans on it
+
+
+RULES = Rules()
 CURES = "more damping, a softer contact, fewer harmonics or a larger static load make it easier"
-LEAST_TOLERANCE = 1e-12  # residual over displacement that rounding still lets through
-FORCE_UNKNOWN = 1e-2  # error of the contact forces from which on a small residual is no solution
-HELD = 1e-3  # contact force over that of the stuck contact from which on the structure leans on it
 
 
 class Evaluation(Protocol):
@@ -141,15 +153,15 @@ def _solve_with_rest(balance: HarmonicBalance, omega: float, start: np.ndarray, 
     steps = products = 0
     before = np.inf
     exact = balance.evaluate(omega, start)
-    x_lin, least = balance.x_lin(omega), ZERO_SIZE * float(np.linalg.norm(start))
+    x_lin, least = balance.x_lin(omega), RULES.zero_size * float(np.linalg.norm(start))
     history: tuple[float, ...] = ()
     closer = replace(options, tolerance=0.3 * options.tolerance)
-    for _ in range(MOST_CORRECTIONS):
+    for _ in range(RULES.most_corrections):
         error = relative_residual(exact, x_lin, least)
         history += (error,)
         if error <= min(options.tolerance, _finer(balance, exact, x_lin, least)):
             return Solved(exact, CONVERGED, steps, products, history)
-        if not error < CORRECTED * before:
+        if not error < RULES.corrected * before:
             break
         rest, before = balance.rest(exact), error
         held = _solve(replace(balance, held_rest=rest), omega, exact, closer)
@@ -166,7 +178,7 @@ def _solve(
 ) -> Solved[Evaluated]:
     """The same with Newton's method alone, from a state evaluated with its derivative."""
     x_lin = balance.x_lin(omega)
-    least = ZERO_SIZE * float(np.linalg.norm(state.x))
+    least = RULES.zero_size * float(np.linalg.norm(state.x))
     error = relative_residual(state, x_lin, least)
     history = [error]
     forcing = 1e-3
@@ -191,7 +203,7 @@ def _solve(
         stalled = reached > max(10 * target, 0.5)
         if stalled and error <= options.tolerance:
             break
-        if stalled and balance.reference_stiffness.size * state.residual.shape[1] > MOST_DIRECT:
+        if stalled and balance.reference_stiffness.size * state.residual.shape[1] > RULES.most_direct:
             left = f" relative residual {error:.1e}, {spent} products leave {reached:.0%} of it"
             return Solved(state, SolveEnd.NO_DIRECTION.say(left), step, products, tuple(history))
         if stalled:  # the direct way
@@ -213,8 +225,8 @@ def _solve(
     outcome = CONVERGED
     if error > options.tolerance:
         outcome = SolveEnd.STEPS_SPENT.say(f" {options.max_steps} steps: {error:.1e}")
-    off = error * FORCE_ACCURACY / _finer(balance, state, x_lin, least)
-    if error <= options.tolerance and off > FORCE_UNKNOWN and _leans(balance, state, x_lin):
+    off = error * RULES.force_accuracy / _finer(balance, state, x_lin, least)
+    if error <= options.tolerance and off > RULES.force_unknown and _leans(balance, state, x_lin):
         far = float(np.abs(state.x).max())
         outcome = SolveEnd.SLIDES_AWAY.say(
             f" {far:.1e} m, and its forces are known to {off:.0%} only: nothing holds it"
@@ -224,14 +236,14 @@ def _solve(
 
 def _shortest_direction(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
     """The shortest solution of jacobian . d = -residual (n_contact, n_coeff), motions that nothing resists left out."""
-    found: np.ndarray = np.linalg.lstsq(jacobian, -residual.ravel(), rcond=UNRESISTED)[0]
+    found: np.ndarray = np.linalg.lstsq(jacobian, -residual.ravel(), rcond=RULES.unresisted)[0]
     return found.reshape(residual.shape)
 
 
 def _leans(balance: Balance[Frequency, Evaluated], state: Evaluated, x_lin: np.ndarray) -> bool:
     """Whether the contact carries a share of what the stuck one would."""
     stuck = balance.reference_stiffness[:, None] * x_lin.reshape(state.g.shape)
-    return float(np.linalg.norm(state.cycle.force)) > HELD * float(np.linalg.norm(stuck))
+    return float(np.linalg.norm(state.cycle.force)) > RULES.held * float(np.linalg.norm(stuck))
 
 
 def wanted(
@@ -246,14 +258,14 @@ def wanted(
 
 
 def _finer(balance: Balance[Frequency, Evaluated], state: Evaluated, x_lin: np.ndarray, least: float) -> float:
-    """The relative residual that leaves the contact forces FORCE_ACCURACY; infinite where nothing touches or moves."""
+    """The relative residual that leaves the contact forces exact enough; infinite where nothing touches or moves."""
     k = balance.reference_stiffness[:, None]
     stretch = np.divide(state.cycle.force.reshape(state.g.shape), k, out=np.zeros_like(state.g), where=k > 0)
     size = float(np.linalg.norm(stretch))
     scale = max(float(np.linalg.norm(state.x)), float(np.linalg.norm(x_lin)), least)
     if size == 0.0 or scale == 0.0:
         return np.inf
-    return max(FORCE_ACCURACY * size / scale, LEAST_TOLERANCE)
+    return max(RULES.force_accuracy * size / scale, RULES.least_tolerance)
 
 
 def _search(
@@ -299,26 +311,27 @@ def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptio
     if first.converged:
         return first
     steps, products = first.steps, first.products
-    factor = 0.0
     start = balance.with_load(0.0).stuck(omega)
     options = options or NewtonOptions()
     last = solve(balance.with_load(0.0), omega, start, options)
-    if not last.converged and balance.n_unknown <= MOST_DENSE:
+    if not last.converged and balance.n_unknown <= RULES.most_dense:
         thorough = replace(options, least_motion=True, max_steps=2 * options.max_steps)
         last = solve(balance.with_load(0.0), omega, start, thorough)
-    hasty = replace(options, max_steps=min(options.max_steps, RAMP_STEPS), slowest=min(options.slowest, RAMP_SLOWEST))
-    for patience in (hasty, options):
-        stride = 0.25
-        while last.converged and stride > 1e-3:
-            target = min(1.0, factor + stride)
-            loaded = balance.with_load(target * balance.load_factor)
-            trial = solve(loaded, omega, last.state.x, patience)
+    hasty = replace(
+        options, max_steps=min(options.max_steps, RULES.ramp_steps), slowest=min(options.slowest, RULES.ramp_slowest)
+    )
+    factor = 0.0
+    for patience in (hasty, options) if last.converged else ():
+
+        def loaded(target: float, _: float, patience: NewtonOptions = patience) -> bool:
+            nonlocal last, steps, products
+            trial = solve(balance.with_load(target * balance.load_factor), omega, last.state.x, patience)
             steps, products = steps + trial.steps, products + trial.products
-            if trial.converged:
-                factor, last, stride = target, trial, 1.5 * stride
-                if factor == 1.0:
-                    return Solution(last.state, CONVERGED, steps, products, last.history)
-            else:
-                stride *= 0.5
+            last = trial if trial.converged else last
+            return trial.converged
+
+        factor = lead(factor, 1.0, SHARES, loaded)
+        if factor == 1.0:
+            return Solution(last.state, CONVERGED, steps, products, last.history)
     outcome = first.outcome.kind.say(f"{first.outcome.detail}; load ramp stopped at {factor:.0%}: {CURES}")
     return Solution(first.state, outcome, steps, products, first.history)

@@ -25,7 +25,7 @@ def sampling_error(balance: HarmonicBalance, omega: float, x: np.ndarray) -> flo
     here, there = balance.evaluate(omega, x, jacobian=False), fine.evaluate(omega, x, jacobian=False)
     left = newton.relative_residual(there, fine.x_lin(omega))
     options = NewtonOptions()
-    closer = replace(options, tolerance=max(SETTLED * left, newton.LEAST_TOLERANCE))
+    closer = replace(options, tolerance=max(SETTLED * left, newton.RULES.least_tolerance))
     found = newton.solve(fine, omega, x, closer)
     if not found.converged and found.history[-1] > options.tolerance:  # too far off to be a start
         found = newton.solve_from_rest(fine, omega)

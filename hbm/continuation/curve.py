@@ -13,25 +13,29 @@ from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED
 
-KINK_ANGLE = 0.75  # turn between neighbouring points beyond which they lie on either side of a kink [rad]
-FOLD_NEWTON_SHARE = 1e-3  # of Newton's tolerance elsewhere: near a fold the state goes as the root of the parameter
-FOLD_TRIALS = 80
-# Change of the parameter from trial to trial, over the tolerance, at which it rests: a trial goes at least 0.02 of the
-# way to the other end, and rounding may turn the tangent there for ever.
-AT_REST = 0.01
-FOLD_TANGENT_ACCURACY = 1e-10  # relative; the sign of their frequency part says where the fold is
-# A step whose cubic has less than this share of the parameter that its ends have may hide two folds: contact makes the
-# slope change by pieces, which a cubic rounds off.
-NEARLY_FOLDS = 0.5
-# Slant of a step, the angle between its chord and the mean of its tangents, up to which it needs no check [rad]: the
-# slant of a smooth curve falls with the square of the step, and few steps have more.
-LARGEST_SLANT = 0.03
-# A tangent that turns past a fold and back past its partner turns by at least the angles that both ends have to a fold.
-# A step whose ends differ by more than that over this factor may hide such a pair.
-FOLD_TURN = 1.2
-# Step below which no pair of folds is looked for: there a fold is a kink, or the solutions are not that accurate.
-SHORT_STEP = 1e-4
-TURN_AT_FOLD = 0.35  # of the tangent, in a step over a fold, beyond which it may have passed three [rad]
+
+@dataclass(frozen=True)
+class CurveRules:
+    """How a step along a curve and a fold within it are judged; see docs/accuracy/ablations.md."""
+
+    kink_angle: float = 0.75  # turn between neighbouring points beyond which they lie on either side of a kink [rad]
+    # of Newton's tolerance elsewhere: near a fold the state goes as the root of the parameter
+    fold_newton_share: float = 1e-3
+    fold_trials: int = 80
+    fold_tangent_accuracy: float = 1e-10  # relative; the sign of their frequency part says where the fold is
+    # A step whose cubic has less than this share of the parameter that its ends have may hide two folds: contact
+    # makes the slope change by pieces, which a cubic rounds off.
+    nearly_folds: float = 0.5
+    # Slant of a step, the angle between its chord and the mean of its tangents, up to which it needs no check [rad]:
+    # the slant of a smooth curve falls with the square of the step, and few steps have more.
+    largest_slant: float = 0.03
+    # A tangent that turns past a fold and back past its partner turns by at least the angles that both ends have to a
+    # fold. A step whose ends differ by more than that over this factor may hide such a pair.
+    fold_turn: float = 1.2
+    turn_at_fold: float = 0.35  # of the tangent, in a step over a fold, beyond which it may have passed three [rad]
+
+
+RULES = CurveRules()
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +124,7 @@ class Segment:
         Where these agree, the cubic through the ends turns back twice, or nearly; where they do not, they lie far apart
         """
         if self.turns:
-            return TURN_AT_FOLD < self.angle <= KINK_ANGLE
+            return RULES.turn_at_fold < self.angle <= RULES.kink_angle
         slopes = np.array([self.start.tangent.p, self.end.tangent.p]) * self.length
         rise = self.chord.p
         a = 3 * (slopes[0] + slopes[1] - 2 * rise)  # derivative of the Hermite cubic: a s^2 + b s + c
@@ -128,17 +132,17 @@ class Segment:
         if a == 0.0 or not 0.0 < -b / (2 * a) < 1.0:
             return False
         extreme = slopes[0] - b * b / (4 * a)
-        return bool(extreme * np.sign(slopes[0]) < NEARLY_FOLDS * np.min(np.abs(slopes)))
+        return bool(extreme * np.sign(slopes[0]) < RULES.nearly_folds * np.min(np.abs(slopes)))
 
     @property
     def doubtful(self) -> bool:
         """Whether the ends alone do not tell the curve between: it may leave its branch, or turn back twice."""
-        if self.slant > LARGEST_SLANT:
+        if self.slant > RULES.largest_slant:
             return True
-        if self.turns or self.length < SHORT_STEP:
+        if self.turns:
             return False
         to_fold = sum(np.arcsin(min(abs(end.tangent.p) / self.metric.width, 1.0)) for end in (self.start, self.end))
-        return bool(to_fold < FOLD_TURN * self.angle)
+        return bool(to_fold < RULES.fold_turn * self.angle)
 
     @property
     def distance_to_fold(self) -> float:
@@ -165,7 +169,7 @@ class Segment:
 
     def at(self, s: float) -> Direction:
         """The Hermite cubic through the ends and their tangents at s in 0..1, or two straight lines round a kink."""
-        if self.angle > KINK_ANGLE:
+        if self.angle > RULES.kink_angle:
             a, b, _ = self.corner
             if s * (a + b) < a:
                 return self.start.place + self.start.tangent * (s * (a + b))
@@ -195,7 +199,7 @@ class Segment:
 
         A close call is decided by solving in the hyperplane through the point, from the segment
         """
-        if self.length == 0.0 or point is self.start or point is self.end or self.angle > KINK_ANGLE:
+        if self.length == 0.0 or point is self.start or point is self.end or self.angle > RULES.kink_angle:
             return False
         metric = self.metric
         s = metric.dot(point.place - self.start.place, self.chord) / self.length**2
@@ -217,33 +221,31 @@ def locate_fold(path: Parameter, segment: Segment, options: NewtonOptions, toler
     tolerance : relative, on the parameter
     Returns the fold, also where it is a kink with tangents of either sign beside it; None where a solve fails
     """
-    tight = replace(options, tolerance=max(FOLD_NEWTON_SHARE * options.tolerance, 1e-13))
+    tight = replace(options, tolerance=max(RULES.fold_newton_share * options.tolerance, 1e-13))
     metric = segment.metric
     try:
         ends = [replace(p, tangent=_sharp_tangent(path, p, metric, tight)) for p in (segment.start, segment.end)]
         if ends[0].tangent.p * ends[1].tangent.p >= 0:  # one end is the fold, up to the accuracy of its tangent before
             return replace(min(ends, key=lambda end: abs(end.tangent.p)), fold=True)
-        segment, weight, corner, last = Segment(ends[0], ends[1], metric), [1.0, 1.0], np.inf, np.inf
-        rests = 0
-        for _ in range(FOLD_TRIALS):
+        segment, weight, corner = Segment(ends[0], ends[1], metric), [1.0, 1.0], np.inf
+        for _ in range(RULES.fold_trials):
             before, corner = corner, _corner_value(segment)
             settled = abs(corner - before) <= 0.1 * tolerance * abs(corner)
             guess = segment.at(_share(segment, weight, settled))
             solution, value = bordered.correct(path, guess, segment.along, metric, tight)
             if min(solution.history) > options.tolerance:
                 return None
-            tangent = bordered.tangent(path, value, solution.state, segment.along, metric, tight, FOLD_TANGENT_ACCURACY)
+            tangent = bordered.tangent(
+                path, value, solution.state, segment.along, metric, tight, RULES.fold_tangent_accuracy
+            )
             point = CurvePoint.of(value, replace(solution, outcome=CONVERGED), tangent, fold=True)
             if tangent.p * segment.start.tangent.p > 0:  # Illinois: halve the weight of an end that stays
                 segment, weight = Segment(point, segment.end, metric), [1.0, 0.5 * weight[1]]
             else:
                 segment, weight = Segment(segment.start, point, metric), [0.5 * weight[0], 1.0]
             steepest = max(abs(segment.start.tangent.p), abs(segment.end.tangent.p))
-            slope = abs(tangent.p) if segment.angle < KINK_ANGLE else steepest
-            rests, last = rests + 1 if abs(value - last) <= AT_REST * tolerance * abs(value) else 0, value
+            slope = abs(tangent.p) if segment.angle < RULES.kink_angle else steepest
             if settled or slope * segment.length <= tolerance * abs(value) or segment.length < 1e-13:
-                return point
-            if rests == 2:  # once it may be as high on either side of the fold
                 return point
     except BorderFailed:
         return None
@@ -255,13 +257,13 @@ def _sharp_tangent(path: Parameter, point: CurvePoint, metric: Metric, options: 
     balance, omega = path.place(point.value)
     flat = point.place.x
     state = balance.evaluate(omega, flat.reshape(balance.contact.n_pair, -1, flat.shape[-1]))
-    return bordered.tangent(path, point.value, state, point.tangent, metric, options, FOLD_TANGENT_ACCURACY)
+    return bordered.tangent(path, point.value, state, point.tangent, metric, options, RULES.fold_tangent_accuracy)
 
 
 def _corner_value(segment: Segment) -> float:
     """The parameter where the tangents of the ends meet; none where the segment is smooth."""
     a, b, _ = segment.corner
-    if segment.angle <= KINK_ANGLE or min(a, b) <= 0:
+    if segment.angle <= RULES.kink_angle or min(a, b) <= 0:
         return float("nan")
     return segment.start.value + a * segment.start.tangent.p
 
@@ -272,7 +274,7 @@ def _share(segment: Segment, weight: list[float], settled: bool) -> float:
     Round a corner it is on the longer leg, close to where the tangents meet, so that both legs get short in turn and
     the meeting point settles; there at last. Elsewhere it is the secant's zero of the tangent's share in the parameter.
     """
-    if segment.angle > KINK_ANGLE:
+    if segment.angle > RULES.kink_angle:
         a, b, _ = segment.corner
         if min(a, b) <= 0:
             return 0.5

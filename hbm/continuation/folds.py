@@ -26,14 +26,6 @@ from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd, Outcome
 from tribodyn.hbm.threads import single
 
-FREQUENCY_SCALE = 0.1  # relative change of frequency that is as long as one of the whole state; it sets the steps alone
-# Step along the surface by which the scalar is differentiated: the square root of Newton's tolerance, where the errors
-# of truncation and of the solves are alike.
-DIFFERENCE_STEP = 1e-4
-ACCURACY = 1e-10  # of tangents, relative; finer than DIFFERENCE_STEP needs by the factor that differencing loses
-FOLD_RESIDUAL = 1e-5  # of the scalar at a fold; the frequency is off by its square, which is below Newton's tolerance
-SEARCH_STEP, SEARCH_STEPS = 1e-3, 8  # arc length of the first step in the search for a fold, and steps either way
-
 
 @dataclass(frozen=True)
 class FoldOptions:
@@ -42,6 +34,12 @@ class FoldOptions:
     step, max_step, min_step : arc length of the first, longest and shortest step; one is the size of the vibration,
         a tenth of the frequency, or `width` times the range of the parameter
     max_points : points after which to end; trials : Newton steps allowed per fold
+    frequency_scale : relative change of frequency that is as long as one of the whole state; it sets the steps alone
+    difference : step along the surface by which the scalar is differentiated: the square root of Newton's tolerance,
+        where the errors of truncation and of the solves are alike
+    accuracy : of tangents, relative; finer than `difference` needs by the factor that differencing loses
+    residual : of the scalar at a fold; the frequency is off by its square, which is below Newton's tolerance
+    search_step, search_steps : arc length of the first step in the search for a fold, and steps either way
     """
 
     step: float = 0.05
@@ -50,6 +48,12 @@ class FoldOptions:
     width: float = 0.2
     max_points: int = 500
     trials: int = 8
+    frequency_scale: float = 0.1
+    difference: float = 1e-4
+    accuracy: float = 1e-10
+    residual: float = 1e-5
+    search_step: float = 1e-3
+    search_steps: int = 8
     newton: NewtonOptions = field(default_factory=NewtonOptions)
 
 
@@ -169,7 +173,7 @@ class _Surface:
 
     def __init__(self, path: Parameter, options: FoldOptions, omega: float, span: float):
         self._path, self._options = path, options
-        self._width, self._span = FREQUENCY_SCALE * omega, options.width * span
+        self._width, self._span = options.frequency_scale * omega, options.width * span
         self._newton = replace(options.newton, tolerance=max(1e-3 * options.newton.tolerance, 1e-13), max_steps=15)
 
     def _metric(self, flat: np.ndarray, balance: HarmonicBalance) -> Metric:
@@ -193,7 +197,7 @@ class _Surface:
             scalar, slopes = self._slopes(value, point.place, along, across, metric)
         except BorderFailed as reason:
             raise NoFold(str(reason)) from None
-        shares = (-slopes[1], slopes[0]) if abs(scalar) <= FOLD_RESIDUAL and slopes[0] != 0 else (0.0, 1.0)
+        shares = (-slopes[1], slopes[0]) if abs(scalar) <= self._options.residual and slopes[0] != 0 else (0.0, 1.0)
         sign = -1.0 if shares[1] * sense < 0 else 1.0
         tangent = along * shares[0] + across * shares[1]
         return self._unit(_Fold(value, solution, along, tangent, shares[1]), metric, sign)
@@ -232,7 +236,9 @@ class _Surface:
             solution = self._solved(response, guess, along, metric)
             here = Direction(solution.state.flat, solution.state.omega)
             try:
-                along = bordered.tangent(response, here.p, solution.state, along, metric, self._newton, ACCURACY)
+                along = bordered.tangent(
+                    response, here.p, solution.state, along, metric, self._newton, self._options.accuracy
+                )
                 across = self._across(value, solution, along, metric)
                 scalar, slopes = self._slopes(value, here, along, across, metric)
             except BorderFailed as reason:
@@ -243,7 +249,7 @@ class _Surface:
             line = np.array([-slopes[1], slopes[0]]) / size
             if trial == 0:
                 row = line
-            if abs(scalar) <= FOLD_RESIDUAL:
+            if abs(scalar) <= self._options.residual:
                 tangent = along * float(line[0]) + across * float(line[1])
                 return _Fold(value, solution, along, tangent, float(line[1]))
             matrix = np.array([slopes, row])
@@ -267,7 +273,7 @@ class _Surface:
         state = balance.evaluate(guess.p, guess.x.reshape(balance.contact.n_pair, -1, guess.x.shape[-1]))
         border = metric.unit(Direction(np.where(balance.basis.order > 0, guess.x, 0.0), 0.0))
         try:
-            return bordered.tangent(response, guess.p, state, border, metric, self._newton, ACCURACY)
+            return bordered.tangent(response, guess.p, state, border, metric, self._newton, self._options.accuracy)
         except BorderFailed as reason:
             raise NoFold(str(reason)) from None
 
@@ -276,7 +282,9 @@ class _Surface:
         state, response = solution.state, self._response(value)
         force = replace(self._path, omega=state.omega).slope(value, state)
         linear, slope = response.make(value).linearise(state), response.slope(state.omega, state)
-        return bordered.solve(linear, slope, along, metric, (-force, 0.0), ACCURACY, self._newton.max_products)[0]
+        return bordered.solve(
+            linear, slope, along, metric, (-force, 0.0), self._options.accuracy, self._newton.max_products
+        )[0]
 
     def _slopes(
         self, value: float, here: Direction, along: Direction, across: Direction, metric: Metric
@@ -287,12 +295,15 @@ class _Surface:
             response = self._response(v)
             balance = response.make(v)
             state = balance.evaluate(place.p, place.x.reshape(balance.contact.n_pair, -1, place.x.shape[-1]))
-            return bordered.tangent(response, place.p, state, along, metric, self._newton, ACCURACY).p / metric.width
+            return (
+                bordered.tangent(response, place.p, state, along, metric, self._newton, self._options.accuracy).p
+                / metric.width
+            )
 
         reach = 1.0 / max(metric.norm(across), 1.0 / self._span)  # change of the parameter that counts as one
         central = scalar(value, here)
-        one = (scalar(value, here + along * DIFFERENCE_STEP) - central) / DIFFERENCE_STEP
-        step = DIFFERENCE_STEP * reach
+        one = (scalar(value, here + along * self._options.difference) - central) / self._options.difference
+        step = self._options.difference * reach
         two = (scalar(value + step, here + across * step) - central) / step
         return central, (one, two)
 
@@ -309,9 +320,9 @@ class _Surface:
         response = self._response(value)
         solution = self._solved(response, guess, along, metric)
         omega = solution.state.omega
-        options = Options(step=SEARCH_STEP, width=1.0, newton=self._options.newton)
+        options = Options(step=self._options.search_step, width=1.0, newton=self._options.newton)
         ways = [Stepper(response, options, solution, omega, omega + self._width, along * sign) for sign in (1.0, -1.0)]
-        for _ in range(SEARCH_STEPS):
+        for _ in range(self._options.search_steps):
             for way in ways:
                 for part in way.advance():
                     if part.end.fold:

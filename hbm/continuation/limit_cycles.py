@@ -20,8 +20,6 @@ from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, newton_on
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
 
-FREQUENCY, DAMPING, AMPLITUDE = -3, -2, -1  # among the coordinates of a point
-
 
 @dataclass(frozen=True)
 class LimitCycle:
@@ -110,9 +108,9 @@ def _without_damping(
 ) -> LimitCycle | None:
     """The point of zero damping near a guess, None where Newton's method does not find it."""
     held = np.zeros(len(guess))
-    held[DAMPING] = 1.0
+    held[-2] = 1.0  # the damping among the coordinates of a point
     begin = guess.copy()
-    begin[DAMPING] = 0.0
+    begin[-2] = 0.0
     point, outcome, _ = newton_on(problem, problem.evaluate(begin), held, options.newton)
     if outcome != CONVERGED:
         return None

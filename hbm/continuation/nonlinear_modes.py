@@ -20,16 +20,6 @@ from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
 
-# Newton steps up to which the next step grows, and from which it shrinks; this moves the points, not the curve.
-FEW_NEWTON_STEPS, MANY_NEWTON_STEPS = 3, 7
-# Weight of log frequency and of the damping ratio in the arc length, beside that of log amplitude: they change by a few
-# per cent where the amplitude changes by decades.
-FREQUENCY_WEIGHT = 5.0
-CORNER_STEP = 1e-2  # share of the longest step below which any turn is taken as a corner of the curve
-# By how much a step may miss its prediction, over what a straight line between its ends may miss: eight on a curve of
-# constant curvature, four at a kink in the middle.
-PREDICTED_OVER_BETWEEN = 5.0
-
 
 @dataclass(frozen=True)
 class BackboneOptions:
@@ -38,12 +28,23 @@ class BackboneOptions:
     between : what a straight line between neighbouring points may miss, of the frequency (relative) and of the damping
         ratio: steps get shorter where slip begins
     min_step : shortest step, as a fraction of the longest; max_points : points after which to end
+    few_steps, many_steps : Newton steps up to which the next step grows, and from which it shrinks
+    frequency_weight : of log frequency and of the damping ratio in the arc length, beside that of log amplitude: they
+        change by a few per cent where the amplitude changes by decades
+    corner_step : share of the longest step below which any turn is taken as a corner of the curve
+    misses : by how much a step may miss its prediction, over `between`: eight on a curve of constant curvature, four at
+        a kink in the middle
     """
 
     n_points: int = 40
     between: float = 1e-3
     min_step: float = 1e-4
     max_points: int = 400
+    few_steps: int = 3
+    many_steps: int = 7
+    frequency_weight: float = 5.0
+    corner_step: float = 1e-2
+    misses: float = 5.0
     newton: NewtonOptions = field(default_factory=NewtonOptions)
 
 
@@ -152,7 +153,7 @@ def walk(
     longest = abs(goal - start) / max(options.n_points - 1, 1)
     step, tangent = longest, np.sign(goal - start) * fixed
     weight = np.ones(len(fixed))
-    weight[-3:-1] = FREQUENCY_WEIGHT**2
+    weight[-3:-1] = options.frequency_weight**2
     while len(solved) < options.max_points:
         here = solved[-1][0].coordinates
         ahead = here + step * tangent
@@ -162,14 +163,14 @@ def walk(
         found = newton_on(problem, problem.evaluate(ahead), fixed if last else weight * tangent, options.newton)
         turned = found[0].coordinates - here
         size = np.sqrt(turned @ (weight * turned))
-        smooth = turned @ (weight * tangent) > 0.5 * size or step < CORNER_STEP * longest
+        smooth = turned @ (weight * tangent) > 0.5 * size or step < options.corner_step * longest
         if found[1] != CONVERGED or not smooth:
             step *= 0.5
             if step < options.min_step * longest:
                 return [*solved, found], BranchEnd.ENDED.say(f" its last point: {found[1]}")
             continue
         missed = np.abs(found[0].coordinates - ahead)[-3:-1].max()
-        if missed > PREDICTED_OVER_BETWEEN * options.between and step >= CORNER_STEP * longest:
+        if missed > options.misses * options.between and step >= options.corner_step * longest:
             step *= 0.5
             continue
         solved.append(found)
@@ -178,9 +179,9 @@ def walk(
         if (found[0].coordinates[-1] - start) * (goal - start) < 0:
             return solved, BranchEnd.TURNED_BACK.say(" where it began")
         tangent = turned / size
-        if found[2] <= FEW_NEWTON_STEPS:
+        if found[2] <= options.few_steps:
             step = min(longest, 1.6 * step)
-        elif found[2] >= MANY_NEWTON_STEPS:
+        elif found[2] >= options.many_steps:
             step *= 0.6
     return solved, BranchEnd.POINTS_DONE.say(f" {options.max_points} points")
 

@@ -19,23 +19,6 @@ from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED, SolveEnd
 from tribodyn.hbm.threads import single
 
-SCAN_TOLERANCE = 0.03  # of the response between the points of the first search
-SCAN_MISSES = 0.15  # of a peak's height, at most, between two points of the first search: five times their tolerance
-COARSEST = 0.05  # longest step of the first search, share of its range
-# highest harmonic of the scans for peaks: a contact that lifts drives higher modes by harmonics of the load, and such a
-# superharmonic resonance may be the highest. With more of them a scan takes longer than a wear step; a peak that is
-# found is solved with all
-SCANNED = 7
-SCANNED_ABOVE = 3  # the same above a tracked peak, where a sweep with rising frequency arrives last
-# amplitude over that of the tracked peak, from which on another one has overtaken it: what fewer harmonics miss of a
-# peak is less, and a peak that emerges passes this at once
-OVERTAKES = 1.2
-APART = 1e-3  # relative distance of frequencies from which on two peaks are two
-NEAR = 1e-3  # relative distance to the peak within which a point beside failed solves is taken for it
-REACH = 2.0  # half widths between the points beside a maximum of a scan, by which its peak may lie outside them
-ASTRAY = 0.05  # of its frequency, by which a peak may move with more harmonics
-TRIED = 3  # maxima of a scan that are refined in turn, the highest first
-
 
 class NoPeak(ValueError):
     """The response has no maximum inside the range that is searched; the message says where it still rises."""
@@ -125,7 +108,21 @@ class AtPeak:
     tolerance : relative, on the frequency of the peak
     highest : amplitude that no linear response inside the range passes, with the contact free or stuck, at load factor
         1 [m]: a tracked peak as high is not overtaken, and none is looked for
-    scanned : highest harmonic of the scans for peaks
+    scanned : highest harmonic of the scans for peaks: a contact that lifts drives higher modes by harmonics of the
+        load, and such a superharmonic resonance may be the highest. With more of them a scan takes longer than
+        a wear step; a peak that is found is solved with all
+    scanned_above : the same above a tracked peak, where a sweep with rising frequency arrives last
+    scan_tolerance : of the response between the points of the first search
+    scan_misses : of a peak's height, at most, between two points of the first search: five times their tolerance
+    coarsest : longest step of the first search, share of its range
+    overtakes : amplitude over that of the tracked peak, from which on another resonance dominates: what fewer harmonics
+        miss of a peak is less, and a peak that emerges passes this at once
+    apart : relative distance of frequencies from which on two peaks are two
+    near : relative distance to the peak within which a point beside failed solves is taken for it
+    reach : half widths between the points beside a maximum of a scan, by which its peak may lie outside them
+    astray : of its frequency, by which a peak may move with more harmonics
+    tried : maxima of a scan that are refined in turn, the highest first
+    Those from `scanned_above` on: see docs/accuracy/ablations.md
     """
 
     output: str
@@ -134,7 +131,17 @@ class AtPeak:
     n_scan: int = 60
     tolerance: float = 1e-5
     highest: float = np.inf
-    scanned: int = SCANNED
+    scanned: int = 7
+    scanned_above: int = 3
+    scan_tolerance: float = 0.03
+    scan_misses: float = 0.15
+    coarsest: float = 0.05
+    overtakes: float = 1.2
+    apart: float = 1e-3
+    near: float = 1e-3
+    reach: float = 2.0
+    astray: float = 0.05
+    tried: int = 3
     newton: NewtonOptions = field(default_factory=NewtonOptions)
 
     @single
@@ -156,11 +163,15 @@ class AtPeak:
         branch = self._scan(balance)
         return self._highest(balance, branch, self._candidates(branch))
 
+    def _is_rough(self, balance: HarmonicBalance) -> bool:
+        """Whether a response may have micro-folds with so many harmonics: many jumps, slopes that say little."""
+        return balance.basis.harmonics[-1] > self.scanned_above
+
     def _candidates(self, branch: Branch) -> np.ndarray:
         """Maxima of a branch that may be its highest."""
         maxima = self._maxima(branch)
         height = branch.amplitude(self.output)[maxima]
-        return maxima[height >= (1 - SCAN_MISSES) * height[0]]
+        return maxima[height >= (1 - self.scan_misses) * height[0]]
 
     def _few(self, balance: HarmonicBalance, highest: int) -> HarmonicBalance:
         """The balance with its harmonics up to one, and those that the loads need."""
@@ -181,7 +192,7 @@ class AtPeak:
             more = balance if kept == balance.basis.harmonics else balance.with_harmonics(kept)
             x, omega = _carried(known, point, more), point.state.omega
             found = self.next(more, omega, x)
-            if not found.solution.converged or abs(found.state.omega - omega) > ASTRAY * omega:
+            if not found.solution.converged or abs(found.state.omega - omega) > self.astray * omega:
                 found = self._at(more, omega, x, found.solves)
             found = replace(found, solves=found.solves + point.solves)
             if far_enough and not found.solution.converged:
@@ -192,14 +203,14 @@ class AtPeak:
             known, point = more, found
 
     def _scan(self, balance: HarmonicBalance) -> Branch:
-        step = min(1 / self.n_scan, COARSEST)
+        step = min(1 / self.n_scan, self.coarsest)
         scan = adaptive.Options(
-            tolerance=SCAN_TOLERANCE,
+            tolerance=self.scan_tolerance,
             step=step,
-            max_step=min(5 * step, COARSEST),
+            max_step=min(5 * step, self.coarsest),
             min_step=1e-3 * step,
             newton=self.newton,
-            load_paths=not _is_rough(balance),
+            load_paths=not self._is_rough(balance),
         )
         return adaptive.follow(balance, self.start, self.stop, scan)
 
@@ -209,10 +220,10 @@ class AtPeak:
         Its solves count those of the branch
         """
         solves = len(branch.omega)
-        for best in maxima[:TRIED]:
+        for best in maxima[: self.tried]:
             beside = branch.omega[best - 1 : best + 2]
             width = float(np.ptp(beside)) / 2
-            within = float(beside.min()) - REACH * width, float(beside.max()) + REACH * width
+            within = float(beside.min()) - self.reach * width, float(beside.max()) + self.reach * width
             x = _point(balance, branch, best)
             found = self._refine(balance, branch.omega[best], x, 0.5 * width, within)
             solves += found.solves
@@ -240,15 +251,15 @@ class AtPeak:
         Returns the peak and the balance solves spent, those of a sweep without any peak apart. Where pairs hammer and
         no solution with all harmonics is found beside that with fewer, the peak has fewer, and zeros in the others
         """
-        if OVERTAKES * point.amplitude >= self.highest * balance.load_factor:
+        if self.overtakes * point.amplitude >= self.highest * balance.load_factor:
             return None, 0
         low, high = sorted((self.start, self.stop))
         tracked = float(np.clip(point.state.omega, low, high))
-        few, fewer = (self._few(balance, top) for top in (self.scanned, min(SCANNED_ABOVE, self.scanned)))
+        few, fewer = (self._few(balance, top) for top in (self.scanned, min(self.scanned_above, self.scanned)))
         parts = [(low, tracked, few), (tracked, high, fewer)] if few.basis != fewer.basis else [(low, high, few)]
         found, solves = None, 0
         for start, stop, scanned in parts:
-            if found is None and stop - start > APART * tracked:
+            if found is None and stop - start > self.apart * tracked:
                 part = replace(self, start=start, stop=stop)
                 found, further = part._higher(scanned, balance, point)
                 solves += further
@@ -263,11 +274,11 @@ class AtPeak:
             maxima = self._maxima(branch)
         except NoPeak:
             return None, len(branch.omega)
-        might = branch.amplitude(self.output)[maxima] > (1 - SCAN_MISSES) * OVERTAKES * point.amplitude
+        might = branch.amplitude(self.output)[maxima] > (1 - self.scan_misses) * self.overtakes * point.amplitude
         if not might.any():
             return None, len(branch.omega)
         scanned = self._highest(few, branch, maxima[might])
-        if _is_rough(few) and not scanned.solution.converged:  # no slope vanishes: the highest point of the sweep
+        if self._is_rough(few) and not scanned.solution.converged:  # no slope vanishes: the highest point of the sweep
             best = maxima[might][0]
             scanned = self._at(few, branch.omega[best], _point(few, branch, best), scanned.solves)
         if not self._is_higher(scanned, point):
@@ -277,8 +288,8 @@ class AtPeak:
 
     def _is_higher(self, found: OperatingPoint, point: OperatingPoint) -> bool:
         omega = found.state.omega
-        apart = abs(omega - point.state.omega) > APART * point.state.omega
-        higher = found.amplitude > OVERTAKES * point.amplitude
+        apart = abs(omega - point.state.omega) > self.apart * point.state.omega
+        higher = found.amplitude > self.overtakes * point.amplitude
         return self._contains(omega) and apart and found.solution.converged and higher
 
     @single
@@ -376,18 +387,15 @@ class AtPeak:
             )
         found = best.solution
         between = np.inf if uphill is None or other is None else abs(uphill.omega - other.omega)
-        if min(abs(best.distance), between) > NEAR * best.omega:  # sampled forces have kinks, where the slope jumps
+        if (
+            min(abs(best.distance), between) > self.near * best.omega
+        ):  # sampled forces have kinks, where the slope jumps
             hertz, rises = best.omega / (2 * np.pi), "rises" if best.slope > 0 else "falls"
             lost = SolveEnd.SITE_NOT_FOUND.say(
                 f" {solves} solves: the curve ends at {hertz:.5g} Hz, where it still {rises}"
             )
             found = replace(found, outcome=lost)
         return OperatingPoint.of(balance, found, self.output, solves)
-
-
-def _is_rough(balance: HarmonicBalance) -> bool:
-    """Whether a response may have micro-folds, with so many harmonics: jumps are many, slopes tell little of a peak."""
-    return balance.basis.harmonics[-1] > SCANNED_ABOVE
 
 
 def _point(balance: HarmonicBalance, branch: Branch, i: int) -> np.ndarray:

@@ -24,6 +24,7 @@ import numpy as np
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.continuation.branch import amplitude
+from tribodyn.hbm.homotopy import SHARES, lead
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.threads import single
 
@@ -194,14 +195,13 @@ def _solve_pushed(
     solution = newton.solve(balance.with_memory(far), omega, x, options)
     if solution.converged or not unloaded.converged:
         return solution
-    factor, stride = 0.0, 0.25
-    while stride > 1e-3:
-        target = min(1.0, factor + stride)
+
+    def pushed(target: float, _: float) -> bool:
+        nonlocal x
         trial = newton.solve(balance.with_memory(balance.memory - target * side * reach), omega, x, options)
-        if not trial.converged:
-            stride *= 0.5
-            continue
-        factor, x = target, trial.state.x
-        if factor == 1.0:
-            return newton.solve(balance.with_memory(far), omega, x, options)
-    return solution
+        x = trial.state.x if trial.converged else x
+        return trial.converged
+
+    if lead(0.0, 1.0, SHARES, pushed) < 1.0:
+        return solution
+    return newton.solve(balance.with_memory(far), omega, x, options)

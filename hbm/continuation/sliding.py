@@ -3,23 +3,24 @@
 With much friction closed pairs stick, and where they stick is found at once. As friction falls they slide, and the
 solution moves with it. A wedge that a load presses between two bodies is the example: from the stuck state Newton's
 method lets go of one of its faces, and nothing holds it any more.
-Source  ours; continuation in a parameter of the problem as in Allgower and Georg 1990, chapter 1
+Source  ours
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.homotopy import DECADES, lead
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.threads import single
 
 FRICTION = "friction"  # what laws call their coefficient
 STARTS = (3.0, 2.5, 2.0, 1.5, 1.0, 0.5)  # decimal logarithms of friction over its own, tried in turn
-SHORTEST = 0.02  # step of the decimal logarithm of friction
-GROWTH = 1.6  # of a step after one that converged
 MOST_STEPS = 400  # of Newton on the whole way
 
 
@@ -28,27 +29,22 @@ def solve_along_friction(balance: HarmonicBalance, omega: float, options: Newton
     """A solution at one frequency [rad/s], None where no law has a coefficient of friction or there is no way to it."""
     if not any(FRICTION in joint.parameters.numbers for joint in balance.contact.joints):
         return None
-    x, stride, left, products = balance.stuck(omega), 1.0, MOST_STEPS, 0
-    for level in STARTS:
+    x, spent, products = balance.stuck(omega), 0, 0
+
+    def rougher(level: float, _: float = np.nan) -> bool:
+        nonlocal found, x, spent, products
+        if spent >= MOST_STEPS:
+            return False
         found = newton.solve(_with_friction(balance, level), omega, x, options)
-        if found.converged:
-            break
-        left, products = left - found.steps, products + found.products
-    while found.converged:
-        left, products = left - found.steps, products + found.products
-        if level == 0.0:
-            return replace(found, steps=MOST_STEPS - left, products=products)
-        x = found.state.x
-        while left > 0 and stride > SHORTEST:
-            target = max(0.0, level - stride)
-            found = newton.solve(_with_friction(balance, target), omega, x, options)
-            if found.converged:
-                level, stride = target, GROWTH * stride
-                break
-            left, products, stride = left - found.steps, products + found.products, 0.5 * stride
-        else:
-            return None
-    return None
+        spent, products = spent + found.steps, products + found.products
+        x = found.state.x if found.converged else x
+        return found.converged
+
+    found: Solution | None = None
+    first = next((level for level in STARTS if rougher(level)), None)
+    if first is None or lead(first, 0.0, DECADES, rougher) > 0.0 or found is None:
+        return None
+    return replace(found, steps=spent, products=products)
 
 
 def _with_friction(balance: HarmonicBalance, level: float) -> HarmonicBalance:

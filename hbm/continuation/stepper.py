@@ -2,30 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tribodyn.hbm.continuation import bordered
+from tribodyn.hbm.continuation import bordered, curve
 from tribodyn.hbm.continuation.bordered import BorderFailed, Direction, Metric
-from tribodyn.hbm.continuation.curve import KINK_ANGLE, SHORT_STEP, CurvePoint, Segment, locate_fold
+from tribodyn.hbm.continuation.curve import CurvePoint, Segment, locate_fold
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.newton import Solution
 
 if TYPE_CHECKING:
     from tribodyn.hbm.continuation.methods.arc_length import Options
 
-LEAST_LENGTH_RATIO = 0.8  # the characteristic length falls to this share per point where the vibration gets small
-# Miss of the prediction, in steps, beyond which the step is too long: two legs that meet in a right angle miss by more.
-LARGEST_MISS = 0.35
-CORNER_STEP = 0.1  # longest step in which a corner is looked for
-TANGENT_ACCURACY = 1e-6  # relative; a tangent here only predicts, and the prediction is off by far more
-MAX_HALVINGS = 6  # of a step that is in doubt: a jump of the least doubtful slant has shown itself after four
-# Step beyond the place where the tangents of the last two points foresee a fold, in distances to it: a step that lands
-# behind that fold finds it, a longer one may land behind its partner too and see neither.
-FOLD_REACH = 2.0
-CAP_GROWTH = 1.1  # growth per step of the cap on steps after a rewind; slow, so that the wrong turn is passed first
+
+@dataclass(frozen=True)
+class StepRules:
+    """How long the steps along a curve are; see docs/accuracy/ablations.md."""
+
+    # the characteristic length falls to this share per point where the vibration gets small
+    least_length_ratio: float = 0.8
+    # Miss of the prediction, in steps, beyond which the step is too long: two legs that meet in a right angle miss by
+    # more.
+    largest_miss: float = 0.35
+    tangent_accuracy: float = 1e-6  # relative; a tangent here only predicts, and the prediction is off by far more
+    max_halvings: int = 6  # of a step that is in doubt: a jump of the least doubtful slant has shown itself after four
+    # Step beyond the place where the tangents of the last two points foresee a fold, in distances to it: a step that
+    # lands behind that fold finds it, a longer one may land behind its partner too and see neither.
+    fold_reach: float = 2.0
+
+
+RULES = StepRules()
 
 
 class Stepper:
@@ -56,7 +64,7 @@ class Stepper:
         forward = self._metric.unit(heading or onward)
         self._here = CurvePoint.of(start, first, self._tangent(start, first, forward) or forward)
         self._bend: Direction | None = None
-        self._step, self._cap = options.step, options.max_step
+        self._step = options.step
         self.segments: list[Segment] = []
         self.trouble = ""
 
@@ -64,14 +72,14 @@ class Stepper:
         """The metric at a point: its length is the size of the vibration or the way that x has gone, of late."""
         vibration = np.linalg.norm(flat[:, self._order > 0])
         away = float(np.linalg.norm(flat - self._reference))
-        self._length = max(float(vibration), away, LEAST_LENGTH_RATIO * self._length)
+        self._length = max(float(vibration), away, RULES.least_length_ratio * self._length)
         length = self._length or float(np.linalg.norm(flat)) or 1.0
         return Metric(length, self._width)
 
     def _tangent(self, value: float, solution: Solution, border: Direction) -> Direction | None:
         try:
             return bordered.tangent(
-                self._path, value, solution.state, border, self._metric, self._options.newton, TANGENT_ACCURACY
+                self._path, value, solution.state, border, self._metric, self._options.newton, RULES.tangent_accuracy
             )
         except BorderFailed:
             return None
@@ -86,18 +94,18 @@ class Stepper:
         segment = self.segments[index]
         del self.segments[index:]
         self._here, self._metric, self._bend = segment.start, segment.metric, None
-        self._step = self._cap = max(0.25 * segment.length, self._options.min_step)
+        self._step = max(0.25 * segment.length, self._options.min_step)
 
     def advance(self) -> list[Segment]:
         """The curve to the next point in segments that end at its folds; none where the walk is stuck."""
         step = self._step
         while step >= self._options.min_step:
             trial = self._straight(step)
-            if step <= CORNER_STEP and (trial is None or trial.angle > KINK_ANGLE):
+            if trial is None or trial.angle > curve.RULES.kink_angle:
                 trial = self._round_corner(step, trial) or trial
             pieces = None if trial is None else self._fitting(trial, step)
             if trial is not None and pieces is not None:
-                parts = self._split(pieces, careful=step > max(0.1 * self._step, SHORT_STEP))
+                parts = self._split(pieces, careful=step > 0.1 * self._step)
                 if parts is not None:
                     self._accept(trial, pieces[-1], step)
                     return parts
@@ -123,13 +131,13 @@ class Stepper:
     def _fitting(self, trial: Segment, step: float) -> list[Segment] | None:
         """The pieces of a step that is short for the curve, or turns at a corner whose legs are straight and meet."""
         stray = self._metric.norm(trial.end.place - self._ahead(step))
-        if trial.angle <= KINK_ANGLE and stray <= LARGEST_MISS * step:
-            pieces = self._pieces(trial, MAX_HALVINGS)
+        if trial.angle <= curve.RULES.kink_angle and stray <= RULES.largest_miss * step:
+            pieces = self._pieces(trial, RULES.max_halvings)
             if pieces is None:
                 self.trouble = f"the curve jumps to another branch at every step down to {step:.1e}"
             return pieces
         self.trouble = f"the curve turns sharply, or jumps, at every step down to {step:.1e}"
-        if trial.angle < LARGEST_MISS:
+        if trial.angle < RULES.largest_miss:
             return None
         first, second, miss = trial.corner
         if min(first, second) < -0.02 * step or first + second > 2 * step or miss > 0.05 * trial.length:
@@ -145,7 +153,7 @@ class Stepper:
         """
         if halvings == 0 or not part.doubtful:
             return [part]
-        if part.slant > 0.5 * KINK_ANGLE:
+        if part.slant > 0.5 * curve.RULES.kink_angle:
             return None
         solution, value = bordered.correct(self._path, part.at(0.5), part.along, part.metric, self._newton)
         tangent = self._tangent(value, solution, part.along) if solution.converged else None
@@ -166,9 +174,9 @@ class Stepper:
         if tangent is None:
             return True
         way = Segment(part.start, CurvePoint.of(value, solution, tangent), part.metric)
-        if way.length < self._options.min_step or way.angle > KINK_ANGLE:
+        if way.length < self._options.min_step or way.angle > curve.RULES.kink_angle:
             return True
-        return self._pieces(way, MAX_HALVINGS) is not None
+        return self._pieces(way, RULES.max_halvings) is not None
 
     def _is_straight(self, point: CurvePoint, step: float) -> bool:
         """Whether the curve keeps the tangent of a point over a step, as a leg of a corner does."""
@@ -196,7 +204,7 @@ class Stepper:
             if tangent is None:
                 continue
             segment = Segment(here, CurvePoint.of(value, solution, tangent), metric)
-            if KINK_ANGLE < segment.angle < np.pi - 1e-3 - 2 * step:
+            if curve.RULES.kink_angle < segment.angle < np.pi - 1e-3 - 2 * step:
                 return segment
         return None
 
@@ -206,7 +214,9 @@ class Stepper:
         state = balance.evaluate(omega, ahead.x.reshape(balance.contact.n_pair, -1, ahead.x.shape[-1]))
         o = self._options.newton
         try:
-            leg = bordered.tangent(self._path, ahead.p, state, self._here.tangent, self._metric, o, TANGENT_ACCURACY)
+            leg = bordered.tangent(
+                self._path, ahead.p, state, self._here.tangent, self._metric, o, RULES.tangent_accuracy
+            )
         except BorderFailed:
             return []
         return [leg, leg * -1.0]
@@ -237,11 +247,10 @@ class Stepper:
         self._metric = self._measure(segment.end.place.x)
         self._here = replace(segment.end, tangent=self._metric.unit(segment.end.tangent))
         factor = 2.0 ** np.clip((o.newton_target - segment.end.solution.steps) / 2, -1, 2)
-        if segment.angle > KINK_ANGLE:
+        if segment.angle > curve.RULES.kink_angle:
             self._bend = None
         else:
             self._bend = (last.end.tangent - last.start.tangent) * (1.0 / last.length)
             factor = min(factor, max(0.5, o.angle / max(segment.angle, 1e-9)))
-        self._cap = min(o.max_step, CAP_GROWTH * self._cap)
-        longest = max(min(self._cap, max(FOLD_REACH * last.distance_to_fold, SHORT_STEP)), o.min_step)
+        longest = max(min(o.max_step, RULES.fold_reach * last.distance_to_fold), o.min_step)
         self._step = float(np.clip(step * factor, o.min_step, longest))

@@ -14,78 +14,93 @@ Source  damping by the natural level function: Deuflhard 2004, Newton Methods fo
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as sla
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.homotopy import DECADES, lead
 from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
 
-DECADES = 13  # by which the springs are softened at most
-SHORTEST = 0.02  # step of the decimal logarithm of the stiffness
-GROWTH = 1.6  # of a step after one that converged
-MOST_STEPS = 600  # of Newton on the whole way
-HASTY = 24  # of them at one stiffness: those that converge take fewer
-AGREES = 1e-6  # residual at the end from the contact's own springs, whose compliance is known less well beside them
-CLOSER = 1e-3  # tolerance at the end over the wanted one: a step more, as a soft support multiplies what is left
-LEAST_LENGTH = 1e-4  # of a damped step
-NEAR = 1e-6  # next step over the displacement at the end: beside stiff springs a residual alone tells too little
-ROUNDING = 1e-15  # relative change of the displacement that may be rounding
-FORCE_KNOWN = 1e-5  # change of the contact forces by that, beyond which they are not known
+
+@dataclass(frozen=True)
+class Rules:
+    """How far the contact is softened, and when the end is a solution; see docs/accuracy/ablations.md.
+
+    decades : by which the springs are softened at most
+    most_steps : of Newton on the whole way; hasty : of them at one stiffness: those that converge take fewer
+    agrees : residual at the end from the contact's own springs, whose compliance is known less well beside them
+    closer : tolerance at the end over the wanted one: a step more, as a soft support multiplies what is left
+    least_length : of a damped step
+    near : next step over the displacement at the end: beside stiff springs a residual alone says too little
+    rounding : relative change of the displacement that may be rounding
+    force_known : change of the contact forces by that, beyond which they are not known
+    """
+
+    decades: int = 13
+    most_steps: int = 600
+    hasty: int = 24
+    agrees: float = 1e-6
+    closer: float = 1e-3
+    least_length: float = 1e-4
+    near: float = 1e-6
+    rounding: float = 1e-15
+    force_known: float = 1e-5
+
+
+RULES = Rules()
 
 
 @single
 def solve_along_stiffness(balance: HarmonicBalance, omega: float, options: NewtonOptions) -> Solution | None:
     """A solution at one frequency [rad/s], None where there is no way to it or the dense Jacobian is too large."""
-    if balance.n_unknown > newton.MOST_DENSE:
+    if balance.n_unknown > newton.RULES.most_dense:
         return None
-    left = MOST_STEPS
-    hasty = replace(options, max_steps=min(options.max_steps, HASTY))
-    soft = None
-    for decade in range(DECADES + 1):
-        soft = _softened(balance, -float(decade), soft)
-        found, steps = _damped(soft, omega, soft.stuck(omega), hasty)
-        left -= steps
+    spent, soft = 0, None
+    hasty = replace(options, max_steps=min(options.max_steps, RULES.hasty))
+    known: list[tuple[float, np.ndarray]] = []  # levels and solutions of the way so far
+
+    def solved(level: float, start: np.ndarray | None = None) -> bool:
+        nonlocal soft, spent
+        soft = _softened(balance, level, soft)
+        found, steps = _damped(soft, omega, soft.stuck(omega) if start is None else start, hasty)
+        spent += steps
         if found is not None:
-            break
-        if left <= 0:
-            return None
-    else:
+            known.append((level, found.x))
+        return found is not None
+
+    def stiffer(target: float, level: float) -> bool:
+        x = known[-1][1]
+        starts = [x]
+        if len(known) > 1:
+            before, x_before = known[-2]
+            starts = [x + (x - x_before) * (target - level) / (level - before), x]
+        return spent < RULES.most_steps and any(solved(target, start) for start in starts)
+
+    levels = (-float(decade) for decade in range(RULES.decades + 1))
+    first = next((level for level in levels if spent < RULES.most_steps and solved(level)), None)
+    if first is None or lead(first, 0.0, DECADES, stiffer) < 0.0:
         return None
-    level, x, stride = -float(decade), found.x, 1.0
-    before: tuple[float, np.ndarray] | None = None
-    while level < 0 and stride > SHORTEST and left > 0:
-        target = min(0.0, level + stride)
-        soft = _softened(balance, target, soft)
-        starts = [x] if before is None else [x + (x - before[1]) * (target - level) / (level - before[0]), x]
-        for start in starts:
-            found, steps = _damped(soft, omega, start, hasty)
-            left -= steps
-            if found is not None:
-                break
-        if found is None:
-            stride *= 0.5
-        else:
-            before, level, x, stride = (level, x), target, found.x, GROWTH * stride
-    if level < 0:
-        return None
-    closer, steps = _damped(soft, omega, x, replace(options, tolerance=CLOSER * options.tolerance))
+    x = known[-1][1]
+    soft = _softened(balance, 0.0, soft)
+    closer, steps = _damped(soft, omega, x, replace(options, tolerance=RULES.closer * options.tolerance))
     state = balance.evaluate(omega, x if closer is None else closer.x)
     error = newton.relative_residual(state, balance.x_lin(omega))
-    if error > AGREES or _rounded(balance, state) > FORCE_KNOWN:
+    if error > RULES.agrees or _rounded(balance, state) > RULES.force_known:
         return None
-    return Solution(state, CONVERGED, MOST_STEPS - left + steps, 0, (error,))
+    return Solution(state, CONVERGED, spent + steps, 0, (error,))
 
 
 def _rounded(balance: HarmonicBalance, state: State) -> float:
     """Largest change of a component of the contact forces, over its own size, when x changes by rounding."""
     beside = np.random.default_rng(0).uniform(-1, 1, state.x.shape)
-    moved = balance.evaluate(state.omega, state.x * (1 + ROUNDING * beside), False).cycle.force - state.cycle.force
+    x = state.x * (1 + RULES.rounding * beside)
+    moved = balance.evaluate(state.omega, x, False).cycle.force - state.cycle.force
     sizes = [(np.linalg.norm(moved[:, i]), np.linalg.norm(state.cycle.force[:, i])) for i in range(moved.shape[1])]
     return max((float(change / size) for change, size in sizes if size > 0), default=0.0)
 
@@ -128,10 +143,10 @@ def _damped(
         with np.errstate(all="ignore"):
             direction = sla.lu_solve(factor, -state.residual.ravel(), check_finite=False)
         size, length = float(np.linalg.norm(direction)), 1.0
-        near = size <= NEAR * float(np.linalg.norm(state.x))
+        near = size <= RULES.near * float(np.linalg.norm(state.x))
         if not np.isfinite(size) or (small and near):
             return (state if small and near else None), step
-        while length > LEAST_LENGTH:
+        while length > RULES.least_length:
             trial = balance.evaluate(omega, state.x + length * direction.reshape(state.x.shape))
             following = sla.lu_solve(factor, trial.residual.ravel(), check_finite=False)
             if float(np.linalg.norm(following)) <= (1 - 0.25 * length) * size:

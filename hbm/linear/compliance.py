@@ -22,13 +22,23 @@ from tribodyn.hbm.linear.expansion import Expansion, UnbalancedLoad
 from tribodyn.hbm.linear.ritz_expansion import RitzExpansion
 from tribodyn.reduction.model import ReducedModel
 
-POINTS_KEPT = 4  # frequencies at hand, for the duties of a mission that are solved in turn
-# of the contact flexibility, on average over the systems of the harmonics, from which on a mode counts in the
-# preconditioner. Its matrix has the modes times the coefficients: so many rows at most, unless these are FEWEST_COARSE
-# modes. 0 to 31 on 20 pairs of a wheel: 0.09 s with 6 modes, 10 s with all 60
-PRECONDITIONED_SHARE, MOST_COARSE, FEWEST_COARSE = 0.1, 1000, 8
+
+@dataclass(frozen=True)
+class ComplianceRules:
+    """What is kept at hand, and how large the preconditioner gets."""
+
+    points_kept: int = 4  # frequencies at hand, for the duties of a mission that are solved in turn
+    # of the contact flexibility, on average over the systems of the harmonics, from which on a mode counts in the
+    # preconditioner. Its matrix has the modes times the coefficients: so many rows at most, unless these are
+    # FEWEST_COARSE modes. 0 to 31 on 20 pairs of a wheel: 0.09 s with 6 modes, 10 s with all 60
+    preconditioned_share: float = 0.1
+    most_coarse: int = 1000
+    fewest_coarse: int = 8
+    unbalanced: float = 1e-7  # of the static loads, on a motion that nothing resists, taken for rounding
+
+
+RULES = ComplianceRules()
 NONE = np.zeros((0, 0), np.float32)
-UNBALANCED = 1e-7  # of the static loads, on a motion that nothing resists, taken for rounding
 
 
 class ContactCompliance:
@@ -95,9 +105,9 @@ class ContactCompliance:
         """Raise UnbalancedLoad where static loads push a rigid motion of a structure that nothing holds."""
         loads = slice(self.n_contact, self.n_contact + self.n_load)
         pushed = expansion.b[loads, : expansion.rigid.shape[1]] * self._load[:, :1]
-        if np.abs(pushed.sum(axis=0)).max(initial=0.0) > UNBALANCED * np.abs(pushed).max(initial=0.0):
+        if np.abs(pushed.sum(axis=0)).max(initial=0.0) > RULES.unbalanced * np.abs(pushed).max(initial=0.0):
             each = np.abs(expansion.b[loads]) * np.abs(self._load[:, :1])
-            if np.abs(pushed.sum(axis=0)).max() > UNBALANCED * each.max():
+            if np.abs(pushed.sum(axis=0)).max() > RULES.unbalanced * each.max():
                 raise UnbalancedLoad(expansion.rigid)
 
     def restricted(self, basis: HarmonicBasis) -> ContactCompliance:
@@ -118,7 +128,7 @@ class ContactCompliance:
     @property
     def preconditioned(self) -> np.ndarray:
         """(n_contact, r) the first of the coarse modes, as many as so many coefficients afford."""
-        return self.coarse[:, : max(FEWEST_COARSE, MOST_COARSE // self.basis.n_coeff)]
+        return self.coarse[:, : max(RULES.fewest_coarse, RULES.most_coarse // self.basis.n_coeff)]
 
     def _coarse_modes(self) -> np.ndarray:
         """(n_contact, r) shapes Q of sqrt(k) x, orthonormal, that carry the contact flexibility but for a small share.
@@ -131,7 +141,7 @@ class ContactCompliance:
         parts = [part for b in shapes for part in ((b.real, b.imag) if np.iscomplexobj(b) else (b,))]
         columns = np.concatenate(parts, axis=1)
         left, size, _ = np.linalg.svd(columns, full_matrices=False)
-        return np.ascontiguousarray(left[:, size**2 > PRECONDITIONED_SHARE * len(self.groups)])
+        return np.ascontiguousarray(left[:, size**2 > RULES.preconditioned_share * len(self.groups)])
 
     def on_rows(self, rows: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """W_0, empty where there is none, modes and these transposed of each group at some contact rows.
@@ -149,10 +159,10 @@ class ContactCompliance:
         return self._active[1]
 
     def at(self, omega: float) -> CompliancePoint:
-        """The compliance at one excitation frequency [rad/s]; the last POINTS_KEPT ones are kept."""
+        """The compliance at one excitation frequency [rad/s]; the last RULES.points_kept ones are kept."""
         point = self._points.pop(omega, None) or CompliancePoint(self, omega)
         self._points[omega] = point
-        if len(self._points) > POINTS_KEPT:
+        if len(self._points) > RULES.points_kept:
             del self._points[next(iter(self._points))]
         return point
 

@@ -27,18 +27,32 @@ from scipy.sparse import csr_matrix
 
 from tribodyn.fem.system import SecondOrderSystem
 
-WANTED_ERROR = 5e-10  # relative, of the expansion at the highest frequency asked for: below Newton's tolerance
-ROUNDING = 1e-7  # largest error that may be rounding
-TRUNCATIONS = ((24, 3), (48, 3), (96, 3), (96, 4), (192, 4), (192, 6))  # modes and powers of s tried in turn
-ALL_MODES_BELOW = 1500  # coordinates up to which all modes are computed at once
-N_PROBE, COMPARED_PORTS = 2, 64  # forces that measure the error, and ports at which truncations are compared
-SPARSE_SHARE = 0.05  # of entries of the port rows, up to which zeros are left out of products: above it dense is faster
-RESONANCE_DISTANCE = 1e-13  # of a frequency from an undamped resonance, relative: the response is rounding alone
-RIGID = 1e3  # squared frequency of a mode over rounding from which on it is looked whether it is rigid
-GAP = 1e-10  # squared frequency of a rigid mode over that of the first elastic one, at the most
-ROUNDED = 1e-6  # the same where it is the rounding of far stiffer modes
-MOST_RIGID = 24  # those of four bodies that nothing joins
-RESISTED = 1e-6  # displacement at the contacts beside that elsewhere from which on a motion is not free of them
+
+@dataclass(frozen=True)
+class ExpansionRules:
+    """How exact the expansion is, and which modes are rigid."""
+
+    # relative, of the expansion at the highest frequency asked for: below Newton's tolerance
+    wanted_error: float = 5e-10
+    rounding: float = 1e-7  # largest error that may be rounding
+    # modes and powers of s tried in turn
+    truncations: tuple[tuple[int, int], ...] = ((24, 3), (48, 3), (96, 3), (96, 4), (192, 4), (192, 6))
+    all_modes_below: int = 1500  # coordinates up to which all modes are computed at once
+    n_probe: int = 2  # forces that measure the error, and ports at which truncations are compared
+    compared_ports: int = 64
+    # of entries of the port rows, up to which zeros are left out of products: above it dense is faster
+    sparse_share: float = 0.05
+    # of a frequency from an undamped resonance, relative: the response is rounding alone
+    resonance_distance: float = 1e-13
+    rigid: float = 1e3  # squared frequency of a mode over rounding from which on it is looked whether it is rigid
+    gap: float = 1e-10  # squared frequency of a rigid mode over that of the first elastic one, at the most
+    rounded: float = 1e-6  # the same where it is the rounding of far stiffer modes
+    most_rigid: int = 24  # those of four bodies that nothing joins
+    # displacement at the contacts beside that elsewhere from which on a motion is not free of them
+    resisted: float = 1e-6
+
+
+RULES = ExpansionRules()
 
 
 class SingularStuckSystem(ValueError):
@@ -66,7 +80,7 @@ class Expansion:
     system : dense, b : (n_contact, n) contact map, stiffness : (n_contact,) stuck contact springs [N/m]
     ports : (n_port, n) rows; contact rows first
     s_max : largest h w that will be asked for [rad/s]; wanted : relative error there that is small enough, None for
-        WANTED_ERROR
+        RULES.wanted_error
     w0 : (n_port, n_port) W_0; b : (n_port, m) modes; e : (order - 2, n_port, m) W_k C Phi s_max^(k+1) at the ports,
         all three views of `columns` = [w0, b, e_0, ...]
     w0_single, b_single : those of the contacts in single precision
@@ -86,7 +100,7 @@ class Expansion:
         s_max: float,
         wanted: float | None = None,
     ):
-        wanted = WANTED_ERROR if wanted is None else wanted
+        wanted = RULES.wanted_error if wanted is None else wanted
         self.n_port, self._n_contact = len(ports), len(b)
         self.s_unit = s_max or 1.0
         mass = np.asarray(system.mass)
@@ -99,7 +113,7 @@ class Expansion:
             "the part can move as a rigid body even with all contacts stuck: clamp it, add a spring, "
             "or raise the contact stiffness"
         )
-        count = n if n < ALL_MODES_BELOW else TRUNCATIONS[-1][0]
+        count = n if n < RULES.all_modes_below else RULES.truncations[-1][0]
         self.hermitian = system.gyroscopic is None and system.circulatory is None
         self.rigid = np.zeros((n, 0))
         # a rigid mode comes out of the eigenvalue problem as rounding of the stiffest ones, of either sign
@@ -109,7 +123,7 @@ class Expansion:
             lam, phi = _modes(stuck, mass, count)
         except np.linalg.LinAlgError:
             lam = np.zeros(1)
-        if lam[0] <= RIGID * rounding:
+        if lam[0] <= RULES.rigid * rounding:
             try:
                 self.rigid, shift = _rigid(stuck, mass)
             except np.linalg.LinAlgError:
@@ -117,7 +131,7 @@ class Expansion:
                     raise loose from None
         if self.rigid.shape[1]:
             try:
-                if np.abs(b @ self.rigid).max(initial=0.0) > RESISTED * np.abs(self.rigid).max():
+                if np.abs(b @ self.rigid).max(initial=0.0) > RULES.resisted * np.abs(self.rigid).max():
                     raise loose
                 held = mass @ self.rigid
                 stuck = stuck + shift * held @ held.conj().T
@@ -127,7 +141,7 @@ class Expansion:
                 raise loose from None
             phi[:, : self.rigid.shape[1]] = self.rigid  # the lowest ones, and no others are as low
         s = 1j * s_max
-        probe = np.random.default_rng(0).normal(size=(self.n_port, N_PROBE))
+        probe = np.random.default_rng(0).normal(size=(self.n_port, RULES.n_probe))
         force = ports.conj().T @ probe
         free = stuck + s * damping + s * s * mass
         self._flow = None if system.circulatory is None else np.asarray(system.circulatory)
@@ -137,14 +151,14 @@ class Expansion:
             free = free - shift * held @ held.conj().T
         exact = ports @ np.linalg.solve(free, force)
         del stuck, free
-        few = np.linspace(0, len(ports) - 1, min(len(ports), COMPARED_PORTS)).astype(int)
+        few = np.linspace(0, len(ports) - 1, min(len(ports), RULES.compared_ports)).astype(int)
         before = np.inf
-        for m, order in (c for c in TRUNCATIONS if c[0] < len(lam)):  # tried between the probe and a few ports
+        for m, order in (c for c in RULES.truncations if c[0] < len(lam)):  # tried between the probe and a few ports
             self._build(lam[:m], phi[:, :m], factor, order, np.concatenate([force.conj().T, ports[few]]))
-            moved = self.at(s).apply(np.eye(N_PROBE), slice(0, N_PROBE))[N_PROBE:]
+            moved = self.at(s).apply(np.eye(RULES.n_probe), slice(0, RULES.n_probe))[RULES.n_probe :]
             error = float(np.abs(moved - exact[few]).max() / np.abs(exact).max())
             # near a resonance rounding of the direct solve itself is what remains: more modes would not help
-            if error <= wanted or 0.5 * before < error < ROUNDING:
+            if error <= wanted or 0.5 * before < error < RULES.rounding:
                 break
             before = error
         else:
@@ -174,7 +188,7 @@ class Expansion:
         self.single = np.empty((p, p * (order - 1)), np.complex64 if np.iscomplexobj(y) else np.float32)
         self.higher = [self.single[:, p * k : p * (k + 1)] for k in range(order - 1)]
         self.t = np.empty((n_e, m, m), y.dtype)
-        at_ports = csr_matrix(ports) if np.count_nonzero(ports) < SPARSE_SHARE * ports.size else ports
+        at_ports = csr_matrix(ports) if np.count_nonzero(ports) < RULES.sparse_share * ports.size else ports
         self.w0[:] = at_ports @ y[:, :p]
         self.b[:] = at_ports @ phi
         # the largest compliance, so that no unit of length or force leaves the range of single precision
@@ -226,7 +240,7 @@ class Expansion:
         if self.flow is not None:
             core += self.flow
         factor, pivots, _ = sla.lapack.zgetrf(core)
-        if s != 0 and np.abs(np.diag(factor)).min() < RESONANCE_DISTANCE * abs(s) ** 2:
+        if s != 0 and np.abs(np.diag(factor)).min() < RULES.resonance_distance * abs(s) ** 2:
             raise UndampedResonance(
                 f"the stuck structure has an undamped resonance at {abs(s) / (2 * np.pi):.6g} Hz, where its response "
                 "is infinite: give it damping or take another frequency"
@@ -239,7 +253,7 @@ def _rigid(stiffness: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, float]:
 
     Raises  LinAlgError where there are none, or the mass is not positive
     """
-    squares, shapes = sla.eigh(stiffness, mass, subset_by_index=(0, min(len(mass), MOST_RIGID + 1) - 1))
+    squares, shapes = sla.eigh(stiffness, mass, subset_by_index=(0, min(len(mass), RULES.most_rigid + 1) - 1))
     largest = float(np.max(np.diag(stiffness).real / np.diag(mass).real)) or 1.0
     size = np.maximum.accumulate(np.abs(squares))
     rounding = len(mass) * float(np.finfo(float).eps) * largest
@@ -247,9 +261,9 @@ def _rigid(stiffness: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, float]:
     gaps = [
         r
         for r, next_one in enumerate(above, start=1)
-        if size[r - 1] <= max(GAP * next_one, min(rounding, ROUNDED * next_one))
+        if size[r - 1] <= max(RULES.gap * next_one, min(rounding, RULES.rounded * next_one))
     ]
-    if not gaps or gaps[-1] > MOST_RIGID:
+    if not gaps or gaps[-1] > RULES.most_rigid:
         raise np.linalg.LinAlgError
     r = gaps[-1]
     # two steps of inverse iteration take the rounding of the stiff modes out of the shapes
@@ -269,7 +283,7 @@ def stuck_modes(stiffness: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, np
     largest = float(np.max(np.diag(stiffness).real / np.diag(mass).real))
     squares, shapes = sla.eigh(stiffness, mass)
     free = np.zeros(len(mass), bool)
-    if squares[0] <= RIGID * len(mass) * np.finfo(float).eps * largest:
+    if squares[0] <= RULES.rigid * len(mass) * np.finfo(float).eps * largest:
         try:
             rigid, shift = _rigid(stiffness, mass)
         except np.linalg.LinAlgError:

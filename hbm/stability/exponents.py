@@ -37,11 +37,22 @@ from tribodyn.hbm.stability.wave_exponents import WaveModes
 from tribodyn.hbm.threads import single
 
 FOLD = "fold"
-NEUTRAL_GROWTH = 1e-6  # over omega: real parts up to it count as zero, for the solution is no better than that
-FEWEST_MODES, MOST_MODES = 20, 30  # friction makes modes far above the excitation flutter, too
+
+
+@dataclass(frozen=True)
+class HillRules:
+    """What Hill's method keeps and takes for rounding; see docs/accuracy/ablations.md."""
+
+    # over omega: real parts up to it count as zero, for the solution is no better than that
+    neutral_growth: float = 1e-6
+    fewest_modes: int = 20  # friction makes modes far above the excitation flutter, too
+    most_modes: int = 30
+    copy_distance: float = 0.02  # over omega: how far truncation may drive copies of one exponent apart
+    equally_central: float = 1e-5  # difference of the mean harmonics of two perturbations that is rounding
+
+
+RULES = HillRules()
 _WAVES: WeakKeyDictionary[ContactCompliance, WaveModes] = WeakKeyDictionary()  # for all solutions of one wheel
-COPY_DISTANCE = 0.02  # over omega: how far truncation may drive copies of one exponent apart
-EQUALLY_CENTRAL = 1e-5  # difference of the mean harmonics of two perturbations that is rounding
 
 
 @dataclass(frozen=True)
@@ -68,7 +79,7 @@ class Stability:
     @property
     def n_unstable(self) -> int:
         """Number of exponents that grow."""
-        return int(np.sum(self.exponents.real > NEUTRAL_GROWTH * self.omega))
+        return int(np.sum(self.exponents.real > RULES.neutral_growth * self.omega))
 
     @property
     def stable(self) -> bool:
@@ -124,7 +135,7 @@ def stability(
 
     state : converged; method : "hill", or "floquet" for small models, by time integration
     n_modes : modes that move dynamically in Hill's method, by default those below three times the highest harmonic,
-        at least FEWEST_MODES and at most MOST_MODES of them
+        at least RULES.fewest_modes and at most RULES.most_modes of them
     top : highest harmonic of the perturbation in Hill's method, by default that of the balance
     A displacement that is prescribed in harmonic 0 alone is free to grow: the force that holds it stays as it is.
     Raises  ValueError for unknown methods and for models whose harmonics see different systems, but for such a
@@ -236,7 +247,7 @@ def _moving(balance: HarmonicBalance, state: State, n_modes: int | None, top: in
     """How many modes move dynamically."""
     frequencies = np.sqrt(balance.compliance.groups[-1][0].lam)
     if n_modes is None:
-        n_modes = int(np.clip(np.sum(frequencies < 3 * (top + 1) * state.omega), FEWEST_MODES, MOST_MODES))
+        n_modes = int(np.clip(np.sum(frequencies < 3 * (top + 1) * state.omega), RULES.fewest_modes, RULES.most_modes))
     return min(n_modes, len(balance.model.system.mass))
 
 
@@ -332,9 +343,9 @@ def _central(values: np.ndarray, centre: np.ndarray, spread: np.ndarray, wanted:
     truncated later.
     """
     chosen: list[int] = []
-    for i in np.lexsort((-spread, np.round(np.abs(centre) / EQUALLY_CENTRAL))):
+    for i in np.lexsort((-spread, np.round(np.abs(centre) / RULES.equally_central))):
         shift = np.round(values[i].imag - values[chosen].imag)
-        same = np.abs(values[i] - values[chosen] - 1j * shift) < COPY_DISTANCE
+        same = np.abs(values[i] - values[chosen] - 1j * shift) < RULES.copy_distance
         if not np.any(same & (shift != 0) & (np.abs(centre[i] - centre[chosen] + shift) < 0.25)):
             chosen.append(int(i))
         if len(chosen) == wanted:

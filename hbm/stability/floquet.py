@@ -7,24 +7,35 @@ Source  Newton-Krylov shooting and its multipliers: Sanchez, Net, Garcia-Archill
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import STICKS
-from tribodyn.hbm.time.period_search import DIFFERENCE, Period, PeriodSearch
+from tribodyn.hbm.time import period_search
+from tribodyn.hbm.time.period_search import Period, PeriodSearch
 from tribodyn.hbm.time.push import push
 from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.hbm.time.time_integration import PeriodicMotion, integrate
 
-GROWTH = 1e-3  # of a perturbation over a period, below which the multipliers of so many steps cannot tell it from none
-ACCURACY = 5e-3  # of the largest multiplier of a large model, where it is above 1
-FEWEST_PRODUCTS, MOST_PRODUCTS = 12, 60  # periods marched for it
-DENSE = 400  # state variables up to which the largest multiplier is taken from the whole monodromy matrix
-PUSHED = 120  # periods in which a push must die away, where differences tell that it grows
-MAX_STATES = 900  # up to which the monodromy matrix is formed, whose eigenvalues are dense work
-LEAST_MULTIPLIER = 1e-10  # smaller ones belong to the time stepping, not to the structure
+
+@dataclass(frozen=True)
+class MultiplierRules:
+    """How far multipliers are known, and what they may cost; see docs/accuracy/ablations.md."""
+
+    # of a perturbation over a period, below which the multipliers of so many steps cannot tell it from none
+    growth: float = 1e-3
+    accuracy: float = 5e-3  # of the largest multiplier of a large model, where it is above 1
+    fewest_products: int = 12  # periods marched for it
+    most_products: int = 60
+    dense: int = 400  # state variables up to which the largest multiplier is taken from the whole monodromy matrix
+    pushed: int = 120  # periods in which a push must die away, where differences tell that it grows
+    max_states: int = 900  # up to which the monodromy matrix is formed, whose eigenvalues are dense work
+    least_multiplier: float = 1e-10  # smaller ones belong to the time stepping, not to the structure
+
+
+RULES = MultiplierRules()
 
 
 def exponents(balance: HarmonicBalance, state: State, options: Options | None = None) -> np.ndarray:
@@ -35,13 +46,13 @@ def exponents(balance: HarmonicBalance, state: State, options: Options | None = 
     """
     options = options or Options()
     stepper = TimeStepper(balance, state.omega, options)
-    if _size(stepper) > MAX_STATES:
+    if _size(stepper) > RULES.max_states:
         raise ValueError(f"{_size(stepper)} state variables are too many for Floquet multipliers: use the method hill")
     motion = integrate(balance, state.omega, state, options, with_slopes=True)
     if not motion.periodic:
         raise ValueError(f"no periodic motion near this state: {motion.outcome}")
     multipliers = np.linalg.eigvals(monodromy(stepper, motion))
-    multipliers = multipliers[np.abs(multipliers) > LEAST_MULTIPLIER]
+    multipliers = multipliers[np.abs(multipliers) > RULES.least_multiplier]
     return np.log(multipliers.astype(complex)) * state.omega / (2 * np.pi)
 
 
@@ -54,7 +65,7 @@ def largest(balance: HarmonicBalance, state: State, options: Options | None = No
     """
     options = options or Options()
     stepper = TimeStepper(balance, state.omega, options)
-    if _size(stepper) <= DENSE:
+    if _size(stepper) <= RULES.dense:
         growth = exponents(balance, state, options).real * 2 * np.pi / state.omega
         return float(np.exp(growth.max(initial=-np.inf)))
     return _by_differences(stepper, state, options)[0]
@@ -70,12 +81,12 @@ def leaves(balance: HarmonicBalance, state: State, options: Options | None = Non
     """
     options = options or Options()
     stepper = TimeStepper(balance, state.omega, options)
-    if _size(stepper) <= DENSE:
-        return largest(balance, state, options) > 1 + GROWTH
+    if _size(stepper) <= RULES.dense:
+        return largest(balance, state, options) > 1 + RULES.growth
     modulus, direction, period = _by_differences(stepper, state, options)
-    if modulus <= 1 + GROWTH:
+    if modulus <= 1 + RULES.growth:
         return False
-    plain = replace(options, accelerate=False, max_periods=PUSHED)
+    plain = replace(options, accelerate=False, max_periods=RULES.pushed)
     return any(push(PeriodSearch(stepper, plain, False), period, 8, s * direction).away for s in (1.0, -1.0))
 
 
@@ -86,9 +97,9 @@ def _by_differences(stepper: TimeStepper, state: State, options: Options) -> tup
     period = search.mix(stepper.start_from(state))
     if period.drift > options.tolerance:
         raise ValueError(f"no periodic motion near this state: drift {period.drift:.1e} at least")
-    plain = PeriodSearch(stepper, replace(options, accelerate=False, max_periods=1 + MOST_PRODUCTS), False)
+    plain = PeriodSearch(stepper, replace(options, accelerate=False, max_periods=1 + RULES.most_products), False)
     base = plain.step(period.end)
-    size = DIFFERENCE * float(np.linalg.norm(base.start))
+    size = period_search.RULES.difference * float(np.linalg.norm(base.start))
     moves = np.ones(len(base.start), bool)
     moves[2 * stepper.n_dynamic :] = False  # what holds a mean displacement stays as it is
     n_memory = balance.memory.size
@@ -105,8 +116,8 @@ def _by_differences(stepper: TimeStepper, state: State, options: Options) -> tup
 def _largest_ritz(product: Callable[[np.ndarray], np.ndarray], start: np.ndarray) -> tuple[float, np.ndarray]:
     """Modulus of the largest eigenvalue of a map and its vector, by Arnoldi's method; of one below 1 a bound does."""
     v = [start / np.linalg.norm(start)]
-    h = np.zeros((MOST_PRODUCTS + 1, MOST_PRODUCTS))
-    for k in range(1, MOST_PRODUCTS + 1):
+    h = np.zeros((RULES.most_products + 1, RULES.most_products))
+    for k in range(1, RULES.most_products + 1):
         w = product(v[-1])
         for i in (*range(k), *range(k)):  # twice: the basis loses its right angles otherwise
             share = v[i] @ w
@@ -116,7 +127,7 @@ def _largest_ritz(product: Callable[[np.ndarray], np.ndarray], start: np.ndarray
         values, vectors = np.linalg.eig(h[:k, :k])
         top = int(np.argmax(np.abs(values)))
         found, miss = float(np.abs(values[top])), float(h[k, k - 1] * np.abs(vectors[-1, top]))
-        if miss <= ACCURACY * found or (k >= FEWEST_PRODUCTS and found + miss < 1):
+        if miss <= RULES.accuracy * found or (k >= RULES.fewest_products and found + miss < 1):
             return found, np.real(np.array(v).T @ vectors[:, top])
         v.append(w / h[k, k - 1])
     raise ValueError(f"the largest multiplier did not converge: {found:.3g}, off by up to {miss:.1g}")

@@ -21,9 +21,18 @@ from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.time.time_step import Moving
 
-REPEATED = 1e-2  # distance of two states, relative to the vibration, up to which the motion has come back
-PERIODIC = 1e-5  # drift over a period, relative, of a motion that counts as periodic
-SAME_SCATTER = 2.0  # standard errors by which the means of two blocks may differ and still be those of one motion
+
+@dataclass(frozen=True)
+class MeanRules:
+    """When a motion counts as the same, or as periodic."""
+
+    repeated: float = 1e-2  # distance of two states, relative to the vibration, up to which the motion has come back
+    periodic: float = 1e-5  # drift over a period, relative, of a motion that counts as periodic
+    # standard errors by which the means of two blocks may differ and still be those of one motion
+    same_scatter: float = 2.0
+
+
+RULES = MeanRules()
 
 
 @dataclass(frozen=True)
@@ -124,11 +133,11 @@ class Follower:
         o = self.options
         assert self._motion is not None
         options = replace(
-            stepper.options, tolerance=PERIODIC, max_periods=o.search, patience=o.search // 2, accelerate=True
+            stepper.options, tolerance=RULES.periodic, max_periods=o.search, patience=o.search // 2, accelerate=True
         )
         search = PeriodSearch(stepper, options, False)
         found = search.mix(self._motion)
-        if found.drift > PERIODIC:
+        if found.drift > RULES.periodic:
             return None, search.periods
         self._motion = found.end
         plain = PeriodSearch(stepper, replace(stepper.options, max_periods=o.block * o.most_blocks), False)
@@ -171,7 +180,7 @@ class Follower:
         )
         whole, error = float(late.mean()), _standard_error(late)
         spread = float(late.std() / whole) if whole > 0 else 0.0
-        back = (search.vector.apart(state, states[-1]) <= REPEATED * found.size for state in states[-2::-1])
+        back = (search.vector.apart(state, states[-1]) <= RULES.repeated * found.size for state in states[-2::-1])
         return MeanMotion(
             energy=energy,
             normal_force=normal,
@@ -190,14 +199,14 @@ class Follower:
     def _same(self, work: np.ndarray) -> bool:
         """Whether two blocks of periods show one motion."""
         before, after = np.split(work, 2)
-        chance = SAME_SCATTER * float(np.hypot(before.std(), after.std())) / np.sqrt(len(after))
+        chance = RULES.same_scatter * float(np.hypot(before.std(), after.std())) / np.sqrt(len(after))
         return bool(abs(after.mean() - before.mean()) <= self.options.accuracy * work.mean() + chance)
 
     def _held(self, stepper: TimeStepper, off: np.ndarray) -> bool:
         """Whether a block of periods has the mean displacement that is prescribed; off : (n_period, k)."""
         if stepper.hold is None:
             return True
-        chance = SAME_SCATTER * off.std(axis=0) / np.sqrt(len(off))
+        chance = RULES.same_scatter * off.std(axis=0) / np.sqrt(len(off))
         return bool((np.abs(off.mean(axis=0)) <= self.options.accuracy * abs(stepper.hold.height) + chance).all())
 
     def _at(self, balance: HarmonicBalance, omega: float) -> TimeStepper:

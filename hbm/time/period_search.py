@@ -16,13 +16,23 @@ from tribodyn.hbm.anderson import Anderson
 from tribodyn.hbm.time.stepper import Options, TimeStepper
 from tribodyn.hbm.time.time_step import Moving, Record
 
-THROWN_OFF = 4.0  # drift, over the smallest one, from which on past periods no longer tell where to go
-LOST = 100.0  # ... from which on mixing does not come back by itself: the motion leaves the periodic one
-PROGRESS = 0.9  # drift, over the smallest one, that counts as a better period
-SLOWLY = 1 / 8  # share of the change of a force that holds a mean displacement, taken after a period that is not mixed
-DIFFERENCE = 1e-6  # step of the derivative of a period, relative to the state
-KRYLOV, FORCING = 60, 0.05  # products at most and relative residual of a linear solve
-SHORTEST = 1 / 64  # share of a Newton step
+
+@dataclass(frozen=True)
+class SearchRules:
+    """How a periodic motion is searched; see docs/accuracy/ablations.md."""
+
+    thrown_off: float = 4.0  # drift, over the smallest one, from which on past periods no longer tell where to go
+    lost: float = 100.0  # ... from which on mixing does not come back by itself: the motion leaves the periodic one
+    progress: float = 0.9  # drift, over the smallest one, that counts as a better period
+    # share of the change of a force that holds a mean displacement, taken after a period that is not mixed
+    slowly: float = 1 / 8
+    difference: float = 1e-6  # step of the derivative of a period, relative to the state
+    krylov: int = 60  # products at most and relative residual of a linear solve
+    forcing: float = 0.05
+    shortest: float = 1 / 64  # share of a Newton step
+
+
+RULES = SearchRules()
 
 
 @dataclass(frozen=True)
@@ -75,9 +85,9 @@ class PeriodSearch:
         try:
             found = self.step(motion)
             while found.drift > self.options.tolerance:
-                if found.drift > THROWN_OFF * self.best.drift:
+                if found.drift > RULES.thrown_off * self.best.drift:
                     mixing.forget()
-                    if found.drift > LOST * self.best.drift and self.best is not tried:
+                    if found.drift > RULES.lost * self.best.drift and self.best is not tried:
                         found = self._shoot(self.best)
                         tried = self.best
                         continue
@@ -101,11 +111,11 @@ class PeriodSearch:
             end = end._replace(hold=self.stepper.hold.after(record))
         z, image = self.vector.pack(motion), self.vector.pack(end)
         if not self.options.accelerate:
-            end = end._replace(hold=motion.hold + SLOWLY * (end.hold - motion.hold))
+            end = end._replace(hold=motion.hold + RULES.slowly * (end.hold - motion.hold))
         change = float(np.linalg.norm(image - z))
         self._last = Period(z, image, end, record, rounds, speed, change / speed if speed > 0 else change)
         self.periods += 1
-        if self.periods == 1 or self._last.drift < PROGRESS * self.best.drift:
+        if self.periods == 1 or self._last.drift < RULES.progress * self.best.drift:
             self.best, self._best_at = self._last, self.periods
         return self._last
 
@@ -113,7 +123,7 @@ class PeriodSearch:
         """Newton's method on P(z) - z = 0, its linear systems by GMRES on differences of P, as far as drift falls."""
         while here.drift > self.options.tolerance:
             miss = here.image - here.start
-            size = DIFFERENCE * float(np.linalg.norm(here.image))
+            size = RULES.difference * float(np.linalg.norm(here.image))
 
             def product(v: np.ndarray, here: Period = here, size: float = size) -> np.ndarray:
                 length = float(np.linalg.norm(v)) / size
@@ -121,14 +131,14 @@ class PeriodSearch:
                 return (there.image - here.image) * length - v
 
             derivative = LinearOperator((len(miss), len(miss)), product, dtype=float)
-            step = gmres(derivative, -miss, rtol=FORCING, restart=KRYLOV, maxiter=1)[0]
+            step = gmres(derivative, -miss, rtol=RULES.forcing, restart=RULES.krylov, maxiter=1)[0]
             share = 1.0
             while True:
                 there = self.step(self.vector.unpack(here.start + share * step, here.end))
                 if there.drift < (1 - 0.1 * share) * here.drift:
                     break
                 share *= 0.5
-                if share < SHORTEST:
+                if share < RULES.shortest:
                     return here
             here = there
         return here

@@ -20,10 +20,18 @@ from tribodyn.hbm.continuation.nonlinear_modes import Backbone
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.time.stepper import IntegrationFailed, Options, TimeStepper
 
-WINDOW = 4  # periods of a window
-MULTIPLES = (2, 3)  # of the frequency, fitted along
-REFINED = 4  # rounds in which frequency and damping of a window settle
-RINGING = 0.05  # of the amplitude, root mean square, from which on what is left over are other modes
+
+@dataclass(frozen=True)
+class FitRules:
+    """How amplitude, frequency and damping are fitted to a free decay."""
+
+    window: int = 4  # periods of a window
+    multiples: tuple[int, ...] = (2, 3)  # of the frequency, fitted along
+    refined: int = 4  # rounds in which frequency and damping of a window settle
+    ringing: float = 0.05  # of the amplitude, root mean square, from which on what is left over are other modes
+
+
+RULES = FitRules()
 
 
 @dataclass(frozen=True)
@@ -82,20 +90,20 @@ def from_decay(time: np.ndarray, displacement: np.ndarray, omega: float) -> Ring
     """
     step = time[1] - time[0]
     period = 2 * np.pi / (omega * step)
-    n = round(WINDOW * period)
+    n = round(RULES.window * period)
     if len(time) < n + period:
         raise ValueError(
-            f"a decay of {len(time) / period:.1f} periods is too short for its damping: {WINDOW + 1} are needed"
+            f"a decay of {len(time) / period:.1f} periods is too short for its damping: {RULES.window + 1} are needed"
         )
     inside = (np.arange(n) + 0.5) / n - 0.5  # time from the middle, over the window
     weight = np.cos(np.pi * inside)  # root of Hann's window
     rate, rows = 1j * omega, []
     for start in range(0, len(time) - n + 1, max(1, round(period / 2))):
         seen = displacement[start : start + n]
-        for _ in range(REFINED):
+        for _ in range(RULES.refined):
             size, slope, left = _fitted(seen, rate * step * n, inside, weight)
             rate += slope / (size * step * n)
-        if not left < RINGING * abs(size):
+        if not left < RULES.ringing * abs(size):
             raise IntegrationFailed(
                 f"the decay is no single oscillation: {left / abs(size):.0%} of its amplitude is other modes that ring "
                 "too; begin at a smaller amplitude, or end at a larger one"
@@ -108,7 +116,12 @@ def from_decay(time: np.ndarray, displacement: np.ndarray, omega: float) -> Ring
 def _fitted(seen: np.ndarray, rate: complex, inside: np.ndarray, weight: np.ndarray) -> tuple[complex, complex, float]:
     """Complex amplitude of exp(rate t) at the middle, its slope over the window, and root mean square of the rest."""
     carrier = np.exp(rate * inside)
-    parts = [carrier, carrier * inside, carrier * inside**2, *(np.exp(1j * m * rate.imag * inside) for m in MULTIPLES)]
+    parts = [
+        carrier,
+        carrier * inside,
+        carrier * inside**2,
+        *(np.exp(1j * m * rate.imag * inside) for m in RULES.multiples),
+    ]
     columns = np.column_stack([np.ones_like(inside), inside, *(c for p in parts for c in (p.real, -p.imag))])
     found = np.linalg.lstsq(columns * weight[:, None], seen * weight, rcond=None)[0]
     rest = float(np.sqrt(np.mean((weight * (seen - columns @ found)) ** 2)))

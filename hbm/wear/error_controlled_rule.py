@@ -39,28 +39,41 @@ from tribodyn.hbm.wear.step_control import STEP_RATIO_LIMITS, Tolerance, growth,
 
 GAMMA = 1 - 1 / np.sqrt(2)
 TURN = 2 * np.pi
-ERROR_TREND_POWER = 0.2  # power with which an error that grows from step to step holds the next one back
-# shares of an event's preload between which a step that would pass the event must end: just below it, so that the next
-# step starts beyond it
-EVENT_WINDOW = (0.97, 0.999)
-# of the first preload, where a run ends at the latest: below it the last touch is noise of Newton's tolerance
-LEAST_PRELOAD_SHARE = 1e-4
+
+
+@dataclass(frozen=True)
+class StepRules:
+    """How the steps of this rule are placed; see docs/accuracy/ablations.md."""
+
+    error_trend_power: float = 0.2  # power with which an error that grows from step to step holds the next one back
+    # shares of an event's preload between which a step that would pass the event must end: just below it, so that the
+    # next step starts beyond it
+    event_window: tuple[float, ...] = (0.97, 0.999)
+    # of the first preload, where a run ends at the latest: below it the last touch is noise of Newton's tolerance
+    least_preload_share: float = 1e-4
+    # share of the tolerance, of the cycles, within which a jump to another peak is located
+    overtaking_accuracy: float = 0.5
+    looked_at: float = 0.97  # ratio of preloads, counted from the first, at which higher peaks are looked for
+    # a peak that moves further than LARGEST_SHIFT, unless less than so many times as far as the step before leads to
+    # expect
+    unexpected: float = 4.0
+    max_corrections: int = 12  # solves of a stage
+    retreats: int = 4  # of them at most, half way back, where no solution is found at a frequency that is tried
+    # d (miss of the frequency) / d omega while it is not known: of a peak that is one mode's. Where a superharmonic
+    # resonance stands on the flank of another the miss is tens of times too large
+    unknown_slope: float = -1.0
+    # largest moves of the frequency, relative: with a slope that is known, with one that is not, over the move before
+    most_moved: float = 0.03
+    first_moved: float = 1e-3
+    further_moved: float = 4.0
+    gain_accuracy: float = 1e-9  # of the depth, for laws whose depth per work is not constant
+
+
+RULES = StepRules()
 # depths of explicit steps over the end of a branch, shares of the tolerance, tried in turn; the longest, 0.81, stays
 # within the tolerance
 EXPLICIT_STEPS = 0.01 * 3.0 ** np.arange(5)
-OVERTAKING_ACCURACY = 0.5  # share of the tolerance, of the cycles, within which a jump to another peak is located
-LOOKED_AT = 0.97  # ratio of preloads, counted from the first, at which higher peaks are looked for
-# a peak that moves further than LARGEST_SHIFT, unless less than so many times as far as the step before leads to expect
-UNEXPECTED = 4.0
 SHIFTED = WearEnd.NO_STEP.say(f": the tracked peak moves by more than {LARGEST_SHIFT:.0%} in the shortest step")
-MAX_CORRECTIONS = 12  # solves of a stage
-RETREATS = 4  # of them at most, half way back, where no solution is found at a frequency that is tried
-# d (miss of the frequency) / d omega while it is not known: of a peak that is one mode's. Where a superharmonic
-# resonance stands on the flank of another the miss is tens of times too large
-UNKNOWN_SLOPE = -1.0
-# largest moves of the frequency, relative: with a slope that is known, with one that is not, over the move before
-MOST_MOVED, FIRST_MOVED, FURTHER_MOVED = 0.03, 1e-3, 4.0
-GAIN_ACCURACY = 1e-9  # of the depth, for laws whose depth per work is not constant
 
 
 @single
@@ -74,11 +87,11 @@ def evolve(
     """Wear the contact until it is lost, with steps chosen by a local error estimate on depth and on life.
 
     on_row, resume, return : as for the thesis's rule; `step_error` of a row is its estimate over the tolerance. The
-    last touch of a vibrating contact does not end in finite time: LEAST_PRELOAD_SHARE ends the run where `lost_below`
-    does not.
+    last touch of a vibrating contact does not end in finite time: `least_preload_share` ends the run where
+    `lost_below` does not.
     Raises  ValueError where the wear law wears pairs that do no friction work
     """
-    problem = replace(problem, lost_below=max(problem.lost_below, LEAST_PRELOAD_SHARE))
+    problem = replace(problem, lost_below=max(problem.lost_below, RULES.least_preload_share))
     rows = rows_to_resume(resume)
     if rows:  # the state after the last step was not kept: take the step again, to the same bits
         again = rows.pop()
@@ -176,7 +189,7 @@ def _step_of(
     smallest = 1e-9 * tolerance.scale / float(state.rate.max())
     leap = EXPLICIT_STEPS[0] * tolerance.share * tolerance.scale / float(state.rate.max())
     stride = 10 * leap
-    drift, slopes = np.zeros(len(state.points)), np.full(len(state.points), UNKNOWN_SLOPE)
+    drift, slopes = np.zeros(len(state.points)), np.full(len(state.points), RULES.unknown_slope)
     if rows and rows[-1].plan[0] > 0:
         stride, slopes = float(rows[-1].plan[0]), rows[-1].plan[1:]
         top = problem.balance.basis.harmonics[-1]
@@ -202,7 +215,7 @@ def _step_of(
             error = local_error(tolerance, problem.area, deviation, worn, stride, second.cycles)
         if error <= 1.0:
             preload = problem.preload(second.points[0].state)
-            if preload >= EVENT_WINDOW[0] * target:
+            if preload >= RULES.event_window[0] * target:
                 found = None
                 if jumped or _is_due(problem, state, second, rows):
                     found, spent = _overtaken(searched, fewer_harmonics.carried(searched, second))
@@ -213,7 +226,7 @@ def _step_of(
                     break
                 else:
                     stays = stride
-                if jumped[0] - stays <= OVERTAKING_ACCURACY * tolerance.share * second.cycles:
+                if jumped[0] - stays <= RULES.overtaking_accuracy * tolerance.share * second.cycles:
                     break
                 stride = 0.5 * (stays + jumped[0])
                 continue
@@ -229,7 +242,7 @@ def _step_of(
         stride, first, second, error, higher = jumped
     worn = second.depth - state.depth
     work = stride * ((1 - GAMMA) * first.work + GAMMA * second.work)
-    trend = (rows[-1].step_error / error) ** ERROR_TREND_POWER if rows and error > 0 else 1.0
+    trend = (rows[-1].step_error / error) ** RULES.error_trend_power if rows and error > 0 else 1.0
     ratio = float(np.clip(growth(error) * min(trend, 1.0), *STEP_RATIO_LIMITS))
     plan = np.array([stride * ratio, *slopes])
     if higher is not None:
@@ -244,7 +257,7 @@ def _is_due(problem: WearProblem, state: WearState, second: WearState, rows: Seq
     shares = np.array([problem.preload(s.points[0].state) for s in (state, second)]) / (first or 1.0)
     if np.any(shares <= 0):
         return True
-    before, after = np.floor(np.log(shares) / np.log(LOOKED_AT))
+    before, after = np.floor(np.log(shares) / np.log(RULES.looked_at))
     return bool(before != after)
 
 
@@ -254,7 +267,7 @@ def _shifts(state: WearState, second: WearState, expected: np.ndarray) -> bool:
     expected : (n_duty,) change of the frequencies that the step before leads to expect [rad/s]
     """
     omega, after = (np.array([point.state.omega for point in s.points]) for s in (state, second))
-    limit = np.maximum(LARGEST_SHIFT * omega, UNEXPECTED * np.abs(expected))
+    limit = np.maximum(LARGEST_SHIFT * omega, RULES.unexpected * np.abs(expected))
     return bool(np.any(np.abs(after - omega) > limit))
 
 
@@ -322,7 +335,7 @@ def _event(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) -> f
 
 def _share_to(target: float, start: float, end: float) -> float:
     """Share of a step after which the preload has fallen from start to just below the target, along its logarithm."""
-    aim = np.mean(EVENT_WINDOW) * target
+    aim = np.mean(RULES.event_window) * target
     return float(np.clip(np.log(start / aim) / np.log(start / max(end, 1e-3 * target)), 0.05, 0.95))
 
 
@@ -372,7 +385,7 @@ def _stage(
         balance = WearingBalance(unworn, [duty.share for duty in duties], base, stretch, gain, depth)
         solution = newton.solve(balance, tuple(omega), x, duties[0].site.newton)
         solves, rounds = solves + len(duties), rounds + 1
-        if not solution.converged and known is not None and retreats < RETREATS:
+        if not solution.converged and known is not None and retreats < RULES.retreats:
             omega, x, retreats = 0.5 * (known[0] + omega), 0.5 * (known[1] + x), retreats + 1
             continue
         worn_at = solution.state
@@ -391,11 +404,11 @@ def _stage(
             return found
         after = np.array([s.next(w, c.distance) for s, w, c in zip(searches, omega, corrections, strict=True)])
         turned = _gain(problem, found)
-        settled = np.all(np.abs(turned - gain) * found.work * stretch <= GAIN_ACCURACY * np.abs(depth).max())
+        settled = np.all(np.abs(turned - gain) * found.work * stretch <= RULES.gain_accuracy * np.abs(depth).max())
         if settled and np.all(np.abs(after - omega) <= accuracy * omega):
             return found
-        if rounds > MAX_CORRECTIONS:
-            lost = SolveEnd.SITE_NOT_FOUND.say(f" {MAX_CORRECTIONS} solves")
+        if rounds > RULES.max_corrections:
+            lost = SolveEnd.SITE_NOT_FOUND.say(f" {RULES.max_corrections} solves")
             return replace(found, points=tuple(replace(p, solution=replace(p.solution, outcome=lost)) for p in points))
         known = omega, solution.state.x
         x = solution.state.x + balance.follow(worn_at, after - omega)
@@ -423,7 +436,7 @@ class _Search:
 
     def __init__(self, slope: float):
         self.slope = slope
-        self._known = slope != UNKNOWN_SLOPE
+        self._known = slope != RULES.unknown_slope
         self.start()
 
     def start(self) -> None:
@@ -437,9 +450,9 @@ class _Search:
         if self._last is not None and omega != self._last[0]:
             slope = (miss - self._last[1]) / (omega - self._last[0])
             self._known, self.slope = (True, slope) if slope < -0.1 else (self._known, self.slope)
-        reach = MOST_MOVED if self._known else FIRST_MOVED
+        reach = RULES.most_moved if self._known else RULES.first_moved
         if self._last is not None:
-            reach = min(reach, max(FIRST_MOVED, FURTHER_MOVED * abs(omega / self._last[0] - 1)))
+            reach = min(reach, max(RULES.first_moved, RULES.further_moved * abs(omega / self._last[0] - 1)))
         self._last = (omega, miss)
         if miss > 0:
             self._below = self._last

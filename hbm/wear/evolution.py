@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,7 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import SEPARATES
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.continuation.sites import Site
+from tribodyn.hbm.homotopy import SHARES, lead
 from tribodyn.hbm.outcome import CONVERGED, Outcome, WearEnd
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.history import WearRow
@@ -100,10 +101,6 @@ class WearProblem:
             return self.balance.preload(state)
         preload = self.balance.preload_by_joint(state)
         return float(sum(preload[name] for name in self.wearing))
-
-    def at_depth(self, depth: np.ndarray) -> HarmonicBalance:
-        """The balance with the gap that a wear depth (n_pair,) [m] has opened."""
-        return self.balance.with_gap(self.balance.contact.gap + depth)
 
     def in_duty(self, duty: Duty, depth: np.ndarray | None = None) -> HarmonicBalance:
         """The problem of a duty with its loads, worn by a depth (n_pair,) [m]; unworn by default."""
@@ -199,17 +196,18 @@ def _neighbour(
 
 def _carry(before: HarmonicBalance, omega: float, x: np.ndarray, opening: np.ndarray) -> tuple[np.ndarray, int]:
     """Follow x at fixed frequency while the gaps open, in steps that halve where Newton fails; x and solves spent."""
-    gap, done, stride, solves = before.contact.gap, 0.0, 0.5, 0
-    while done < 1.0 and stride > 1e-3:
-        reach = min(1.0, done + stride)
+    gap, solves = before.contact.gap, 0
+
+    def opened(reach: float, done: float) -> bool:
+        nonlocal x, solves
         here, there = before.with_gap(gap + done * opening), before.with_gap(gap + reach * opening)
         guess = x + here.gap_response(here.evaluate(omega, x), (reach - done) * opening)
         solution = newton.solve(there, omega, guess)
         solves += 1
-        if solution.converged:
-            x, done, stride = solution.state.x, reach, 1.5 * stride
-        else:
-            stride *= 0.5
+        x = solution.state.x if solution.converged else x
+        return solution.converged
+
+    lead(0.0, 1.0, replace(SHARES, first=0.5), opened)
     return x, solves
 
 

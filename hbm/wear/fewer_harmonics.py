@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tribodyn.hbm.continuation.operating_point import SCANNED, OperatingPoint
+from tribodyn.hbm.continuation.operating_point import AtPeak, OperatingPoint
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear.evolution import LARGEST_SHIFT, WearProblem, WearState, worn_state
 from tribodyn.hbm.wear.history import WearRow
@@ -62,7 +62,9 @@ def with_fewer(problem: WearProblem) -> WearProblem | None:
 
 def of_scans(whole: WearProblem) -> WearProblem:
     """The problem with the harmonics that scans for peaks have."""
-    return _with_harmonics(whole, tuple(h for h in whole.balance.basis.harmonics if h <= _needed(whole, SCANNED)))
+    return _with_harmonics(
+        whole, tuple(h for h in whole.balance.basis.harmonics if h <= _needed(whole, AtPeak.scanned))
+    )
 
 
 def searched_with(whole: WearProblem, problem: WearProblem) -> WearProblem:

@@ -254,7 +254,7 @@ def test_it_says_where_it_ends():
     impatient = arc_length.follow(high, 4.0, 0.2, Options(patience=5))
     told, _, furthest = str(impatient.end).removesuffix(" Hz").rpartition(" ")
     assert told.endswith("5 points brought it hardly further than")
-    assert float(furthest) == pytest.approx(impatient.frequency.min(), rel=arc_length.HEADWAY)
+    assert float(furthest) == pytest.approx(impatient.frequency.min(), rel=arc_length.Rules.headway)
     assert impatient.frequency.argmin() + 6 <= len(impatient.omega) < len(back.omega)
     with pytest.raises(ValueError, match="start and stop are the same"):
         arc_length.follow(balance, 2.0, 2.0)

@@ -73,5 +73,5 @@ def test_the_limit_of_stiff_springs_is_come_to() -> None:
 def test_too_many_unknowns_are_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     body = lattice(2, 2)
     balance = body.balance(body.ordinary)
-    monkeypatch.setattr(newton, "MOST_DENSE", balance.n_unknown - 1)
+    monkeypatch.setattr(newton, "RULES", replace(newton.RULES, most_dense=balance.n_unknown - 1))
     assert solve_along_stiffness(balance, body.ordinary.omega, NewtonOptions()) is None

@@ -14,7 +14,7 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import harmonic_choice
-from tribodyn.hbm.continuation.operating_point import SCANNED, AtFrequency, AtPeak
+from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
 from tribodyn.hbm.continuation.sites import Site
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear.error_controlled_rule import jumps
@@ -108,7 +108,7 @@ class _Sweep:
 
     @classmethod
     def of(cls, balance: HarmonicBalance, wear: WearHistory, duty: Duty) -> _Sweep:
-        top = max(balance.basis.harmonics[-1] + MORE, SCANNED)
+        top = max(balance.basis.harmonics[-1] + MORE, AtPeak.scanned)
         wide = harmonic_choice.widened(balance, top)
         wide = wide.with_harmonics(tuple(h for h in wide.basis.harmonics if h <= top)).with_load(duty.load)
         return cls(wide, balance.basis, wear, _searching(duty.site, top), balance.contact.gap, top)

@@ -26,17 +26,26 @@ from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import BranchEnd, Outcome
 from tribodyn.hbm.threads import single
 
-# Least share of the miss of extrapolation that counts as error of interpolation. On a smooth curve the share follows
-# from the fourth derivative and may vanish; next to a kink that formula does not hold, and a third is on the safe side.
-LEAST_ERROR_SHARE = 0.3
-# Error estimate in the shortest step, over the tolerance, beyond which the response has jumped: a step that is shorter
-# than the first by thousands of times cannot be that wrong on one and the same curve.
-JUMP_ERROR = 1e3
-TAKEN = 1.2  # steps ahead within which a point that was solved before, or the stop, is taken for the next one
-# Points in the shortest step that miss the tolerance: a response with so many of them is rough however close they lie,
-# as where pairs come to rest anew at every point, and the shortest step is doubled.
-CRAWLED = 50
-REJECTED_ERROR = 2.0  # error estimate, over the tolerance, that takes a step back; one solve is worth a factor of two
+
+@dataclass(frozen=True)
+class Rules:
+    """When a step is taken back, and when the response has jumped; see docs/accuracy/ablations.md.
+
+    least_error_share : of the miss of extrapolation that counts as error of interpolation. On a smooth curve the share
+        follows from the fourth derivative and may vanish; next to a kink that formula does not hold
+    jump_error : error estimate in the shortest step, over the tolerance, beyond which the response has jumped: a step
+        that is shorter than the first by thousands of times cannot be that wrong on one and the same curve
+    taken : steps ahead within which a point that was solved before, or the stop, is taken for the next one
+    crawled : points in the shortest step that miss the tolerance: a response with so many of them is rough however
+        close they lie, as where pairs come to rest anew at every point, and the shortest step is doubled
+    rejected_error : error estimate, over the tolerance, that takes a step back; one solve is worth a factor of two
+    """
+
+    least_error_share: float = 0.3
+    jump_error: float = 1e3
+    taken: float = 1.2
+    crawled: int = 50
+    rejected_error: float = 2.0
 
 
 @dataclass(frozen=True)
@@ -53,6 +62,7 @@ class Options:
     """Shortest step, relative to the range; a response that is not found in it, or changes abruptly, has jumped."""
     max_points: int = number(default=5000, low=2)
     """Points after which to end."""
+    rules: Rules = field(default_factory=Rules, kw_only=True)
     newton: NewtonOptions = field(default_factory=NewtonOptions, kw_only=True)
     guess: np.ndarray | None = field(default=None, kw_only=True)
     """(n_pair, n_component, n_coeff) neighbour of the first solution [m]; from rest by default."""
@@ -179,15 +189,15 @@ class _Sweep:
             response = self._outputs(value, solution)
             error = self._error(value, response)
             step = abs((value - here) / self._span)
-            if error > REJECTED_ERROR and step > TAKEN * self._shortest:
+            if error > self._options.rules.rejected_error and step > self._options.rules.taken * self._shortest:
                 self._ahead.append((value, solution))
                 self._step = max(step * self._factor(error), self._shortest)
                 continue
-            self._crawled += error > REJECTED_ERROR
-            if self._crawled == CRAWLED:
+            self._crawled += error > self._options.rules.rejected_error
+            if self._crawled == self._options.rules.crawled:
                 self._crawled, self._shortest = 0, min(2 * self._shortest, self._options.max_step)
-            self._accept(value, solution, response, jumped=error > JUMP_ERROR)
-            if error <= JUMP_ERROR:
+            self._accept(value, solution, response, jumped=error > self._options.rules.jump_error)
+            if error <= self._options.rules.jump_error:
                 self._step = float(np.clip(step * self._factor(error), self._shortest, self._options.max_step))
             return ""
 
@@ -213,9 +223,9 @@ class _Sweep:
     def _solve(self, here: float) -> tuple[float, Solution]:
         """The next point: the stop or one solved ahead where it is near, else one solved anew."""
         value = here + self._step * self._span
-        if self._ahead and abs(self._ahead[-1][0] - here) <= TAKEN * abs(value - here):
+        if self._ahead and abs(self._ahead[-1][0] - here) <= self._options.rules.taken * abs(value - here):
             return self._ahead.pop()
-        if abs(self._stop - here) <= TAKEN * abs(value - here):
+        if abs(self._stop - here) <= self._options.rules.taken * abs(value - here):
             value = self._stop
         known = max(self._clean, len(self.builder.value) - EXTRAPOLATION_DEGREE - 1)
         guess = extrapolate(np.array(self.builder.value[known:]), self.builder.x[known:], value)
@@ -231,7 +241,7 @@ class _Sweep:
         window = np.append(known[1:], value)  # of the polynomial that interpolates here, at worst
         between = np.linspace(known[-1], value, 9)[1:-1]
         share = np.abs(np.prod(between[:, None] - window, axis=1)).max() / np.abs(np.prod(value - known))
-        share = max(share, LEAST_ERROR_SHARE)
+        share = max(share, self._options.rules.least_error_share)
         scale = np.maximum(self._largest, self._size(response))
         with np.errstate(divide="ignore", invalid="ignore"):
             relative = np.where(scale > 0, missed / scale, 0.0)

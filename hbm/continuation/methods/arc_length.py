@@ -31,13 +31,26 @@ from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd, Outcome
 from tribodyn.hbm.threads import single
 
-# Steps of the parameter over a gap in the curve, shares of its range, tried in turn; a longer one could miss a peak.
-GAP_STEPS = 10 ** np.arange(-6.0, -2.5)
-MAX_GAPS = 20  # a curve with more is none
-MAX_REWINDS = 4  # times that a walk which came back onto its own way goes back, to four times shorter steps
-HEADWAY = 1e-3  # share of the range
-RAMP_PATIENCE = 150  # points of a curve over the load that brings no more load; whole curves take 190 or so
-MAX_LANDINGS = 20  # times that it goes back from a bound where it lands astray; steps of a corner need not get shorter
+
+@dataclass(frozen=True)
+class Rules:
+    """What a walk does where the curve ends, turns into itself or brings nothing; see docs/accuracy/ablations.md.
+
+    gap_steps : of the parameter over a gap in the curve, shares of its range, tried in turn; a longer one could miss a
+        peak
+    max_gaps : a curve with more is none
+    max_rewinds : times that a walk which came back onto its own way goes back, to four times shorter steps
+    headway : share of the range that `patience` waits for
+    max_landings : times that it goes back from a bound where it lands on another branch
+    ramp_patience : points of a curve over the load that brings no more load; whole curves take 190 or so
+    """
+
+    gap_steps: tuple[float, ...] = (1e-6, 1e-5, 1e-4, 1e-3)
+    max_gaps: int = 20
+    max_rewinds: int = 4
+    headway: float = 1e-3
+    max_landings: int = 20
+    ramp_patience: int = 150
 
 
 @dataclass(frozen=True)
@@ -46,7 +59,7 @@ class Options:
 
     bounds : values of the parameter between which the curve is followed, start and stop by default
     guess : (n_pair, n_component, n_coeff) neighbour of the first solution [m]; from rest by default
-    patience : points in which the curve has to come further from its start, by HEADWAY of the range; any by default
+    patience : points in which the curve has to come further from its start by `rules.headway`; any by default
     """
 
     step: float = number(default=0.05, above=0.0)
@@ -72,6 +85,7 @@ class Options:
     bounds: tuple[float, float] | None = field(default=None, kw_only=True)
     guess: np.ndarray | None = field(default=None, kw_only=True)
     patience: int | None = field(default=None, kw_only=True)
+    rules: Rules = field(default_factory=Rules, kw_only=True)
     newton: NewtonOptions = field(default_factory=NewtonOptions, kw_only=True)
 
     def __post_init__(self) -> None:
@@ -144,7 +158,7 @@ def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOpti
     first = newton.solve_from_rest(balance, omega, options)
     if first.converged:
         return first
-    ramp_options = Options(newton=options, patience=RAMP_PATIENCE)
+    ramp_options = Options(newton=options, patience=Rules.ramp_patience)
     ramp = follow(parameter.load(balance, omega), 0.0, balance.load_factor, ramp_options)
     if ramp.parameter[-1] == balance.load_factor:
         last = newton.solve(balance, omega, ramp.contact[-1].reshape(first.state.x.shape), options)
@@ -224,14 +238,14 @@ class _Walk:
     def _stays(self) -> bool:
         """Whether the points that the patience allows brought the walk hardly further."""
         here, count = self.builder.value[-1], len(self.builder.value)
-        if abs(here - self._start) > abs(self._milestone - self._start) + HEADWAY * self._reach:
+        if abs(here - self._start) > abs(self._milestone - self._start) + self._options.rules.headway * self._reach:
             self._milestone, self._since = here, count
         return self._options.patience is not None and count >= self._since + self._options.patience
 
     def _jump(self) -> bool:
         """Step over a gap in the curve, its parameter moving on as before; whether there is a solution behind."""
         here, span, sense = self.builder.value[-1], self._bounds[1] - self._bounds[0], self._stepper.sense
-        for share in GAP_STEPS if len(self._jumps) < MAX_GAPS else ():
+        for share in self._options.rules.gap_steps if len(self._jumps) < self._options.rules.max_gaps else ():
             value = here + sense * share * span
             if sense == 0 or not self._bounds[0] < value < self._bounds[1]:
                 break
@@ -251,7 +265,7 @@ class _Walk:
         guess = flat.reshape(balance.contact.n_pair, -1, flat.shape[-1])
         last = newton.solve(balance, omega, guess, self._options.newton)
         astray = last.converged and not self._stepper.arrives(part, bound, last)
-        if astray and part.length > self._options.min_step and self._landings < MAX_LANDINGS:
+        if astray and part.length > self._options.min_step and self._landings < self._options.rules.max_landings:
             self._landings += 1
             self._rewind(len(self._stepper.segments) - 1)
             return None
@@ -287,7 +301,7 @@ class _Walk:
             for sense in (-1.0, 1.0):
                 if not any(p.passes(self._path, old[index].start, sense, newton_options) for p in near):
                     continue
-                if self._rewinds == MAX_REWINDS:
+                if self._rewinds == self._options.rules.max_rewinds:
                     return BranchEnd.ENDED.say(f" {here}: the curve came back onto itself")
                 self._rewinds += 1
                 index = index if sense < 0 else max(index - 2, 0)

@@ -24,10 +24,22 @@ from tribodyn.hbm.outcome import BranchEnd, Outcome, SolveEnd
 from tribodyn.hbm.threads import single
 
 EXTRAPOLATION_DEGREE = 2  # higher ones amplify the kinks of the contact
-LEAST_SPACING = 0.5  # of the points extrapolated from, in steps: closer ones amplify what Newton leaves
-MAX_FOLD_POINTS = 200  # by arc length on the way round folds, after which the sweep looks from rest
-# Newton's method gives up early where a shorter step of the continuation is left to try, which costs less.
-TRIAL_SHORTEST, TRIAL_SLOWEST = 0.03, 0.8
+
+
+@dataclass(frozen=True)
+class Rules:
+    """How a step that fails is made all the same; see docs/accuracy/ablations.md.
+
+    least_spacing : of the points extrapolated from, in steps: closer ones amplify what Newton leaves
+    max_fold_points : by arc length on the way round folds, after which the sweep looks from rest
+    trial_shortest, trial_slowest : where Newton's method gives up early, as a shorter step is left to try: shortest
+        share of its step, and residual over that of two steps before
+    """
+
+    least_spacing: float = 0.5
+    max_fold_points: int = 200
+    trial_shortest: float = 0.03
+    trial_slowest: float = 0.8
 
 
 @dataclass(frozen=True)
@@ -38,6 +50,7 @@ class Options:
     """Equidistant values, ends included; `response.points` of a scene by default."""
     refinements: int = number(default=6, low=0)
     """Times that a step which fails may be halved."""
+    rules: Rules = field(default_factory=Rules, kw_only=True)
     newton: NewtonOptions = field(default_factory=NewtonOptions, kw_only=True)
 
     def __post_init__(self) -> None:
@@ -112,9 +125,9 @@ class _Sweep:
 
 def _step(path: Parameter, builder: BranchBuilder, value: float, options: Options, halvings: int) -> Solution:
     """One step to `value`, through points in between where it fails."""
-    hasty = replace(options.newton, shortest=TRIAL_SHORTEST, slowest=TRIAL_SLOWEST)
+    hasty = replace(options.newton, shortest=options.rules.trial_shortest, slowest=options.rules.trial_slowest)
     patience = hasty if halvings > 0 else options.newton
-    solution = newton.solve(*path.place(value), predict(builder, value), patience)
+    solution = newton.solve(*path.place(value), predict(builder, value, options.rules.least_spacing), patience)
     if not solution.converged and halvings > 0:
         middle = _step(path, builder, 0.5 * (builder.value[-1] + value), options, halvings - 1)
         if not middle.converged:
@@ -133,7 +146,7 @@ def _by_arc_length(
         width=arc_length.Options.width * abs((stop - origin) / (value - here)),
         bounds=(min(origin, value), max(origin, value)),
         guess=builder.x[-2],
-        max_points=MAX_FOLD_POINTS,
+        max_points=options.rules.max_fold_points,
         newton=options.newton,
     )
     curve = arc_length.follow(path, here, value, way)
@@ -155,13 +168,13 @@ def _by_arc_length(
     return solution
 
 
-def predict(builder: BranchBuilder, value: float) -> np.ndarray:
+def predict(builder: BranchBuilder, value: float, least_spacing: float = Rules.least_spacing) -> np.ndarray:
     """Extrapolation of the last points to a value of the parameter: (n_pair, n_component, n_coeff) [m].
 
     Points closer together than half of the step, as halved steps leave them, would blow up their differences; those
     before a fold lie on another leg of the curve.
     """
-    apart = LEAST_SPACING * abs(value - builder.value[-1])
+    apart = least_spacing * abs(value - builder.value[-1])
     chosen = [len(builder.value) - 1]
     for i in reversed(range(builder.folds[-1] + 1 if builder.folds else 0, chosen[0])):
         if len(chosen) > EXTRAPOLATION_DEGREE:
