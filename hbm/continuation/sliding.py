@@ -30,6 +30,7 @@ def solve_along_friction(balance: HarmonicBalance, omega: float, options: Newton
     if not any(FRICTION in joint.parameters.numbers for joint in balance.contact.joints):
         return None
     x, spent, products = balance.stuck(omega), 0, 0
+    found: Solution | None = None
 
     def rougher(level: float, _: float = np.nan) -> bool:
         nonlocal found, x, spent, products
@@ -40,7 +41,6 @@ def solve_along_friction(balance: HarmonicBalance, omega: float, options: Newton
         x = found.state.x if found.converged else x
         return found.converged
 
-    found: Solution | None = None
     first = next((level for level in STARTS if rougher(level)), None)
     if first is None or lead(first, 0.0, DECADES, rougher) > 0.0 or found is None:
         return None
