@@ -29,7 +29,7 @@ from tribodyn.hbm.wear import law as wear_law
 from tribodyn.workflows.command.main import app
 from tribodyn.workflows.result import store
 from tribodyn.workflows.scene.fields import Direction, Quantity
-from tribodyn.workflows.scene.matrices import MatrixScene
+from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.schema import PartScene
 from tribodyn.workflows.scene.structure import StructureScene
 

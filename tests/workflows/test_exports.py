@@ -21,7 +21,7 @@ from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridRead
 from tests.helpers.synthetic_result import LENGTH, WIDTH, block, result
 from tribodyn.reduction import foreign
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.export import curves, formats, matrices, tables, vtk
+from tribodyn.workflows.export import curves, formats, matrix_file, tables, vtk
 from tribodyn.workflows.pictures import exploded
 from tribodyn.workflows.result import faces, states, store
 from tribodyn.workflows.result.result import Result
@@ -217,8 +217,8 @@ def test_xarray_opens_the_result_file(tmp_path: Path) -> None:
 
 
 def test_reduced_matrices_are_those_of_the_run(small: Result, tmp_path: Path) -> None:
-    model = matrices.reduced_model(small)
-    wanted = matrices.arrays(model)
+    model = matrix_file.reduced_model(small)
+    wanted = matrix_file.arrays(model)
     written = formats.write(small, ["npz", "mtx", "abaqus"], tmp_path)
     npz = foreign.read_matrices(tmp_path / "npz" / "reduced.npz")
     inp = foreign.read_matrices(

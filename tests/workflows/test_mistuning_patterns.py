@@ -13,7 +13,7 @@ from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
-from tribodyn.workflows.scene.wheel import Mistuning
+from tribodyn.workflows.scene.sectors import Mistuning
 from tribodyn.workflows.studies.wheels import mistuned_motion, mistuned_wear, patterns
 
 CHANGED = {

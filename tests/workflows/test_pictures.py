@@ -17,7 +17,7 @@ from tests.helpers.synthetic_result import result
 from tribodyn.workflows.pictures import film, offscreen, plots, render, view
 from tribodyn.workflows.pictures.film_of_cycle import CycleFilm
 from tribodyn.workflows.pictures.film_of_wear import WearFilm
-from tribodyn.workflows.pictures.style import SIZES
+from tribodyn.workflows.pictures.style import LAYOUT
 
 COARSE = 60  # dots per inch: what is drawn is the same, in a tenth of the time
 
@@ -86,7 +86,7 @@ def test_a_film_is_written_whole(over: Literal["wear", "cycle"], tmp_path: Path)
     assert {path.stem for path in paths.values()} == {"wear" if over == "wear" else "cycle_8"}
     counted, seconds = imageio_ffmpeg.count_frames_and_secs(str(paths[".mp4"]))
     assert counted == 3
-    assert seconds == pytest.approx(3 / SIZES.rate, rel=0.01)
+    assert seconds == pytest.approx(3 / LAYOUT.rate, rel=0.01)
     with Image.open(paths[".gif"]) as gif:
         assert gif.n_frames == 3
         pages = []

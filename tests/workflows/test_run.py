@@ -21,7 +21,7 @@ from tribodyn.workflows.result import store
 from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.summary import summary
-from tribodyn.workflows.run import checkpoint, fields, modelling, pipeline, references
+from tribodyn.workflows.run import checkpoint, full_fields, modelling, pipeline, references
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import read
 
@@ -100,7 +100,7 @@ def test_loops_enclose_the_energy(finished: Result, tmp_path: Path) -> None:
     assert wear is not None
     assert loops is not None
     balance = modelling.build(read("beam", SMALL), tmp_path, Progress()).balance.with_samples(4096, located=False)
-    fine = fields.hysteresis_loops(balance, [wear.rows()[row] for row in loops.row], loops.row)
+    fine = full_fields.hysteresis_loops(balance, [wear.rows()[row] for row in loops.row], loops.row)
     for row, x, force in zip(loops.row, fine.displacement, fine.force, strict=True):
         following = np.roll(x, -1, -1) - np.roll(x, 1, -1)
         area = 0.5 * np.sum(force * following, axis=(1, 2))

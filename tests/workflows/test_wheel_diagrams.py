@@ -28,7 +28,7 @@ def test_an_engine_order_excites_the_diameter_that_its_samples_have(n_sectors: i
 
 def test_meetings_are_modes_on_lines_of_engine_orders() -> None:
     frequency = np.array([[100.0, 400.0], [120.0, 420.0], [150.0, 450.0]])  # of diameters 0, 1, 2 of four sectors
-    found = wheel_diagrams.meetings(frequency, 4, 30.0, 60.0)
+    found = wheel_diagrams.crossings(frequency, 4, 30.0, 60.0)
     low = {(3, 1, 0)}  # 120 Hz by order 3; diameter 0 needs orders 4, 8, ..., diameter 2 needs 2, 6, ...
     high = {(7, 1, 1), (8, 0, 1), (9, 1, 1), (10, 2, 1), (11, 1, 1), (12, 0, 1), (13, 1, 1), (14, 2, 1)}
     assert {(m.engine_order, m.diameter, m.family) for m in found} == low | high

@@ -11,10 +11,9 @@ import numpy as np
 from tribodyn.geometry import parts
 from tribodyn.geometry.sources import cad
 from tribodyn.workflows.scene.body import Geometry
-from tribodyn.workflows.scene.decks import Deck
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import PartScene
-from tribodyn.workflows.scene.structure import Body, StructureScene
+from tribodyn.workflows.scene.structure import BodyTable, DeckTable, StructureScene
 
 FINER = 3 / 2  # elements along every edge over those of the scene
 STILL_FINER = 2.0  # the same, where with FINER a row of contact elements stays a single one
@@ -25,7 +24,7 @@ A_FINER_MESH = "a finer mesh"
 HALF = 0.5  # size of halved elements
 TWICE_AS_MANY = 0.25  # of twice as many modes, whose error falls with the square of their number
 
-Mesh = Geometry | Body | Deck
+Mesh = Geometry | BodyTable | DeckTable
 
 
 class Given(ValueError):
@@ -145,7 +144,7 @@ def _rescaled(key: str, table: Mesh, folder: Path, share: float) -> tuple[list[s
 
     Raises  Given where there are none
     """
-    if not isinstance(table, Deck) and table.part_name is not None:
+    if not isinstance(table, DeckTable) and table.part_name is not None:
         part = parts.load(table.part_name)
         own = part.Parameters(**table.parameters)
         counts = parts.rescaled(part, own, share)
@@ -153,7 +152,7 @@ def _rescaled(key: str, table: Mesh, folder: Path, share: float) -> tuple[list[s
             raise Given(f"the part of [{key}] lists no counts of elements in MESH")
         size = float(np.mean([getattr(own, name) / count for name, count in counts.items()]))
         return [f"{key}.{name}={count}" for name, count in counts.items()], size
-    if not isinstance(table, Body) or Path(str(table.mesh)).suffix.lower() not in cad.ENDINGS:
+    if not isinstance(table, BodyTable) or Path(str(table.mesh)).suffix.lower() not in cad.ENDINGS:
         raise Given(f"the mesh of [{key}] is given")
     own_size = table.size or table.unit * cad.default_size(folder / str(table.mesh))
     faces = ", ".join(f'"{name}" = {face / share:.6g}' for name, face in table.face_sizes.items())
@@ -162,7 +161,7 @@ def _rescaled(key: str, table: Mesh, folder: Path, share: float) -> tuple[list[s
 
 def _more_of_single_ones(key: str, table: Mesh) -> list[str]:
     """Overrides that give a part more elements where no mesh of it has fewer."""
-    if isinstance(table, Deck) or table.part_name is None:
+    if isinstance(table, DeckTable) or table.part_name is None:
         return []
     part = parts.load(table.part_name)
     own = part.Parameters(**table.parameters)

@@ -21,7 +21,7 @@ class Function(IntEnum):
     GENERAL, TIME, FRF = 0, 1, 4
 
 
-class Quantity(IntEnum):
+class DataKind(IntEnum):
     """Kinds of data of dataset 58."""
 
     PLAIN, DISPLACEMENT, FORCE, EXCITATION, TIME, FREQUENCY = 1, 8, 9, 13, 17, 18
@@ -102,10 +102,10 @@ def _spectra(result: Result) -> list[dict[str, Any]]:
             if h == 1 and force is not None:
                 value, kind, text = value / force, Function.FRF, f"{output} over force, harmonic 1"
             entry = _function(
-                kind, text, "frequency", Quantity.FREQUENCY, "Hz", frf.frequency, Quantity.DISPLACEMENT, "m", value
+                kind, text, "frequency", DataKind.FREQUENCY, "Hz", frf.frequency, DataKind.DISPLACEMENT, "m", value
             )
             if kind == Function.FRF:
-                entry |= {"orddenom_spec_data_type": Quantity.EXCITATION, "orddenom_axis_lab": "force"}
+                entry |= {"orddenom_spec_data_type": DataKind.EXCITATION, "orddenom_axis_lab": "force"}
                 entry |= {"orddenom_axis_units_lab": "N"}
             found.append(entry)
     return found
@@ -133,7 +133,7 @@ def _histories(result: Result) -> list[dict[str, Any]]:
     )}  # fmt: skip
     return [
         _function(
-            Function.GENERAL, name, "cycles", Quantity.PLAIN, "", table["cycles"], Quantity.PLAIN, unit, table[name]
+            Function.GENERAL, name, "cycles", DataKind.PLAIN, "", table["cycles"], DataKind.PLAIN, unit, table[name]
         )
         for name, unit in wanted.items()
     ]
@@ -150,12 +150,12 @@ def _loops(result: Result) -> list[dict[str, Any]]:
         pair = int(np.argmax(np.ptp(kept.displacement[at], axis=-1).max(axis=-1)))
         for c, component in enumerate(patch.components):
             for what, values, kind, unit in (
-                ("displacement", kept.displacement, Quantity.DISPLACEMENT, "m"),
-                ("force", kept.force, Quantity.FORCE, "N"),
+                ("displacement", kept.displacement, DataKind.DISPLACEMENT, "m"),
+                ("force", kept.force, DataKind.FORCE, "N"),
             ):  # fmt: skip
                 text = f"state {row}, pair {pair}, {component}, {what}"
                 y = values[at, pair, c]
-                found.append(_function(Function.TIME, text, "phase", Quantity.TIME, "rad", phase, kind, unit, y, pair))
+                found.append(_function(Function.TIME, text, "phase", DataKind.TIME, "rad", phase, kind, unit, y, pair))
     return found
 
 

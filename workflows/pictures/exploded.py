@@ -13,7 +13,7 @@ from tribodyn.workflows.pictures import view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, scale_bar
 from tribodyn.workflows.pictures.opened import Field
 from tribodyn.workflows.pictures.shots import Layer, View, frame, shoot, show, trimmed, with_room
-from tribodyn.workflows.pictures.style import BODIES, PRESSURE_MAP, SIZES, STYLE, WEAR_MAP
+from tribodyn.workflows.pictures.style import BODIES, LAYOUT, PRESSURE_MAP, STYLE, WEAR_MAP
 from tribodyn.workflows.result.faces import bodies, meetings_of
 from tribodyn.workflows.result.result import PartMesh, Result
 from tribodyn.workflows.result.states import shown_states
@@ -133,7 +133,7 @@ def exploded_picture(result: Result) -> Figure:
         shell.points += offset[np.flatnonzero(body == b)[0]]
         layers.append(Layer(shell, color=BODIES[b % len(BODIES)]))
     for one in meetings_of(result):
-        lift = SIZES.lift * float(np.sqrt(one.patch.area.sum()))
+        lift = LAYOUT.lift * float(np.sqrt(one.patch.area.sum()))
         for face in one.faces:
             there = face.points + lift * face.outward + offset[face.nodes[0]]
             layers += Field(values[one.pairs], limits, map_)(one.patch, there)
@@ -144,8 +144,8 @@ def exploded_picture(result: Result) -> Figure:
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         shots, cameras = [], []
         for side in (level + EXPLOSION.rise * axis, level - EXPLOSION.rise * axis):
-            cameras.append(frame(points, side, up, SIZES.apart[0] / SIZES.apart[1]))
-            shots.append(shoot(View(layers), cameras[-1], SIZES.apart))
+            cameras.append(frame(points, side, up, LAYOUT.apart[0] / LAYOUT.apart[1]))
+            shots.append(shoot(View(layers), cameras[-1], LAYOUT.apart))
         images, corner = with_room(trimmed(shots))
         long = images[0].shape[1] > EXPLOSION.flat * images[0].shape[0]
         wide = 7.0 if long else 5.0

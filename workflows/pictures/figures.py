@@ -15,7 +15,7 @@ from matplotlib.patches import Patch as Swatch
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from tribodyn.hbm.contact.law import SEPARATES
-from tribodyn.workflows.pictures.style import FORMATS, SIZES, STATUS, STYLE
+from tribodyn.workflows.pictures.style import FORMATS, LAYOUT, STATUS, STYLE
 from tribodyn.workflows.result.result import Result
 
 
@@ -61,7 +61,7 @@ def save(figure: Figure, stem: Path, formats: Sequence[str] = ("png",), dpi: int
             if name not in FORMATS:
                 raise ValueError(f'no picture format "{name}": take one of {", ".join(FORMATS)}')
             path = stem.with_name(f"{stem.name}.{name}")
-            figure.savefig(path, dpi=dpi or SIZES.dpi)
+            figure.savefig(path, dpi=dpi or LAYOUT.dpi)
             written.append(path)
     return written
 

@@ -22,7 +22,7 @@ from PIL import Image
 from tribodyn.workflows.pictures.film_of_cycle import CycleFilm
 from tribodyn.workflows.pictures.film_of_wear import WearFilm
 from tribodyn.workflows.pictures.offscreen import check
-from tribodyn.workflows.pictures.style import SIZES, STYLE
+from tribodyn.workflows.pictures.style import LAYOUT, STYLE
 from tribodyn.workflows.result.result import Result
 
 FORMATS = ("mp4", "gif")
@@ -44,8 +44,8 @@ def film(
     over: Literal["wear", "cycle"],
     row: int | None = None,
     formats: Sequence[str] = ("mp4",),
-    images: int = SIZES.images,
-    dpi: int = SIZES.film_dpi,
+    images: int = LAYOUT.images,
+    dpi: int = LAYOUT.film_dpi,
     deformation: float | None = None,
     wear: float | None = None,
 ) -> list[Path]:
@@ -71,7 +71,7 @@ def film(
     return encode(drawn(made, dpi), place / made.name, formats)
 
 
-def drawn(made: Filmed, dpi: int = SIZES.film_dpi) -> Iterator[np.ndarray]:
+def drawn(made: Filmed, dpi: int = LAYOUT.film_dpi) -> Iterator[np.ndarray]:
     """The images (height, width, 3) of a film, all with the layout of the first."""
     with mpl.rc_context(STYLE):
         canvas = FigureCanvasAgg(made.figure)
@@ -94,7 +94,7 @@ def encode(images: Iterable[np.ndarray], stem: Path, formats: Sequence[str]) -> 
         if name not in FORMATS:
             raise ValueError(f'no film format "{name}": take {" or ".join(FORMATS)}')
     paths = {name: stem.with_name(f"{stem.name}.{name}") for name in dict.fromkeys(formats)}
-    kept, rate = [], SIZES.rate
+    kept, rate = [], LAYOUT.rate
     flow = _even(images)
     first = next(flow)
     with ExitStack() as stack:

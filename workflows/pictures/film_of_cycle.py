@@ -16,7 +16,7 @@ from tribodyn.workflows.pictures.figures import force_unit, heading, length_unit
 from tribodyn.workflows.pictures.plots import has_friction, loop_size, pair_name
 from tribodyn.workflows.pictures.render import Moving
 from tribodyn.workflows.pictures.shots import shoot, show, with_room
-from tribodyn.workflows.pictures.style import BLUE, INK, MOTION_MAP, RED, SIZES, STATUS, STYLE
+from tribodyn.workflows.pictures.style import BLUE, INK, LAYOUT, MOTION_MAP, RED, STATUS, STYLE
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import instant_status, over_a_cycle, shown_states
 
@@ -59,7 +59,7 @@ class CycleFilm:
             self._top = float(self._moving.amplitude(self.state).max())
         self._wear = self._moving.wear if self._moving is not None else wear or 1.0
         with mpl.rc_context(STYLE):
-            self.figure = Figure(figsize=SIZES.film, layout="constrained")
+            self.figure = Figure(figsize=LAYOUT.film, layout="constrained")
             self._draw(result)
 
     @property
@@ -72,7 +72,7 @@ class CycleFilm:
         sample = number * self._status.shape[1] // self.count
         for axes, image in zip(self._panels, self._shots(number, sample), strict=True):
             padded = np.full(axes.images[0].get_array().shape, 255, np.uint8)
-            padded[: SIZES.film_part[1]] = image
+            padded[: LAYOUT.film_part[1]] = image
             axes.images[0].set_data(padded)
         x, force = self._loop[:2]
         self._mark.set_data(x[sample : sample + 1], force[sample : sample + 1])
@@ -117,11 +117,12 @@ class CycleFilm:
             points = self._moving.points(self.state, self._factor * vibration)
             values = np.linalg.norm(vibration, axis=1)
             view = self._moving.view(points, values, (0.0, self._top))
-            found.append(self._moving.marked(shoot(view, self._moving.camera, SIZES.film_part), points))
+            found.append(self._moving.marked(shoot(view, self._moving.camera, LAYOUT.film_part), points))
         if self._contact is not None:
             own = self._contact.own(self.state)
             paint = book.Status(self._status[self._contact.pairs, sample])
-            found.append(shoot(self._contact.view(own.depth, self._wear, paint), self._contact.camera, SIZES.film_part))
+            view = self._contact.view(own.depth, self._wear, paint)
+            found.append(shoot(view, self._contact.camera, LAYOUT.film_part))
         return found
 
     def _draw_loop(self, axes: Any, result: Result) -> None:

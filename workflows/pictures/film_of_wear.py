@@ -15,7 +15,7 @@ from tribodyn.workflows.pictures import opened as book
 from tribodyn.workflows.pictures.figures import force_unit, heading, length_unit, pressure_unit, status_legend
 from tribodyn.workflows.pictures.plots import cycle_axis
 from tribodyn.workflows.pictures.shots import shoot, show, with_room
-from tribodyn.workflows.pictures.style import BLUE, ORANGE, PRESSURE_MAP, RED, SIZES, STYLE, WEAR_MAP
+from tribodyn.workflows.pictures.style import BLUE, LAYOUT, ORANGE, PRESSURE_MAP, RED, STYLE, WEAR_MAP
 from tribodyn.workflows.pictures.view import wear_scale
 from tribodyn.workflows.result.faces import Meeting
 from tribodyn.workflows.result.result import Result
@@ -46,7 +46,7 @@ class WearFilm:
         self._depth_top = float(depth.max())
         self.scale = wear or wear_scale(self.contact.patch, depth)
         with mpl.rc_context(STYLE):
-            self.figure = Figure(figsize=SIZES.film, layout="constrained")
+            self.figure = Figure(figsize=LAYOUT.film, layout="constrained")
             halves: Any = self.figure.subfigures(2, 1, height_ratios=[1.8, 1])
             upper, lower = halves
             self._panels = dict(zip(PANELS, upper.subplots(1, 3), strict=True))
@@ -72,7 +72,7 @@ class WearFilm:
         state = self.states[number]
         for name, axes in self._panels.items():
             image = np.full(axes.images[0].get_array().shape, 255, np.uint8)
-            image[: SIZES.film_contact[1]] = self._shot(state, name)
+            image[: LAYOUT.film_contact[1]] = self._shot(state, name)
             axes.images[0].set_data(image)
         self._panels["depth"].set_title(state.label, fontsize=12)
         for mark, x, y in self._marks:
@@ -86,7 +86,7 @@ class WearFilm:
 
     def _shot(self, state: State, name: str) -> np.ndarray:
         view = self.contact.view(state.depth, self.scale, self._paint(state, name))
-        return shoot(view, self.contact.camera, SIZES.film_contact)
+        return shoot(view, self.contact.camera, LAYOUT.film_contact)
 
     def _paint(self, state: State, name: str) -> book.Paint:
         if name == "status":

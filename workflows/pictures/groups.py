@@ -10,7 +10,7 @@ import numpy as np
 
 from tribodyn.workflows.pictures import offscreen
 from tribodyn.workflows.pictures.shots import SHADE
-from tribodyn.workflows.pictures.style import BODY, INK, PAPER, SIZES
+from tribodyn.workflows.pictures.style import BODY, INK, LAYOUT, PAPER
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#f0e442", "#7f3c8d", "#8c564b", "#17becf")
 
@@ -29,7 +29,7 @@ def draw(solids: Sequence[Solid], path: Path, most: int = 20) -> Path:
     offscreen.check()
     import pyvista as pv
 
-    view = pv.Plotter(off_screen=True, shape=(1, 3), col_weights=[3, 3, 1.6], window_size=SIZES.groups, border=False)
+    view = pv.Plotter(off_screen=True, shape=(1, 3), col_weights=[3, 3, 1.6], window_size=LAYOUT.groups, border=False)
     named = [(solid, name, ids) for solid in solids for name, ids in (solid.mesh.boundaries or {}).items()]
     for side in (0, 1):
         view.subplot(0, side)

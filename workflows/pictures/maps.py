@@ -23,7 +23,7 @@ from tribodyn.workflows.pictures.figures import (
     status_legend,
     titled,
 )
-from tribodyn.workflows.pictures.style import MOTION_MAP, PRESSURE_MAP, SIZES, STATUS, STYLE, WEAR_MAP
+from tribodyn.workflows.pictures.style import LAYOUT, MOTION_MAP, PRESSURE_MAP, STATUS, STYLE, WEAR_MAP
 from tribodyn.workflows.result.result import Patch, Result
 from tribodyn.workflows.result.states import shown_cycles, shown_states, state_of
 
@@ -92,7 +92,7 @@ def motion_maps(result: Result, rows: Sequence[int] | np.ndarray | None = None) 
         raise ValueError("the result holds no worn patch with faces to draw a map on")
     n = len(wear.cycles)
     rows = np.unique([0, (n - 1) // 2, n - 1]) if rows is None else rows
-    basis = HarmonicBasis(result.harmonics, SIZES.samples)
+    basis = HarmonicBasis(result.harmonics, LAYOUT.samples)
     columns = []
     for row in rows:
         x = wear.displacement[row].reshape(len(patch.area), -1, basis.n_coeff)
@@ -208,7 +208,7 @@ def _grid(patch: Patch, n_row: int, n_column: int) -> tuple[Figure, np.ndarray]:
     """A figure with axes (n_row, n_column) of the shape of a patch; the legend of all states fits below."""
     wide, tall = np.ptp(patch.flat, axis=0)
     aspect = float(np.clip(tall / max(wide, 1e-12), 0.25, 2.0))
-    size = (max(3.1 * n_column + 0.4, SIZES.narrowest), n_row * (2.3 * aspect + 0.75) + 0.9)
+    size = (max(3.1 * n_column + 0.4, LAYOUT.narrowest), n_row * (2.3 * aspect + 0.75) + 0.9)
     figure = Figure(figsize=size, layout="constrained")
     return figure, figure.subplots(n_row, n_column, squeeze=False)
 

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame
-from tribodyn.workflows.pictures.style import BODY, BODY_2, EDGE, SIZES, STATUS
+from tribodyn.workflows.pictures.style import BODY, BODY_2, EDGE, LAYOUT, STATUS
 from tribodyn.workflows.pictures.view import polygons
 from tribodyn.workflows.result.faces import Face, Meeting, bodies, meetings_of
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
@@ -62,7 +62,7 @@ class Opened:
             face = self.faces[number] if number < len(self.faces) else None
             block = self._block(face, number == 0, scale * depth)
             points = np.column_stack(
-                [self.flat, (0.0 if face is None else -scale * share) * depth + SIZES.lift * self.size]
+                [self.flat, (0.0 if face is None else -scale * share) * depth + LAYOUT.lift * self.size]
             )
             if number:
                 block.points = self._turned(np.asarray(block.points), -1)

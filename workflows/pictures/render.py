@@ -17,7 +17,7 @@ from tribodyn.workflows.pictures import opened as book
 from tribodyn.workflows.pictures import view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, save, scale_bar, status_legend
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, show, trimmed, with_room
-from tribodyn.workflows.pictures.style import MOTION_MAP, PRESSURE_MAP, RED, SIZES, STYLE, WEAR_MAP
+from tribodyn.workflows.pictures.style import LAYOUT, MOTION_MAP, PRESSURE_MAP, RED, STYLE, WEAR_MAP
 from tribodyn.workflows.result.faces import Meeting, bodies, meetings_of, worn_off
 from tribodyn.workflows.result.result import PartMesh, Result
 from tribodyn.workflows.result.states import State, has_states, shown_states
@@ -74,10 +74,10 @@ def part_picture(result: Result, deformation: float | None = None, wear: float |
         bars.append((factor * float(amplitude.max()), f"vibration amplitude / {unit}"))
         points = moving.points(state, scales[-1] * vibration)
         view = moving.view(points, factor * amplitude, (0.0, bars[-1][0]))
-        images.append(moving.marked(shoot(view, moving.camera, SIZES.view), points))
+        images.append(moving.marked(shoot(view, moving.camera, LAYOUT.view), points))
     images, corner = with_room(trimmed(images))
     with mpl.rc_context({**STYLE, "axes.grid": False}):
-        wide = max(SIZES.column, SIZES.least / len(states))
+        wide = max(LAYOUT.column, LAYOUT.least / len(states))
         tall = wide * images[0].shape[0] / images[0].shape[1]
         figure = Figure(figsize=(wide * len(states) + 0.2, tall + 1.7), layout="constrained")
         columns = np.atleast_1d(figure.subplots(1, len(states)))
@@ -99,11 +99,11 @@ def contact_picture(result: Result, contact: Meeting, wear: float | None = None)
     rows = [name for name, there in (("depth", worn), ("status", bool(told)), ("pressure", True)) if there]
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         figure = Figure(
-            figsize=(max(SIZES.column * len(states), SIZES.least) + 0.2, 2.9 * len(rows) + 0.7), layout="constrained"
+            figsize=(max(LAYOUT.column * len(states), LAYOUT.least) + 0.2, 2.9 * len(rows) + 0.7), layout="constrained"
         )
         grid = figure.subplots(len(rows), len(states), squeeze=False)
         painted = [[_painted(opened, state, name, wear) for state in states] for name in rows]
-        shots = [shoot(view, opened.camera, SIZES.book) for line in painted for view, _ in line]
+        shots = [shoot(view, opened.camera, LAYOUT.book) for line in painted for view, _ in line]
         images, corner = with_room(trimmed(shots))
         bars = [bar for line in painted for _, bar in line]
         for axes, image, bar in zip(grid.ravel(), images, bars, strict=True):
@@ -162,7 +162,7 @@ class Moving:
         reach = [part.points + self.rest_scale * s for s in static]
         for s in (drawing.swing(d, result.harmonics) for d in fields.displacement):
             reach += [part.points + self.vibration_scale(s) * s, part.points - self.vibration_scale(s) * s]
-        self.camera: Camera = frame(np.concatenate(reach), *drawing.looking(result), SIZES.view[0] / SIZES.view[1])
+        self.camera: Camera = frame(np.concatenate(reach), *drawing.looking(result), LAYOUT.view[0] / LAYOUT.view[1])
 
     def vibration_scale(self, vibration: np.ndarray) -> float:
         """The factor that a vibration (n_node, 3) is drawn with."""
@@ -187,8 +187,8 @@ class Moving:
             ends = [(at[k][0] * size[0], at[k][1] * size[1]) for k in (i, j)]
             pen.line(ends, fill=RED, width=width)
         low, high = at.min(axis=0) * size, at.max(axis=0) * size
-        if np.linalg.norm(high - low) < SIZES.ringed * size[0]:
-            middle, radius = (low + high) / 2, 0.75 * SIZES.ringed * size[0]
+        if np.linalg.norm(high - low) < LAYOUT.ringed * size[0]:
+            middle, radius = (low + high) / 2, 0.75 * LAYOUT.ringed * size[0]
             pen.ellipse([*(middle - radius), *(middle + radius)], outline=RED, width=width)
         return np.asarray(picture)
 
@@ -220,7 +220,7 @@ class Moving:
 
         grid = pv.UnstructuredGrid({_cell_type(self.part): self.part.cells}, points)
         grid.point_data["shown"] = values
-        body = grid.extract_surface(nonlinear_subdivision=SIZES.smooth, algorithm="dataset_surface")
+        body = grid.extract_surface(nonlinear_subdivision=LAYOUT.smooth, algorithm="dataset_surface")
         layers = [Layer(body, values=np.asarray(body.point_data["shown"]), map=MOTION_MAP, limits=limits)]
         return View(layers, [self.outline])
 

@@ -21,7 +21,7 @@ from tribodyn.workflows.pictures import view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, named, scale_bar
 from tribodyn.workflows.pictures.offscreen import check
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, shoot, show, with_room
-from tribodyn.workflows.pictures.style import BLUE, INK, MOTION_MAP, ORANGE, SIZES, STYLE
+from tribodyn.workflows.pictures.style import BLUE, INK, LAYOUT, MOTION_MAP, ORANGE, STYLE
 from tribodyn.workflows.result.result import PartMesh, Result
 from tribodyn.workflows.result.states import shown_states
 
@@ -108,7 +108,7 @@ def wheel_picture(result: Result, wheel: Wheel, deformation: float | None = None
                 values = factor * np.linalg.norm(vibration, axis=-1)[shell.nodes]
                 blade = shell.at(wheel.blade(rest + scale * vibration, n))
                 layers.append(Layer(blade, values=values, map=MOTION_MAP, limits=(0.0, factor * largest), edges=False))
-            (image,), corner = with_room([shoot(View(layers), camera, SIZES.wheel)])
+            (image,), corner = with_room([shoot(View(layers), camera, LAYOUT.wheel)])
             show(axes, image, camera, "xyz", corner)
             axes.set_title(f"{state.label}\nvibration × {scale:g}", fontsize=10)
             scale_bar(figure, axes, MOTION_MAP, 0.0, factor * largest, f"vibration at one instant / {unit}")
@@ -214,7 +214,7 @@ class MistunedWheelFilm:
         values = np.linalg.norm(moved, axis=2).ravel()
         wheel, limits = pv.PolyData(placed, self._faces), (0.0, self._largest)
         layer = Layer(wheel, values=values, map=MOTION_MAP, limits=limits, edges=False)
-        return shoot(View([layer]), self._camera, SIZES.wheel)
+        return shoot(View([layer]), self._camera, LAYOUT.wheel)
 
 
 def _repeated(faces: np.ndarray, n_point: int, count: int) -> np.ndarray:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.workflows.pictures.style import BLUE, BODY, EDGE, GREEN, PAPER, RED, SIZES
+from tribodyn.workflows.pictures.style import BLUE, BODY, EDGE, GREEN, LAYOUT, PAPER, RED
 
 SHADE = {"ambient": 0.45, "diffuse": 0.6, "specular": 0.0}
 OF_AXES = (RED, GREEN, BLUE)
@@ -143,7 +143,7 @@ def with_room(images: Sequence[np.ndarray]) -> tuple[list[np.ndarray], tuple[flo
 
 def room(image: np.ndarray) -> int:
     """Side of the box that the axes of an image stand in [pixels]."""
-    smaller, larger = SIZES.axes_box
+    smaller, larger = LAYOUT.axes_box
     return round(max(smaller * min(image.shape[:2]), larger * max(image.shape[:2])))
 
 
@@ -162,7 +162,7 @@ def draw_axes(axes: Any, camera: Camera, names: Sequence[str], middle: tuple[flo
     right, towards = np.cross(camera.up, camera.towards), np.asarray(camera.towards)
     seen = np.column_stack([right, -np.asarray(camera.up)])  # pixels count downwards
     length = np.linalg.norm(seen, axis=1)[:, None]
-    long = length > SIZES.axes_dot
+    long = length > LAYOUT.axes_dot
     away = -seen.sum(axis=0) / max(float(np.linalg.norm(seen.sum(axis=0))), 1e-9)
     outwards = np.where(long, seen / np.maximum(length, 1e-9), away)
     start = np.asarray(middle) - 0.28 * box * np.clip(seen.sum(axis=0), -1, 1)

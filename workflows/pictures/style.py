@@ -32,8 +32,8 @@ FORMATS = ("png", "pdf", "svg")
 
 
 @dataclass(frozen=True)
-class Sizes:
-    """Sizes of pictures.
+class Layout:
+    """Layout of pictures.
 
     dpi : dots per inch of figures, film_dpi : of films, report_dpi : of figures in a report
     narrowest : inches of a figure of maps, below which a legend of all states does not fit
@@ -74,11 +74,11 @@ class Sizes:
     lift: float = 4e-3
 
 
-SIZES = Sizes()
+LAYOUT = Layout()
 
 STYLE: dict[str, Any] = {
-    "figure.dpi": SIZES.dpi,
-    "savefig.dpi": SIZES.dpi,
+    "figure.dpi": LAYOUT.dpi,
+    "savefig.dpi": LAYOUT.dpi,
     "font.family": ["STIXGeneral", "DejaVu Serif"],  # come with matplotlib; look like the text of a paper
     "mathtext.fontset": "stix",
     "pdf.fonttype": 42,  # text stays text

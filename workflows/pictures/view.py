@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.workflows.pictures.style import SIZES
+from tribodyn.workflows.pictures.style import LAYOUT
 from tribodyn.workflows.result.result import Patch, Result
 
 
@@ -32,7 +32,7 @@ def swing(displacement: np.ndarray, harmonics: tuple[int, ...]) -> np.ndarray:
 
 def cycle(displacement: np.ndarray, harmonics: tuple[int, ...]) -> np.ndarray:
     """Vibration about the mean position (..., n_instant) over one cycle from coefficients (..., n_coeff) [m]."""
-    basis = HarmonicBasis(harmonics, max(SIZES.instants, 2 * harmonics[-1] + 1))
+    basis = HarmonicBasis(harmonics, max(LAYOUT.instants, 2 * harmonics[-1] + 1))
     return np.asarray(displacement @ (basis.synthesis * (basis.order > 0)).T)
 
 

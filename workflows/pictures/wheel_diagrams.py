@@ -26,7 +26,7 @@ STATES = {"free": ("o--", GREY, "contact free"), "stuck": ("o-", BLUE, "contact 
 
 
 @dataclass(frozen=True)
-class Meeting:
+class Crossing:
     """An engine order that excites a mode in the range of speeds.
 
     speed : at which it does so [Hz]; frequency : of the mode [Hz]
@@ -45,13 +45,13 @@ def diameter_of(engine_order: int, n_sectors: int) -> int:
     return min(rest, n_sectors - rest)
 
 
-def meetings(frequency: np.ndarray, n_sectors: int, slow: float, fast: float) -> list[Meeting]:
+def crossings(frequency: np.ndarray, n_sectors: int, slow: float, fast: float) -> list[Crossing]:
     """Where engine orders excite modes in a range of speeds, by engine order and family.
 
     frequency : (n_diameter, family) of the nodal diameters from 0 on [Hz], taken as the same at all speeds of the range
     slow, fast : ends of the range [Hz], slow above 0
     """
-    found: list[Meeting] = []
+    found: list[Crossing] = []
     if np.isnan(frequency).all():
         return found
     for order in range(1, int(np.nanmax(frequency) / slow) + 1):
@@ -60,7 +60,7 @@ def meetings(frequency: np.ndarray, n_sectors: int, slow: float, fast: float) ->
             continue
         for family, hertz in enumerate(frequency[diameter]):
             if slow <= hertz / order <= fast:
-                found.append(Meeting(order, diameter, family, float(hertz / order), float(hertz)))
+                found.append(Crossing(order, diameter, family, float(hertz / order), float(hertz)))
     return found
 
 
@@ -138,7 +138,7 @@ def safe(families: Families, n_sectors: int, slow: float, fast: float, scene: st
         axes.vlines(places[there], orders[there] * slow, orders[there] * fast, color=ORANGE, lw=5, alpha=0.35, zorder=1)
         for state, values in families.items():
             _families(axes, values, *STATES[state])
-        rings = [meeting for values in families.values() for meeting in meetings(values, n_sectors, slow, fast)]
+        rings = [crossing for values in families.values() for crossing in crossings(values, n_sectors, slow, fast)]
         axes.plot(
             [m.diameter for m in rings], [m.frequency for m in rings], "o", ms=10, mfc="none", color=RED,
             label=f"met by an engine order ({len(rings)})",

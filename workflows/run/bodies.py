@@ -91,13 +91,13 @@ def _apart(bodies: Sequence[Body]) -> None:
             )
 
 
-def of_decks(scene: StructureScene, folder: Path) -> dict[str, decks.Structure]:
+def of_decks(scene: StructureScene, folder: Path) -> dict[str, decks.CarriedDeck]:
     """What the decks of a scene bring, by their names; raises ValueError as `decks.structure` does."""
     materials = {name: solid(table) for name, table in scene.materials.items()} if scene.decks else {}
     return {name: decks.structure(name, table, materials, folder) for name, table in scene.decks.items()}
 
 
-def _placed(table: structure.Body, folder: Path, path: Path) -> Noted:
+def _placed(table: structure.BodyTable, folder: Path, path: Path) -> Noted:
     notes: tuple[str, ...] = ()
     if table.mesh is not None:
         mesh, node_sets, notes = mesh_reader.read_with_notes(folder / table.mesh, _sizes(table))
@@ -116,7 +116,7 @@ def _placed(table: structure.Body, folder: Path, path: Path) -> Noted:
     return placing.placed(mesh, 1.0, turn, shift + np.array(table.translation)), node_sets, notes
 
 
-def _sizes(table: structure.Body) -> cad.Sizes | None:
+def _sizes(table: structure.BodyTable) -> cad.Sizes | None:
     """Sizes of elements in the unit of a CAD file, of which only the body's own solid is meshed; None for a mesh.
 
     Raises  ValueError where sizes are asked of a file that is a mesh already
@@ -130,7 +130,7 @@ def _sizes(table: structure.Body) -> cad.Sizes | None:
     return cad.Sizes(table.size and table.size / table.unit, faces=faces, only=table.volume)
 
 
-def _material(table: structure.Body, materials: Mapping[str, SolidMaterial]) -> Materials:
+def _material(table: structure.BodyTable, materials: Mapping[str, SolidMaterial]) -> Materials:
     if isinstance(table.material, str):
         return solid(materials[table.material])
     return {volume: solid(materials[name]) for volume, name in table.material.items()}
@@ -149,7 +149,7 @@ def solid(table: SolidMaterial) -> AnyMaterial:
     return Material(table.young, table.poisson, table.density, table.expansion)
 
 
-def _middle(whole: Assembly, table: structure.Coupling) -> list[float]:
+def _middle(whole: Assembly, table: structure.CouplingTable) -> list[float]:
     if table.point is not None:
         return list(table.point)
     if table.face in whole.boundaries:

@@ -12,7 +12,7 @@ from tribodyn.fem.interface import COMPONENTS, ContactInterface
 from tribodyn.geometry.surface import HeightMap, prepare
 from tribodyn.geometry.surface_pair import centred, facing_gap, onto_nodes
 from tribodyn.workflows.scene.contact import Surfaces
-from tribodyn.workflows.scene.measured import faces
+from tribodyn.workflows.scene.contact_numbers import faces
 
 FLAT = 1e-6  # part of its size by which a flat patch may bulge
 

@@ -22,15 +22,15 @@ from tribodyn.fem.material import AnyMaterial, Material, Orthotropic
 from tribodyn.fem.springs import Mass
 from tribodyn.geometry import refine
 from tribodyn.geometry.sources import deck, picking, read
-from tribodyn.workflows.scene.decks import EVERYTHING
-from tribodyn.workflows.scene.decks import Deck as Table
+from tribodyn.workflows.scene.structure import EVERYTHING
+from tribodyn.workflows.scene.structure import DeckTable as Table
 
 UNITS = {metres: name for name, metres in read.UNITS.items()}
 ALL_AXES = (0, 1, 2, 3, 4, 5)
 
 
 @dataclass
-class Structure:
+class CarriedDeck:
     """What a deck brings into a scene. points : name -> (3,) of its reference points [m]; load : all its loads
     notes : sentences on what was done to it, and on what of it is not used"""
 
@@ -48,7 +48,7 @@ def load_name(deck_name: str) -> str:
     return f"decks.{deck_name}"
 
 
-def structure(name: str, table: Table, materials: Mapping[str, AnyMaterial], folder: Path) -> Structure:
+def structure(name: str, table: Table, materials: Mapping[str, AnyMaterial], folder: Path) -> CarriedDeck:
     """What the deck of a table brings.
 
     materials : those of the scene, which take the place of the deck's of the same name; folder : of the scene
@@ -78,12 +78,12 @@ class _Carrying:
         self.materials = materials
         self.faces: dict[str, list[str]] = {}  # group of the deck -> its names in the assembly
         self.sets: dict[str, list[str]] = {}
-        self.made = Structure([self._body(body) for body in source.bodies])
+        self.made = CarriedDeck([self._body(body) for body in source.bodies])
         self.notes = self.made.notes
         self.axes_of: dict[str, set[int]] = {}  # point -> its axes that an equation moves
         self.carried: set[str] = set()  # points that a coupling ties to a face
 
-    def done(self) -> Structure:
+    def done(self) -> CarriedDeck:
         """All of it."""
         use = self.table.use
         for kind in EVERYTHING:

@@ -15,7 +15,7 @@ from tribodyn.hbm.contact.stiffness import rectangular_punch
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.reduction.model import ModelInfo, ReducedModel
 from tribodyn.workflows.run import bodies, decks
-from tribodyn.workflows.scene.contact import Contact, FaceContact
+from tribodyn.workflows.scene.contact import ContactTable, FaceContact
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, PartScene, Scene
 from tribodyn.workflows.scene.structure import StructureScene
 
@@ -51,7 +51,7 @@ def joint_pairs(scene: Scene, reduced: ReducedModel) -> dict[str, slice]:
     return dict(reduced.info.joints)
 
 
-def joint_stiffness(scene: Scene, contact: Contact) -> tuple[float, float]:
+def joint_stiffness(scene: Scene, contact: ContactTable) -> tuple[float, float]:
     """Tangential and normal stiffness of a joint [N/m]; those of a punch in shear along t1 serve both tangents."""
     if isinstance(contact, FaceContact) and contact.punch is not None:
         first = elastic(scene, contact.groups[0])
@@ -94,7 +94,7 @@ def make_joints(scene: Scene, reduced: ReducedModel) -> list[Joint]:
 
 
 def parameters_of(
-    contact: Contact, interface: ContactInterface, pairs: slice, springs: np.ndarray
+    contact: ContactTable, interface: ContactInterface, pairs: slice, springs: np.ndarray
 ) -> law.ContactParameters:
     """The parameters of a joint with springs (n_pair, n_component); a law that counts by area has that of each pair."""
     numbers: dict[str, Any] = dict(contact.numbers)

@@ -14,7 +14,7 @@ from tribodyn.reduction.foreign import ForeignMatrices, read_matrices, reduced_m
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.matrix_files import read_array
 from tribodyn.reduction.model import ReducedModel
-from tribodyn.workflows.scene.matrices import DofOutput, MatrixFiles, MatrixScene, Variable
+from tribodyn.workflows.scene.matrix_scene import DofOutput, MatrixFiles, MatrixScene, Variable
 
 OUTPUT = "response"
 

@@ -48,7 +48,7 @@ from tribodyn.workflows.run.contact_surfaces import mapped_gap, surface_gap
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.sanity_checks import check_size
 from tribodyn.workflows.scene.loads import StaticLoad
-from tribodyn.workflows.scene.matrices import MatrixScene
+from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, PartScene, Scene
 from tribodyn.workflows.scene.solution import HIGHEST

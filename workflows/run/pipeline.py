@@ -22,7 +22,7 @@ from tribodyn.workflows.run import curve, modelling, references, sanity_checks, 
 from tribodyn.workflows.run.checkpoint import Clock, Keeper, alone_in
 from tribodyn.workflows.run.description import described
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.fields import with_shown
+from tribodyn.workflows.run.full_fields import with_shown
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import Scene

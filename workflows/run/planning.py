@@ -24,7 +24,7 @@ from tribodyn.workflows.run.modelling import clamps, make_mesh
 from tribodyn.workflows.run.part_reduction import components, without_masters
 from tribodyn.workflows.run.settings import check_names
 from tribodyn.workflows.scene.afterwards import VerdictOptions
-from tribodyn.workflows.scene.matrices import MatrixScene
+from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.own import is_file
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene

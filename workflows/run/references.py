@@ -16,7 +16,7 @@ from tribodyn.workflows.scene.schema import MeshScene, Scene
 
 
 @dataclass(frozen=True)
-class Linear:
+class LinearOptions:
     """How linear amplitudes are computed.
 
     points : frequencies of a curve; between : beside the resonances themselves, to find the largest amplitude
@@ -31,7 +31,7 @@ class Linear:
     rigid: float = 1e-6
 
 
-LINEAR = Linear()
+LINEAR = LinearOptions()
 
 
 def linear_references(balance: HarmonicBalance, output: str, start: float, stop: float) -> References:

@@ -20,7 +20,7 @@ from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import references, settings
 from tribodyn.workflows.run.checkpoint import Keeper
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.fields import with_shown
+from tribodyn.workflows.run.full_fields import with_shown
 from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import Scene

@@ -92,7 +92,7 @@ def part_parameters(part: str, given: dict[str, Any], folder: Path | None = None
     return asdict(parts.load(part).Parameters(**values))
 
 
-class Material(Table):
+class MaterialTable(Table):
     """Linear isotropic elasticity and density."""
 
     young: Annotated[float, quantity("Pa"), Field(gt=0)]

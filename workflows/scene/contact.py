@@ -11,8 +11,7 @@ from pydantic import Field, StrictBool, StrictInt, ValidationInfo, field_validat
 
 from tribodyn import declare
 from tribodyn.hbm.contact import law as contact_law
-from tribodyn.workflows.scene.fields import Angle, Direction, Length, Stiffness, Table
-from tribodyn.workflows.scene.hot import ByTemperature, Change
+from tribodyn.workflows.scene.fields import Angle, Direction, Length, Number, Stiffness, Table, quantity
 from tribodyn.workflows.scene.own import LawTable, beside, folder_of, is_file
 
 
@@ -25,7 +24,49 @@ def rows_of(path: Path) -> list[list[float]]:
     return rows
 
 
-class Contact(LawTable):
+Change = Annotated[float, quantity("K")]
+GIVEN = ("friction", "tangential_stiffness", "normal_stiffness")
+
+
+class ByTemperature(Table):
+    """Numbers of a contact at several changes of temperature, linear between them; none beyond their ends."""
+
+    temperature: Annotated[tuple[Change, ...], Field(min_length=1)]
+    """Changes of temperature, ascending, counted as those of the loads."""
+    friction: tuple[Annotated[Number, Field(ge=0)], ...] | None = None
+    """Coefficient of friction at each."""
+    tangential_stiffness: tuple[Annotated[Stiffness, Field(ge=0)], ...] | None = None
+    """Tangential stiffness of the contact at each."""
+    normal_stiffness: tuple[Annotated[Stiffness, Field(ge=0)], ...] | None = None
+    """Normal stiffness of the contact at each."""
+
+    @model_validator(mode="after")
+    def _columns(self) -> ByTemperature:
+        if any(np.diff(self.temperature) <= 0):
+            raise ValueError("temperature: give the changes of temperature in ascending order")
+        if not self.columns:
+            raise ValueError(f"give at least one of {', '.join(GIVEN)} at each temperature")
+        for name, values in self.columns.items():
+            if len(values) != len(self.temperature):
+                raise ValueError(f"{name}: give {len(self.temperature)} values, one for each temperature")
+        return self
+
+    @property
+    def columns(self) -> dict[str, tuple[float, ...]]:
+        """The numbers that are given, by name."""
+        return {name: values for name in GIVEN if (values := getattr(self, name)) is not None}
+
+    def at(self, temperature: float) -> dict[str, float]:
+        """The numbers at a change of temperature [K]; raises ValueError beyond the ends."""
+        low, high = self.temperature[0], self.temperature[-1]
+        if not low <= temperature <= high:
+            raise ValueError(
+                f"the contact is at {temperature:g} K, but by_temperature goes from {low:g} to {high:g} K: extend it"
+            )
+        return {name: float(np.interp(temperature, self.temperature, values)) for name, values in self.columns.items()}
+
+
+class ContactTable(LawTable):
     """The contact law of every node pair; stiffness is that of all pairs together, shared by their area."""
 
     TABLE: ClassVar[str] = "contact"
@@ -65,7 +106,7 @@ class Contact(LawTable):
         return Path(self.law_name) if self._own is not None else contact_law.file_of(self.law)
 
     @model_validator(mode="after")
-    def _only_what_the_components_need(self) -> Contact:
+    def _only_what_the_components_need(self) -> ContactTable:
         along, across = any(c != "n" for c in self.components), "n" in self.components
         given = self.stiffness_is_given
         for name, need in (
@@ -87,7 +128,7 @@ class Contact(LawTable):
         return bool(declare.constant(self.law_file, "OWN_STIFFNESS"))
 
 
-class FaceContact(Contact):
+class FaceContact(ContactTable):
     """Faces of the part against the ground, or a face against another one."""
 
     group: str | Annotated[tuple[str, ...], Field(min_length=1)]

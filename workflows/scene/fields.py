@@ -1,7 +1,8 @@
-"""Kinds of values in a scene file: quantities with units, directions, tables that refuse what they do not know."""
+"""Kinds of values in a scene file: quantities with units, directions, tables, and the sentence on an unknown key."""
 
 from __future__ import annotations
 
+import difflib
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -55,3 +56,11 @@ def _direction(value: object) -> tuple[float, float, float]:
 
 
 Direction = Annotated[tuple[float, float, float], BeforeValidator(_direction)]
+
+
+def unknown_key(key: str, known: list[str]) -> str:
+    """Clause about a key that does not exist, with the one that was probably meant and all that exist."""
+    names = [name for name in known if name != "parameters"]
+    close = difflib.get_close_matches(key.rpartition(".")[2], names, n=1)
+    hint = f" (did you mean {close[0]}?)" if close else ""
+    return f"unknown key {key}{hint}, known here: {', '.join(names)}"

@@ -26,7 +26,7 @@ from tribodyn.workflows.scene.fields import (
 KINDS = ("value", "pressure", "moment", "acceleration", "base_acceleration", "speed", "temperature")
 
 
-class Spring(Table):
+class SpringTable(Table):
     """A spring from a group to the ground, or to the matching nodes of another group, that acts in one direction."""
 
     group: str

@@ -14,9 +14,8 @@ from typing import Any, ClassVar, Self
 from pydantic import ConfigDict, PrivateAttr, ValidationInfo, model_validator
 
 from tribodyn.declare import Number, read
-from tribodyn.workflows.scene.fields import Table
+from tribodyn.workflows.scene.fields import Table, unknown_key
 from tribodyn.workflows.scene.units import to_si
-from tribodyn.workflows.scene.words import unknown_key
 
 ANY_UNIT = ("m", "rad", "")  # what a number without a declared unit may be given in
 

@@ -11,10 +11,10 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from tribodyn.workflows.scene.matrices import MatrixScene
+from tribodyn.workflows.scene.fields import unknown_key
+from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
 from tribodyn.workflows.scene.structure import StructureScene
-from tribodyn.workflows.scene.words import unknown_key
 
 CASES = Path(__file__).parents[1] / "cases"
 MOST_PROBLEMS = 3  # told in one sentence

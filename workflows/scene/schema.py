@@ -18,15 +18,16 @@ from pydantic import (
 )
 
 from tribodyn.workflows.scene.afterwards import Pictures, VerdictOptions
-from tribodyn.workflows.scene.body import Geometry, Material
-from tribodyn.workflows.scene.contact import Contact, FaceContact, Surfaces
+from tribodyn.workflows.scene.body import Geometry, MaterialTable
+from tribodyn.workflows.scene.contact import ContactTable, FaceContact, Surfaces
+from tribodyn.workflows.scene.contact_numbers import takes_asperities, with_asperities, with_numbers_when_hot
 from tribodyn.workflows.scene.fields import (
     Table,
+    unknown_key,
 )
-from tribodyn.workflows.scene.hot import with_numbers_when_hot
-from tribodyn.workflows.scene.loads import HarmonicLoad, Loads, Motion, Prescribed, Spring, StaticLoad
-from tribodyn.workflows.scene.measured import takes_asperities, with_asperities
+from tribodyn.workflows.scene.loads import HarmonicLoad, Loads, Motion, Prescribed, SpringTable, StaticLoad
 from tribodyn.workflows.scene.own import folder_of
+from tribodyn.workflows.scene.sectors import FlowTable, Mistuning, WheelTable
 from tribodyn.workflows.scene.solution import (
     Damping,
     Harmonics,
@@ -38,8 +39,6 @@ from tribodyn.workflows.scene.solution import (
     Solver,
 )
 from tribodyn.workflows.scene.wear import Wear
-from tribodyn.workflows.scene.wheel import Flow, Mistuning, Wheel
-from tribodyn.workflows.scene.words import unknown_key
 
 CENTRIFUGAL = "centrifugal"
 
@@ -83,7 +82,7 @@ class Scene(Table, ABC):
 
     @property
     @abstractmethod
-    def joints(self) -> Mapping[str, Contact]:
+    def joints(self) -> Mapping[str, ContactTable]:
         """The contacts by name."""
 
     @property
@@ -95,7 +94,7 @@ class Scene(Table, ABC):
 class MeshScene(Scene):
     """What every scene with a mesh says; see PartScene for one part, StructureScene in structure for several bodies."""
 
-    springs: dict[str, Spring] = Field(default_factory=dict)
+    springs: dict[str, SpringTable] = Field(default_factory=dict)
     """Springs by name."""
     prescribed: dict[str, Prescribed] = Field(default_factory=dict)
     """A prescribed static displacement, by name; at most one."""
@@ -109,11 +108,11 @@ class MeshScene(Scene):
     """The response that is computed."""
     reduction: Reduction
     """The reduction."""
-    wheel: Wheel | None = None
+    wheel: WheelTable | None = None
     """The wheel of which the part is one sector."""
     mistuning: Mistuning | None = None
     """How far its blades differ."""
-    flow: Flow | None = None
+    flow: FlowTable | None = None
     """The flow round its blades, for `tribodyn flutter`."""
 
     one_body: ClassVar[bool] = False
@@ -226,7 +225,7 @@ class PartScene(MeshScene):
 
     geometry: Geometry
     """Part or mesh."""
-    material: Material
+    material: MaterialTable
     """Material."""
     contact: FaceContact
     """The contact faces and their law."""

@@ -5,22 +5,94 @@ Groups of a body are named "body.group".
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, StrictInt, ValidationInfo, model_validator
 
-from tribodyn.workflows.scene.body import Geometry, Material, gathered
+from tribodyn.geometry.sources.picking import Rule
+from tribodyn.workflows.scene.body import Geometry, MaterialTable, gathered
 from tribodyn.workflows.scene.contact import FaceContact
-from tribodyn.workflows.scene.decks import Deck, in_metres
-from tribodyn.workflows.scene.faces import FaceRule, Point
-from tribodyn.workflows.scene.fields import Angle, Direction, Length, Number, Stiffness, Table, quantity
+from tribodyn.workflows.scene.fields import Angle, Direction, Length, Number, Stiffness, Table, quantity, unknown_key
 from tribodyn.workflows.scene.own import folder_of, own_file
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene
-from tribodyn.workflows.scene.wear import JointWear
-from tribodyn.workflows.scene.words import unknown_key
+from tribodyn.workflows.scene.units import to_si
+from tribodyn.workflows.scene.wear import JointWearTable
 
 GROUND = "ground"
+
+Point = tuple[Length, Length, Length]
+
+
+class FaceRule(Table):
+    """A face of a body: the facets of its boundary that satisfy all that is given.
+
+    Places are those of the file or part, before the body is moved, in metres unless a unit is given.
+    """
+
+    box: tuple[Point, Point] | None = None
+    """Two corners of a box within which the whole facets lie."""
+    nearest: Point | None = None
+    """Point whose nearest smooth face is taken: all that goes on from there without an edge."""
+    normal: Direction | None = None
+    """Direction in which the facets look, outwards."""
+    within: Annotated[Angle, Field(gt=0, le=math.pi)] = math.radians(5.0)
+    """How far a facet may look away from `normal`."""
+    cad: tuple[StrictInt, ...] = ()
+    """Numbers of faces of a CAD file, as `tribodyn inspect` lists them."""
+
+    @model_validator(mode="after")
+    def _something(self) -> FaceRule:
+        if self.box is None and self.nearest is None and self.normal is None and not self.cad:
+            raise ValueError("expected a rule: box, nearest, normal or cad")
+        return self
+
+    @property
+    def rule(self) -> Rule:
+        """The rule for geometry.sources.picking."""
+        return Rule(self.box, self.nearest, self.normal, self.within, self.cad)
+
+
+Use = Literal["ties", "couplings", "equations", "masses", "supports", "forces", "pressures"]
+EVERYTHING: tuple[Use, ...] = ("ties", "couplings", "equations", "masses", "supports", "forces", "pressures")
+
+
+def in_metres(value: object) -> object:
+    """A unit of length by its name as a number of metres."""
+    return to_si(f"1 {value}", "m") if isinstance(value, str) else value
+
+
+class DeckFace(FaceRule):
+    """A face of a body of a deck that is picked by rule, where the deck puts the body."""
+
+    body: str
+    """Body of the deck, as `tribodyn inspect` lists it."""
+
+
+class DeckTable(Table):
+    """A deck of another FE program with its bodies, materials, constraints, supports and loads.
+
+    Its bodies stand in the scene under their names in the deck, its groups under "body.group". The forces and pressures
+    of all its steps act together as one static load. A material of the scene takes the place of one of the same name.
+    """
+
+    file: str
+    """The deck, relative to the scene file."""
+    unit: Annotated[float, BeforeValidator(in_metres), Field(gt=0)] = 1.0
+    """Its unit of length, such as "mm"; a deck in mm counts in N, mm, t and s."""
+    use: tuple[Use, ...] = EVERYTHING
+    """What is taken from it beside bodies and materials; everything by default."""
+    material: str | None = None
+    """Material of the scene for elements to which the deck gives none."""
+    halved: Annotated[StrictInt, Field(ge=0, le=3)] = 0
+    """How many times every element of its bodies is cut into eight of half the size, its shape kept."""
+    fixed: tuple[str, ...] = ()
+    """Groups "body.group" that are clamped besides."""
+    fixed_axes: dict[str, str] = Field(default_factory=dict)
+    """Groups "body.group" held along some axes besides: group = letters out of "xyz"."""
+    faces: dict[str, DeckFace] = Field(default_factory=dict)
+    """Faces of its bodies that are picked by rule, by name; they are known as "body.name"."""
 
 
 class Rotation(Table):
@@ -34,7 +106,7 @@ class Rotation(Table):
     """Point on the axis."""
 
 
-class Body(Table):
+class BodyTable(Table):
     """A body: a part of geometry/ or a mesh file, where it stands, what it is made of and what holds it.
 
     All other keys of the table are parameters of the part; those left out have the part's own defaults.
@@ -144,7 +216,7 @@ class SolidMaterial(Table):
 class NamedContact(FaceContact):
     """A joint: a face against another one, whose mesh need not match, or against the ground."""
 
-    wear: JointWear | None = None
+    wear: JointWearTable | None = None
     """How this joint wears, instead of what [wear] says for all."""
 
     @model_validator(mode="before")
@@ -160,7 +232,7 @@ class NamedContact(FaceContact):
         return {**rest, "group": table["first"], **other}
 
 
-class Tie(Table):
+class TieTable(Table):
     """Two faces that are glued; their meshes need not match."""
 
     first: str
@@ -174,7 +246,7 @@ class Tie(Table):
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
-class Coupling(Table):
+class CouplingTable(Table):
     """A point that carries a face; loads, springs, masses and outputs may name it."""
 
     face: str
@@ -188,7 +260,7 @@ class Coupling(Table):
     """What of the point is held: out of "x", "y", "z" and the turns "rx", "ry", "rz"; only of a rigid coupling."""
 
     @model_validator(mode="after")
-    def _kinds(self) -> Coupling:
+    def _kinds(self) -> CouplingTable:
         if self.kind not in ("rigid", "distributed"):
             raise ValueError(f'kind: expected "rigid" or "distributed", got {self.kind!r}')
         if set(self.fixed) - set(AXES):
@@ -198,7 +270,7 @@ class Coupling(Table):
         return self
 
 
-class Link(Table):
+class LinkTable(Table):
     """The points of two couplings move alike."""
 
     first: str
@@ -209,7 +281,7 @@ class Link(Table):
     """Motions in which they stay free of each other: out of "x", "y", "z" and the turns "rx", "ry", "rz"."""
 
     @model_validator(mode="after")
-    def _known(self) -> Link:
+    def _known(self) -> LinkTable:
         if set(self.free) - set(AXES) or len(set(self.free)) == len(AXES):
             raise ValueError(f"free: expected some of {', '.join(AXES)}, but not all, got {list(self.free)}")
         if self.first == self.second:
@@ -220,7 +292,7 @@ class Link(Table):
 Inertia = Annotated[float, quantity("kg m2"), Field(ge=0)]
 
 
-class PointMass(Table):
+class PointMassTable(Table):
     """A lumped mass."""
 
     at: str
@@ -231,7 +303,7 @@ class PointMass(Table):
     """Moments of inertia about x, y, z at the point of a coupling."""
 
 
-class Bolt(Table):
+class BoltTable(Table):
     """A bolt between the faces under its head and under its nut, as an elastic rod with a preload."""
 
     first: str
@@ -251,7 +323,7 @@ class Bolt(Table):
     """Stiffness along the shank instead of diameter and material."""
 
     @model_validator(mode="after")
-    def _stiff(self) -> Bolt:
+    def _stiff(self) -> BoltTable:
         if self.state not in ("locked", "constant"):
             raise ValueError(f'state: expected "locked" or "constant", got {self.state!r}')
         shank = self.diameter is not None and self.material is not None
@@ -263,29 +335,29 @@ class Bolt(Table):
 class StructureScene(MeshScene):
     """Bodies, what joins them, loads, reduction, response and wear; a single part may stand in [geometry]."""
 
-    bodies: dict[str, Body] = Field(default_factory=dict)
+    bodies: dict[str, BodyTable] = Field(default_factory=dict)
     """Bodies by name."""
-    decks: dict[str, Deck] = Field(default_factory=dict)
+    decks: dict[str, DeckTable] = Field(default_factory=dict)
     """Decks of other FE programs by name, which bring bodies and what joins, holds and loads them."""
     materials: dict[str, SolidMaterial] = Field(default_factory=dict)
     """Materials by name."""
     geometry: Geometry | None = None
     """A single part or mesh, instead of bodies."""
-    material: Material | None = None
+    material: MaterialTable | None = None
     """Its material."""
     contact: FaceContact | None = None
     """A single contact, instead of contacts."""
     contacts: dict[str, NamedContact] = Field(default_factory=dict)
     """Joints by name."""
-    ties: dict[str, Tie] = Field(default_factory=dict)
+    ties: dict[str, TieTable] = Field(default_factory=dict)
     """Faces glued together, by name."""
-    couplings: dict[str, Coupling] = Field(default_factory=dict)
+    couplings: dict[str, CouplingTable] = Field(default_factory=dict)
     """Points that carry faces, by name."""
-    links: dict[str, Link] = Field(default_factory=dict)
+    links: dict[str, LinkTable] = Field(default_factory=dict)
     """Points of couplings that move alike, by name."""
-    masses: dict[str, PointMass] = Field(default_factory=dict)
+    masses: dict[str, PointMassTable] = Field(default_factory=dict)
     """Lumped masses by name."""
-    bolts: dict[str, Bolt] = Field(default_factory=dict)
+    bolts: dict[str, BoltTable] = Field(default_factory=dict)
     """Bolts by name."""
 
     @property

@@ -116,7 +116,7 @@ class MissionDuty(Table):
     """Speed of the wheel meanwhile; `wheel.speed` by default."""
 
 
-class JointWear(LawTable):
+class JointWearTable(LawTable):
     """How one joint wears."""
 
     TABLE: ClassVar[str] = "wear"

@@ -43,12 +43,12 @@ class WheelModes:
         first = self.waves["stuck"][:, :, 0]
         return {order: critical_speeds(self.speeds, first[:, i], order) for i, order in enumerate(self.orders)}
 
-    def meetings(self) -> dict[str, list[wheel_diagrams.Meeting]]:
+    def meetings(self) -> dict[str, list[wheel_diagrams.Crossing]]:
         """Modes that engine orders meet in the range of speeds, by the state of the contact."""
         if self.slow is None or self.fast is None:
             return {}
         slow, fast = self.slow, self.fast
-        return {s: wheel_diagrams.meetings(v, self.n_sectors, slow, fast) for s, v in self.families.items()}
+        return {s: wheel_diagrams.crossings(v, self.n_sectors, slow, fast) for s, v in self.families.items()}
 
     def figures(self) -> dict[str, Figure]:
         """The pictures by name."""

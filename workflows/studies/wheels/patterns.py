@@ -43,9 +43,9 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.content import digests
+from tribodyn.workflows.scene.fields import unknown_key
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
-from tribodyn.workflows.scene.wheel import Mistuning
-from tribodyn.workflows.scene.words import unknown_key
+from tribodyn.workflows.scene.sectors import Mistuning
 from tribodyn.workflows.studies.many import pool
 from tribodyn.workflows.studies.many.journal import Journal
 from tribodyn.workflows.studies.many.task import Row, Status

@@ -10,7 +10,7 @@ from pydantic import Field, StrictBool, StrictInt, model_validator
 from tribodyn.workflows.scene.fields import Direction, Frequency, Length, Number, Table
 
 
-class Wheel(Table):
+class WheelTable(Table):
     """Identical sectors about an axis through the origin, under a wave that travels round.
 
     A contact with the next sector has the right face as its first one, the left one as its second. Static loads act on
@@ -64,7 +64,7 @@ class Mistuning(Table):
 Influence = tuple[StrictInt, Number, Number]
 
 
-class Flow(Table):
+class FlowTable(Table):
     """Forces of a flow on the vibrating blades of the wheel, by coefficients of one family of modes; see the theory of
     flutter.
     """
@@ -78,7 +78,7 @@ class Flow(Table):
     """Number of the family, from 0, among the modes of the stuck wheel."""
 
     @model_validator(mode="after")
-    def _one_kind(self) -> Flow:
+    def _one_kind(self) -> FlowTable:
         if bool(self.influence) == bool(self.by_diameter):
             raise ValueError("flow: give either influence or by_diameter")
         for name, rows in (("influence", self.influence), ("by_diameter", self.by_diameter)):

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
-from tribodyn.workflows.scene.contact import Contact
+from tribodyn.workflows.scene.contact import ContactTable
 from tribodyn.workflows.scene.fields import Angle, Direction, Force, Number, Quantity, Table
 from tribodyn.workflows.scene.loads import Loads
 from tribodyn.workflows.scene.schema import Scene
@@ -89,7 +89,7 @@ class MatrixFiles(Table):
         return self
 
 
-class DofContact(Contact):
+class DofContact(ContactTable):
     """DOFs that touch, pair by pair, each other or the ground."""
 
     dofs: Annotated[tuple[tuple[Dof, ...], ...] | Variable, BeforeValidator(_rows)]
