@@ -18,12 +18,12 @@ from tribodyn.fem.elements import batches, connectivity, scatter
 from tribodyn.fem.material import AnyMaterial, Material
 
 
-def assemble(mesh: Any, material: Any, order: int | None = None) -> tuple[csr_matrix, csr_matrix]:
+def assemble(mesh: Any, material: Any, order: int = 5) -> tuple[csr_matrix, csr_matrix]:
     """Mass and stiffness over all nodes, DOF = node * 3 + component; reference points of an assembly have none.
 
     mesh : scikit-fem MeshHex2 or MeshTet2, or an assembly of such
     material : one for the whole mesh, or subdomain name -> material; of an assembly one, or body name -> these
-    order : quadrature order, 5 by default
+    order : quadrature order
     Returns M [kg], K [N/m], each (3 n_node, 3 n_node), symmetric to the last bit
     """
     found = [_assemble(piece.mesh, one, order) for piece, one in materials_of(mesh, material)]
@@ -36,7 +36,7 @@ def assemble(mesh: Any, material: Any, order: int | None = None) -> tuple[csr_ma
 
 
 def _assemble(
-    mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial], order: int | None
+    mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial], order: int
 ) -> tuple[csr_matrix, csr_matrix]:
     nodes = connectivity(mesh)
     kinds, kind = of_elements(mesh, material)

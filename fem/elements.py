@@ -13,10 +13,6 @@ from scipy.sparse import bsr_matrix, csr_matrix
 from skfem import MeshHex2, MeshTet2
 from skfem.quadrature import get_quadrature
 
-# Exact for the mass of straight-sided elements: 27 Gauss points in a hexahedron, 14 points in a tetrahedron.
-DEFAULT_ORDER = 5
-BATCH = 256
-
 
 def coordinates(mesh: Any) -> np.ndarray:
     """Coordinates of all second-order nodes (n_node, 3) [m]."""
@@ -36,21 +32,25 @@ def connectivity(mesh: Any) -> np.ndarray:
     return np.asarray(mesh.dofs.element_dofs.T)
 
 
-def batches(mesh: Any, order: int | None = None) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield (elements, N, grad N, weight) for up to 256 elements at a time.
+def batches(
+    mesh: Any, order: int = 5, size: int = 256
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+    """Yield (elements, N, grad N, weight) for some elements at a time.
 
-    order : polynomial order of the quadrature rule, 5 by default
+    order : polynomial order of the quadrature rule; 5 is exact for the mass of straight-sided elements, with 27 Gauss
+        points in a hexahedron and 14 points in a tetrahedron
+    size : elements at a time; memory only
     Yields elements (n_e,), N (n_q, n_a) [-], gradient (n_e, n_q, 3, n_a) [1/m], weight |J| w (n_e, n_q) [m3]
     Raises  ValueError where an element is folded
     """
     nodes, points = connectivity(mesh), coordinates(mesh)
     element = mesh.elem()
-    X, w = get_quadrature(element, DEFAULT_ORDER if order is None else order)
+    X, w = get_quadrature(element, order)
     values, slopes = zip(*(element.lbasis(X, a) for a in range(nodes.shape[1])), strict=True)
     N = np.stack(np.broadcast_arrays(*values)).T
     dN = np.stack([np.stack(np.broadcast_arrays(*s)) for s in slopes]).transpose(2, 1, 0)  # n_q, 3 local, n_a
-    for start in range(0, len(nodes), BATCH):
-        elements = np.arange(start, min(start + BATCH, len(nodes)))
+    for start in range(0, len(nodes), size):
+        elements = np.arange(start, min(start + size, len(nodes)))
         J = dN @ points[nodes[elements]][:, None]  # J[e, q, i, j] = d x_j / d X_i
         det = np.linalg.det(J)
         folded = (np.sign(det) != np.sign(det[:, :1])).any(axis=1) | (det[:, 0] == 0)

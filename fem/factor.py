@@ -20,8 +20,6 @@ from tribodyn.fem.refined import Refined
 # Relative residual of the softest direction that still counts as regular. Measured: a plate 2000 times longer than
 # thick reaches 0.05, a body that can move rigidly 6 to 1000.
 SINGULAR = 0.5
-NO_MEMORY = -2  # error code of PARDISO
-ANALYSE_AND_FACTORISE, SOLVE = 12, 33  # phases of PARDISO
 SOLVERS = ("pardiso", "superlu", "mumps", "single_precision", "multigrid")
 
 
@@ -120,6 +118,9 @@ def pardiso_available() -> bool:
 class Pardiso:
     """MKL PARDISO on the upper triangle, mtype 2 (positive definite) or -2 (indefinite), where `single` in float32."""
 
+    NO_MEMORY = -2  # error code
+    ANALYSE_AND_FACTORISE, SOLVE = 12, 33  # phases
+
     def __init__(self, K: csr_matrix, definite: bool = True, single: bool = False) -> None:
         from pypardiso import PyPardisoSolver
 
@@ -137,7 +138,7 @@ class Pardiso:
         # METIS, and no iterative refinement unless pivots were perturbed: MKL's defaults refine twice, 5 times slower
         for place, value in {1: 1, 2: 2, 8: 0, 10: 8, 28: int(single)}.items():
             self._solver.set_iparm(place, value)
-        self._call(ANALYSE_AND_FACTORISE, np.zeros(K.shape[0], self._kind))
+        self._call(self.ANALYSE_AND_FACTORISE, np.zeros(K.shape[0], self._kind))
 
     @property
     def negative(self) -> int:
@@ -146,7 +147,7 @@ class Pardiso:
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """Solution of the same shape as rhs, (n,) or (n, k)."""
-        return np.ascontiguousarray(self._call(SOLVE, np.asfortranarray(rhs, dtype=self._kind)))
+        return np.ascontiguousarray(self._call(self.SOLVE, np.asfortranarray(rhs, dtype=self._kind)))
 
     def _call(self, phase: int, rhs: np.ndarray) -> np.ndarray:
         """One call of PARDISO; rhs (n,) or (n, k) in Fortran's order. Raises MemoryError, ArithmeticError."""
@@ -166,7 +167,7 @@ class Pardiso:
             number(0), rhs.ctypes.data_as(ctypes.c_void_p), found.ctypes.data_as(ctypes.c_void_p),
             ctypes.byref(trouble),
         )  # fmt: skip
-        if trouble.value == NO_MEMORY:
+        if trouble.value == self.NO_MEMORY:
             raise MemoryError(f"the memory is not enough for the factors of {len(rows) - 1} equations")
         if trouble.value:
             raise ArithmeticError(f"PARDISO's error {trouble.value}")

@@ -12,9 +12,6 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import cg
 
-TOLERANCE = 1e-11  # of the residual beside the right-hand side
-MOST = 2000  # iterations
-
 
 class Multigrid:
     """Conjugate gradients preconditioned by smoothed aggregation.
@@ -25,6 +22,8 @@ class Multigrid:
     Source  Vanek, Mandel, Brezina 1996, doi 10.1007/BF02238511
     """
 
+    residual = 1e-11  # beside the right-hand side
+    most = 2000  # iterations
     name = "conjugate gradients with algebraic multigrid"
     tolerance = 1e-9  # that eigenvalues from its solutions can have
 
@@ -48,9 +47,11 @@ class Multigrid:
         def counted(_: Any) -> None:
             self.iterations += 1
 
-        found, trouble = cg(self._K, rhs, rtol=TOLERANCE, maxiter=MOST, M=self._preconditioner, callback=counted)
+        found, trouble = cg(
+            self._K, rhs, rtol=self.residual, maxiter=self.most, M=self._preconditioner, callback=counted
+        )
         if trouble:
-            raise RuntimeError(f"conjugate gradients do not converge in {MOST} iterations: take a direct solver")
+            raise RuntimeError(f"conjugate gradients do not converge in {self.most} iterations: take a direct solver")
         return np.asarray(found)
 
 

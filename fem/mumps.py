@@ -18,7 +18,6 @@ from scipy.sparse import csr_matrix
 
 COMMAND = "TRIBODYN_MPI"  # of the environment: how a Python with PETSc is started
 DEFAULT = "/usr/bin/python3"  # Debian's, one process
-PATIENCE = 20.0  # seconds for the processes to end
 WORKER = Path(__file__).with_name("mumps_worker.py")
 CURE = (
     "install PETSc for the system's Python (on Debian: apt-get install python3-petsc4py-real python3-mpi4py), and set "
@@ -29,11 +28,13 @@ CURE = (
 class Mumps:
     """A Cholesky factor, or LDL^T where the matrix is indefinite, that lives in MPI processes until this is deleted.
 
-    K : (n, n) symmetric. The environment's TRIBODYN_MPI tells how the processes are started; one alone by default
+    K : (n, n) symmetric. The environment's TRIBODYN_MPI is the command that starts the processes; one alone by default
     Raises  ValueError where PETSc cannot be started; ArithmeticError where a pivot is zero or negative; RuntimeError,
         as `solve`, where the processes end
     Source  MUMPS: Amestoy, Duff, Koster, L'Excellent 2001, doi 10.1137/S0895479899358194
     """
+
+    patience = 20.0  # seconds for the processes to end
 
     def __init__(self, K: csr_matrix, definite: bool = True) -> None:
         self._n = K.shape[0]
@@ -57,12 +58,12 @@ class Mumps:
             )  # fmt: skip
         except OSError as trouble:
             raise ValueError(f"the solver mumps cannot start {command[0]} ({trouble.strerror}): {CURE}") from None
-        told = self._told()
-        if told[:1] == ["trouble"]:
-            raise ArithmeticError(f"MUMPS's error {told[1]}")
-        if told[:1] != ["ready"]:
+        words = self._answer()
+        if words[:1] == ["trouble"]:
+            raise ArithmeticError(f"MUMPS's error {words[1]}")
+        if words[:1] != ["ready"]:
             raise ValueError(f"the solver mumps does not start{self._why()}: {CURE}")
-        self.name = f"MUMPS of PETSc {told[2]}, {told[1]} MPI process{'es' if told[1] != '1' else ''}"
+        self.name = f"MUMPS of PETSc {words[2]}, {words[1]} MPI process{'es' if words[1] != '1' else ''}"
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """Solution of the same shape as rhs, (n,) or (n, k)."""
@@ -79,12 +80,12 @@ class Mumps:
             self._process.stdin.write(f"{columns.shape[1]}\n")
             self._process.stdin.flush()
         except OSError:
-            pass  # what it told last says why
-        if self._told() != ["solved"]:
+            pass  # its last answer says why
+        if self._answer() != ["solved"]:
             raise RuntimeError(f"the processes of MUMPS have ended{self._why()}")
         return np.array(found, order="C").reshape(np.shape(rhs))
 
-    def _told(self) -> list[str]:
+    def _answer(self) -> list[str]:
         """Words of the next line of the first process; none where it has ended."""
         assert self._process.stdout is not None
         return self._process.stdout.readline().split()
@@ -102,7 +103,7 @@ class Mumps:
             for pipe in (process.stdin, process.stdout):
                 pipe.close()  # without a next line they end
             try:
-                process.wait(PATIENCE)
+                process.wait(self.patience)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()

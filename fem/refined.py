@@ -14,11 +14,6 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix, diags_array
 
-TOLERANCE = 1e-12  # of the residual beside the right-hand side, both scaled
-MOST = 300  # iterations
-BLOCK = 16  # right-hand sides at once: six arrays of their size are held
-STIFFER = (0.0, 1e-7, 1e-6, 1e-5)  # added to the scaled diagonal; the rounding of single precision is 6e-8
-
 
 class Refined:
     """Conjugate gradients preconditioned by a factor that is nearly one of the matrix.
@@ -31,6 +26,10 @@ class Refined:
         doi 10.1137/19M1298263, section 2
     """
 
+    residual = 1e-12  # beside the right-hand side, both scaled
+    most = 300  # iterations
+    at_once = 16  # right-hand sides: six arrays of their size are held
+    stiffer = (0.0, 1e-7, 1e-6, 1e-5)  # added to the scaled diagonal; the rounding of single precision is 6e-8
     name = "MKL PARDISO in single precision, with conjugate gradients"
     tolerance = 1e-10  # that eigenvalues from its solutions can have
 
@@ -41,12 +40,12 @@ class Refined:
         self._K, self._scale, self.iterations = K, 1 / np.sqrt(diagonal), 0
         scaling = diags_array(self._scale)
         scaled = csr_matrix(scaling @ K @ scaling)
-        for stiffer in STIFFER:
+        for stiffer in self.stiffer:
             scaled.setdiag(1.0 + stiffer)
             try:
                 self._factor = nearly(scaled)
             except ArithmeticError:
-                if stiffer == STIFFER[-1]:
+                if stiffer == self.stiffer[-1]:
                     raise
             else:
                 break
@@ -55,19 +54,19 @@ class Refined:
         """Solution of the same shape as rhs, (n,) or (n, k)."""
         columns = np.asarray(rhs, float).reshape(len(rhs), -1)
         found = np.empty(columns.shape)
-        for start in range(0, columns.shape[1], BLOCK):
-            found[:, start : start + BLOCK] = self._solve(columns[:, start : start + BLOCK])
+        for start in range(0, columns.shape[1], self.at_once):
+            found[:, start : start + self.at_once] = self._solve(columns[:, start : start + self.at_once])
         return found.reshape(np.shape(rhs))
 
     def _solve(self, rhs: np.ndarray) -> np.ndarray:
         """Solution (n, k) of some right-hand sides."""
         scale = self._scale[:, None]
         r = scale * rhs
-        wanted = TOLERANCE * np.linalg.norm(r, axis=0)
+        wanted = self.residual * np.linalg.norm(r, axis=0)
         x = np.zeros_like(r)
         z = self._nearly(r)
         p, rz = z.copy(), np.sum(r * z, axis=0)
-        for _ in range(MOST):
+        for _ in range(self.most):
             if (np.linalg.norm(r, axis=0) <= wanted).all():
                 return np.asarray(scale * x)
             self.iterations += 1
@@ -79,7 +78,7 @@ class Refined:
             after = np.sum(r * z, axis=0)
             p = z + _over(after, rz) * p
             rz = after
-        raise RuntimeError(f"the factor in single precision is too far off: no solution in {MOST} iterations")
+        raise RuntimeError(f"the factor in single precision is too far off: no solution in {self.most} iterations")
 
     def _nearly(self, r: np.ndarray) -> np.ndarray:
         """By the factor, each column at a size that single precision can hold."""

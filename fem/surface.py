@@ -16,7 +16,6 @@ from tribodyn.fem.elements import connectivity, coordinates
 # The four quads that a nine-node face shows, in its own node order: corners, mid-sides, middle.
 NINE_NODE_QUADS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
 OPPOSITE = np.array([2, 0, 1])  # corner of a six-node face opposite each of its sides
-FACE_ORDER = 6
 
 
 @dataclass(frozen=True)
@@ -146,7 +145,7 @@ def face_integrals(mesh: Any, facets: np.ndarray, vertices_only: bool = False) -
     hexahedra = isinstance(mesh, MeshHex2)
     geometry = ElementQuad2() if hexahedra else ElementTriP2()
     linear: Any = ElementQuad1() if hexahedra else ElementTriP1()
-    X, w = get_quadrature(geometry, FACE_ORDER)
+    X, w = get_quadrature(geometry, 6)  # exact for a shape function times the normal of a flat face
     nodes, points = _facet_nodes(mesh, facets), coordinates(mesh)
     slopes = np.stack([_tabulate(geometry.lbasis(X, a)[1]) for a in range(nodes.shape[1])])  # n_a, 2, n_q
     tangents = np.einsum("aiq,fax->fiqx", slopes, points[nodes])

@@ -12,12 +12,8 @@ import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import maximum_filter
 
-from tribodyn.geometry.surface import HeightMap, check, fill_holes, level, prepare, remove_outliers, split
+from tribodyn.geometry.surface import LIMITS, HeightMap, mended, split
 from tribodyn.geometry.surface_pair import centred
-
-FEWEST = 30  # summits below which there are no statistics of them
-STEPS = 0.1  # points with a highest neighbour as high, over summits, beyond which the heights come in steps
-ROWS = 101  # of a table of gaps
 
 
 @dataclass(frozen=True)
@@ -89,7 +85,7 @@ class Asperities:
         """(n,) how far each is below the highest [m]."""
         return self.height.max() - self.height
 
-    def table(self, rows: int = ROWS) -> np.ndarray:
+    def table(self, rows: int = 101) -> np.ndarray:
         """(rows, 2) gaps [m], equidistant from the highest to the lowest summit, and summits per m2 and m of gap.
 
         The density is linear between the rows and keeps the number and the mean gap of the summits: each counts at
@@ -127,16 +123,11 @@ def identify(
             continue
         if shortest is None:
             _refuse_steps(face)
-        if cutoff is None:
-            check(face)
-            without_spikes, spikes = remove_outliers(face)
-            whole, holes = fill_holes(without_spikes)
-            rough, said = level(whole), (*spikes, *holes)
-        else:
-            prepared = prepare(face, cutoff)
-            rough, said = prepared.roughness, prepared.repairs
+        rough, changed = mended(face)
+        if cutoff is not None:
+            rough = split(rough, cutoff)[1]
         faces.append(centred(split(rough, shortest)[0] if shortest is not None else rough))
-        repairs += said
+        repairs += changed
     both = faces[0] if len(faces) == 1 else _sum(*faces)
     height, curvature = summits(both)
     area = float(np.prod([step * (n - 2) for step, n in zip(both.spacing, both.z.shape, strict=True)]))
@@ -163,7 +154,7 @@ def summits(surface: HeightMap) -> tuple[np.ndarray, np.ndarray]:
     """Heights above the mean of the face [m] and curvatures [1/m] of the points above all eight neighbours, (n,) each.
 
     The curvature is the mean of the second differences along x and y. The rim holds no summit.
-    Raises  ValueError: holes, fewer than FEWEST summits
+    Raises  ValueError: holes, too few summits
     """
     z = surface.z
     if not np.isfinite(z).all():
@@ -171,9 +162,10 @@ def summits(surface: HeightMap) -> tuple[np.ndarray, np.ndarray]:
     inner = z[1:-1, 1:-1]
     found = inner > _highest_neighbour(z)
     count = int(found.sum())
-    if count < FEWEST:
+    if count < LIMITS.summits:
         raise ValueError(
-            f"{surface.name}: {count} summits are too few for statistics, {FEWEST} are wanted: measure a larger area"
+            f"{surface.name}: {count} summits are too few for statistics, {LIMITS.summits} are wanted: "
+            "measure a larger area"
         )
     bend_x, bend_y = _bends(surface)
     return inner[found] - z.mean(), -0.5 * (bend_x + bend_y)[found]
@@ -194,10 +186,10 @@ def _refuse_steps(surface: HeightMap) -> None:
     z = np.where(np.isfinite(surface.z), surface.z, -np.inf)
     inner, highest, lowest = z[1:-1, 1:-1], _highest_neighbour(z), -_highest_neighbour(-z)
     single, shared = int((inner > highest).sum()), int(((inner == highest) & (inner > lowest)).sum())
-    if shared > STEPS * max(single, 1):
+    if shared > LIMITS.terraces * max(single, 1):
         raise ValueError(
             f"{surface.name}: {shared} points are as high as their highest neighbour and {single} above all of them, "
-            "so that its heights come in steps and summits cannot be told: give `shortest`, some steps of the grid"
+            "so that its heights come in steps and summits cannot be found: give `shortest`, some steps of the grid"
         )
 
 

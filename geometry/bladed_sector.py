@@ -28,10 +28,6 @@ SHARED = (
     *("shroud_length", "clearance", *OF_BLADE),
 )  # with geometry.blade
 
-LAP = 0.1  # part of its length by which the flank of the slot starts and ends below that of the root
-BELOW_PLATFORM = 2e-3  # that opens between the posts of the disk and the platforms [m]
-PARTING = 4e-4  # that opens between root and slot beside the flanks [m]
-
 
 @dataclass(frozen=True)
 class Parameters:
@@ -49,6 +45,9 @@ class Parameters:
     gap_bottom, gap_top : between neighbouring platforms at their lower and upper edge
     neck_width, bulb_width : of the root above and below its flanks
     neck_height, flank_height, bulb_height : of the root along the radius, from the platform downwards
+    lap : part of its length by which the flank of the slot starts and ends below that of the root
+    post_gap, root_gap : that open between the posts of the disk and the platforms, and between root and slot beside the
+        flanks
     disk_radius : of the bore; disk_taper : axial length of the disk at its bore over that at the rim
     damper_length : axial; damper_low, damper_high : where its faces begin and end, over the platform's height
     n_along, n_up : contact nodes along and up a shroud contact face, at vertices
@@ -85,6 +84,9 @@ class Parameters:
     neck_height: float = 0.008
     flank_height: float = 0.002
     bulb_height: float = 0.006
+    lap: float = 0.1
+    post_gap: float = 2e-3
+    root_gap: float = 4e-4
     disk_radius: float = 0.11
     disk_taper: float = 0.6
     damper_length: float = 0.036
@@ -108,7 +110,8 @@ class Parameters:
     def __post_init__(self) -> None:
         checks.positive(self, "platform_height", "platform_length", "gap_bottom", "gap_top")
         checks.positive(self, "neck_width", "bulb_width", "neck_height", "flank_height", "bulb_height")
-        checks.positive(self, "disk_radius", "damper_length")
+        checks.positive(self, "disk_radius", "damper_length", "post_gap", "root_gap")
+        checks.within(self, "lap", least=0.0, most=0.5, unit="a ratio")
         checks.positive(self, "disk_taper", unit="a ratio")
         checks.within(self, "damper_low", "damper_high", least=0.0, most=1.0, unit="a fraction")
         checks.whole(self, "n_platform", "n_neck", "n_flank", "n_axial", "n_slot", "n_post", least=1)
@@ -138,13 +141,13 @@ class Parameters:
                 f"geometry.disk_radius is {self.disk_radius}: give a radius below {self.bottom:.4g} m, the bottom of "
                 "the slot"
             )
-        if self.slot(LAP)[1] >= self.post_top:
+        if self.slot(self.lap)[1] >= self.post_top:
             raise ValueError(
                 f"geometry.neck_height is {self.neck_height}: give more than "
-                f"{self.under - self.post_top - LAP * self.flank_height:.4g}, or the posts of the disk end below the "
-                "flanks of its slot"
+                f"{self.under - self.post_top - self.lap * self.flank_height:.4g}, or the posts of the disk end below "
+                "the flanks of its slot"
             )
-        if self.slot(1 + LAP)[0] >= 0.9 * self.bottom * np.tan(self.pitch / 2):
+        if self.slot(1 + self.lap)[0] >= 0.9 * self.bottom * np.tan(self.pitch / 2):
             raise ValueError(
                 f"geometry.bulb_width is {self.bulb_width}: the disk has no room for it between its seams; give less, "
                 "or fewer geometry.n_blades"
@@ -177,12 +180,12 @@ class Parameters:
     @property
     def bottom(self) -> float:
         """Height z of the bottom of the slot [m]."""
-        return self.flank_top - self.flank_height - self.bulb_height - PARTING
+        return self.flank_top - self.flank_height - self.bulb_height - self.root_gap
 
     @property
     def post_top(self) -> float:
         """Height z of the top of the disk's posts, below the lowest corners of the platforms [m]."""
-        return self.under * float(np.cos(self.pitch / 2)) - BELOW_PLATFORM
+        return self.under * float(np.cos(self.pitch / 2)) - self.post_gap
 
     def slot(self, t: float) -> np.ndarray:
         """Point y, z (2,) of the line of the right flank, 0 at its upper and 1 at its lower edge on the root [m]."""
@@ -272,7 +275,7 @@ def _root(p: Parameters, base: Platform, rows: tuple[int, ...]) -> list[blocks.B
 def _disk(p: Parameters) -> blocks.Body:
     """Two posts beside the slot and the disk below them, down to the bore."""
     half = p.platform_length / 2
-    upper, lower = p.slot(LAP), p.slot(1 + LAP)
+    upper, lower = p.slot(p.lap), p.slot(1 + p.lap)
     wall = [np.array([lower[0], p.bottom]), lower, upper, np.array([upper[0], p.post_top])]
 
     def placed(profile: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:

@@ -9,8 +9,6 @@ import numpy as np
 
 from tribodyn.geometry import blocks, checks, rings
 
-CORE = 0.55  # of the radius of the shank: where its square core ends
-
 MESH = ("n_around", "n_grip", "n_nut", "n_end", "n_head")  # numbers of elements
 
 
@@ -21,6 +19,7 @@ class Parameters:
     diameter, length : of the shank [m]; flats : of the head [m]; head_height [m]
     seat_diameter : inside of the ring by which the head rests [m]
     grip : distance of the nut from the head [m]; nut_height : over which the shank holds the nut [m]
+    core : where the square core of the shank ends, over its radius
     n_around : elements around, a multiple of 12; n_grip, n_nut, n_end, n_head : along grip, nut, free end and head
     """
 
@@ -31,6 +30,7 @@ class Parameters:
     seat_diameter: float = 8.73125e-3
     grip: float = 28.575e-3
     nut_height: float = 5.159375e-3
+    core: float = 0.55
     n_around: int = 12
     n_grip: int = 3
     n_nut: int = 1
@@ -39,6 +39,7 @@ class Parameters:
 
     def __post_init__(self) -> None:
         checks.positive(self, "diameter", "length", "flats", "head_height", "seat_diameter", "grip", "nut_height")
+        checks.within(self, "core", least=0.1, most=0.7, unit="a ratio")
         checks.whole(self, "n_around", "n_grip", "n_nut", "n_end", "n_head", least=1)
         if self.n_around % 12:
             raise ValueError(
@@ -54,7 +55,7 @@ def build(parameters: Parameters, path: str | Path) -> None:
     """Write the mesh. Groups: volume "bolt"; surfaces "under_head", "thread" where the nut holds, "head", "end"."""
     p = parameters
     radius, across = p.diameter / 2, p.n_around // 4
-    square, shank, seat = rings.diamond(CORE * radius), rings.circle(radius), rings.circle(p.seat_diameter / 2)
+    square, shank, seat = rings.diamond(p.core * radius), rings.circle(radius), rings.circle(p.seat_diameter / 2)
     parts = []
     stations = [
         (-p.length, -p.grip - p.nut_height, p.n_end, {"w-": "end"}, None),
@@ -65,7 +66,7 @@ def build(parameters: Parameters, path: str | Path) -> None:
     for start, stop, count, ends, side in stations:
         z = np.linspace(start, stop, count + 1)
         outside = {} if side is None else {"v+": side}
-        parts.append(rings.core(CORE * radius, across, z, "bolt", ends))
+        parts.append(rings.core(p.core * radius, across, z, "bolt", ends))
         parts.append(rings.ring(square, shank, p.n_around, 1, z, "bolt", {**ends, **outside}))
     z = np.linspace(0.0, p.head_height, p.n_head + 1)
     parts.append(rings.ring(shank, seat, p.n_around, 1, z, "bolt", {"w+": "head"}))

@@ -14,7 +14,6 @@ from tribodyn.geometry import checks
 from tribodyn.geometry.gmsh_session import save, session
 
 MESH = ("n_length",)  # numbers of elements
-SIDES = 8  # of a hole, straight, so that no element bends
 
 
 @dataclass(frozen=True)
@@ -22,7 +21,8 @@ class Parameters:
     """The clamped leg stands along z, its back on x = 0; the other lies along x, its lower face on z = 0.
 
     length, height : of the lying and of the standing leg, outside [m]; width : along y; thickness : of both legs
-    hole, holes : diameter of the octagonal holes through the standing leg, in a row up the middle, and their number
+    hole, holes : diameter of the holes through the standing leg, in a row up the middle, and their number
+    sides : of a hole, straight, so that no element bends
     pad_length : of the pad below the end of the lying leg
     n_length : elements along the lying leg, which sets the size of all
     """
@@ -33,13 +33,14 @@ class Parameters:
     thickness: float = 0.008
     hole: float = 0.008
     holes: int = 2
+    sides: int = 8
     pad_length: float = 0.02
     n_length: int = 14
 
     def __post_init__(self) -> None:
         checks.positive(self, "length", "height", "width", "thickness", "hole", "pad_length")
         checks.whole(self, "holes", least=0)
-        checks.whole(self, "n_length", least=3)
+        checks.whole(self, "n_length", "sides", least=3)
         if self.thickness >= self.height or self.thickness + self.pad_length >= self.length:
             raise ValueError(
                 f"geometry.thickness is {self.thickness}: keep it below height, and with pad_length below length"
@@ -61,7 +62,7 @@ def build(parameters: Parameters, path: str | Path) -> None:
         standing = occ.addBox(0, 0, 0, p.thickness, p.width, p.height)
         for number in range(p.holes):
             z = p.thickness + (p.height - p.thickness) * (number + 0.5) / p.holes
-            turn = np.pi / SIDES * (2 * np.arange(SIDES) + 1)
+            turn = np.pi / p.sides * (2 * np.arange(p.sides) + 1)
             corners = [occ.addPoint(0, p.width / 2 + p.hole / 2 * c, z + p.hole / 2 * s) for c, s in _circle(turn)]
             sides = [occ.addLine(a, b) for a, b in pairwise([*corners, corners[0]])]
             face = occ.addPlaneSurface([occ.addCurveLoop(sides)])

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 SYSTEM_LIBRARIES = "libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1"
-LAST = 20  # bytes of a mesh file that hold the end of its last section
 
 
 class GmshUnavailable(ValueError):
@@ -53,6 +52,7 @@ def save(gmsh: Any, path: str | Path) -> None:
     gmsh.option.setNumber("Mesh.SaveAll", 0)
     gmsh.write(str(path))
     with open(path, "rb") as file:
-        file.seek(-min(LAST, file.seek(0, os.SEEK_END)), os.SEEK_END)
+        tail = min(len(b"\n$EndElements\r\n"), file.seek(0, os.SEEK_END))
+        file.seek(-tail, os.SEEK_END)
         if b"$End" not in file.read():
             raise OSError(f"the mesh cannot be written to '{path}': is the disk full?")

@@ -21,18 +21,37 @@ import numpy as np
 
 from tribodyn.geometry import blocks, checks, grid
 
-# Fixed shapes, ours [m].
-SHANK = 0.010  # the upper specimen hangs on a shank of this length and of the beam's whole thickness
-SPECIMEN_SIDE, SPECIMEN_DEPTH = 0.020, 0.040  # lower specimen, reaches into the slot
-HEAD_DEPTH, HEAD_WIDENING_X, HEAD_WIDENING_Y = 0.015, 1.5, 2.0  # separator below the lower specimen
-LIMB_DEPTH = 0.025  # vertical extent of the two limbs of the separator, at 45 degrees to the normal (thesis 5.2.1)
-PLATE_SIDE, PLATE_DEPTH = 0.140, 0.020  # moving platform
-SCREWS = ((-0.040, -0.045), (0.040, -0.045), (-0.040, 0.045), (0.040, 0.045), (0.0, -0.070), (0.0, 0.070))
-PINS = ((-0.070, 0.0), (0.070, 0.0))
-COVER_DEPTH = 0.010
-COLUMN_ABOVE = 0.020  # of the column over the beam
+
+@dataclass(frozen=True)
+class Shapes:
+    """Fixed dimensions, ours [m].
+
+    shank : length of the shank, of the beam's whole thickness, that the upper specimen hangs on
+    specimen_side, specimen_depth : of the lower specimen, which reaches into the slot
+    head_depth, head_x, head_y : of the separator below the lower specimen, and how much it widens along x and y [-]
+    limb_depth : vertical extent of the two limbs of the separator, at 45 degrees to the normal (thesis 5.2.1)
+    plate_side, plate_depth : of the moving platform; screws, pins : their places below it
+    cover_depth : of the cover plate; column_above : of the column over the beam
+    """
+
+    shank: float = 0.010
+    specimen_side: float = 0.020
+    specimen_depth: float = 0.040
+    head_depth: float = 0.015
+    head_x: float = 1.5
+    head_y: float = 2.0
+    limb_depth: float = 0.025
+    plate_side: float = 0.140
+    plate_depth: float = 0.020
+    screws: tuple[tuple[float, float], ...] = (
+        (-0.040, -0.045), (0.040, -0.045), (-0.040, 0.045), (0.040, 0.045), (0.0, -0.070), (0.0, 0.070),
+    )  # fmt: skip
+    pins: tuple[tuple[float, float], ...] = ((-0.070, 0.0), (0.070, 0.0))
+    cover_depth: float = 0.010
+    column_above: float = 0.020
 
 
+OURS = Shapes()
 MESH = ("n_contact_length", "n_contact_width", "n_root", "n_half")  # numbers of elements or nodes
 
 
@@ -81,7 +100,7 @@ class Parameters:
         checks.odd(self, "n_contact_length", "n_contact_width")
         checks.whole(self, "n_root", "n_half", least=1)
         for name, largest, what in (
-            ("contact_length", SHANK, "the shank of the upper specimen"),
+            ("contact_length", OURS.shank, "the shank of the upper specimen"),
             ("contact_width", self.thickness, "geometry.thickness"),
             ("foot", 0.9 * self.protrusion, "nine tenths of geometry.protrusion"),
             ("protrusion", self.slot_height - 0.001, "geometry.slot_height less 1 mm"),
@@ -96,8 +115,10 @@ class Parameters:
                 f"geometry.longest is {self.longest}: the free length of {self.free_length:g} m takes more than "
                 f"{checks.MOST} such elements; give at least {self.free_length / checks.MOST:.4g} m"
             )
-        if self.slot_length <= SPECIMEN_SIDE:
-            raise ValueError(f"geometry.slot_length is {self.slot_length}: the lower specimen needs {SPECIMEN_SIDE} m")
+        if self.slot_length <= OURS.specimen_side:
+            raise ValueError(
+                f"geometry.slot_length is {self.slot_length}: the lower specimen needs {OURS.specimen_side} m"
+            )
         if self.root_length >= self.column_length:
             raise ValueError(
                 f"geometry.root_length is {self.root_length}: keep it below column_length ({self.column_length})"
@@ -156,7 +177,7 @@ def _column(p: Parameters) -> blocks.Body:
     whole = np.append(behind[0], root)
     across = p.thickness / 2 + grid.towards_start(0.0, p.column_depth, 3, 2.0)
     below = np.linspace(-p.column_height, 0.0, 3)
-    above = np.array([p.height, p.height + COLUMN_ABOVE])
+    above = np.array([p.height, p.height + OURS.column_above])
     return blocks.body(
         [
             blocks.Block(whole, across, below, "column", {"w-": "column_base"}),
@@ -173,16 +194,16 @@ def _beam(p: Parameters) -> blocks.Body:
     root, (_, above) = _root_lines(p), _height_lines(p)
     up = np.unique(np.concatenate(_height_lines(p)))
     thick = across * (p.thickness / p.contact_width)
-    cover = np.array([thick[0] - COVER_DEPTH, thick[0]])
+    cover = np.array([thick[0] - OURS.cover_depth, thick[0]])
     quarters = p.solid_length * np.array([0.25, 0.5, 0.75, 1.0])
     span = _lines_through([0.0, p.shaker_distance, *quarters], p.longest)
-    specimen = p.contact_x + along * (SHANK / p.contact_length)
+    specimen = p.contact_x + along * (OURS.shank / p.contact_length)
     arm = np.concatenate([span[-1:], specimen, [p.free_length]])
     taper = p.contact_z + np.array([0.0, p.foot, (p.foot + p.protrusion) / 2, p.protrusion])
 
     def widen(at: np.ndarray) -> np.ndarray:
         rise = np.clip((at[:, 2] - taper[1]) / (taper[2] - taper[1]), 0.0, 1.0)
-        scale = 1 + rise[:, None] * (np.array([SHANK / p.contact_length, p.thickness / p.contact_width]) - 1)
+        scale = 1 + rise[:, None] * (np.array([OURS.shank / p.contact_length, p.thickness / p.contact_width]) - 1)
         return np.column_stack([p.contact_x + scale[:, 0] * at[:, 0], scale[:, 1] * at[:, 1], at[:, 2]])
 
     points: dict[str, tuple[float, float, float]] = {
@@ -214,18 +235,20 @@ def _lines_through(stops: list[float], longest: float) -> np.ndarray:
 def _platform(p: Parameters) -> blocks.Body:
     """Lower specimen on the separator, whose two limbs stand at 45 degrees on the platform."""
     along, across = _contact_lines(p)
-    side = SPECIMEN_SIDE / 2
+    side = OURS.specimen_side / 2
     u, v = np.concatenate([[-side], along, [side]]), np.concatenate([[-side], across, [side]])
     top = p.contact_z
-    foot, neck, sole, bottom = top - np.cumsum([SPECIMEN_DEPTH, HEAD_DEPTH, LIMB_DEPTH, PLATE_DEPTH])
-    depths = np.array([foot, (foot + top) / 2, (foot + 7 * top) / 8, top])
-    wide = np.array([HEAD_WIDENING_X, HEAD_WIDENING_Y])
+    foot, neck, sole, bottom = top - np.cumsum(
+        [OURS.specimen_depth, OURS.head_depth, OURS.limb_depth, OURS.plate_depth]
+    )
+    up = np.array([foot, (foot + top) / 2, (foot + 7 * top) / 8, top])
+    wide = np.array([OURS.head_x, OURS.head_y])
 
     def place(at: np.ndarray) -> np.ndarray:
         return at + [p.contact_x, 0.0, 0.0]
 
     def head(at: np.ndarray) -> np.ndarray:
-        scale = 1 + (foot - at[:, 2:]) / HEAD_DEPTH * (wide - 1)
+        scale = 1 + (foot - at[:, 2:]) / OURS.head_depth * (wide - 1)
         return place(np.column_stack([scale * at[:, :2], at[:, 2]]))
 
     def limb(sign: int) -> blocks.Block:
@@ -236,20 +259,20 @@ def _platform(p: Parameters) -> blocks.Body:
         lines = v[:2] if sign < 0 else v[-2:]
         return blocks.Block(u, lines, np.linspace(sole, neck, 3), "separator", mapping=lean)
 
-    inner, outer = wide[1] * v[-2] + LIMB_DEPTH, wide[1] * v[-1] + LIMB_DEPTH  # where a limb stands
-    half = PLATE_SIDE / 2
-    plate_x = np.concatenate([[-half, SCREWS[0][0]], wide[0] * u, [SCREWS[1][0], half]])
+    inner, outer = wide[1] * v[-2] + OURS.limb_depth, wide[1] * v[-1] + OURS.limb_depth  # where a limb stands
+    half = OURS.plate_side / 2
+    plate_x = np.concatenate([[-half, OURS.screws[0][0]], wide[0] * u, [OURS.screws[1][0], half]])
     plate_y = np.concatenate([[-half, -outer, -inner, 0.0, inner, outer, half]])
     return blocks.body(
         [
-            blocks.Block(u, v, depths, "lower_specimen", {"w+": "lower_contact"}, place),
+            blocks.Block(u, v, up, "lower_specimen", {"w+": "lower_contact"}, place),
             blocks.Block(u, v, np.linspace(neck, foot, 3), "separator", mapping=head),
             limb(-1),
             limb(1),
             blocks.Block(plate_x, plate_y, np.array([bottom, sole]), "platform", mapping=place),
         ],
         points={
-            "screws": np.array([(p.contact_x + x, y, bottom) for x, y in SCREWS]),
-            "pins": np.array([(p.contact_x + x, y, bottom) for x, y in PINS]),
+            "screws": np.array([(p.contact_x + x, y, bottom) for x, y in OURS.screws]),
+            "pins": np.array([(p.contact_x + x, y, bottom) for x, y in OURS.pins]),
         },
     )

@@ -13,18 +13,37 @@ import scipy.sparse as sp
 from scipy.ndimage import distance_transform_edt, median_filter
 from scipy.sparse.linalg import spsolve
 
-LARGEST_SIZE = 1.0
-SMALLEST_SIZE = 1e-6
-"""Sides of a face [m] beyond which the lateral unit must be wrong."""
-
-STEEPEST = 1.0
-"""Median slope [-] beyond which the height unit must be wrong; machined faces have some hundredths."""
-
-FLATTEST = 1e-10
-"""Peak to valley [m], about an atom, below which the height unit must be wrong."""
-
 GAUSS_CONSTANT = np.sqrt(np.log(2) / np.pi)
 """alpha of ISO 16610-21: a wave as long as the cut-off passes with one half of its amplitude."""
+
+
+@dataclass(frozen=True)
+class MapLimits:
+    """What a measured face can be.
+
+    largest, smallest : sides [m] beyond which the lateral unit must be wrong
+    steepest : median slope beyond which the height unit must be wrong; machined faces have some hundredths
+    flattest : peak to valley [m], about an atom, below which the height unit must be wrong
+    spike : distance of a spike from its surroundings, in robust standard deviations (1.4826 times the median of all
+        distances); it also stands out by a tenth of the height that nine tenths of the levelled surface keep to, so
+        that smooth maps lose no crests
+    spikes, holes : shares of the points beyond which a map is refused
+    summits : below which there are no statistics of them
+    terraces : points with a highest neighbour as high, over summits, beyond which the heights come in steps
+    """
+
+    largest: float = 1.0
+    smallest: float = 1e-6
+    steepest: float = 1.0
+    flattest: float = 1e-10
+    spike: float = 8.0
+    spikes: float = 0.05
+    holes: float = 0.2
+    summits: int = 30
+    terraces: float = 0.1
+
+
+LIMITS = MapLimits()
 
 
 @dataclass(frozen=True)
@@ -88,11 +107,16 @@ def prepare(surface: HeightMap, cutoff: float, expected_size: tuple[float, float
     expected_size : sides of the face it should cover [m]
     Raises  ValueError: what the steps refuse
     """
+    levelled, repairs = mended(surface, expected_size)
+    return Prepared(*split(levelled, cutoff), repairs)
+
+
+def mended(surface: HeightMap, expected_size: tuple[float, float] | None = None) -> tuple[HeightMap, tuple[str, ...]]:
+    """The map without spikes and holes, levelled, and what was changed; arguments and errors as of `prepare`."""
     check(surface, expected_size)
     without_spikes, spikes = remove_outliers(surface)
     whole, holes = fill_holes(without_spikes)
-    waviness, roughness = split(level(whole), cutoff)
-    return Prepared(waviness, roughness, (*spikes, *holes))
+    return level(whole), (*spikes, *holes)
 
 
 def check(surface: HeightMap, expected_size: tuple[float, float] | None = None) -> None:
@@ -104,7 +128,7 @@ def check(surface: HeightMap, expected_size: tuple[float, float] | None = None) 
     if not np.isfinite(surface.z).any():
         raise ValueError(f"{name}: no point has a height: check the file and its missing-value code")
     for axis, side in zip("xy", surface.size, strict=True):
-        if not SMALLEST_SIZE <= side <= LARGEST_SIZE:
+        if not LIMITS.smallest <= side <= LIMITS.largest:
             raise ValueError(f"{name}: it is {side:g} m long in {axis}: give the lateral unit, 1e-6 for micrometres")
     if expected_size is not None:
         for axis, side, wanted in zip("xy", surface.size, expected_size, strict=True):
@@ -114,24 +138,19 @@ def check(surface: HeightMap, expected_size: tuple[float, float] | None = None) 
                 )
     slopes = [np.abs(np.diff(surface.z, axis=axis)) / step for axis, step in enumerate(surface.spacing)]
     known = np.concatenate([slope[np.isfinite(slope)] for slope in slopes])
-    if known.size and np.median(known) > STEEPEST:
+    if known.size and np.median(known) > LIMITS.steepest:
         raise ValueError(
             f"{name}: its median slope is {np.median(known):.3g}, steeper than any machined face: "
             "give the height unit, such as 1e-6 for micrometres"
         )
     span = np.nanmax(surface.z) - np.nanmin(surface.z)
-    if 0 < span < FLATTEST:
+    if 0 < span < LIMITS.flattest:
         raise ValueError(f"{name}: peak to valley is {span:.3g} m, less than an atom: give the height unit")
 
 
-def remove_outliers(
-    surface: HeightMap, factor: float = 8.0, largest_share: float = 0.05
-) -> tuple[HeightMap, list[str]]:
+def remove_outliers(surface: HeightMap) -> tuple[HeightMap, list[str]]:
     """Turn spikes into holes: points far off the median of the 5 x 5 points around them.
 
-    factor : distance in robust standard deviations (1.4826 times the median of all distances); a spike also stands out
-        by a tenth of the height that nine tenths of the levelled surface keep to, so that smooth maps lose no crests
-    largest_share : share of measured points beyond which the map is refused
     Returns the map with NaN at spikes, and what was done
     """
     measured = np.isfinite(surface.z)
@@ -140,11 +159,11 @@ def remove_outliers(
     distance = np.abs(closed - median_filter(closed, size=5, mode="nearest"))
     sigma = 1.4826 * np.median(distance[measured])
     low, high = np.percentile(level(surface).z[measured], (5, 95))
-    spikes = measured & (distance > factor * sigma) & (distance > 0.1 * (high - low))
+    spikes = measured & (distance > LIMITS.spike * sigma) & (distance > 0.1 * (high - low))
     count = int(spikes.sum())
     if count == 0:
         return surface, []
-    if count > largest_share * measured.sum():
+    if count > LIMITS.spikes * measured.sum():
         raise ValueError(
             f"{surface.name}: {count} of {measured.sum()} points are spikes: this is noise, not a face with outliers"
         )
@@ -154,20 +173,19 @@ def remove_outliers(
     ]
 
 
-def fill_holes(surface: HeightMap, largest_share: float = 0.2) -> tuple[HeightMap, list[str]]:
+def fill_holes(surface: HeightMap) -> tuple[HeightMap, list[str]]:
     """Close holes with the surface that has no curvature of its own there (Laplace), bounded by its rim.
 
-    largest_share : share of the map beyond which it is refused
     Returns the map without NaN, and what was done
     """
     holes = ~np.isfinite(surface.z)
     count = int(holes.sum())
     if count == 0:
         return surface, []
-    if count > largest_share * holes.size:
+    if count > LIMITS.holes * holes.size:
         raise ValueError(
             f"{surface.name}: {100 * count / holes.size:.0f} % of its points have no height, more than "
-            f"{100 * largest_share:.0f} %: measure again or crop it"
+            f"{100 * LIMITS.holes:.0f} %: measure again or crop it"
         )
     number = np.full(holes.shape, -1)
     number[holes] = np.arange(count)

@@ -16,9 +16,6 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from tribodyn.geometry.surface import HeightMap
 
-CELLS_PER_NODE = 8
-"""Sampling cells across the distance of neighbouring nodes, at least."""
-
 
 def centred(surface: HeightMap, at: tuple[float, float] = (0.0, 0.0)) -> HeightMap:
     """The same map with its middle at a point [m]."""
@@ -33,10 +30,11 @@ def mirrored(surface: HeightMap, axis: str) -> HeightMap:
     return surface.with_heights(np.flip(surface.z, 0 if axis == "x" else 1))
 
 
-def onto_nodes(surface: HeightMap, nodes: np.ndarray) -> np.ndarray:
+def onto_nodes(surface: HeightMap, nodes: np.ndarray, cells_across: int = 8) -> np.ndarray:
     """Mean height over the tributary area of each contact node.
 
     nodes : (n, 2) positions in the coordinates of the map [m]; the patch is their convex hull
+    cells_across : sampling cells across the distance of neighbouring nodes, at least
     Returns (n,) heights [m]; weighted by tributary area their mean is the mean height of the patch
     Raises  ValueError: nodes off the map, holes, nodes on a line
     Source  Tamatam 2021, 5.4.2: down-sampling by elemental area; here a point belongs to its nearest node
@@ -60,7 +58,7 @@ def onto_nodes(surface: HeightMap, nodes: np.ndarray) -> np.ndarray:
     if not distance > 0:
         raise ValueError(f"{surface.name}: two contact nodes are in the same place")
     counts = [
-        ceil(side / min(step, distance / CELLS_PER_NODE) - 1e-9)
+        ceil(side / min(step, distance / cells_across) - 1e-9)
         for side, step in zip(high - low, surface.spacing, strict=True)
     ]
     x, y = (start + (np.arange(n) + 0.5) / n * (stop - start) for start, stop, n in zip(low, high, counts, strict=True))

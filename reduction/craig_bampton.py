@@ -18,15 +18,9 @@ from tribodyn.fem.factor import Factor, eigenvalues_below, factorise
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.modes import StaticDivergence, modes
 from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.model import ModelInfo, ReducedModel
-from tribodyn.reduction.truncation import frequency_error
-
-POINT_LOAD = 30  # a load or output on more DOFs than this is distributed: projected, but it makes no masters
-BLOCK = 128  # right-hand sides solved at once
-REPORTED_MODES = 10
-FEW_SLAVES = 400  # all of whose modes may be kept
-MOST_MODES = 1000  # below a cutoff: dense matrices of more of them, and their eigensolve, take minutes
 
 
 def craig_bampton(
@@ -100,7 +94,7 @@ def craig_bampton(
     )
     for springs in (None,) if contact_stiffness is None else (None, contact_stiffness):
         try:
-            frequency, q = linear_modes(model, springs, min(REPORTED_MODES, reduced.n_dof))
+            frequency, q = linear_modes(model, springs, min(LIMITS.reported_modes, reduced.n_dof))
         except StaticDivergence:
             if not interface.n_pair:
                 raise
@@ -121,7 +115,7 @@ def master_dofs(
 ) -> np.ndarray:
     """DOFs that stay, in any order: those the contact map touches, those of point loads and outputs, and the extra."""
     touched = [np.flatnonzero(v) for v in (*system.loads.values(), *system.outputs.values())]
-    points = [dofs for dofs in touched if len(dofs) <= POINT_LOAD]
+    points = [dofs for dofs in touched if len(dofs) <= LIMITS.point_load]
     return np.concatenate([csc_matrix(interface.B).nonzero()[1], np.asarray(extra, dtype=int).ravel(), *points])
 
 
@@ -137,7 +131,7 @@ def fixed_interface_modes(
     """Modes with the masters held: omega (k,) [rad/s], phi (n_slave, k), and the first omega left out (inf for none).
 
     Raises  ValueError where not exactly one of n_modes, cutoff is given, more modes are asked than there are, or the
-        cutoff is beyond what the mesh resolves, more modes than half of the slaves, or has more than MOST_MODES. How
+        cutoff is beyond what the mesh resolves, more modes than half of the slaves, or has too many modes. How
         many there will be is foretold as for a bar in bending, whose number of modes rises as the root of frequency;
         elsewhere it rises faster, and they are counted where there would be too many if it rose as that of a plate, as
         frequency
@@ -153,16 +147,16 @@ def fixed_interface_modes(
         if cutoff is None or omega[-1] > 2 * np.pi * cutoff or len(omega) == n_slave:
             break
         expected = len(omega) * np.sqrt(2 * np.pi * cutoff / max(omega[-1], 1e-300))
-        if n_slave > FEW_SLAVES and 2 * expected > n_slave:
+        if 2 * expected > n_slave:
             raise ValueError(
                 f"the cutoff of the reduction, {cutoff:g} Hz, is beyond what the mesh resolves: mode {len(omega)} of "
                 f"{n_slave} has {omega[-1] / (2 * np.pi):.3g} Hz; lower reduction.cutoff, or look at the material"
             )
-        most = min(n_slave / 2, MOST_MODES)
-        if n_slave > FEW_SLAVES and below is None and len(omega) * 2 * np.pi * cutoff > most * omega[-1]:
+        most = min(n_slave / 2, LIMITS.most_modes)
+        if below is None and len(omega) * 2 * np.pi * cutoff > most * omega[-1]:
             below = eigenvalues_below(K_ss, M_ss, (2 * np.pi * cutoff) ** 2)  # as for a plate there are too many
             if below > most:
-                why = "beyond what the mesh resolves" if 2 * below > n_slave else f"above {MOST_MODES} modes"
+                why = "beyond what the mesh resolves" if 2 * below > n_slave else f"above {LIMITS.most_modes} modes"
                 raise ValueError(
                     f"the cutoff of the reduction, {cutoff:g} Hz, is {why}: {below} of its "
                     f"{n_slave} modes lie below it; lower reduction.cutoff, or look at the material"
@@ -198,6 +192,28 @@ def with_static_shapes(
     return omega, phi
 
 
+def frequency_error(factor: Factor, residual: np.ndarray, omega: np.ndarray, omitted: float) -> np.ndarray:
+    """Estimated relative error of reduced frequencies, always too high ones.
+
+    The residual of a reduced mode lies in the omitted fixed-interface modes. One step of exact dynamic condensation
+    would lower its eigenvalue by r^T (K_ss - lambda M_ss)^-1 r, which is at most r^T K_ss^-1 r / (1 - lambda/lambda_o).
+    Springs between masters, such as a stuck contact, leave the residual at the slaves as it is.
+
+    factor : of K_ss; residual : (n_slave, k) of mass-normalised reduced modes; omega : (k,) [rad/s]
+    omitted : first fixed-interface frequency left out [rad/s]
+    Returns (k,); 0 for rigid-body modes, inf for modes above the first omitted one
+    Source  first-order perturbation of Leung's exact condensation (1978)
+    """
+    flexible = np.einsum("sk,sk->k", residual, factor.solve(residual)) / 2
+    room = 1 - (omega / omitted) ** 2
+    error = np.full(len(omega), np.inf)
+    elastic = omega > 1e-6 * omega.max()
+    error[~elastic] = 0.0
+    safe = elastic & (room > 0)
+    error[safe] = flexible[safe] / (omega[safe] ** 2 * room[safe])
+    return error
+
+
 def _congruent(basis: np.ndarray, matrix: Any, sign: float = 1.0) -> np.ndarray:
     """basis^T A basis (k, k) of a sparse A (n, n) with A^T = sign A, block by block: no second array as large as the
     basis.
@@ -210,7 +226,7 @@ def _congruent(basis: np.ndarray, matrix: Any, sign: float = 1.0) -> np.ndarray:
 
 
 def _blocks(n: int) -> list[slice]:
-    return [slice(start, min(start + BLOCK, n)) for start in range(0, n, BLOCK)]
+    return [slice(start, min(start + LIMITS.solved_at_once, n)) for start in range(0, n, LIMITS.solved_at_once)]
 
 
 def _symmetric(matrix: Any) -> np.ndarray:

@@ -19,18 +19,12 @@ from scipy.sparse import vstack
 
 from tribodyn.fem import wheel
 from tribodyn.fem.cyclic import Sector, at_index, projected, seam_map
-from tribodyn.fem.gyroscopic import turning_frequencies
-from tribodyn.fem.hermitian import hermitian_modes
-from tribodyn.fem.modes import StaticDivergence
+from tribodyn.fem.modes import StaticDivergence, hermitian_modes, turning_frequencies
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.reduction.craig_bampton import POINT_LOAD, REPORTED_MODES, craig_bampton
+from tribodyn.reduction.craig_bampton import craig_bampton
+from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ModelInfo, ReducedModel
-
-ROUNDING = 1e-9  # of the rows of a contact map
-MANY = 1000  # coordinates of a wave from which on its damping and compliance cost more than `stuck_ritz`
-RITZ_MODES = 192  # as many as the compliance is expanded in at the most
-DEPENDENT = 1e-10  # share of its strain energy that a static shape must add to the others to be kept
 
 
 @dataclass(frozen=True)
@@ -97,8 +91,8 @@ def travelling_wave(
 
     cutoff : highest frequency [Hz] of the modes that then stand for seam, left shroud and fixed-interface modes (3.20);
         None keeps all these coordinates
-    springs : (n_pair, n_component) contact springs [N/m]; where they are given, more than MANY coordinates are replaced
-        by those of `stuck_ritz`
+    springs : (n_pair, n_component) contact springs [N/m]; where they are given, more than `LIMITS.many` coordinates are
+        replaced by those of `stuck_ritz`
     Returns the model whose system and interface are those of harmonic 1; coordinates, but for those of `stuck_ritz`,
         are the relative displacements, then accessories, then the rest; `reconstruct` takes the harmonic. One object
         serves all harmonics of one index
@@ -107,7 +101,7 @@ def travelling_wave(
     system, B = wave.model(1)
     info = replace(_shared_info(reduced), engine_order=engine_order)
     try:
-        omega, _ = hermitian_modes(system.stiffness, system.mass, min(REPORTED_MODES, system.n_dof))
+        omega, _ = hermitian_modes(system.stiffness, system.mass, min(LIMITS.reported_modes, system.n_dof))
         info = replace(info, free_frequency=omega / (2 * np.pi))
     except StaticDivergence:  # rotation carries away what only the contact holds
         pass
@@ -166,7 +160,7 @@ class _Indices:
         self, system: SecondOrderSystem, B: np.ndarray, T: np.ndarray
     ) -> tuple[SecondOrderSystem, np.ndarray, np.ndarray]:
         """The same in fewer coordinates where there are many."""
-        if self._springs is None or system.n_dof <= MANY:
+        if self._springs is None or system.n_dof <= LIMITS.many:
             return system, B, T
         try:
             V = stuck_ritz(system, B, self._springs)
@@ -199,7 +193,7 @@ class _Wave:
 def distinct(sector: Sector) -> tuple[Sector, np.ndarray]:
     """The sector with each row of its contact once, where joints share nodes, and which of them each row was (n_c,)."""
     right, left = np.asarray(sector.interface.B), np.asarray(sector.left)
-    same = (right @ right.T >= 1 - ROUNDING) & (left @ left.T >= 1 - ROUNDING)
+    same = (right @ right.T >= 1 - LIMITS.rounding) & (left @ left.T >= 1 - LIMITS.rounding)
     same[np.arange(len(right)), np.arange(len(right))] = True
     first, of_row = np.unique(same.argmax(axis=1), return_inverse=True)
     once = replace(sector, interface=replace(sector.interface, B=right[first]), left=left[first])
@@ -210,7 +204,7 @@ def node_to_node(sector: Sector) -> bool:
     """Whether every contact is one of the neighbours' nodes, each in one pair, as `relative_map` needs it."""
     right, left = np.asarray(sector.interface.B), np.asarray(sector.left)
     between = np.abs(left).max(axis=1, initial=0.0) > 0
-    return bool(between.all()) and np.abs(right @ right.T - np.eye(len(right))).max(initial=0.0) <= ROUNDING
+    return bool(between.all()) and np.abs(right @ right.T - np.eye(len(right))).max(initial=0.0) <= LIMITS.rounding
 
 
 def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:
@@ -224,13 +218,13 @@ def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:
     S = seam_map(sector, index)
     right, left = sector.interface.B @ S, sector.left @ S
     faces = np.flatnonzero(np.abs(right).max(axis=0))
-    if np.abs(right @ right.conj().T - np.eye(len(right))).max() > ROUNDING or left[:, faces].any():
+    if np.abs(right @ right.conj().T - np.eye(len(right))).max() > LIMITS.rounding or left[:, faces].any():
         raise ValueError(
             "the right contact face of a cyclic part must be of master nodes that lie neither on its left contact face "
             "nor on a cyclic face"
         )
     vectors = (*sector.system.loads.values(), *sector.system.outputs.values())
-    points = [np.flatnonzero(S.T @ v) for v in vectors if np.count_nonzero(v) <= POINT_LOAD]
+    points = [np.flatnonzero(S.T @ v) for v in vectors if np.count_nonzero(v) <= LIMITS.point_load]
     accessories = np.setdiff1d(np.concatenate([*points, []]).astype(int), faces)
     rest = np.setdiff1d(np.arange(S.shape[1]), np.concatenate([faces, accessories]))
     others = np.concatenate([accessories, rest])
@@ -257,7 +251,7 @@ def stuck_ritz(system: SecondOrderSystem, B: np.ndarray, springs: np.ndarray) ->
     K = (K + K.conj().T) / 2
     n = len(K)
     factor = sla.cho_factor(K)
-    nu, phi = sla.eigh(system.mass, K, subset_by_index=(max(n - RITZ_MODES, 0), n - 1))  # of unit energy
+    nu, phi = sla.eigh(system.mass, K, subset_by_index=(max(n - LIMITS.ritz_modes, 0), n - 1))  # of unit energy
     forces = np.column_stack(
         [B.conj().T, *(v for v in system.loads.values()), *(np.conj(v) for v in system.outputs.values())]
     )
@@ -266,7 +260,7 @@ def stuck_ritz(system: SecondOrderSystem, B: np.ndarray, springs: np.ndarray) ->
     forces, shapes = (a[:, size > 0] / np.sqrt(size[size > 0]) for a in (forces, shapes))
     shapes = shapes - phi @ (phi.conj().T @ forces)
     energy, turn = sla.eigh(shapes.conj().T @ (K @ shapes))
-    kept = energy > DEPENDENT
+    kept = energy > LIMITS.dependent
     return np.concatenate([phi / np.sqrt(nu), (shapes @ turn[:, kept]) / np.sqrt(energy[kept])], axis=1)
 
 

@@ -37,7 +37,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from tribodyn.fem.interface import COMPONENTS, ContactInterface
+from tribodyn.fem.interface import COMPONENTS, ContactInterface, checked_components, contact_frames
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction import abaqus_matrix, harwell_boeing, matrix_files
 from tribodyn.reduction.abaqus_matrix import Labels
@@ -45,12 +45,6 @@ from tribodyn.reduction.model import ModelInfo, ReducedModel
 
 NAMES = {"mass": "M", "stiffness": "K", "damping": "C"}
 """Variables looked for in a file that holds all matrices."""
-
-CONSTRAINED = 1e30
-"""Diagonal stiffness [N/m] that only Abaqus's penalty for a constrained DOF (1e36) reaches."""
-
-SYMMETRY = 1e-8
-"""Largest asymmetry, relative to the largest entry, that is taken as rounding of the file."""
 
 Dof = int | Sequence[int | str]
 """A DOF: number from 0, or (node, component)."""
@@ -137,9 +131,7 @@ class ForeignMatrices:
         gap : opening before loading [m], one for all or (n_pair,)
         points : (n_pair, 3) positions for pictures [m]; all at the origin where unknown
         """
-        kept = tuple(components)
-        if not kept or kept != tuple(name for name in COMPONENTS if name in kept):
-            raise ValueError(f"contact components are {kept}: give some of t1, t2, n in this order")
+        kept = checked_components(components)
         width = len(kept) if normal is None else 3
         first = self._table(body1, width, "body1")
         second = None if body2 is None else self._table(body2, width, "body2")
@@ -179,9 +171,7 @@ class ForeignMatrices:
         components : subset of t1, t2, n in this order; n counts as positive where it closes
         area, gap, points : as in `contact`
         """
-        kept = tuple(components)
-        if not kept or kept != tuple(name for name in COMPONENTS if name in kept):
-            raise ValueError(f"contact components are {kept}: give some of t1, t2, n in this order")
+        kept = checked_components(components)
         motion = sp.csr_matrix(np.atleast_2d(rows) if not sp.issparse(rows) else rows, dtype=float)
         if motion.shape[1] != self.n_dof or motion.shape[0] % len(kept) or not motion.shape[0]:
             raise ValueError(
@@ -312,14 +302,14 @@ def reduced_model(system: SecondOrderSystem, interface: ContactInterface) -> Red
     )
 
 
-def _without_constrained(matrices: ForeignMatrices) -> ForeignMatrices:
-    """Leave out the DOFs that Abaqus holds by a penalty, and say so."""
-    held = matrices.stiffness.diagonal() >= CONSTRAINED
+def _without_constrained(matrices: ForeignMatrices, penalty: float = 1e30) -> ForeignMatrices:
+    """Leave out the DOFs that Abaqus holds by its penalty of 1e36 N/m, and note it."""
+    held = matrices.stiffness.diagonal() >= penalty
     if not held.any():
         return matrices
     if matrices.labels is None:
         raise ValueError(
-            f"{held.sum()} DOFs have a stiffness of {CONSTRAINED:g} N/m or more, which is how Abaqus constrains: "
+            f"{held.sum()} DOFs have a stiffness of {penalty:g} N/m or more, which is how Abaqus constrains: "
             "export with FORMAT=MATRIX INPUT, whose labels allow leaving them out"
         )
     free = np.flatnonzero(~held)
@@ -328,19 +318,22 @@ def _without_constrained(matrices: ForeignMatrices) -> ForeignMatrices:
         stiffness=matrices.stiffness[free][:, free],
         damping=None if matrices.damping is None else matrices.damping[free][:, free],
         labels=tuple(matrices.labels[k] for k in free),
-        notes=(*matrices.notes, f"{held.sum()} constrained DOFs (stiffness {CONSTRAINED:g} N/m or more) were left out"),
+        notes=(*matrices.notes, f"{held.sum()} constrained DOFs (stiffness {penalty:g} N/m or more) were left out"),
     )
 
 
-def _symmetric(matrix: sp.csr_matrix, name: str) -> sp.csr_matrix:
-    """The matrix, made exactly symmetric, or a ValueError that shows the worst entry."""
+def _symmetric(matrix: sp.csr_matrix, name: str, rounding: float = 1e-8) -> sp.csr_matrix:
+    """The matrix, made exactly symmetric, or a ValueError that shows the worst entry.
+
+    rounding : largest asymmetry, over the largest entry, that is rounding of the file
+    """
     if matrix.shape[0] != matrix.shape[1]:
         raise ValueError(f"the {name} is {matrix.shape[0]} x {matrix.shape[1]}: it must be square")
     largest = abs(matrix).max()
     if largest == 0:
         raise ValueError(f"the {name} is zero: is it the right variable?")
     difference = abs(matrix - matrix.T).tocoo()
-    if difference.nnz and difference.data.max() > SYMMETRY * largest:
+    if difference.nnz and difference.data.max() > rounding * largest:
         if not (sp.tril(matrix, -1).nnz and sp.triu(matrix, 1).nnz):
             raise ValueError(f"the {name} holds one triangle only: mirror it before saving, A + tril(A, -1).T")
         worst = int(difference.data.argmax())
@@ -400,16 +393,12 @@ def _signs(signs: Sequence[float] | None, n_component: int) -> np.ndarray:
 
 
 def _frames(normal: Sequence[float] | np.ndarray, t1: Sequence[float] | None, n_pair: int) -> np.ndarray:
-    """(n_pair, 3, 3) rows t1, t2, n."""
+    """(n_pair, 3, 3) rows t1, t2, n; without a t1 it follows the axis that is least along the normal."""
     direction = np.broadcast_to(np.asarray(normal, float), (n_pair, 3))
     length = np.linalg.norm(direction, axis=1, keepdims=True)
     if not (length > 0).all():
         raise ValueError("a contact normal is zero: give a direction from body 1 into body 2")
     n = direction / length
-    axis = np.eye(3)[np.abs(n).argmin(axis=1)] if t1 is None else np.asarray(t1, float) / np.linalg.norm(t1)
-    along = axis - n * (axis * n).sum(axis=1, keepdims=True)
-    size = np.linalg.norm(along, axis=1, keepdims=True)
-    if not (size > 1e-6).all():
-        raise ValueError(f"the contact direction t1 = {t1} is along the contact normal: give one along the face")
-    along /= size
-    return np.stack([along, np.cross(n, along), n], axis=1)
+    if t1 is not None:
+        return contact_frames(n, t1)
+    return np.concatenate([contact_frames(one[None], np.eye(3)[np.abs(one).argmin()].tolist()) for one in n])

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import null_space
 
-from tribodyn.reduction.craig_bampton import REPORTED_MODES
+from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.projection import projected
@@ -28,5 +28,5 @@ def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:
     held = rows @ model.basis
     N = null_space(held / np.linalg.norm(held, axis=1, keepdims=True))
     held_model = projected(model, N)
-    frequency, _ = linear_modes(held_model, n=min(REPORTED_MODES, N.shape[1]))
+    frequency, _ = linear_modes(held_model, n=min(LIMITS.reported_modes, N.shape[1]))
     return replace(held_model, info=replace(held_model.info, free_frequency=frequency))

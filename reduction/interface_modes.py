@@ -16,10 +16,9 @@ import numpy as np
 import scipy.linalg as sla
 
 from tribodyn.fem.modes import modes
+from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.projection import projected
-
-DEPENDENT = 1e-6  # size of what is new in a shape, relative, that is rounding
 
 
 def interface_modes(
@@ -93,4 +92,4 @@ def _lacking(phi: np.ndarray, shapes: np.ndarray, mass: np.ndarray) -> np.ndarra
     rest = shapes - phi @ (phi.T @ mass @ shapes)
     rest -= phi @ (phi.T @ mass @ rest)
     left, size, _ = np.linalg.svd(rest, full_matrices=False)
-    return left[:, size > DEPENDENT * np.linalg.norm(shapes, 2)]
+    return left[:, size > LIMITS.new * np.linalg.norm(shapes, 2)]

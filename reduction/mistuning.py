@@ -16,12 +16,11 @@ import numpy as np
 import scipy.linalg as sla
 
 from tribodyn.fem.cyclic import at_index, seam_map
-from tribodyn.fem.hermitian import hermitian_modes
+from tribodyn.fem.modes import hermitian_modes
 from tribodyn.reduction.cyclic import ReducedSector
+from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import stuck_stiffness
 
-HELD = (1.0, 0.05)  # share of the contact springs that acts: a contact that slips is nearly free
-RESISTED = 1e-12  # energy over that of the stiffest coordinate, from which on a shape strains
 PORT = "mistuning"
 
 
@@ -48,7 +47,7 @@ def nominal_shapes(
     for index in range(sector.n_sectors // 2 + 1):
         system, B = at_index(sector, index)
         forces = np.array([system.loads[name] for name in loads]).reshape(len(loads), -1).T
-        for share in HELD:
+        for share in (1.0, LIMITS.nearly_free):
             K = np.asarray(stuck_stiffness(system.stiffness, np.asarray(B), share * springs))
             modes = hermitian_modes(K, system.mass, min(families, len(K)))[1]
             static = sla.solve(K, forces, assume_a="her")
@@ -62,19 +61,11 @@ def orthonormal(stiffness: np.ndarray, shapes: np.ndarray, left_out: float) -> n
     size = np.linalg.norm(shapes, axis=0)
     shapes = shapes[:, size > 0] / size[size > 0]
     energy = np.einsum("ij,ij->j", shapes, stiffness @ shapes)
-    resisted = energy > RESISTED * np.abs(stiffness).max()
+    resisted = energy > 0
     shapes = shapes[:, resisted] / np.sqrt(energy[resisted])
     share, turn = np.linalg.eigh(shapes.T @ stiffness @ shapes)
     kept = share > left_out * share[-1]
     found: np.ndarray = (shapes @ turn[:, kept] / np.sqrt(share[kept]))[:, ::-1]
-    return found
-
-
-def all_shapes(stiffness: np.ndarray) -> np.ndarray:
-    """A K-orthonormal basis (n, r) of all that K resists."""
-    share, turn = np.linalg.eigh(stiffness)
-    kept = share > 1e-13 * share[-1]
-    found: np.ndarray = turn[:, kept] / np.sqrt(share[kept])
     return found
 
 

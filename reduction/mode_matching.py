@@ -11,9 +11,6 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-DOMINANT = 0.4  # share of the motion that makes a mode one of a kind
-STRANGER = 10.0  # cost of a mode of another kind, beside squared logarithms of ratios of frequencies
-
 
 def mac(first: np.ndarray, second: np.ndarray, weight: np.ndarray | None = None) -> np.ndarray:
     """Modal assurance criterion (n_first, n_second): |a^H W b|^2 / (a^H W a b^H W b), 1 for the same shape.
@@ -45,12 +42,17 @@ def match_modes(first: np.ndarray, second: np.ndarray, weight: np.ndarray | None
 
 
 def match_kinds(
-    frequency: np.ndarray, share: np.ndarray, wanted: Sequence[tuple[int, float]], dominant: float = DOMINANT
+    frequency: np.ndarray,
+    share: np.ndarray,
+    wanted: Sequence[tuple[int, float]],
+    dominant: float = 0.4,
+    stranger: float = 10.0,
 ) -> np.ndarray:
     """The mode (n_wanted,) that stands for each wanted one: of its kind, and nearest in frequency on the whole.
 
     frequency : (n,) of the modes; share : (n, n_kind) of each mode's motion that is of a kind
     wanted : kind and frequency of each; dominant : share from which on a mode counts as one of a kind
+    stranger : cost of a mode of another kind, beside squared logarithms of ratios of frequencies
     Returns indices into frequency, no two the same; where there are too few modes of a kind, one of another kind stands
     Raises  ValueError where there are fewer modes than wanted ones
     """
@@ -58,5 +60,5 @@ def match_kinds(
         raise ValueError(f"{len(wanted)} modes are wanted of {len(frequency)}: compute more modes")
     distance = np.log(np.asarray(frequency)[None, :] / np.array([[value] for _, value in wanted])) ** 2
     for row, (kind, _) in zip(distance, wanted, strict=True):
-        row[share[:, kind] < dominant] = STRANGER
+        row[share[:, kind] < dominant] = stranger
     return np.asarray(linear_sum_assignment(distance)[1])

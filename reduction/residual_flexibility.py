@@ -34,15 +34,10 @@ from tribodyn.fem.factor import Factor, factorise
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.reduction.craig_bampton import REPORTED_MODES, fixed_interface_modes
+from tribodyn.reduction.craig_bampton import fixed_interface_modes
+from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import linear_modes, stuck_stiffness
 from tribodyn.reduction.model import ModelInfo, ReducedModel
-
-CLUSTERS = 64  # of pairs, each with a uniform traction for every component
-BLOCK = 16  # right-hand sides solved at once
-ROWS = 4096  # of the shapes that are turned at once
-DEPENDENT = 1e-10  # share of its strain energy that a shape must add to the others to be kept
-POWER_STEPS, POWER_VECTORS = 6, 4  # of the iteration that measures how much flexibility is left out
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +91,9 @@ class ResidualFlexibility:
     def left_out(self) -> float:
         """Largest eigenvalue of k^1/2 R k^1/2: 1 would be a contact that sees nothing else; by power iteration."""
         root = np.sqrt(self.stiffness)[:, None]
-        x = np.random.default_rng(0).standard_normal((len(root), POWER_VECTORS))
+        x = np.random.default_rng(0).standard_normal((len(root), LIMITS.power_vectors))
         size = np.zeros(1)
-        for _ in range(POWER_STEPS):
+        for _ in range(LIMITS.power_steps):
             x, _ = np.linalg.qr(x)
             y = root * self.apply(root * x)
             size, turn = np.linalg.eigh(0.5 * (x.T @ y + y.T @ x))
@@ -129,7 +124,7 @@ def residual_flexibility(
     stiffness: np.ndarray,
     n_modes: int | None = None,
     cutoff: float | None = None,
-    clusters: int = CLUSTERS,
+    clusters: int = LIMITS.clusters,
     solver: str | None = None,
 ) -> ReducedModel:
     """Reduce a full system to modes of its stuck state and Ritz vectors, with the flexibility these leave out.
@@ -168,13 +163,13 @@ def residual_flexibility(
         n_modes=len(squares),
         factorisation=factor.name,
         first_omitted_frequency=omitted / (2 * np.pi),
-        stuck_frequency=np.sqrt(squares[:REPORTED_MODES]) / (2 * np.pi),
+        stuck_frequency=np.sqrt(squares[: LIMITS.reported_modes]) / (2 * np.pi),
     )
     rest = ResidualFlexibility(k, K, B, V, squares, M, solver)
     rest.__dict__["factor"] = factor
     model = ReducedModel(reduced, replace(interface, B=at_contact), V, info, residual=rest)
     try:
-        free_frequency = linear_modes(model, None, min(REPORTED_MODES, len(squares)))[0]
+        free_frequency = linear_modes(model, None, min(LIMITS.reported_modes, len(squares)))[0]
     except StaticDivergence:  # rotation carries away what only the contact holds
         return model
     return replace(model, info=replace(info, free_frequency=free_frequency))
@@ -216,25 +211,28 @@ def _ritz(
     omega (k,), phi (n_full, k) : modes of K_s, M; forces : (n_full, j); factor : of K_s
     K_s times a static shape is its force, and times a mode M phi omega^2: K_s itself is not asked for
     """
-    k, n = len(omega), len(omega) + forces.shape[1]
+    k, n, step = len(omega), len(omega) + forces.shape[1], LIMITS.static_at_once
     shapes = np.empty((len(phi), n), order="F")
     shapes[:, :k] = phi
     with threadpool_limits(1):
-        for at in range(0, n - k, BLOCK):
-            block = forces[:, at : at + BLOCK].toarray(order="F")
-            shapes[:, k + at : k + at + BLOCK] = factor.solve(block)
+        for at in range(0, n - k, step):
+            block = forces[:, at : at + step].toarray(order="F")
+            shapes[:, k + at : k + at + step] = factor.solve(block)
     energy = np.diag(np.concatenate([omega**2, np.zeros(n - k)]))
     energy[k:] = forces.T @ shapes
     energy[:k, k:] = energy[k:, :k].T
-    inertia = np.concatenate([shapes.T @ (M @ shapes[:, at : at + BLOCK]) for at in range(0, n, BLOCK)], axis=1)
+    inertia = np.concatenate(
+        [shapes.T @ (M @ shapes[:, at : at + step]) for at in range(0, n, step)],
+        axis=1,
+    )
     scale = np.sqrt(np.diag(energy))
     size, turn = sla.eigh(0.5 * (energy + energy.T) / np.outer(scale, scale))
-    kept = size > DEPENDENT * size[-1]
+    kept = size > LIMITS.dependent * size[-1]
     basis = turn[:, kept] / np.sqrt(size[kept]) / scale[:, None]  # of unit energy
     inertia = basis.T @ inertia @ basis
     nu, y = sla.eigh(0.5 * (inertia + inertia.T))
     nu, y = nu[::-1], y[:, ::-1]
     turned = basis @ (y / np.sqrt(nu))
-    for at in range(0, len(shapes), ROWS):  # in place: they are the largest array but the factor
-        shapes[at : at + ROWS, : len(nu)] = shapes[at : at + ROWS] @ turned
+    for at in range(0, len(shapes), LIMITS.turned_at_once):  # in place: they are the largest array but the factor
+        shapes[at : at + LIMITS.turned_at_once, : len(nu)] = shapes[at : at + LIMITS.turned_at_once] @ turned
     return shapes[:, : len(nu)], 1.0 / nu

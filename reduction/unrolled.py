@@ -15,10 +15,8 @@ import scipy.linalg as sla
 
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.fem.wheel import of_sector
+from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.model import ReducedModel
-
-STATIC = 100.0  # frequency over `highest` that is given to shapes which stand for all static ones
-NEGLIGIBLE = 1e-14  # of the largest compliance of these shapes
 
 
 def period(n_sectors: int, engine_order: int) -> int:
@@ -93,8 +91,8 @@ def _modes(
     if len(lam) - moving > len(rows):
         rest = rows[:, moving:] / np.sqrt(lam[moving:])
         size, shapes = sla.eigh(rest @ rest.conj().T)
-        kept = size > NEGLIGIBLE * size[-1]
-        still = STATIC * highest
+        kept = size > LIMITS.negligible * size[-1]
+        still = LIMITS.still * highest
         rows = np.concatenate([rows[:, :moving], still * np.sqrt(size[kept]) * shapes[:, kept]], axis=1)
         lam = np.concatenate([lam[:moving], np.full(int(kept.sum()), still**2)])
         phi = phi[:, :moving]

@@ -19,9 +19,6 @@ from tribodyn.geometry.sources.raw import RawMesh
 
 ENDINGS = (".step", ".stp", ".iges", ".igs", ".brep")
 _NO_NAME = "Open CASCADE"  # how its writer calls what has no name
-ELEMENTS_ALONG = 10  # on the longest edge of the box, where no size is asked for
-AROUND = 8  # elements around a full turn of a curved face, down to the part FINEST of the least size
-FINEST = 4
 
 
 @dataclass(frozen=True)
@@ -29,12 +26,17 @@ class Sizes:
     """Element sizes, in the unit of the file. everywhere : None for a tenth of the shape's length
     bodies : name of a solid -> size; faces : number of a face -> size there
     only : name of the one solid that is meshed, None for all
+    along : elements on the longest edge of the box where no size is asked for
+    around : elements around a full turn of a curved face, down to the least size over `finest`
     """
 
     everywhere: float | None = None
     bodies: Mapping[str, float] = field(default_factory=dict)
     faces: Mapping[int, float] = field(default_factory=dict)
     only: str | None = None
+    along: int = 10
+    around: int = 8
+    finest: int = 4
 
 
 def read(path: Path, sizes: Sizes | None = None) -> RawMesh:
@@ -63,12 +65,12 @@ def default_size(path: Path) -> float:
     """Size of the elements where none is asked for, in the unit of the file; raises ValueError as `read` does."""
     with session() as gmsh:
         _solids(gmsh, path)
-        return _tenth(gmsh.model)
+        return _default_size(gmsh.model, Sizes())
 
 
-def _tenth(model: Any) -> float:
+def _default_size(model: Any, sizes: Sizes) -> float:
     box = np.array(model.getBoundingBox(-1, -1)).reshape(2, 3)
-    return float(np.ptp(box, axis=0).max()) / ELEMENTS_ALONG
+    return float(np.ptp(box, axis=0).max()) / sizes.along
 
 
 def _solids(gmsh: Any, path: Path) -> dict[str, int]:
@@ -106,7 +108,7 @@ def _meshed(gmsh: Any, path: Path, shapes: Mapping[str, int], sizes: Sizes) -> R
         model.setVisibility(model.getEntities(), 0)
         model.setVisibility([(3, *shapes.values())], 1, recursive=True)
         gmsh.option.setNumber("Mesh.MeshOnlyVisible", 1)
-    everywhere = sizes.everywhere or _tenth(model)
+    everywhere = sizes.everywhere or _default_size(model, sizes)
     for values in ((everywhere,), sizes.bodies.values(), sizes.faces.values()):
         if any(not value > 0 for value in values):
             raise ValueError(f"CAD file '{path}': element sizes must be above zero")
@@ -127,9 +129,9 @@ def _meshed(gmsh: Any, path: Path, shapes: Mapping[str, int], sizes: Sizes) -> R
         constant(size, SurfacesList=[face])
     asked = [everywhere, *sizes.bodies.values(), *sizes.faces.values()]
     gmsh.option.setNumber("Mesh.MeshSizeMax", max(asked))
-    gmsh.option.setNumber("Mesh.MeshSizeMin", min(asked) / FINEST)
+    gmsh.option.setNumber("Mesh.MeshSizeMin", min(asked) / sizes.finest)
     gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)  # those of a CAD file are 0, which asks for the least one
-    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", AROUND)
+    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", sizes.around)
     if fields:
         least = model.mesh.field.add("Min")
         model.mesh.field.setNumbers(least, "FieldsList", fields)

@@ -23,13 +23,18 @@ class Solid:
         return tuple(face for face in self.faces if len(face) == 4)
 
 
-WEDGE_EDGES = ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5))
-PYRAMID_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4))
-
 TETRA = Solid(4, TET_EDGES, ((0, 1, 2), (0, 1, 3), (1, 2, 3), (0, 2, 3)))
 HEXA = Solid(8, HEX_EDGES, HEX_FACES)
-WEDGE = Solid(6, WEDGE_EDGES, ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)))
-PYRAMID = Solid(5, PYRAMID_EDGES, ((0, 1, 2, 3), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)))
+WEDGE = Solid(
+    6,
+    ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
+    ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+)
+PYRAMID = Solid(
+    5,
+    ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4)),
+    ((0, 1, 2, 3), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+)
 
 # kind -> (its solid, whether it has edge nodes, whether it has nodes in its quadrilateral faces, in its middle)
 VOLUMES: dict[str, tuple[Solid, bool, bool, bool]] = {

@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-DEEPEST = 10  # files that include files
-
 
 @dataclass(frozen=True)
 class Card:
@@ -51,12 +49,13 @@ class Card:
         return f"card *{self.name} at line {self.line} of '{self.file}'"
 
 
-def cards(path: Path, depth: int = 0) -> Iterator[Card]:
+def cards(path: Path, within: tuple[Path, ...] = ()) -> Iterator[Card]:
     """All cards of a deck in order, those of included files in their place.
 
+    within : files that include this one
     Raises  ValueError: an included file that is not there, or data before the first card
     """
-    if depth > DEEPEST:
+    if path.resolve() in within:
         raise ValueError(f"deck '{path}' includes itself: take the *INCLUDE out")
     card: Card | None = None
     pending = ""
@@ -75,7 +74,7 @@ def cards(path: Path, depth: int = 0) -> Iterator[Card]:
                 other = path.parent / card.option("INPUT").strip("\"'")
                 if not other.is_file():
                     raise ValueError(f"{card.where} names the file '{other.name}', which does not exist: put it beside")
-                yield from cards(other, depth + 1)
+                yield from cards(other, (*within, path.resolve()))
                 card = None
         elif card is None:
             raise ValueError(f"deck '{path}' has data at line {number} before any card: it is no deck of Abaqus")

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 SMOOTH = np.cos(np.radians(30.0))  # facets that meet at less belong to one face
-ALONG = 5.0  # default angle within which a facet faces a direction [deg]
 
 
 @dataclass(frozen=True)
@@ -26,7 +25,7 @@ class Rule:
     box: tuple[Sequence[float], Sequence[float]] | None = None
     nearest: Sequence[float] | None = None
     normal: Sequence[float] | None = None
-    within: float = np.radians(ALONG)
+    within: float = float(np.radians(5.0))
     numbers: Sequence[int] = ()
 
 
@@ -89,7 +88,7 @@ def within_box(mesh: Any, low: Sequence[float], high: Sequence[float]) -> np.nda
     return _some(facets[inside.all(axis=(0, 1))], mesh, f"lies within the box {_place(low)} to {_place(high)} m")
 
 
-def by_normal(mesh: Any, direction: Sequence[float], degrees: float = ALONG) -> np.ndarray:
+def by_normal(mesh: Any, direction: Sequence[float], degrees: float) -> np.ndarray:
     """Boundary facets whose outward normal points along a direction to within an angle; raises ValueError likewise."""
     facets, _, normal = outline(mesh)
     along = np.asarray(direction, dtype=float)

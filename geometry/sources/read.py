@@ -17,8 +17,11 @@ from tribodyn.geometry.sources.deck import Deck, in_si
 from tribodyn.geometry.sources.raw import RawMesh
 from tribodyn.geometry.sources.solid import Body
 
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
-POUND = 4.4482216152605  # [N], the force of decks in inches and feet
+# unit of length -> [m], and the force [N] that decks in it count in
+UNITS = {
+    "m": (1.0, 1.0), "cm": (1e-2, 1.0), "mm": (1e-3, 1.0), "um": (1e-6, 1.0),
+    "in": (0.0254, 4.4482216152605), "ft": (0.3048, 4.4482216152605),
+}  # fmt: skip
 READERS: dict[str, Callable[[Path], RawMesh]] = {
     ".msh": msh.read,
     ".inp": abaqus_cards.read,
@@ -93,7 +96,7 @@ def read_raw(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) 
         ) from None
     if not raw.cells:
         raise ValueError(f"mesh file '{path}' has no volume elements: mesh the volume, a surface alone has no mass")
-    return scaled(raw, UNITS[unit], POUND if unit in ("in", "ft") else 1.0)
+    return scaled(raw, *UNITS[unit])
 
 
 def scaled(raw: RawMesh, metre: float, newton: float = 1.0) -> RawMesh:

@@ -11,9 +11,9 @@ import skfem
 from tribodyn.fem import cyclic
 from tribodyn.fem.cyclic import Sector, at_index
 from tribodyn.fem.elasticity import assemble
-from tribodyn.fem.gyroscopic import turning_frequencies
 from tribodyn.fem.loads import NodalForce
 from tribodyn.fem.material import Material
+from tribodyn.fem.modes import turning_frequencies
 from tribodyn.fem.part import build
 from tribodyn.fem.prestress import coriolis
 from tribodyn.reduction.cyclic import nodal_diameters

@@ -112,13 +112,13 @@ def test_faces_are_picked_by_rule(blocks):
     source = read.read(blocks, "mm")
     body = min(source.bodies.values(), key=lambda one: one.mesh.p[2].min())
     mesh = body.mesh
-    top = picking.by_normal(mesh, (0, 0, 1))
+    top = picking.by_normal(mesh, (0, 0, 1), 5.0)
     assert facts.area(mesh, top) == pytest.approx(60e-3 * 20e-3)
     np.testing.assert_array_equal(np.sort(picking.nearest(mesh, (0.03, 0.01, 0.02))), np.sort(top))
     np.testing.assert_array_equal(np.sort(picking.within_box(mesh, (0, 0, 0.01), (0.06, 0.02, 0.01))), np.sort(top))
     with pytest.raises(ValueError, match="no face of the boundary lies within the box"):
         picking.within_box(mesh, (1, 1, 1), (2, 2, 2))
     with pytest.raises(ValueError, match="no face of the boundary faces"):
-        picking.by_normal(mesh, (1, 1, 1))
+        picking.by_normal(mesh, (1, 1, 1), 5.0)
     with pytest.raises(ValueError, match="not all zero"):
-        picking.by_normal(mesh, (0, 0, 0))
+        picking.by_normal(mesh, (0, 0, 0), 5.0)

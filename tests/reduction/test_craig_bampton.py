@@ -12,6 +12,7 @@ from tribodyn.fem.factor import factorise
 from tribodyn.reduction import craig_bampton as craig_bampton_module
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.damping import modal_damping, rayleigh
+from tribodyn.reduction.limits import ReductionLimits
 from tribodyn.reduction.linear import linear_modes, stuck_stiffness, system_modes
 from tribodyn.reduction.store import load, save
 
@@ -107,9 +108,9 @@ def test_truncation_estimate(part, model):
 def test_a_cutoff_with_too_many_modes_is_refused_before_they_are_computed(part, model, monkeypatch):
     omitted = model.info.first_omitted_frequency
     found = craig_bampton(part.system, part.interface, cutoff=2 * omitted).info.n_modes
-    monkeypatch.setattr(craig_bampton_module, "MOST_MODES", found)
+    monkeypatch.setattr(craig_bampton_module, "LIMITS", ReductionLimits(most_modes=found))
     assert craig_bampton(part.system, part.interface, cutoff=2 * omitted).info.n_modes == found
-    monkeypatch.setattr(craig_bampton_module, "MOST_MODES", found - 1)
+    monkeypatch.setattr(craig_bampton_module, "LIMITS", ReductionLimits(most_modes=found - 1))
     with pytest.raises(ValueError, match=rf"is above {found - 1} modes: {found} of its \d+ modes lie below it"):
         craig_bampton(part.system, part.interface, cutoff=2 * omitted)
 

@@ -10,9 +10,10 @@ from tests.helpers import small_wheel as small
 from tribodyn.fem import cyclic, wheel
 from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.cyclic import at_index, projected
-from tribodyn.fem.hermitian import hermitian_modes
+from tribodyn.fem.modes import hermitian_modes
 from tribodyn.reduction import cyclic as waves
 from tribodyn.reduction.damping import modal_damping
+from tribodyn.reduction.limits import ReductionLimits
 from tribodyn.reduction.linear import linear_modes, stuck_stiffness, system_modes
 from tribodyn.reduction.store import load, save
 from tribodyn.workflows.scene import scene_file
@@ -140,8 +141,7 @@ def test_stuck_ritz_shapes_keep_statics_exact_and_the_contact_near(reduced, monk
     """Contacts, loads and outputs of a wave in few coordinates, against all of them; above the first mode, too."""
     k = reduced.sector.interface.stiffness(*small.STIFFNESS)
     fine = waves.travelling_wave(reduced, 3)
-    monkeypatch.setattr(waves, "MANY", 0)
-    monkeypatch.setattr(waves, "RITZ_MODES", 12)
+    monkeypatch.setattr(waves, "LIMITS", ReductionLimits(many=0, ritz_modes=12))
     coarse = waves.travelling_wave(reduced, 3, springs=k)
 
     def response(model, h, hertz):

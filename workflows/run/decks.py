@@ -25,7 +25,7 @@ from tribodyn.geometry.sources import deck, picking, read
 from tribodyn.workflows.scene.structure import EVERYTHING
 from tribodyn.workflows.scene.structure import DeckTable as Table
 
-UNITS = {metres: name for name, metres in read.UNITS.items()}
+UNITS = {metres: name for name, (metres, _) in read.UNITS.items()}
 ALL_AXES = (0, 1, 2, 3, 4, 5)
 
 

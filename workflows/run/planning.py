@@ -16,8 +16,7 @@ import numpy as np
 from tribodyn.fem.assembly import pieces
 from tribodyn.fem.constraints import free_dofs, named
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.reduction.craig_bampton import POINT_LOAD
-from tribodyn.reduction.residual_flexibility import CLUSTERS
+from tribodyn.reduction.limits import LIMITS
 from tribodyn.workflows.run import matrix_model
 from tribodyn.workflows.run import memory as memory_use
 from tribodyn.workflows.run.modelling import clamps, make_mesh
@@ -136,7 +135,7 @@ def plan(file: SceneFile) -> Plan:
         modes, cutoff = built.reduction.modes, built.reduction.cutoff
         sparse = without_masters(built, pairs * len(components(scene)), held > 0)
         if sparse:
-            masters = CLUSTERS * len(components(scene)) + 5
+            masters = LIMITS.clusters * len(components(scene)) + 5
     basis = HarmonicBasis(scene.harmonics.kept or COSTS.harmonics, scene.harmonics.samples)
     n_component = len(components(scene))
     contact = pairs * n_component
@@ -192,7 +191,7 @@ def _contact(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], free
         pairs += sum(len(side) for side in nodes[: len(contact.groups)])
     masters += [named(node_sets, given.group) * 3 + "xyz".index(given.axis) for given in scene.prescribed.values()]
     touched = [(named(node_sets, group)[:, None] * 3 + np.flatnonzero(axis)).ravel() for group, axis in points]
-    masters += [dofs for dofs in touched if len(dofs) <= POINT_LOAD]
+    masters += [dofs for dofs in touched if len(dofs) <= LIMITS.point_load]
     return pairs, len(np.intersect1d(np.concatenate([*masters, []]).astype(int), free))
 
 

@@ -25,8 +25,8 @@ from tribodyn.hbm.continuation.sliding import solve_along_friction
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.recovery import full_displacement
-from tribodyn.reduction.craig_bampton import POINT_LOAD
 from tribodyn.reduction.cyclic import ReducedSector, reduce_sector
+from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ModelInfo, ReducedModel
 from tribodyn.reduction.residual_flexibility import residual_flexibility
@@ -176,7 +176,7 @@ def at_rest(scene: MeshScene, sector: Sector, tolerance: float = 1e-10, samples:
 def distributed(scene: MeshScene, sector: Sector) -> list[str]:
     """Static loads that act on many nodes, whose statics the reduction is to keep exact."""
     static, loads = static_loads(scene), sector.system.loads
-    return [name for name in loads if name in static and np.count_nonzero(loads[name]) > POINT_LOAD]
+    return [name for name in loads if name in static and np.count_nonzero(loads[name]) > LIMITS.point_load]
 
 
 def static_loads(scene: MeshScene) -> dict[str, float]:

@@ -1,0 +1,48 @@
+"""Limits of the reductions: what is small, what is many, and how much is worked on at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ReductionLimits:
+    """Counts unless said otherwise; none of them changes a result beyond what its line says.
+
+    point_load : DOFs of a load or output above which it is distributed: projected, but it makes no masters
+    reported_modes : natural frequencies that a model reports
+    solved_at_once, static_at_once : right-hand sides of constraint modes and of static shapes; memory only
+    turned_at_once : rows of the shapes that are turned in place; memory only
+    most_modes : below a cutoff: dense matrices of more modes, and their eigensolve, take minutes
+    many : coordinates of a wave from which on its damping and compliance cost more than `stuck_ritz`
+    ritz_modes : modes of `stuck_ritz`, as many as the compliance is expanded in at the most
+    clusters : of pairs, each with a uniform traction for every component; docs/theory/residual_flexibility.md
+    power_steps, power_vectors : of the iteration that measures how much flexibility is left out
+    dependent : share of its strain energy that a static shape must add to the others to be kept
+    new : size of what modes lack of a shape, relative, below which it is rounding
+    rounding : of the rows of a contact map
+    nearly_free : share of the contact springs in the second set of nominal modes: a contact that slips is nearly free
+    still : frequency, over the highest wanted one, that is given to shapes which stand for all static ones
+    negligible : compliance of such a shape, over the largest, that is left out
+    """
+
+    point_load: int = 30
+    reported_modes: int = 10
+    solved_at_once: int = 128
+    static_at_once: int = 16
+    turned_at_once: int = 4096
+    most_modes: int = 1000
+    many: int = 1000
+    ritz_modes: int = 192
+    clusters: int = 64
+    power_steps: int = 6
+    power_vectors: int = 4
+    dependent: float = 1e-10
+    new: float = 1e-6
+    rounding: float = 1e-9
+    nearly_free: float = 0.05
+    still: float = 100.0
+    negligible: float = 1e-14
+
+
+LIMITS = ReductionLimits()
