@@ -131,7 +131,7 @@ def _table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
 def _verdict(result: Result) -> str:
     numbers = result.summary()
     mark = "good" if numbers["finished"] else "bad"
-    said = f'<p class="{mark}"><strong>{escape(result.state[:1].upper() + result.state[1:])}.</strong></p>'
+    html = f'<p class="{mark}"><strong>{escape(result.state[:1].upper() + result.state[1:])}.</strong></p>'
     judged = numbers.get("verdict")
     if isinstance(judged, Mapping):
         rows = []
@@ -143,9 +143,9 @@ def _verdict(result: Result) -> str:
                 str(item.get("dominated_by") or ""), "yes" if item.get("stated") else "no",
                 str(item.get("reason") or ""),
             ))  # fmt: skip
-        head = ("quantity", "value", "total error", "most of it", "may be stated", "why")
-        said += _table(rows, head)
-    return said + _table(text.numbers(result))
+        head = ("quantity", "value", "total error", "dominated by", "may be stated", "why")
+        html += _table(rows, head)
+    return html + _table(text.numbers(result))
 
 
 def _number(value: Any) -> str:

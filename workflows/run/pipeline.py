@@ -41,7 +41,7 @@ def run(
     folder : None keeps nothing on disk
     earlier : an unfinished result of the same scene to resume
     build : makes the model, for runs that share what models are made of; from the scene alone by default
-    row_only : without what the row of a study does not tell: linear references, and the error budget where no verdict
+    row_only : without what the row of a study does not hold: linear references, and the error budget where no verdict
         needs it
     Raises  ValueError: the scene asks for what cannot be, SolveFailed: after what was computed is kept
     """

@@ -28,7 +28,7 @@ class Pictures(Table):
     """Factor on wear depth in renders; chosen by size by default."""
 
 
-VERDICT_SECONDS = (10.0, 60.0)  # bounds where the scene does not say
+VERDICT_SECONDS = (10.0, 60.0)  # bounds where the scene gives none
 # of the seconds of the run: what a verdict needs besides its measurements keeps both below twice the run
 VERDICT_SHARE = 0.9
 
