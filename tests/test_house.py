@@ -29,7 +29,7 @@ ORDER = (
     ("workflows.scene",),
     ("workflows.result",),
     ("workflows.run",),
-    ("workflows.errors", "workflows.accuracy"),
+    ("workflows.errors",),
     ("workflows.pictures",),
     ("workflows.report", "workflows.export"),
     ("workflows.studies", "workflows.api", "workflows.benchmarks"),

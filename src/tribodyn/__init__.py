@@ -120,9 +120,6 @@ if TYPE_CHECKING:
         write_whole,
     )
     from tribodyn.workflows.api.whole_scenes import (
-        check_accuracy,
-        check_promise,
-        compare_wear_steps,
         converge,
         export,
         fit,
@@ -286,9 +283,6 @@ _HOME |= dict.fromkeys(
 # of whole scenes; see tribodyn.workflows.api.whole_scenes
 _HOME |= dict.fromkeys(
     (
-        "check_accuracy",
-        "check_promise",
-        "compare_wear_steps",
         "converge",
         "export",
         "fit",
@@ -364,10 +358,7 @@ __all__ = [
     "campbell",
     "changed",
     "chatter",
-    "check_accuracy",
-    "check_promise",
     "coexisting",
-    "compare_wear_steps",
     "contact_laws",
     "contact_patch",
     "continuations",

@@ -18,7 +18,7 @@ from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.linear import recovery
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.reference import DenseBalance
-from tribodyn.workflows.accuracy.statement import LARGEST
+from tribodyn.workflows.errors.options import DEFAULT
 
 CONVERGED, REFUSED, WRONG = "converged", "refused", "wrong"  # what is said of a cell
 LARGEST_DENSE = 1600  # unknowns up to which the dense reference is solved
@@ -107,11 +107,11 @@ def _gain(balance: HarmonicBalance, state: State, energy: np.ndarray) -> float:
 def sampled_honestly(balance: HarmonicBalance, state: State) -> Verdict:
     """Whether the estimated error of sampling covers the true one: against located transitions and more samples.
 
-    The estimate is held to a factor. From LARGEST on a verdict states no number, and neither is there one to check.
+    The estimate is held to a factor. Above DEFAULT.largest no number is reported, and none is checked.
     """
     estimate = sampling_error(balance, state.omega, state.x)
-    if estimate > LARGEST:
-        says = f"the error estimate of the samples is above {LARGEST:.0%}, no response is stated"
+    if estimate > DEFAULT.largest:
+        says = f"the error estimate of the samples is above {DEFAULT.largest:.0%}, no response is stated"
         return Verdict(REFUSED, f'{says}: take more or harmonics.transitions = "located"')
     fine = balance.with_samples(4096, located=True)
     reference = arc_length.solve_along_load(fine, state.omega, NewtonOptions(tolerance=1e-2 * NEWTON))

@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from tests.proof.fuzz_runs import ACCEPTED, REFUSED, Case, Command, Runs, Tried
-from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
+from tests.proof.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.scene import scene_file
 
 NASTY = (

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.workflows.accuracy import statement
-from tribodyn.workflows.accuracy.statement import LARGEST, Verdict
+from tribodyn.workflows.errors.options import DEFAULT
 from tribodyn.workflows.result import store, summary
 from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.verdict import Verdict, loaded
 
 MAY_LACK = (
     "patch.free_deflection", "stability.growth", "worn.omega", "worn.amplitude", "wear.preload_at_rest",
@@ -30,7 +30,7 @@ def wrong(file: Path) -> str:
     for name, value in _numbers(result):
         if name not in MAY_LACK and not np.isfinite(value).all():
             return f"not finite: {name}"
-    verdict = statement.loaded(result.verdict) if result.verdict else None
+    verdict = loaded(result.verdict) if result.verdict else None
     return "" if verdict is None else _of_verdict(verdict, summary.numbers(result))
 
 
@@ -42,7 +42,7 @@ def _numbers(result: Result) -> Iterator[tuple[str, Any]]:
             for item in fields(of):
                 yield from _within(f"{part}.{item.name}", getattr(of, item.name))
     summed = summary.numbers(result)
-    del summed["verdict"], summed["error_budget"]  # inf is there "nobody knows"
+    del summed["verdict"], summed["changes"]  # inf is there "nobody knows"
     yield from _within("summary", summed)
 
 
@@ -67,11 +67,14 @@ def _of_verdict(verdict: Verdict, summed: dict[str, Any]) -> str:
         same = value is None or other is None or isclose(value, other, rel_tol=0.01)
         trouble = (
             (said.stated and value is None, "is stated without a value"),
-            (not said.stated and not said.reason, "is not stated, for no reason"),
+            (value is not None and said.stated and error is None, "is stated without an error"),
             (value is not None and not np.isfinite(value), "is no number"),
             (value is not None and value < 0 and name not in MAY_BE_NEGATIVE, "is negative"),
             (error is not None and not 0 <= error < np.inf, "has an error that is no number"),
-            (said.stated and error is not None and error > LARGEST, f"is stated with an error above {LARGEST:.0%}"),
+            (
+                said.stated and error is not None and error > DEFAULT.largest,
+                f"is stated with an error above {DEFAULT.largest:.0%}",
+            ),
             (not same, "is not what the summary tells"),
         )
         for found, what in trouble:

@@ -31,8 +31,9 @@ from tribodyn.hbm.wear.law import JointWear
 from tribodyn.hbm.wear.step_control import Tolerance
 from tribodyn.reduction.damping import modal_damping
 from tribodyn.reduction.linear import linear_modes
-from tribodyn.workflows.accuracy.limit import limit_of
-from tribodyn.workflows.accuracy.statement import loaded
+from tribodyn.workflows.errors.limit import limit_of
+from tribodyn.workflows.errors.verdict import with_verdict
+from tribodyn.workflows.result.verdict import loaded
 from tribodyn.workflows.run import modelling, pipeline, references
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
@@ -201,10 +202,10 @@ def beam() -> Numbers:
 
 def stated() -> Numbers:
     """Errors that a run states of itself."""
-    result = pipeline.run(scene_file.read("beam", (*BEAM, "verdict.seconds=40")), None, Progress())
+    result = pipeline.run(scene_file.read("beam", BEAM), None, Progress(), judge=with_verdict)
     said = loaded(result.verdict)
     found = {f"stated error of {name}": one.error for name, one in said.statements.items()}
-    parts = {f"error of {one.quantity} by {one.source}": one.error for one in said.contributions}
+    parts = {f"change of {one.quantity} by {one.refinement}": one.relative for one in said.changes}
     values = np.array([_response_size(lattice(2, 2), top) for top in (1, 3, 7)])
     limit = {"limit over harmonics": np.array([limit_of([1, 2, 4], list(values)).value])}
     return limit | {name: np.array([error]) for name, error in (found | parts).items() if error is not None}

@@ -16,18 +16,20 @@ from typing import Any
 
 import numpy as np
 
+from tests.proof import reference
 from tests.proof.scoreboard_scenes import draw
-from tribodyn.workflows.accuracy import probes, reference, refinement, verdict
-from tribodyn.workflows.accuracy.statement import QUANTITIES
-from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
+from tests.proof.time_limit import TimeUp, processor_seconds
+from tribodyn.workflows.errors import accuracy, verdict
+from tribodyn.workflows.errors.states import relative
 from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.verdict import QUANTITIES, Verdict, loaded
 from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 
 ROWS = "rows.jsonl"
 ROUNDING = 1e-8  # relative difference that says nothing
-PROMISED = 14  # every so many scenes a promise is asked for too
+BOUNDED = 14  # every so many scenes an error bound is asked for too
 WANTED = "20 % of peak frequency, amplitude, energy, preload"
 
 
@@ -48,15 +50,15 @@ class Judged:
     reason: str
 
     @property
-    def promised(self) -> bool:
+    def counted(self) -> bool:
         """Whether there is a stated error and a reference to hold it against; not where the scene gives the number."""
         known = self.stated and self.error is not None and self.true is not None
         return known and max(self.error or 0.0, self.true or 0.0) > ROUNDING
 
     @property
-    def broken(self) -> bool:
+    def violated(self) -> bool:
         """Whether the true error is above the stated one."""
-        return self.promised and (self.true or 0.0) > (self.error or 0.0) + ROUNDING
+        return self.counted and (self.true or 0.0) > (self.error or 0.0) + ROUNDING
 
 
 @dataclass(frozen=True)
@@ -70,9 +72,10 @@ class Row:
     n_pair: int
     harmonics: int
     judged: tuple[Judged, ...]
-    promise: tuple[Judged, ...]
-    contributions: tuple[dict[str, Any], ...]
+    bound: tuple[Judged, ...]
+    changes: tuple[dict[str, Any], ...]
     seconds: tuple[float, float, float]
+    ratio: float | None = None
 
     def record(self) -> str:
         """One line of JSON."""
@@ -82,9 +85,9 @@ class Row:
 def row_of(line: str) -> Row:
     """A row from its line of JSON."""
     data = json.loads(line)
-    for name in ("judged", "promise"):
+    for name in ("judged", "bound"):
         data[name] = tuple(Judged(**one) for one in data[name])
-    data["contributions"], data["seconds"] = tuple(data["contributions"]), tuple(data["seconds"])
+    data["changes"], data["seconds"] = tuple(data["changes"]), tuple(data["seconds"])
     return Row(**data)
 
 
@@ -115,9 +118,9 @@ def run(scenes: int, seed: int, folder: Path, seconds: float, say: Callable[[str
         with (folder / ROWS).open("a", encoding="utf-8") as file:
             file.write("\n" * _torn(folder) + row.record() + "\n")
         kept.append(row)
-        broken = ", ".join(one.quantity for one in (*row.judged, *row.promise) if one.broken)
+        broken = ", ".join(one.quantity for one in (*row.judged, *row.bound) if one.violated)
         spent = "/".join(f"{one:.0f}" for one in row.seconds)
-        say(f"{row.family} {number}: {row.outcome}, {spent} s{f'; BROKEN: {broken}' if broken else ''}")
+        say(f"{row.family} {number}: {row.outcome}, {spent} s{f'; VIOLATED: {broken}' if broken else ''}")
     return sorted((row for row in kept if not scenes or row.number < scenes), key=lambda row: row.number)
 
 
@@ -140,7 +143,7 @@ def measured(number: int, seed: int, seconds: float) -> Row:
         except (ValueError, RuntimeError) as refusal:
             return replace(row, outcome=f"refused: {refusal}", seconds=(process_time() - clock, 0.0, 0.0))
         ran = process_time() - clock
-        said = verdict.judge(file, model, result, Progress(), ran)
+        said = verdict.judge(file, model, result, Progress())
         clock = process_time()
         truth, outcome = reference.solved(file, seconds)
         referred = process_time() - clock
@@ -150,8 +153,9 @@ def measured(number: int, seed: int, seconds: float) -> Row:
             n_pair=model.balance.contact.n_pair,
             harmonics=max(result.harmonics),
             judged=tuple(_judged(name, said, truth) for name in QUANTITIES),
-            promise=_promise(file, seconds) if number % PROMISED == 1 else (),
-            contributions=tuple(asdict(part) for part in said.contributions),
+            bound=_bound(file, seconds) if number % BOUNDED == 1 else (),
+            changes=tuple(asdict(one) for one in said.changes),
+            ratio=said.ratio,
             seconds=(ran, said.seconds, referred),
         )
 
@@ -167,29 +171,27 @@ def solved(file: SceneFile) -> tuple[Result, modelling.Model]:
     return pipeline.run(file.changed("verdict.enabled=false"), None, Progress(), build=build), models[-1]
 
 
-def _judged(name: str, said: verdict.Verdict, truth: reference.Values) -> Judged:
+def _judged(name: str, said: Verdict, truth: reference.Values) -> Judged:
     one, right = said.statements[name], truth[name]
-    true = None if one.value is None or right is None else probes.relative(one.value, right)
+    true = None if one.value is None or right is None else relative(one.value, right)
     return Judged(name, one.value, one.error, one.dominated_by, one.stated, right, true, one.reason)
 
 
-def _promise(file: SceneFile, seconds: float) -> tuple[Judged, ...]:
-    """What `run --accuracy` promises of the unworn response, against a reference that is finer than its last round."""
+def _bound(file: SceneFile, seconds: float) -> tuple[Judged, ...]:
+    """What `run --accuracy` bounds of the unworn response, against a reference that is finer than its last round."""
     start = process_time()
 
     def round_of(one: SceneFile, number: int) -> Result:
         if process_time() - start > seconds:
-            raise RuntimeError(f"the promise takes above {seconds:g} s")
-        clock = process_time()
+            raise RuntimeError(f"the bound takes above {seconds:g} s")
         result, model = solved(one)
-        said = verdict.judge(one, model, result, Progress(), process_time() - clock)
-        return replace(result, verdict=said.dumped())
+        return verdict.with_verdict(one, model, result, Progress())
 
     try:
-        result, promise = refinement.to_accuracy(file, WANTED, round_of, lambda sentence: None)
+        result, bound = accuracy.to_accuracy(file, WANTED, round_of, lambda sentence: None)
     except (ValueError, RuntimeError):
         return ()
-    found, _ = reference.held(file, result, promise, seconds)
-    return tuple(
-        Judged(one.quantity, one.value, promise.wanted, None, True, one.reference, one.true, "") for one in found
-    )
+    truth, _ = reference.solved(file.changed("wear=", *bound.overrides), seconds, reference.FINER.refined_elements)
+    said = loaded(result.verdict)
+    met = [name for name, why in bound.reasons.items() if not why]
+    return tuple(replace(_judged(name, said, truth), error=bound.wanted.error) for name in met)

@@ -27,7 +27,6 @@ WIDEST = 4.0  # highest over lowest frequency of a response
 STEEL = {"young": "210 GPa", "density": "7860 kg/m3", "poisson": 0.3}
 MODES = 6  # stuck modes that the resonance is looked for in
 WORN = 0.5  # share of the scenes that are worn
-LONGER = 30.0  # processor seconds of the verdict on wheels, on rigs, and on what wears: its late states take more
 # logarithm of the tangential force of the stuck contact over what friction can carry; with little of it wear fades
 # out before the contact is lost
 DRIVE, WEARING = (-0.2, 0.8), (0.4, 1.0)
@@ -76,8 +75,6 @@ def draw(number: int, seed: int, folder: Path) -> Drawn:
         table["wear"] |= {"at": {"frequency": place}}
     if worn or family == "rig":
         table["damping"]["modal"] *= DAMPED
-    if worn or family in HIGHEST:
-        table["verdict"] = {"seconds": LONGER}
     return Drawn(number, seed, family, as_toml(table))
 
 

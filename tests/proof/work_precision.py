@@ -16,6 +16,7 @@ from time import process_time
 
 import numpy as np
 
+from tests.proof.time_limit import TimeUp, processor_seconds
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact import law
@@ -27,9 +28,8 @@ from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.stepper import IntegrationFailed, Options
 from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_share
-from tribodyn.workflows.accuracy import probes
-from tribodyn.workflows.accuracy.limit import Limit, limit_of
-from tribodyn.workflows.accuracy.time_limit import TimeUp, processor_seconds
+from tribodyn.workflows.errors import states
+from tribodyn.workflows.errors.limit import Limit, limit_of
 from tribodyn.workflows.run import curve, modelling, settings, wear_run
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
@@ -239,7 +239,7 @@ def _start(file: SceneFile, at: float | None) -> _Start:
         own, problems = own.with_load(duty.load), {top: b.with_load(duty.load) for top, b in problems.items()}
         point = duty.site.first(own)
     else:
-        point = probes.highest_of(curve.follow_response(scene, own, lambda share, note: None), own)
+        point = states.highest_of(curve.follow_response(scene, own, lambda share, note: None), own)
     if not point.solution.converged:
         raise RuntimeError(f"there is no motion to begin with: {point.solution.outcome}")
     omega, x = point.state.omega, point.state.x

@@ -19,8 +19,8 @@ from tests.proof.work_precision import (
     Candidate,
     WorkPrecision,
 )
-from tribodyn.workflows.accuracy.limit import Limit
-from tribodyn.workflows.accuracy.trade_table import plain
+from tribodyn.workflows.errors.limit import Limit
+from tribodyn.workflows.errors.trade_table import plain
 from tribodyn.workflows.pictures.figures import axes_of, log_axis, named
 from tribodyn.workflows.pictures.style import BLUE, GREEN, GREY, ORANGE
 from tribodyn.workflows.result.whole_file import replacing

@@ -155,6 +155,6 @@ def matrices(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @given(spoilt("matrices"))
 def test_a_spoilt_scene_runs_fails_or_is_refused_in_one_sentence(matrices: Path, drawn: tuple[str, list[str]]) -> None:
     with tempfile.TemporaryDirectory() as out:
-        short = ["--set", "response.points=8", "--set", "wear.max_steps=2", "--set", "verdict.seconds=0.3"]
+        short = ["--set", "response.points=8", "--set", "wear.max_steps=2", "--set", "verdict.enabled=false"]
         arguments = ["run", str(matrices / "own.toml"), "--out", out, "--no-pictures", *short, *changes(drawn[1])]
         check(*leave(*arguments), (0, 2, 3))

@@ -22,10 +22,7 @@ from tribodyn.hbm.wear.history import cycles_to_share
 from tribodyn.hbm.wear.law import Exposure
 from tribodyn.hbm.wear.laws import energy
 from tribodyn.reduction.damping import rayleigh, rayleigh_of_ratios
-from tribodyn.workflows.accuracy import mesh_probe, probes, verdict
-from tribodyn.workflows.accuracy.limit import limit_of
-from tribodyn.workflows.accuracy.statement import Contribution
-from tribodyn.workflows.accuracy.time_probe import Checked
+from tribodyn.workflows.errors.limit import limit_of
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.references import delta_max
 from tribodyn.workflows.scene import scene_file
@@ -151,63 +148,6 @@ def test_the_ground_moves_ahead_by_its_phase() -> None:
     part = SimpleNamespace(interface=interface, pairs={"foot": slice(0, 1)})
     found = modelling.ground_motion(scene, part, HarmonicBasis((0, 1)))
     np.testing.assert_allclose(found[0], [0.0, 2 * np.cos(0.3), -2 * np.sin(0.3)], atol=1e-15)
-
-
-def test_the_total_error_counts_the_sum_of_its_parts() -> None:
-    """1.3 times the sum where all knobs at once were not tried; what is no knob is added."""
-    errors = {"mesh and contact grid": 0.1, "modes": 0.02, "wear steps": 0.05}
-    parts = [Contribution(source, "preload", error, "") for source, error in errors.items()]
-    said = verdict._statement("preload", 100.0, parts, Checked((), 0, ""), SimpleNamespace(wear_steps=0))
-    assert said.error == pytest.approx(1.3 * 0.12 + 0.05)
-    assert said.dominated_by == "mesh and contact grid"
-
-
-def test_life_is_off_by_depth_and_energy_together(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mesh_probe.convergence, "has_settled", lambda differences: True)
-    monkeypatch.setattr(mesh_probe.convergence, "bound", lambda differences, *given: differences[0])
-    monkeypatch.setattr(mesh_probe.convergence, "steepens", lambda differences: False)
-    found = {name: [0.0] for name in ("peak_frequency", "amplitude", "preload")} | {"energy": [0.2], "depth": [0.05]}
-    probe = mesh_probe.Probe(SimpleNamespace(wear=None), None, 1.0, "")
-    said = probe._contributions("mesh", mesh_probe.Seen({"elements": found}))
-    assert {one.quantity: one.error for one in said}["life"] == pytest.approx(0.25)
-
-
-def test_the_energy_is_not_known_better_than_half_the_amplitude(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two meshes agree on it by chance: 0.6 % between them, 14 % in the amplitude (beam 12 of seed 2026)."""
-    monkeypatch.setattr(mesh_probe.convergence, "has_settled", lambda differences: True)
-    monkeypatch.setattr(mesh_probe.convergence, "bound", lambda differences, *given: differences[0])
-    monkeypatch.setattr(mesh_probe.convergence, "steepens", lambda differences: False)
-    found = {"peak_frequency": [0.0], "amplitude": [0.14], "preload": [0.0], "energy": [0.006]}
-    probe = mesh_probe.Probe(SimpleNamespace(wear=None), None, 1.0, "")
-    said = probe._contributions("mesh", mesh_probe.Seen({"elements": found}))
-    assert {one.quantity: one.error for one in said}["energy"] == pytest.approx(0.07)
-
-
-def test_a_flat_top_leaves_the_energy_open(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Amplitude 1 - |w - 1| / 10 and energy w: within 1 % of the amplitude the peak may lie 10 % away."""
-
-    def beside(output: str, omega: float, newton: object) -> SimpleNamespace:
-        return SimpleNamespace(next=lambda balance, _, x: point(omega))
-
-    def point(omega: float) -> SimpleNamespace:
-        solution = SimpleNamespace(converged=True)
-        state = SimpleNamespace(omega=omega, x=None)
-        return SimpleNamespace(state=state, amplitude=1 - 0.1 * abs(omega - 1), solution=solution)
-
-    monkeypatch.setattr(probes, "AtFrequency", beside)
-    balance = SimpleNamespace(energy=lambda state: np.array([state.omega]))
-    state = SimpleNamespace(here=point(1.0), balance=balance, site=probes.AtPeak("tip", 0.5, 2.0))
-    assert probes.energy_beside(state, 0.1, 0.0101) == pytest.approx(0.1)
-    assert probes.energy_beside(state, 0.1, 0.0051) == pytest.approx(0.05)  # the ends of the reach are lower
-    assert probes.energy_beside(state, 0.0, 0.0101) == 0.0
-
-
-def test_twice_the_energy_is_half_the_life() -> None:
-    here = SimpleNamespace(state=None)
-    balance = SimpleNamespace(energy=lambda state: np.array([1.0]))
-    seen = [SimpleNamespace(cycles=c, balance=balance, here=here) for c in (0.0, 50.0)]
-    finer = [probes.Answers(1.0, 1.0, 2.0, 1.0)] * 2
-    assert probes.carried_to_life(seen, finer, 100.0) == pytest.approx(1.0)
 
 
 def test_a_sequence_of_known_order_is_extrapolated_to_its_limit() -> None:

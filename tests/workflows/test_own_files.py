@@ -17,7 +17,7 @@ from tribodyn.hbm.contact import law as contact_law
 from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear import law as wear_law
-from tribodyn.workflows.accuracy import knobs
+from tribodyn.workflows.errors import knobs
 from tribodyn.workflows.run import planning
 from tribodyn.workflows.scene import scene_file
 

@@ -12,10 +12,10 @@ import pytest
 from tests.proof import planted_faults, planting, reference_runs
 from tests.proof.planted_faults import Fault, Seen
 from tribodyn.hbm.wear.history import cycles_to_share
-from tribodyn.workflows.accuracy.limit import limit_of
+from tribodyn.workflows.errors.limit import limit_of
 
 TREE = Path(__file__).parents[2]
-LIMIT = "workflows/accuracy/limit.py"
+LIMIT = "workflows/errors/limit.py"
 
 
 def the_fault(file: str, does: str = "") -> Fault:
@@ -68,7 +68,7 @@ def test_a_fault_is_seen_by_its_test_and_a_test_that_always_fails_is_not_counted
     (tmp_path / "workflows").symlink_to(TREE / "workflows")
     test = tmp_path / "test_of_limit.py"
     test.write_text(
-        "from tribodyn.workflows.accuracy.limit import limit_of\n\n\n"
+        "from tribodyn.workflows.errors.limit import limit_of\n\n\n"
         "def test_always_wrong():\n    assert False\n\n\n"
         "def test_limit():\n    assert abs(limit_of([1, 2, 4], [2.0, 1.25, 1.0625]).value - 1.0) < 1e-9\n"
     )

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.workflows.accuracy import measure
 from tribodyn.workflows.command import main as cli
+from tribodyn.workflows.errors import cost
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies import variation
 from tribodyn.workflows.studies.fits import fit_file
@@ -43,7 +43,7 @@ def test_each_change_is_made_alone_and_none_stops_the_others(capsys: pytest.Capt
     call([*words("vary", "beam"), *(word for change in changes for word in ("--change", change)), "--json"])
     own, stuck, damped, both = json.loads(capsys.readouterr().out)
     assert "the resonance peak of response has moved beyond 1200 Hz" in stuck["outcome"]
-    direct = measure.measure(scene_file.read("beam", (*TINY, "damping.modal=4 %", "contact.friction=0.4")))
+    direct = cost.measure(scene_file.read("beam", (*TINY, "damping.modal=4 %", "contact.friction=0.4")))
     assert both["peak_m"] == direct.values["peak_m"]
     assert damped["peak_m"] < own["peak_m"]
     assert own["outcome"] == "converged"

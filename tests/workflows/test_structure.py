@@ -16,7 +16,8 @@ from tribodyn.hbm.contact import law
 from tribodyn.hbm.continuation import nonlinear_modes
 from tribodyn.hbm.outcome import BranchEnd, WearEnd
 from tribodyn.reduction.linear import linear_modes
-from tribodyn.workflows.accuracy import convergence, other_meshes, probes
+from tribodyn.workflows.errors import refine, states
+from tribodyn.workflows.errors.options import DEFAULT
 from tribodyn.workflows.report import text as in_words
 from tribodyn.workflows.result import summary
 from tribodyn.workflows.run import modelling, pipeline
@@ -321,11 +322,13 @@ def test_what_a_bolt_clamps_carries_its_force_on_small_faces_too(tmp_path: Path)
     assert balance.preload(found.state) == pytest.approx(3000.0, rel=1e-6)
 
 
-def test_every_body_of_a_scene_is_made_coarser_or_the_elements_of_all_are_halved(tmp_path: Path) -> None:
+def test_every_body_of_a_scene_is_refined_or_the_elements_of_all_are_halved(tmp_path: Path) -> None:
     """Parts by their counts, CAD files by their sizes; a mesh file cannot be made again, but its elements cut."""
     file = scene_file.parse(BLOCKS, "blocks.toml", folder=tmp_path)
-    coarse = other_meshes.coarser(file, 20_000)[0].file.scene
-    assert (coarse.bodies["lower"].parameters["n_length"], coarse.bodies["upper"].parameters["n_length"]) == (3, 2)
+    own, (finer, ratio) = file.scene, refine.mesh(file, 2.0)
+    for name in ("lower", "upper"):
+        assert finer.scene.bodies[name].parameters["n_length"] == 2 * own.bodies[name].parameters["n_length"]
+    assert ratio == pytest.approx(2.0, rel=0.1)
     with session() as gmsh:
         gmsh.model.occ.addBox(0, 0, 0, 40, 10, 10)
         gmsh.model.occ.synchronize()
@@ -340,16 +343,14 @@ def test_every_body_of_a_scene_is_made_coarser_or_the_elements_of_all_are_halved
         .replace("upper.z_max", "upper.face 6")
     )
     drawn_file = scene_file.parse(own + tail, "drawn.toml", folder=tmp_path)
-    coarse = other_meshes.coarser(drawn_file, 20_000)[0].file.scene
-    assert coarse.bodies["upper"].size == pytest.approx(6e-3)  # a tenth of 40 mm, and half as much again
-    assert coarse.bodies["upper"].face_sizes == {"face 2": pytest.approx(4.5e-3)}
+    upper = refine.mesh(drawn_file, 2.0)[0].scene.bodies["upper"]
+    assert upper.size == pytest.approx(2e-3)  # half of a tenth of 40 mm
+    assert upper.face_sizes == {"face 2": pytest.approx(1.5e-3)}
     given = (own + tail).replace("box.step", "box.msh").replace('face_sizes = { "face 2" = "3 mm" }\n', "")
     file = scene_file.parse(given, "given.toml", folder=tmp_path)
-    (finer,) = other_meshes.coarser(file, 20_000)
-    assert [finer.file.scene.bodies[name].halved for name in ("lower", "upper")] == [1, 1]
-    assert (finer.size, finer.how) == (0.5, "halved elements")
-    with pytest.raises(ValueError, match=r"its elements halved would have some 8e\+05 DOFs"):
-        other_meshes.coarser(file, 100_000)
+    finer, ratio = refine.mesh(file, 1.5)
+    assert [finer.scene.bodies[name].halved for name in ("lower", "upper")] == [1, 1]
+    assert ratio == refine.HALVED
 
 
 def test_the_error_of_a_mesh_that_is_given_is_told_by_its_halved_elements(tmp_path: Path) -> None:
@@ -361,8 +362,8 @@ def test_the_error_of_a_mesh_that_is_given_is_told_by_its_halved_elements(tmp_pa
     files = [scene_file.parse(text, "bar.toml", (f"geometry.halved={n}",), tmp_path) for n in range(2)]
     mesh, sets = modelling.make_mesh(files[1], tmp_path)
     assert (mesh.nelements, len(sets["tip"])) == (8 * 16, 1)
-    found = [probes.unworn(file, modelling.build(file, None, Progress(), (0, 1))).answers.hertz for file in files]
-    error = convergence.bound([convergence.difference(other_meshes.HALF, found[1], found[0])])
+    found = [states.unworn(file, modelling.build(file, None, Progress(), (0, 1))).answers.hertz for file in files]
+    error = DEFAULT.total(abs(found[0] / found[1] - 1), refine.HALVED)
     assert 0.3 * error < found[0] / 461.658 - 1 < error  # the peak with geometry.halved=2
 
 

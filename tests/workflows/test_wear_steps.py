@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.coarse_scenes import BEAM
-from tribodyn.workflows.accuracy import wear_steps
+from tests.proof import wear_steps
 from tribodyn.workflows.command import main as cli
 
 SMALL = (

@@ -13,14 +13,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 from tribodyn.fem.material import Material
-from tribodyn.workflows.accuracy import converge as grids
-from tribodyn.workflows.accuracy import knob_trade, promise, reference, wear_steps
-from tribodyn.workflows.accuracy.converge import Study as GridStudy
-from tribodyn.workflows.accuracy.promise import Check
-from tribodyn.workflows.accuracy.reference import Held
-from tribodyn.workflows.accuracy.refinement import Promise
-from tribodyn.workflows.accuracy.trade_table import Trade
-from tribodyn.workflows.accuracy.wear_steps import WearStepTable
+from tribodyn.workflows.errors import converge as grids
+from tribodyn.workflows.errors import knob_trade
+from tribodyn.workflows.errors.converge import Study as GridStudy
+from tribodyn.workflows.errors.trade_table import Trade
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.studies import inspection, verification, worn_in_time, worn_states
 from tribodyn.workflows.studies.curves import folds as fold_study
@@ -149,30 +145,6 @@ def trade(
     """
     texts = override_texts(overrides)
     return knob_trade.run(fspath(scene), knobs, texts, reporter(progress).say, most, keep, earlier)
-
-
-def compare_wear_steps(scene: Place, *, overrides: Overrides = (), progress: Report = None) -> WearStepTable:
-    """Cost and error of wear steps by both rules, as `tribodyn trade SCENE --knob wear_step`."""
-    return wear_steps.compare(fspath(scene), reporter(progress).say, override_texts(overrides))
-
-
-def check_promise(
-    scene: Place, accuracy: str, *, table: Place | None = None, overrides: Overrides = (), progress: Report = None
-) -> Check:
-    """Run what a trade chooses for an accuracy such as "1 % of life", against a run that is finer in every knob."""
-    by = None if table is None else Path(table)
-    return promise.check(fspath(scene), override_texts(overrides), accuracy, by, reporter(progress).say)
-
-
-def check_accuracy(
-    source: Source, result: Result, promised: Promise, *, seconds: float = 3600.0, overrides: Overrides = ()
-) -> tuple[tuple[Held, ...], str]:
-    """Hold what `run_to_accuracy` has promised against a reference that is finer in every knob.
-
-    source, overrides : as given to run_to_accuracy; result, promised : what it returned; seconds : of the processor
-    Returns each promise beside the reference, and "" or why the reference lacks something
-    """
-    return reference.held(read_scene(source, overrides), result, promised, seconds)
 
 
 def converge(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shlex
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,10 +17,7 @@ from tribodyn.workflows.command.words import Flag, Json, Overrides, make_room, p
 from tribodyn.workflows.scene import scene_file
 
 if TYPE_CHECKING:
-    from tribodyn.workflows.accuracy.refinement import Promise
     from tribodyn.workflows.result.result import Result
-    from tribodyn.workflows.run.progress import Progress
-    from tribodyn.workflows.scene.scene_file import SceneFile
 
 Formats = Annotated[tuple[str, ...], Parameter(name="--format", negative=(), consume_multiple=True)]
 
@@ -56,8 +52,6 @@ def run(
     *,
     overrides: Overrides = (),
     accuracy: str | None = None,
-    table: Path | None = None,
-    check: Flag = False,
     out: Path | None = None,
     resume: Flag = False,
     pictures: Annotated[bool, Parameter(negative="--no-pictures")] = True,
@@ -74,14 +68,9 @@ def run(
         Name of a scene (see `tribodyn list`) or a .toml file.
     accuracy
         Relative error wanted, such as "1 %", or of what is named, "1 % of energy": the scene is run with finer and
-        finer settings until the errors that its own verdict measures are below that; exit code 3 where they do not
-        get there. Without depth or life in it nothing is worn. "1 % of life given harmonics" leaves a setting as the
-        scene has it, and its error out.
-    table
-        A trade of this scene to choose the settings by instead, the cheapest that it promises.
-    check
-        Hold what --accuracy promises against a reference that is finer than its last run in mesh, contact grid, modes,
-        harmonics, samples, Newton and wear steps, too; exit code 1 where it is broken. It takes ten times as long.
+        finer settings until the errors of its verdict are below that; exit code 3 where they do not get there. Without
+        depth or life in it nothing is worn. "1 % of life given harmonics" leaves a setting as the scene has it, and
+        its error out.
     out
         Folder of the result; results/NAME by default.
     resume
@@ -93,7 +82,6 @@ def run(
     log
         File to which every line of progress is added, with its time.
     """
-    from tribodyn.workflows.accuracy.accuracy import tuned
     from tribodyn.workflows.run.failure import SolveFailed
     from tribodyn.workflows.run.progress import console_progress
     from tribodyn.workflows.studies import scenes
@@ -101,22 +89,13 @@ def run(
     make_room(out)
     progress = console_progress(quiet, log)
     file = scene_file.read(scene, overrides)
-    if accuracy is None and table is not None:
-        raise ValueError("--table is the trade that --accuracy goes by: give --accuracy, too")
-    if check and (accuracy is None or table is not None):
-        raise ValueError(
-            "--check is of what --accuracy promises without a table; that of a table: tribodyn trade --check"
-        )
-    if accuracy is not None and table is not None:
-        file, choice = tuned(scene, overrides, accuracy, table)
-        progress.say(choice.sentence)
     folder = out or Path("results") / file.name
     path = folder / "result.h5"
     try:
-        if accuracy is not None and table is None:
-            result, promise = scenes.run_to_accuracy(file, accuracy, folder, progress=progress, resume=resume)
+        if accuracy is not None:
+            result, bound = scenes.run_to_accuracy(file, accuracy, folder, progress=progress, resume=resume)
         else:
-            result, promise = scenes.run(file, folder, progress=progress, resume=resume), None
+            result, bound = scenes.run(file, folder, progress=progress, resume=resume), None
     except KeyboardInterrupt:
         raise KeyboardInterrupt(_kept(path, scene, file.overrides)) from None
     except SolveFailed as failure:
@@ -126,22 +105,8 @@ def run(
     progress.say(f"result: {path}")
     if pictures:
         _draw(result, folder / "pictures", tell=progress.say)
-    if promise is not None and check:
-        _check(file, result, promise, progress)
-    if promise is not None and not promise.kept:
-        raise RuntimeError(f"{promise.sentence}; the result is kept in {path}")
-
-
-def _check(file: SceneFile, result: Result, promise: Promise, progress: Progress) -> None:
-    """Print a promise beside its reference; raises SystemExit 1 where it is broken."""
-    from tribodyn.workflows.accuracy import reference
-    from tribodyn.workflows.api import whole_scenes
-
-    with progress.stage("reference"):
-        found, lacking = whole_scenes.check_accuracy(file, result, promise)
-    print(reference.as_text(found, lacking))
-    if any(one.broken for one in found):
-        sys.exit(1)
+    if bound is not None and not bound.met:
+        raise RuntimeError(f"{bound.sentence}; the result is kept in {path}")
 
 
 def _kept(path: Path, scene: str, overrides: Sequence[str]) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -11,71 +10,54 @@ from cyclopts import Parameter
 
 from tribodyn.workflows.command.words import PICTURE, Flag, Json, Overrides, aside, make_room, quantity
 
-Knobs = Annotated[tuple[str, ...], Parameter(name="--knob", negative=(), consume_multiple=False)]
+Settings = Annotated[tuple[str, ...], Parameter(name="--setting", negative=(), consume_multiple=False)]
 
 
 def trade(
     scene: str,
     *,
-    knob: Knobs = (),
+    setting: Settings = (),
     overrides: Overrides = (),
     most: int = 99,
     out: Path | None = None,
-    check: str | None = None,
     as_json: Json = False,
 ) -> None:
-    """Measure what each knob costs and what it is worth, against where it tends to on the same scene.
+    """Measure what each setting costs and what it is worth, against where it tends to on the same scene.
 
     Parameters
     ----------
     scene
         Name of a scene or a .toml file.
-    knob
-        Knob to measure, can be repeated; the other knobs of an earlier table stay. All knobs by default.
-        wear_step alone is table 4.2 of the thesis with life added.
+    setting
+        Setting to measure, can be repeated; the others of an earlier table stay. All by default.
     most
-        Settings of each knob, the finest ones.
+        Values of each setting, the finest ones.
     out
         Table to write (.json), its plot beside it (.png); results/NAME/trade.json by default.
-    check
-        Measure no table, but run what `run --accuracy` would choose for this accuracy, such as "1 %" or "1 % of
-        life", against a run that is finer in every knob; exit code 1 where the promise is broken. --out: the table
-        to go by.
     as_json
         Print JSON for machines.
     """
     if most < 1:
-        raise ValueError(f"--most {most}: a knob needs one setting at least")
-    from tribodyn.workflows.accuracy import accuracy, knob_trade, promise, trade_picture, trade_table, wear_steps
+        raise ValueError(f"--most {most}: a setting needs one value at least")
     from tribodyn.workflows.api import whole_scenes
+    from tribodyn.workflows.errors import choice, knob_trade, trade_picture, trade_table
 
-    if knob == ("wear_step",):
-        make_room(out, PICTURE)
-        table = whole_scenes.compare_wear_steps(scene, overrides=overrides, progress=aside)
-        if out is not None:
-            wear_steps.picture(table).savefig(out)
-        print(json.dumps(wear_steps.as_records(table), indent=2) if as_json else wear_steps.as_text(table))
-        return
-    if check is not None:
-        kept = whole_scenes.check_promise(scene, check, table=out, overrides=overrides, progress=aside)
-        print(json.dumps(promise.as_record(kept), indent=2) if as_json else promise.as_text(kept))
-        if not kept.kept:
-            sys.exit(1)
-        return
     make_room(out, (".json",))
     path = out or Path("results") / Path(scene).stem / "trade.json"
-    earlier = trade_table.load(path) if knob and path.exists() else None
+    earlier = trade_table.load(path) if setting and path.exists() else None
 
     def keep(table: trade_table.Trade) -> None:
         trade_table.save(table, path)
 
-    found = whole_scenes.trade(scene, knob, most=most, overrides=overrides, progress=aside, keep=keep, earlier=earlier)
+    found = whole_scenes.trade(
+        scene, setting, most=most, overrides=overrides, progress=aside, keep=keep, earlier=earlier
+    )
     trade_picture.picture(found).savefig(path.with_suffix(".png"))
     if as_json:
         print(json.dumps(knob_trade.as_records(found), indent=2))
     else:
         print(knob_trade.as_text(found))
-        print(*accuracy.advice(found), path, path.with_suffix(".png"), sep="\n")
+        print(*choice.advice(found), path, path.with_suffix(".png"), sep="\n")
 
 
 def converge(
@@ -94,8 +76,8 @@ def converge(
     as_json
         Print JSON for machines.
     """
-    from tribodyn.workflows.accuracy import converge as study
     from tribodyn.workflows.api import whole_scenes
+    from tribodyn.workflows.errors import converge as study
 
     make_room(out)
     found = whole_scenes.converge(scene, most=most, overrides=overrides, progress=aside)

@@ -11,6 +11,7 @@ import numpy as np
 
 from tribodyn.workflows.export.library import library
 from tribodyn.workflows.export.tables import tables, terms
+from tribodyn.workflows.result import verdict
 from tribodyn.workflows.result.columns import write_columns
 from tribodyn.workflows.result.result import Result
 
@@ -56,7 +57,9 @@ def write_mat(result: Result, folder: Path) -> list[Path]:
         name: {key: _plain(column) for key, column in table.items()} for name, table in tables(result).items()
     }
     facts: dict[str, Any] = {key: value for key, value in result.facts.table().items() if len(key) <= 31}
-    facts["error_budget"] = [{k: np.nan if v is None else v for k, v in vars(e).items()} for e in result.budget]
+    facts["changes"] = [
+        {k: np.nan if v is None else v for k, v in row.items()} for row in verdict.table(result.verdict)
+    ]
     content |= {"facts": facts, "provenance": dict(result.provenance), "state": result.state}
     path = folder / "result.mat"
     savemat(path, content, long_field_names=True, oned_as="column")

@@ -24,6 +24,7 @@ def mesh_fields(result: Result, row: int | None = None) -> pv.UnstructuredGrid:
         wear_depth    total depth of the pair at the node in that state, nan off the patch [m]
     Raises  ValueError where the result keeps no mesh or no field at the row
     """
+    import pyvista as pv
 
     part, fields = result.part, result.fields
     if part is None or fields is None:
@@ -33,7 +34,7 @@ def mesh_fields(result: Result, row: int | None = None) -> pv.UnstructuredGrid:
     if row not in rows:
         raise ValueError(f"the result has no field at wear row {row}: it has those at {', '.join(map(str, rows))}")
     displacement = fields.displacement[rows.index(row)]
-    grid = view.grid_of(part)
+    grid = pv.UnstructuredGrid({getattr(pv.CellType, part.kind.upper()): part.cells}, part.points)
     vibration = view.cycle(displacement, result.harmonics)
     grid.point_data["static"] = view.at_rest(displacement, result.harmonics)
     grid.point_data["vibration"] = view.swing(displacement, result.harmonics)
@@ -46,7 +47,7 @@ def mesh_fields(result: Result, row: int | None = None) -> pv.UnstructuredGrid:
 
 
 def patch_fields(result: Result, row: int = -1) -> pv.PolyData:
-    """The faces of the contact patch with what a wear row holds for each pair, all of the one state that it solved.
+    """The faces of the contact patch with what a wear row says of each pair, all of it of the one state that it solved.
 
     Point data (n_pair,): wear_depth [m] of that state, gap [m] before loading, pressure [Pa] mean over the cycle,
     energy [J] friction work of one cycle, status (bits of hbm.contact.law: 1 sticks, 2 slips, 4 separates)

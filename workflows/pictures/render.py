@@ -19,7 +19,7 @@ from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_u
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, show, trimmed, with_room
 from tribodyn.workflows.pictures.style import LAYOUT, MOTION_MAP, PRESSURE_MAP, RED, STYLE, WEAR_MAP
 from tribodyn.workflows.result.faces import Meeting, bodies, meetings_of, worn_off
-from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.result import PartMesh, Result
 from tribodyn.workflows.result.states import State, has_states, shown_states
 
 
@@ -95,8 +95,8 @@ def contact_picture(result: Result, contact: Meeting, wear: float | None = None)
     states = [opened.own(state) for state in shown_states(result)]
     depth = np.stack([state.depth for state in states])
     wear = wear or drawing.wear_scale(opened.patch, depth)
-    worn, known = bool(depth.max() > 0), [s for s in states if s.status is not None]
-    rows = [name for name, there in (("depth", worn), ("status", bool(known)), ("pressure", True)) if there]
+    worn, told = bool(depth.max() > 0), [s for s in states if s.status is not None]
+    rows = [name for name, there in (("depth", worn), ("status", bool(told)), ("pressure", True)) if there]
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         figure = Figure(
             figsize=(max(LAYOUT.column * len(states), LAYOUT.least) + 0.2, 2.9 * len(rows) + 0.7), layout="constrained"
@@ -113,7 +113,7 @@ def contact_picture(result: Result, contact: Meeting, wear: float | None = None)
         for axes, state in zip(grid[0], states, strict=True):
             axes.set_title(state.label, fontsize=10)
         if "status" in rows:
-            present = {int(bits) for s in known if s.status is not None for bits in s.status}
+            present = {int(bits) for s in told if s.status is not None for bits in s.status}
             status_legend(figure, present, opened.patch.components)
         told_scale = f", depth in relief × {wear:g}" if worn else ""
         heading(figure, result, f"opened {opened.sides}{told_scale}")
@@ -156,7 +156,8 @@ class Moving:
         self.rest_scale = deformation or drawing.deformation_scale(static, self.size)
         depth = np.stack([state.depth for state in shown_states(result)])
         self.wear = wear or drawing.wear_scale(patch, depth)
-        self.shell = drawing.surface(drawing.grid_of(part))
+        kind = _cell_type(part)
+        self.shell = drawing.surface(part.points, part.cells, kind, 0)
         self.outline = self.shell.extract_feature_edges(30)
         reach = [part.points + self.rest_scale * s for s in static]
         for s in (drawing.swing(d, result.harmonics) for d in fields.displacement):
@@ -215,8 +216,16 @@ class Moving:
 
     def view(self, points: np.ndarray, values: np.ndarray, limits: tuple[float, float]) -> View:
         """The part with its nodes at points (n_node, 3), coloured by values of the nodes."""
-        grid = drawing.grid_of(self.part, points)
+        import pyvista as pv
+
+        grid = pv.UnstructuredGrid({_cell_type(self.part): self.part.cells}, points)
         grid.point_data["shown"] = values
-        body = drawing.surface(grid, LAYOUT.smooth)
+        body = grid.extract_surface(nonlinear_subdivision=LAYOUT.smooth, algorithm="dataset_surface")
         layers = [Layer(body, values=np.asarray(body.point_data["shown"]), map=MOTION_MAP, limits=limits)]
         return View(layers, [self.outline])
+
+
+def _cell_type(part: PartMesh) -> int:
+    import pyvista as pv
+
+    return int(getattr(pv.CellType, part.kind.upper()))

@@ -16,13 +16,13 @@ import matplotlib as mpl
 import numpy as np
 
 from tribodyn.version import __version__
-from tribodyn.workflows.accuracy import statement
 from tribodyn.workflows.pictures import offscreen, plots, render
 from tribodyn.workflows.pictures.style import STYLE
 from tribodyn.workflows.report import text
 from tribodyn.workflows.report.charts import charts
 from tribodyn.workflows.report.solid import solid
 from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.verdict import UNITS
 
 DPI = 110  # of the figures on the page
 LARGEST = 15e6  # bytes of a page
@@ -48,14 +48,14 @@ def page(results: Sequence[tuple[str, Result, Path | None]]) -> str:
         parts.append(_section("Side by side", _comparison(named), "compare"))
     for number, (name, result, path) in enumerate(results):
         more = f"{name}: " if len(named) > 1 else ""
-        parts.append(_section(f"{more}verdict", _verdict(result), f"verdict-{number}"))
+        parts.append(_section(f"{more}errors", _verdict(result), f"verdict-{number}"))
         if data["solids"][number] is not None:
             parts.append(_section(f"{more}worn part", _viewer(number), f"part-{number}"))
         if number == 0:
             holders = "".join(map(_chart_holder, data["charts"]))
             parts.append(_section("Curves", '<div class="grid">' + holders + "</div>", "curves"))
         parts.append(_section(f"{more}inspection of the part and model", _inspection(result), f"inspection-{number}"))
-        parts.append(_section(f"{more}error budget", _budget(result), f"budget-{number}"))
+        parts.append(_section(f"{more}measured changes", _changes(result), f"changes-{number}"))
         parts.append(_section(f"{more}figures", _figures(result), f"figures-{number}"))
         parts.append(
             _section(f"{more}scene", f"<pre>{escape(result.provenance['scene_text'])}</pre>", f"scene-{number}")
@@ -131,21 +131,20 @@ def _table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
 def _verdict(result: Result) -> str:
     numbers = result.summary()
     mark = "good" if numbers["finished"] else "bad"
-    html = f'<p class="{mark}"><strong>{escape(result.state[:1].upper() + result.state[1:])}.</strong></p>'
+    said = f'<p class="{mark}"><strong>{escape(result.state[:1].upper() + result.state[1:])}.</strong></p>'
     judged = numbers.get("verdict")
     if isinstance(judged, Mapping):
         rows = []
         for name, item in judged.items():
             value, error = item.get("value"), item.get("error")
-            shown = "none" if value is None else f"{value:.5g} {statement.UNITS.get(name, '')}"
+            shown = "none" if value is None else f"{value:.5g} {UNITS.get(name, '')}"
             rows.append((
-                name.replace("_", " "), shown, "not known" if error is None else statement.percent(error),
-                str(item.get("dominated_by") or ""), "yes" if item.get("stated") else "no",
-                str(item.get("reason") or ""),
+                name.replace("_", " "), shown, "not known" if error is None else text.percent(error),
+                str(item.get("dominated_by") or ""), str(item.get("status") or ""), str(item.get("reason") or ""),
             ))  # fmt: skip
-        head = ("quantity", "value", "total error", "dominated by", "may be stated", "why")
-        html += _table(rows, head)
-    return html + _table(text.numbers(result))
+        head = ("quantity", "value", "total error", "dominated by", "status", "why")
+        said += _table(rows, head)
+    return said + _table(text.numbers(result))
 
 
 def _number(value: Any) -> str:
@@ -196,15 +195,20 @@ def _inspection(result: Result) -> str:
     return _table(rows)
 
 
-def _budget(result: Result) -> str:
-    entries = result.summary()["error_budget"] or []
+def _changes(result: Result) -> str:
+    entries = result.summary()["changes"] or []
     if not entries:
-        return "<p>No error has been estimated.</p>"
+        return "<p>No refinement has been measured.</p>"
     rows = [
-        (e["source"], e["quantity"], "not known" if e["error"] is None else f"{e['error']:.2g}", e["by"])
+        (
+            e["refinement"],
+            e["quantity"],
+            "not known" if e["relative"] is None else text.percent(e["relative"]),
+            e["how"],
+        )
         for e in entries
     ]
-    return _table(rows, ("source", "quantity", "relative error", "by"))
+    return _table(rows, ("refinement", "quantity", "relative change", "how"))
 
 
 def _figures(result: Result) -> str:

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from tribodyn.hbm.wear.history import LIFE_SHARE
-from tribodyn.workflows.accuracy import budget, statement
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.summary import first_lost
+from tribodyn.workflows.result.verdict import NAMES, UNITS, Change, Refinement, Status, Verdict, loaded
 
 Lines = list[tuple[str, str]]
 
 
 def lines(result: Result) -> Lines:
-    """The verdict, the numbers of the result, and the error budget."""
-    verdict = statement.lines(statement.loaded(result.verdict)) if result.verdict else []
-    return [*verdict, *numbers(result), *budget.lines(result)]
+    """The numbers of the result, and their errors."""
+    return [*numbers(result), *(errors(loaded(result.verdict)) if result.verdict else [])]
 
 
 def numbers(result: Result) -> Lines:
@@ -111,3 +111,44 @@ def _course(found: dict[str, Any], name: str, scale: float, unit: str) -> str:
     """The first and the last value of a wear run, or the one of a response."""
     first, last = (float("nan") if value is None else scale * value for value in found[name])
     return f"{first:.5g} {unit}" if found["wear_steps"] == 0 else f"{first:.5g} -> {last:.5g} {unit}"
+
+
+def errors(verdict: Verdict) -> list[tuple[str, str]]:
+    """Values with their errors, as pairs of a name and a readable value."""
+    shown = [("errors", "")]
+    for name, one in verdict.statements.items():
+        label = f"  {NAMES.get(name, name)}"
+        if one.value is None:
+            shown.append((label, f"none: {one.reason}"))
+            continue
+        number = f"{one.value:.4g} {UNITS[name]}"
+        if one.stated:
+            by = f", dominated by {one.dominated_by}" if one.dominated_by else ""
+            shown.append((label, f"{number}, error {percent(one.error or 0.0)}{by}"))
+        elif one.status == Status.NOT_KNOWN:
+            shown.append((label, f"{number}, error not known: {one.reason}"))
+        else:
+            shown.append((label, f"{one.status}: {one.reason}" if one.reason else one.status))
+    return [*shown, *_changes(verdict.changes)]
+
+
+def _changes(changes: Sequence[Change]) -> list[tuple[str, str]]:
+    """What each refinement changed, a line each."""
+    shown = [("changes by", "")] if changes else []
+    for refinement in Refinement:
+        own = [one for one in changes if one.refinement == refinement]
+        known = [
+            f"{NAMES.get(one.quantity, one.quantity)} {percent(one.relative)}"
+            for one in own
+            if one.relative is not None
+        ]
+        if known:
+            shown.append((f"  {refinement}", ", ".join(known)))
+        elif own:
+            shown.append((f"  {refinement}", f"not measured: {own[0].how}"))
+    return shown
+
+
+def percent(error: float) -> str:
+    """A relative error for people."""
+    return f"{100 * error:.2g} %" if error >= 1e-4 else "below 0.01 %"

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.wear.history import WearHistory
-from tribodyn.workflows.result.facts import BudgetEntry, Facts, Stage
+from tribodyn.workflows.result.facts import Facts, Stage
 from tribodyn.workflows.result.summary import summary
 
 PEAKS = 3  # of a response that does not wear, shown in pictures
@@ -215,15 +215,13 @@ class Result:
     provenance : scene text and overrides, versions, seed, start time, threads
     facts : what was modelled and how long it took
     stage : how far the run came; `state` is its sentence
-    budget : what each discretisation contributes to the error, empty before it is known
-    verdict : JSON text of accuracy.statement.Verdict, empty where none was asked for
+    verdict : JSON text of result.verdict.Verdict, empty where none was asked for
     response : curve of the unworn contact; stability, bounds : of it, where the scene asks for them
     """
 
     provenance: Mapping[str, str]
     facts: Facts
     stage: Stage
-    budget: tuple[BudgetEntry, ...] = ()
     patch: Patch | None = None
     part: PartMesh | None = None
     references: References | None = None
@@ -238,7 +236,7 @@ class Result:
 
     @property
     def state(self) -> str:
-        """A sentence on how far the run came."""
+        """Sentence that says how far the run came."""
         if self.stage is Stage.WEARING and self.wear is not None:
             return f"{self.stage.value}: {len(self.wear.cycles)} wear steps are done"
         if self.stage is Stage.FAILED and self.wear is not None:

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import hashlib
 import io
-import json
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -22,7 +21,7 @@ import numpy as np
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.outcome import BranchEnd, End, Outcome, SolveEnd, WearEnd
 from tribodyn.hbm.wear.history import WearHistory
-from tribodyn.workflows.result.facts import BudgetEntry, Facts, Stage
+from tribodyn.workflows.result.facts import Facts, Stage
 from tribodyn.workflows.result.result import (
     CurveStability,
     Fields,
@@ -45,7 +44,6 @@ Ended = TypeVar("Ended", bound=End)
 KIND = "end_kind"  # attribute with the name of the member whose sentence stands in "end"
 ENDS: dict[type, type[End]] = {Branch: BranchEnd, WearHistory: WearEnd}
 KINDS = "outcome_kind"  # attribute with the names of the members whose sentences stand in "outcome"
-BUDGET = "error_budget"  # attribute of the group facts that holds the entries of the budget as JSON
 
 # group -> (type, {array: (dimensions, unit)}); what is not an array is an attribute of the group
 SCHEMA: dict[str, tuple[type, dict[str, tuple[tuple[str, ...], str]]]] = {
@@ -178,8 +176,6 @@ def _write(file: h5py.File, result: Result) -> None:
     file.attrs["stage"] = result.stage.name
     file.attrs["verdict"] = result.verdict
     facts = result.facts.table()
-    if result.budget:
-        facts[BUDGET] = json.dumps([asdict(entry) for entry in result.budget])
     for name, table in (("provenance", result.provenance), ("facts", facts)):
         group = file.create_group(name)
         for key, value in table.items():
@@ -263,7 +259,6 @@ def load(path: Path) -> Result:
             provenance=_attributes(file["provenance"].attrs),
             facts=Facts.of(facts),
             stage=stage,
-            budget=tuple(BudgetEntry(**entry) for entry in json.loads(facts.get(BUDGET, "[]"))),
             verdict=str(file.attrs.get("verdict", "")),
             **parts,
         )
@@ -280,8 +275,8 @@ def _read(group: h5py.Group, kind: type, arrays: Mapping[str, Any]) -> Any:
         elif item.name == "end":
             values[item.name] = _outcome(ENDS[kind], str(group.attrs[KIND]), str(group.attrs[item.name]))
         elif item.name == "outcome":
-            ends = zip(group.attrs[KINDS], group.attrs[item.name], strict=True)
-            values[item.name] = tuple(_outcome(SolveEnd, str(name), str(text)) for name, text in ends)
+            said = zip(group.attrs[KINDS], group.attrs[item.name], strict=True)
+            values[item.name] = tuple(_outcome(SolveEnd, str(name), str(text)) for name, text in said)
         else:
             value = group.attrs[item.name]
             values[item.name] = value if isinstance(value, str) else tuple(str(entry) for entry in value)

@@ -10,6 +10,7 @@ import numpy as np
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear.events import events
 from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload, cycles_to_share
+from tribodyn.workflows.result import verdict
 
 if TYPE_CHECKING:
     from tribodyn.workflows.result.result import Result
@@ -29,14 +30,14 @@ def summary(result: Result) -> dict[str, Any]:
     wear_steps, hbm_solves : steps taken and balance solves spent on wear
     peak_hz, peak_m, preload_N : [first, last] of the wear run, or the peak of the response curve without one
     peak_at_end : whether that peak is no peak, but an end of the response curve
-    peak_is_stable : whether that peak of the curve is stable, None where this was not asked for
+    peak_is_stable : whether that peak of the curve is a motion that stays, None where this was not asked for
     stable_peak_hz, stable_peak_m : the highest point of the curve that is
     seconds : of computing, interrupted runs included
     joints : named contact -> pairs, area_m2, and with wear preload_N [first, last], life_cycles until its preload has
         fallen to `wear.lost_below` (LIFE_SHARE where that is 0), None if it has not, depth_max_m, depth_mean_m,
         volume_m3, energy_J of that joint; empty where the scene names none
-    verdict : quantity -> value, error, dominated_by, stated, reason, see workflows.accuracy.statement; None without
-    error_budget : what each discretisation contributes, see result.facts.BudgetEntry
+    verdict : quantity -> value, error, dominated_by, status, reason, stated, see result.verdict.Statement; None without
+    changes : what each refinement changed, see result.verdict.Change
     """
     return {name: plain(value) for name, value in numbers(result).items()}
 
@@ -51,8 +52,8 @@ def numbers(result: Result) -> dict[str, Any]:
     found |= _curve(result)
     found["joints"] = by_joint(result)
     found["free_hz"] = result.facts.free_hz.tolist()
-    found["error_budget"] = [vars(entry) for entry in result.budget]
-    found["verdict"] = json.loads(result.verdict)["statements"] if result.verdict else None
+    found["verdict"] = verdict.record(result.verdict)
+    found["changes"] = verdict.table(result.verdict)
     return found
 
 
@@ -157,7 +158,7 @@ def _peak(result: Result) -> dict[str, Any]:
 
 
 def _stable_peak(result: Result) -> dict[str, Any]:
-    """An unstable motion is a solution of the balance that no vibration remains at, however high it is."""
+    """An unstable motion is a solution of the balance that no vibration stays at, however high it is."""
     frf, marks = result.response, result.stability
     if frf is None or marks is None:
         return dict.fromkeys(("peak_is_stable", "stable_peak_hz", "stable_peak_m"))

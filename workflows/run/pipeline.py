@@ -1,4 +1,4 @@
-"""From a scene to a result: model, response, what the scene asks about it, wear, worn responses, error budget."""
+"""From a scene to a result: model, response, what the scene asks about it, wear, worn responses."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.threads import limited
-from tribodyn.workflows.accuracy import verdict
-from tribodyn.workflows.accuracy.budget import with_budget
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.result import Result
@@ -27,6 +25,8 @@ from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import Scene
 
+Judge = Callable[[SceneFile, modelling.Model, Result, Progress], Result]
+
 
 def run(
     file: SceneFile,
@@ -35,14 +35,15 @@ def run(
     earlier: Result | None = None,
     build: Callable[[SceneFile], modelling.Model] | None = None,
     row_only: bool = False,
+    judge: Judge | None = None,
 ) -> Result:
     """Compute everything that a scene asks for, and keep it in `folder`/result.h5 while it grows.
 
     folder : None keeps nothing on disk
     earlier : an unfinished result of the same scene to resume
     build : makes the model, for runs that share what models are made of; from the scene alone by default
-    row_only : without what the row of a study does not hold: linear references, and the error budget where no verdict
-        needs it
+    row_only : without linear references, which the row of a study does not hold
+    judge : measures the errors of the finished result, where the scene wants them
     Raises  ValueError: the scene asks for what cannot be, SolveFailed: after what was computed is kept
     """
     scene, clock = file.scene, Clock(earlier)
@@ -89,12 +90,8 @@ def run(
                 count = scene.wear.responses
                 curves = curve.worn_responses(result, model.balance, count, again, advance)
                 result = keep(replace(result, worn=curves))
-        if not row_only or scene.verdict.enabled:
-            with progress.stage("error budget"):
-                result = with_budget(file, model.balance, result)
-        if scene.verdict.enabled:
-            found = verdict.judge(file, model, result, progress, keep.clock.processor_seconds())
-            result = replace(result, verdict=found.dumped())
+        if judge is not None and scene.verdict.enabled:
+            result = judge(file, model, result, progress)
         return keep(replace(result, stage=Stage.COMPLETE))
 
 

@@ -22,7 +22,6 @@ from tribodyn.workflows.run import memory as memory_use
 from tribodyn.workflows.run.modelling import clamps, make_mesh
 from tribodyn.workflows.run.part_reduction import components, without_masters
 from tribodyn.workflows.run.settings import check_names
-from tribodyn.workflows.scene.afterwards import VerdictOptions
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.own import is_file
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -59,7 +58,7 @@ COSTS = Costs()
 
 @dataclass(frozen=True)
 class Plan:
-    """Sizes, memory [bytes] and time [s] of a scene; wear_steps is None where it is not known, 0 without wear."""
+    """Sizes, memory [bytes] and time [s] of a scene; wear_steps is None where it cannot be told, 0 without wear."""
 
     elements: int
     nodes: int
@@ -73,22 +72,12 @@ class Plan:
     wear_steps: int | None
     wear_solves: int
     solve_seconds: float
-    verdict: VerdictOptions
+    verdict: bool
 
     @property
     def computing_seconds(self) -> float:
-        """Expected time of the run without its verdict [s]."""
+        """Expected time of the run without its errors [s]."""
         return self.reduction_seconds + (self.response_solves + self.wear_solves) * self.solve_seconds
-
-    @property
-    def verdict_seconds(self) -> float:
-        """Most processor time that the verdict takes [s]."""
-        return self.verdict.limit(self.computing_seconds) if self.verdict.enabled else 0.0
-
-    @property
-    def seconds(self) -> float:
-        """Expected time of the whole run [s]."""
-        return self.computing_seconds + self.verdict_seconds
 
     def lines(self) -> list[tuple[str, str]]:
         """The plan as pairs of a name and a readable value."""
@@ -104,8 +93,8 @@ class Plan:
             ("reduction", f"about {_time(self.reduction_seconds)}"),
             ("response", f"{self.response_solves} solves, about {response}"),
             ("wear", f"{steps} steps, about {wear}" if self.wear_solves else "none"),
-            ("verdict", f"at most {_time(self.verdict_seconds)}" if self.verdict.enabled else "none"),
-            ("whole run", f"about {_time(self.seconds)} on one core, to a factor of three"),
+            ("errors", "measured on a finer model after the run" if self.verdict else "not measured"),
+            ("whole run", f"about {_time(self.computing_seconds)} on one core, to a factor of three, without errors"),
         ]
 
 
@@ -163,7 +152,7 @@ def plan(file: SceneFile) -> Plan:
         wear_steps=steps,
         wear_solves=solves,
         solve_seconds=5e-3 + basis.n_coeff * (COSTS.sparse * full if sparse else COSTS.solve * contact**2),
-        verdict=scene.verdict,
+        verdict=scene.verdict.enabled,
     )
 
 

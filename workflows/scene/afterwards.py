@@ -28,25 +28,11 @@ class Pictures(Table):
     """Factor on wear depth in renders; chosen by size by default."""
 
 
-VERDICT_SECONDS = (10.0, 60.0)  # bounds where the scene gives none
-# of the seconds of the run: what a verdict needs besides its measurements keeps both below twice the run
-VERDICT_SHARE = 0.9
-
-
 class VerdictOptions(Table):
-    """What is measured to judge a finished result, see `tribodyn.workflows.accuracy.verdict`."""
+    """What is measured to judge a finished result, see `tribodyn.workflows.errors.verdict`."""
 
     enabled: StrictBool = True
     """Judge the result when the run is done."""
-    seconds: Annotated[Number, Field(gt=0)] | None = None
-    """Processor seconds that the measurements may take together; what they do not reach is not known. By default nine
-    tenths of those of the run, but 10 at least and 60 at most."""
-    mesh: StrictBool = True
-    """Solve the unworn contact on other meshes, and with more modes."""
     in_time: StrictBool | None = None
-    """Integrate the unworn, the middle and the late state in time; by default where the contact has at most 60
-    components and the seconds last."""
-
-    def limit(self, spent: float) -> float:
-        """Processor seconds that the measurements may take after a run that took `spent` of them."""
-        return self.seconds or min(max(VERDICT_SHARE * spent, VERDICT_SECONDS[0]), VERDICT_SECONDS[1])
+    """Integrate the unworn, the middle and the late state in time; by default where the contact has at most 30
+    components."""

@@ -10,8 +10,9 @@ from typing import Any, Literal
 import numpy as np
 import tomli_w
 
-from tribodyn.workflows.accuracy import refinement
-from tribodyn.workflows.accuracy.refinement import Promise
+from tribodyn.workflows.errors import accuracy as errors
+from tribodyn.workflows.errors.accuracy import Bound
+from tribodyn.workflows.errors.verdict import with_verdict
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import checkpoint, modelling, pipeline, planning
@@ -83,7 +84,7 @@ def run(
     if folder is None:
         if pictures or resume:
             raise ValueError(f"{'pictures' if pictures else 'resume'} needs a folder: give run a folder")
-        return pipeline.run(file, None, reporter(progress))
+        return pipeline.run(file, None, reporter(progress), judge=with_verdict)
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)
     path = place / "result.h5"
@@ -92,7 +93,7 @@ def run(
         reporter(progress).say(f"{path} is complete already")
         result = earlier
     else:
-        result = pipeline.run(file, place, reporter(progress), earlier)
+        result = pipeline.run(file, place, reporter(progress), earlier, judge=with_verdict)
     if pictures:
         draw(result, place / "pictures")
     return result
@@ -106,13 +107,13 @@ def run_to_accuracy(
     overrides: Overrides = (),
     progress: Report = None,
     resume: bool = False,
-) -> tuple[Result, Promise]:
+) -> tuple[Result, Bound]:
     """Run a scene with finer and finer settings until its own verdict's errors are below the wanted one.
 
     accuracy : such as "1 %", "1 % of energy and peak frequency", "1 % of life given harmonics"
     folder : where result.h5 of the last run is kept, and those of all runs in rounds/1, rounds/2, ...
     resume : take the runs that the folder holds already
-    Returns the last result and what may be promised of it; `kept` says whether all that was asked for is
+    Returns the last result and its errors; `met` says whether all are below the bound
     Raises  ValueError: the accuracy or the scene asks for what cannot be; SolveFailed: folder keeps what was computed
     """
     file, report = read_scene(source, overrides), reporter(progress)
@@ -121,11 +122,11 @@ def run_to_accuracy(
         place = None if folder is None else Path(folder) / "rounds" / str(number)
         return run(current, place, progress=progress, resume=resume and place is not None)
 
-    result, promise = refinement.to_accuracy(file, accuracy, one, report.say)
+    result, bound = errors.to_accuracy(file, accuracy, one, report.say)
     if folder is not None:
         store.set_aside(Path(folder) / "result.h5")
         store.save(Path(folder) / "result.h5", result)
-    return result, promise
+    return result, bound
 
 
 def load(path: str | PathLike[str]) -> Result:

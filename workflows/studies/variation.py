@@ -13,8 +13,8 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm.continuation.operating_point import NoPeak
-from tribodyn.workflows.accuracy import measure
-from tribodyn.workflows.accuracy.trade_table import ANSWERED
+from tribodyn.workflows.errors import cost
+from tribodyn.workflows.errors.trade_table import ANSWERED
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.studies.fits import fit_file
@@ -47,7 +47,7 @@ def changed(scene: str, overrides: Sequence[str], changes: Sequence[str]) -> dic
 
 def answers(file: SceneFile) -> tuple[Answers, str]:
     """Peak, energy, preload, depth and life of a scene, as the trade of its settings measures them, and the outcome."""
-    found = measure.measure(file)
+    found = cost.measure(file)
     return found.values, found.outcome
 
 

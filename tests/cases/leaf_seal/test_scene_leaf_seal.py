@@ -21,7 +21,7 @@ from tribodyn.hbm.linear.recovery import coordinates
 from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.stepper import Options
-from tribodyn.workflows.accuracy.statement import loaded
+from tribodyn.workflows.result.verdict import loaded
 from tribodyn.workflows.run import modelling, pipeline, planning
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import linear_references
@@ -355,7 +355,7 @@ def test_the_verdict_knows_what_a_fold_is_off_by(tmp_path):
     """The highest point is a fold, which one harmonic puts 8 % too low and a quarter too high, as in time."""
     overrides = (
         "geometry.n_column=7", "geometry.pin_column=2", 'response.frequency=["120 Hz", "180 Hz"]',
-        "response.stability=false", "verdict.mesh=false", "verdict.seconds=60", "verdict.in_time=false",
+        "response.stability=false", "verdict.enabled=false", "verdict.in_time=false",
     )  # fmt: skip
     result = pipeline.run(scene_file.read("leaf_seal_thesis", overrides), tmp_path, Progress())
     found = {part.quantity: part.error for part in loaded(result.verdict).contributions if part.source == "harmonics"}

@@ -14,8 +14,9 @@ from typing import Any, Literal
 import numpy as np
 
 from tribodyn.version import __version__
-from tribodyn.workflows.accuracy.statement import QUANTITIES
+from tribodyn.workflows.errors.verdict import with_verdict
 from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.verdict import QUANTITIES
 from tribodyn.workflows.run import modelling, pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.reuse import Bench
@@ -103,7 +104,7 @@ def solve(task: Task) -> Row:
     with _one_at_a_time:
         _set_up(task)
         try:
-            result = pipeline.run(task.scene(), None, Progress(), build=_model, row_only=True)
+            result = pipeline.run(task.scene(), None, Progress(), build=_model, row_only=True, judge=with_verdict)
         except np.linalg.LinAlgError as error:
             return ended("failed", error)
         except (ValueError, OSError) as error:

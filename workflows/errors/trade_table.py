@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.workflows.accuracy.knobs import study_of
-from tribodyn.workflows.accuracy.limit import limit_of
+from tribodyn.workflows.errors.knobs import study_of
+from tribodyn.workflows.errors.limit import limit_of
+from tribodyn.workflows.result.summary import plain
 from tribodyn.workflows.result.whole_file import replacing
 from tribodyn.workflows.scene.content import code, digests
 from tribodyn.workflows.scene.scene_file import SceneFile, first_difference
@@ -183,12 +184,3 @@ def load(path: Path) -> Trade:
 
 def _size(row: dict[str, Any]) -> float:
     return float("nan") if row["size"] is None else float(row["size"])
-
-
-def plain(value: Any) -> Any:
-    """A value as JSON has it: nan and inf become None."""
-    if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from tribodyn.workflows.accuracy.accuracy import front
-from tribodyn.workflows.accuracy.trade_table import NAMES, QUANTITIES, Trade
+from tribodyn.workflows.errors.choice import front
+from tribodyn.workflows.errors.trade_table import NAMES, QUANTITIES, Trade
 from tribodyn.workflows.pictures.style import GREY, INK, STYLE
 
 SHOWN = ("peak_m", "energy_J", "life_cycles")

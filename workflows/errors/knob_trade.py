@@ -6,18 +6,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
-from tribodyn.workflows.accuracy.knobs import Knob, Setting, chosen, knobs_of, study_of
-from tribodyn.workflows.accuracy.limit import limit_of
-from tribodyn.workflows.accuracy.measure import Measured, measure
-from tribodyn.workflows.accuracy.trade_table import (
+from tribodyn.workflows.errors.cost import Measured, measure
+from tribodyn.workflows.errors.knobs import Knob, Setting, chosen, knobs_of, study_of
+from tribodyn.workflows.errors.limit import limit_of
+from tribodyn.workflows.errors.trade_table import (
     ANSWERED,
     NAMES,
     QUANTITIES,
     Trade,
     TradeRow,
     known_of,
-    plain,
 )
+from tribodyn.workflows.result.summary import plain
 from tribodyn.workflows.scene import scene_file
 
 BASE = "base"

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 
-from tribodyn.workflows.accuracy.trade_table import ANSWERED, NAMES, QUANTITIES, Trade, TradeRow, load
-from tribodyn.workflows.scene.scene_file import SceneFile, read
-from tribodyn.workflows.scene.units import to_si
+from tribodyn.workflows.errors.trade_table import ANSWERED, NAMES, QUANTITIES, Trade, TradeRow
 
 OF_WEAR = ("depth_m", "life_cycles")
 WANTED = tuple(float(10**-power) for power in np.arange(0.5, 5, 0.125))  # errors of the Pareto front
 WORTH = 0.1  # of the time that a coarser setting must save: the clock is no better, and coarse ones are less robust
-ACCURACY = re.compile(r"(.*?)(?: ?\bof\b(.*?))?(?:,? ?\bgiven\b(.*))?")
-PER_CENT = re.compile(r" ?\bper ?cent\b")
 MARGIN = 0.7  # of the wanted error that the knobs together may use up: they were measured one by one
 
 
@@ -65,43 +59,6 @@ class Choice:
         return f"{sure}; nothing else is promised: {self.missed}" if self.missed else sure
 
 
-def parsed(text: str) -> tuple[float, tuple[str, ...], tuple[str, ...]]:
-    """A wanted accuracy such as "1 %", "1 % of life and peak frequency" or "1 % of life given harmonics".
-
-    Returns the relative error, the quantities that are named, and knobs that stay as the scene has them, whose error is
-    not counted
-    Raises  ValueError with one sentence
-    """
-    parts = ACCURACY.fullmatch(" ".join(text.lower().split()).rstrip("."))
-    assert parts is not None  # anything is a number so far
-    number, names, knobs = parts.groups()
-    try:
-        wanted = to_si(PER_CENT.sub("%", number), "")
-    except ValueError as wrong:
-        raise ValueError(f'--accuracy "{text}": {wrong}') from None
-    if wanted <= 0:
-        raise ValueError(f'--accuracy "{text}": an error is above 0, such as "1 %"')
-    if wanted >= 1:
-        raise ValueError(f'--accuracy "{text}": an error of {100 * wanted:.4g} % says nothing, ask for such as "1 %"')
-    asked = () if names is None else _listed(names)
-    for name in asked:
-        if name not in NAMES:
-            raise ValueError(f'--accuracy "{text}": after "of" {_quoted(name)} is none of {", ".join(NAMES)}')
-    given = () if knobs is None else tuple(knob.replace(" ", "_") for knob in _listed(knobs))
-    if "" in given:
-        raise ValueError(f'--accuracy "{text}": after "given" a knob is missing, such as harmonics')
-    return wanted, tuple(QUANTITIES[NAMES.index(name)] for name in dict.fromkeys(asked)), given
-
-
-def _listed(text: str) -> tuple[str, ...]:
-    """Words of a list "a, b and the c"."""
-    return tuple(item.strip().removeprefix("the ") for item in re.split(r",(?: and\b)?| and\b", text))
-
-
-def _quoted(name: str) -> str:
-    return f'"{name}"' if name else "nothing"
-
-
 def choose(trade: Trade, wanted: float, quantities: Sequence[str] = QUANTITIES, given: Sequence[str] = ()) -> Choice:
     """The cheapest settings whose errors add up to less than the wanted one, in every quantity.
 
@@ -141,19 +98,6 @@ def choose(trade: Trade, wanted: float, quantities: Sequence[str] = QUANTITIES, 
             break
         place = max(allowed, key=lambda t: (1 - seconds(t) / seconds(place)) / max(total(t) - total(place), 1e-9))
     return Choice(tuple(ladders[k][i] for k, i in place.items()), errors(place), seconds(place), tuple(given))
-
-
-def choose_most(trade: Trade, wanted: float, quantities: Sequence[str], given: Sequence[str] = ()) -> Choice:
-    """As `choose`, for as many of the quantities as can be promised: the worst known is left out until it can be."""
-    asked, missed = [q for q in quantities if any(row.values[q] is not None for row in trade.rows)], ""
-    while True:
-        try:
-            return replace(choose(trade, wanted, asked, given), missed=missed)
-        except Refused as refusal:
-            missed = missed or str(refusal)
-            asked.remove(refusal.quantity)
-            if not asked:
-                raise
 
 
 def _refusal(
@@ -238,50 +182,3 @@ def advice(trade: Trade, wanted: float = 0.01) -> list[str]:
         settings = ", ".join(row.setting for row in found.rows)
         lines.append(f"for {100 * wanted:.3g} % on {name} use {settings}: {found.seconds:.2g} s")
     return lines
-
-
-def beside(file: SceneFile) -> Path:
-    """Where the trade of a scene lies that comes with it: beside it."""
-    return file.folder / f"{file.name}.trade.json"
-
-
-def table_of(file: SceneFile, path: Path | None = None) -> Trade:
-    """The trade of a scene: of `path`, or results/NAME/trade.json, or the one beside the scene.
-
-    Raises  ValueError where there is none, or where the scene, a file that it names or the program was another one
-    """
-    here = Path("results") / file.name / "trade.json"
-    places = [path] if path is not None else [p for p in (here, beside(file)) if p.is_file()]
-    changed: list[str] = []
-    for place in places:
-        trade = load(place)
-        changed.append(trade.changed(file, shipped=file.comes_along and place.resolve() == beside(file).resolve()))
-        if not changed[-1]:
-            return trade
-    if places:
-        raise ValueError(
-            f"the trade in {places[0]} was measured {changed[0]}: measure it again with "
-            f"tribodyn trade {file.word} and the same --set"
-        )
-    raise ValueError(f"no trade was measured for {file.name}: measure it with tribodyn trade {file.word}")
-
-
-def tuned(name: str, overrides: Sequence[str], wanted: str, path: Path | None = None) -> tuple[SceneFile, Choice]:
-    """The scene with the cheapest settings that promise an accuracy as `parsed` reads it, and the choice.
-
-    Quantities that are named are promised or refused; where none is, as many as can be. Where neither depth nor life
-    is asked for, the scene is not worn.
-    """
-    file = read(name, overrides)
-    trade = table_of(file, path)
-    error, quantities, given = parsed(wanted)
-    way = choose if quantities else choose_most
-    asked = quantities or QUANTITIES
-    has = [q for q in QUANTITIES if any(row.values[q] is not None for row in trade.rows)]
-    for quantity in quantities:
-        if quantity not in has:
-            known = ", ".join(map(_name, has))
-            raise ValueError(f"the trade of {file.name} has measured no {_name(quantity)}, but {known}")
-    choice = way(trade, error, asked, given)
-    unasked = file.scene.wear is not None and not any(quantity in asked for quantity in OF_WEAR)
-    return read(name, (*overrides, *choice.overrides, *(("wear=",) if unasked else ()))), choice

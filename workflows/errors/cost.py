@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from tribodyn.hbm.continuation.operating_point import AtFrequency, OperatingPoint
 from tribodyn.hbm.wear.history import WearHistory, cycles_to_preload
-from tribodyn.workflows.accuracy.trade_table import ANSWERED, QUANTITIES
+from tribodyn.workflows.errors.trade_table import ANSWERED, QUANTITIES
 from tribodyn.workflows.run import curve, memory, modelling, pipeline, settings, wear_run
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile

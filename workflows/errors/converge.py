@@ -20,11 +20,11 @@ from matplotlib.ticker import NullLocator
 from matplotlib.tri import Triangulation
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
-from tribodyn.workflows.accuracy import limit
-from tribodyn.workflows.accuracy.knobs import Ladder, Setting, study_of, study_path
-from tribodyn.workflows.accuracy.limit import Limit
-from tribodyn.workflows.accuracy.measure import Measured, measure
-from tribodyn.workflows.accuracy.trade_table import ANSWERED, NAMES, QUANTITIES
+from tribodyn.workflows.errors import limit
+from tribodyn.workflows.errors.cost import Measured, measure
+from tribodyn.workflows.errors.knobs import Ladder, Setting, study_of, study_path
+from tribodyn.workflows.errors.limit import Limit
+from tribodyn.workflows.errors.trade_table import ANSWERED, NAMES, QUANTITIES
 from tribodyn.workflows.pictures.style import BLUE, GREEN, GREY, ORANGE, STYLE
 from tribodyn.workflows.scene import scene_file
 

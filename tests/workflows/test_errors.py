@@ -1,0 +1,266 @@
+"""The error system: a table of measured changes, one rule, and what is reported of a result."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+
+import tribodyn as td
+from tests.proof import reference
+from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
+from tribodyn.hbm.stability.stays import MULTIPLIERS
+from tribodyn.workflows.errors import accuracy, measure, refine, verdict
+from tribodyn.workflows.errors.accuracy import Bound
+from tribodyn.workflows.errors.in_time import Finding
+from tribodyn.workflows.errors.options import DEFAULT
+from tribodyn.workflows.errors.states import relative
+from tribodyn.workflows.result.verdict import QUANTITIES, Change, Refinement, Statement, Status, Verdict, loaded
+from tribodyn.workflows.scene import scene_file
+
+SMALL = (
+    "harmonics.kept=[0, 1]", "geometry.n_patch=5", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=4",
+    "wear.tolerance=10 %", "response.points=30", "verdict.in_time=false",
+)  # fmt: skip
+TINY = (
+    "harmonics.kept=[0, 1]", "geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "reduction.modes=5",
+    "response.points=20", "harmonics.samples=64", "pictures.renders=false", "verdict.in_time=false",
+)  # fmt: skip
+OF_STATE = ("peak_frequency", "amplitude", "energy", "preload")
+
+
+@pytest.fixture(scope="module")
+def small() -> td.Result:
+    return td.run("beam", overrides=(*SMALL, "wear.max_steps=2"))
+
+
+def rows(result: td.Result, refinement: Refinement) -> dict[str, Change]:
+    return {row.quantity: row for row in loaded(result.verdict).changes if row.refinement == refinement}
+
+
+def test_every_quantity_has_a_statement(small: td.Result) -> None:
+    said = small.summary()["verdict"]
+    assert tuple(said) == QUANTITIES
+    for name, one in said.items():
+        assert one["stated"] == (one["status"] == Status.REPORTED), name
+        assert not one["stated"] or 0 < one["error"] <= DEFAULT.largest  # no value is stated without an error
+    assert [said[name]["stated"] for name in OF_STATE].count(True) >= 2
+    assert said["life"]["value"] is None
+    assert json.loads(json.dumps(said)) == said
+
+
+def test_single_refinements_lead_step_by_step_to_the_combined_one(small: td.Result) -> None:
+    modes, mesh, harmonics, combined = (
+        rows(small, r) for r in (Refinement.MODES, Refinement.MESH, Refinement.HARMONICS, Refinement.COMBINED)
+    )
+    for name in OF_STATE:
+        assert modes[name].value == combined[name].value
+        assert modes[name].refined == mesh[name].value
+        assert mesh[name].refined == harmonics[name].value
+        assert harmonics[name].refined == combined[name].refined
+        assert combined[name].relative == relative(combined[name].value or 0.0, combined[name].refined or 0.0)
+
+
+def test_the_combined_refinement_is_that_of_a_finer_run(small: td.Result) -> None:
+    """Twice the elements, harmonics to 5 and twice the modes, run as a scene of its own."""
+    finer = td.run(
+        "beam",
+        overrides=(*SMALL[5:], "geometry.n_patch=9", "geometry.n_length=8", "geometry.n_height=2", "reduction.modes=8",
+            "harmonics.kept=[0, 1, 2, 3, 4, 5]", "harmonics.samples=80", "wear.max_steps=1", "verdict.enabled=false"),
+    )  # fmt: skip
+    combined = rows(small, Refinement.COMBINED)
+    assert finer.wear is not None
+    assert combined["preload"].refined == pytest.approx(float(finer.wear.preload[0]), rel=1e-4)
+    assert combined["peak_frequency"].refined == pytest.approx(float(finer.wear.omega[0]) / (2 * np.pi), rel=1e-4)
+
+
+def test_the_error_holds_against_a_finer_reference(small: td.Result) -> None:
+    file = scene_file.read("beam", (*SMALL, "wear="))
+    truth, outcome = reference.solved(file, 120.0)
+    assert outcome == reference.MEASURED
+    for name, one in loaded(small.verdict).statements.items():
+        right = truth[name]
+        if one.stated and right is not None:
+            assert one.value is not None
+            assert relative(one.value, right) < (one.error or 0.0) < 12 * max(relative(one.value, right), DEFAULT.floor)
+
+
+def test_the_same_scene_has_the_same_errors_in_every_digit(small: td.Result) -> None:
+    """Nothing that is decided depends on a clock."""
+    first, again = loaded(small.verdict), loaded(td.run("beam", overrides=(*SMALL, "wear.max_steps=2")).verdict)
+    assert replace(again, seconds=first.seconds) == first
+
+
+@pytest.mark.parametrize(
+    ("change", "ratio", "total"),
+    [(0.01, 2.0, 0.025), (0.01, 1.5, 0.0375), (0.0, 2.0, 2.5e-3), (0.3, 2.0, 0.75)],
+)
+def test_the_rule(change: float, ratio: float, total: float) -> None:
+    row = Change(Refinement.COMBINED, "energy", 1.0, 1.0, change, "")
+    assert verdict.error_of([row], ratio)[0] == pytest.approx(total)
+
+
+def test_an_error_that_nobody_measured_is_not_known() -> None:
+    row = Change(Refinement.COMBINED, "energy", None, None, None, "above the limit")
+    assert verdict.error_of([row], None) == (None, "above the limit")
+    assert verdict.error_of([], None)[0] is None
+
+
+def test_what_is_above_a_limit_of_work_is_not_measured() -> None:
+    """Limits count unknowns and DOFs; harmonics and modes are measured all the same."""
+    limits = replace(DEFAULT, max_unknowns=10)
+    file = scene_file.read("beam", (*TINY, "wear="))
+    result = td.run(file, overrides=["verdict.enabled=false"])
+    found = verdict.judge(file, td.build(file), result, td_progress(), limits)
+    assert {found.statements[name].status for name in OF_STATE} == {Status.NOT_KNOWN}
+    assert {row.refinement for row in found.changes if row.relative} >= {Refinement.MODES, Refinement.HARMONICS}
+
+
+def td_progress() -> measure.Progress:
+    return measure.Progress()
+
+
+def test_depth_and_life_are_those_of_a_finer_wear_run() -> None:
+    overrides = (*TINY, "wear.rule=thesis", "wear.step=40 %")
+    result = td.run("beam", overrides=overrides)
+    combined = rows(result, Refinement.COMBINED)
+    assert result.summary()["life_cycles"] == combined["life"].value
+    file = scene_file.read("beam", overrides)
+    finer = refine.wear(refine.harmonics(refine.modes(refine.mesh(file, 2.0)[0], 2) or file, 5), 2.0)
+    there = td.run(finer, overrides=["verdict.enabled=false"])
+    assert there.summary()["life_cycles"] == pytest.approx(combined["life"].refined, rel=1e-6)
+    statement = loaded(result.verdict).statements["life"]
+    assert statement.error == pytest.approx(DEFAULT.total(combined["life"].relative or 0.0, 2.0))
+
+
+def finding(**changes: object) -> Finding:
+    return replace(Finding(0.0, 0.001, 0.001, 0.0, 1e-4, True, MULTIPLIERS, CONVERGED), **changes)  # type: ignore[arg-type]
+
+
+LOST: Outcome[SolveEnd] = SolveEnd.INTEGRATION_FAILED.say("")
+
+
+@pytest.mark.parametrize(
+    ("changes", "status"),
+    [
+        ({}, None),
+        ({"energy": 0.2}, Status.CONTRADICTED),
+        ({"stable": False}, Status.UNSTABLE),
+        ({"stable": False, "how": "Hill's method"}, Status.UNSTABLE),
+        ({"stable": False, "how": "Hill's method", "energy": 1e-4}, None),
+        ({"outcome": LOST, "energy": np.nan}, Status.NOT_PERIODIC),
+    ],
+)
+def test_what_time_integration_finds_decides_what_is_reported(
+    changes: dict[str, object], status: Status | None
+) -> None:
+    assert finding(**changes).judged("energy", 0.01)[0] == status
+
+
+def test_small_contacts_are_integrated_in_time() -> None:
+    overrides = (*TINY[:-1], "wear=", "loads.harmonic.shake.value=1 kN")
+    said = loaded(td.run("beam", overrides=overrides).verdict).statements
+    assert {said[name].status for name in OF_STATE} <= set(Status)
+    assert said["peak_frequency"].stated
+
+
+def test_an_end_of_the_range_is_no_peak() -> None:
+    said = td.run("beam", overrides=(*TINY, "wear=", "response.frequency=['500 Hz', '600 Hz']")).summary()["verdict"]
+    assert {one["status"] for one in said.values()} == {Status.ABSENT}
+
+
+def test_the_verdict_is_kept(small: td.Result, tmp_path: Path) -> None:
+    found = loaded(small.verdict)
+    assert loaded(found.dumped()) == found
+    assert small.summary()["changes"] == [vars(row) for row in found.changes]
+
+
+@pytest.fixture(scope="module")
+def reached(tmp_path_factory: pytest.TempPathFactory) -> tuple[td.Result, Bound, Path]:
+    """The beam without wear, to 20 % of its preload and peak frequency."""
+    folder = tmp_path_factory.mktemp("accuracy")
+    result, bound = td.run_to_accuracy("beam", "20 % of peak frequency, preload", folder, overrides=TINY)
+    return result, bound, folder
+
+
+def test_a_bound_is_what_the_last_run_measured(reached: tuple[td.Result, Bound, Path]) -> None:
+    result, bound, folder = reached
+    assert bound.met, bound.sentence
+    said = result.summary()["verdict"]
+    for name in ("peak_frequency", "preload"):
+        assert bound.errors[name] == said[name]["error"] <= 0.2
+    assert result.wear is None  # neither depth nor life was asked for
+    assert td.load(folder).summary() == result.summary()
+    assert sorted(path.name for path in (folder / "rounds").iterdir()) == [str(n) for n in range(1, bound.rounds + 1)]
+
+
+def test_a_resumed_search_repeats_no_round(reached: tuple[td.Result, Bound, Path]) -> None:
+    result, bound, folder = reached
+    before = {path: path.stat().st_mtime_ns for path in folder.glob("rounds/*/result.h5")}
+    again = td.run_to_accuracy("beam", "20 % of peak frequency, preload", folder, overrides=TINY, resume=True)
+    assert {path: path.stat().st_mtime_ns for path in folder.glob("rounds/*/result.h5")} == before
+    assert (again[1], again[0].summary()) == (bound, result.summary())
+
+
+def made(changes: dict[str, dict[str, float | None]]) -> Verdict:
+    """A verdict from changes by refinement and quantity."""
+    table = [Change(r, q, 1.0, 1.0, e, "made") for r, of in changes.items() for q, e in of.items()]
+    said = {}
+    for name in QUANTITIES:
+        own = [row for row in table if row.quantity == name]
+        known = [row.relative for row in own if row.relative is not None]
+        error = DEFAULT.total(sum(known), 2.0) if own and len(known) == len(own) else None
+        status = Status.NOT_KNOWN if error is None else Status.REPORTED
+        said[name] = Statement(1.0 if own else None, error, None, status if own else Status.ABSENT, "")
+    return Verdict(said, tuple(table), 2.0, 0.0)
+
+
+def search(wanted: str, verdicts: list[Verdict]) -> tuple[Bound, list[tuple[str, ...]]]:
+    """A search whose runs have given verdicts; returns the overrides of every round, too."""
+    asked: list[tuple[str, ...]] = []
+
+    def run(file: td.SceneFile, number: int) -> td.Result:
+        asked.append(file.overrides)
+        given = verdicts[min(number, len(verdicts)) - 1]
+        return cast(td.Result, SimpleNamespace(verdict=given.dumped(), harmonics=(0, 1)))
+
+    file = td.read_scene("beam", ["harmonics.kept=[0, 1]"])
+    return accuracy.to_accuracy(file, wanted, run, lambda sentence: None)[1], asked
+
+
+def test_only_what_contributes_is_refined() -> None:
+    rough = made({"harmonics": {"energy": 0.3}, "modes": {"energy": 1e-5}, "wear steps": {"life": 0.5}})
+    fine = made({"harmonics": {"energy": 0.003}, "modes": {"energy": 1e-4}})
+    bound, rounds = search("1 % of energy", [rough, fine])
+    assert bound.met
+    changed = {text.partition("=")[0] for text in set(rounds[1]) - set(rounds[0])}
+    assert changed == {"harmonics.kept", "harmonics.samples"}
+
+
+def test_what_cannot_be_refined_is_named() -> None:
+    bound, rounds = search("1 % of energy", [made({"mesh and contact grid": {"energy": None}})])
+    assert not bound.met
+    assert len(rounds) == accuracy.Rounds().most
+    bound, rounds = search(
+        "1 % of energy given harmonics", [made({"harmonics": {"energy": 0.3}, "modes": {"energy": 0.0}})]
+    )
+    assert bound.met
+    assert len(rounds) == 1
+
+
+@pytest.mark.parametrize("text", ["", "0", "120 %", "1 % of colour", "1 % of life given luck", "abc"])
+def test_an_accuracy_that_means_nothing_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="--accuracy"):
+        accuracy.parsed(text)
+
+
+def test_an_accuracy_is_read() -> None:
+    wanted = accuracy.parsed("1 % of life and peak frequency, given mesh and contact grid and harmonics")
+    assert wanted.error == pytest.approx(0.01)
+    assert wanted.quantities == ("life", "peak_frequency")
+    assert wanted.given == ("mesh and contact grid", "harmonics")

@@ -1,0 +1,214 @@
+"""From a wanted accuracy to settings that meet it: run, read the verdict, refine what contributes most, repeat."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from tribodyn.workflows.errors import refine
+from tribodyn.workflows.errors.options import DEFAULT
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.verdict import NAMES, QUANTITIES, Refinement, Verdict, loaded
+from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.units import to_si
+
+OF_WEAR = ("depth", "life")
+FORM = re.compile(r"(.*?)(?: ?\bof\b(.*?))?(?:,? ?\bgiven\b(.*))?")
+PER_CENT = re.compile(r" ?\bper ?cent\b")
+
+Runner = Callable[[SceneFile, int], Result]
+
+
+@dataclass(frozen=True)
+class Rounds:
+    """How a scene is refined.
+
+    most : runs; share : of the wanted error, below which the change by a refinement is left as it is
+    finer : elements along every edge of the next round over those of this one
+    """
+
+    most: int = 8
+    share: float = 0.2
+    finer: float = 1.5
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """error : relative; quantities : that are named, none for all that the scene has; given : refinements left out."""
+
+    error: float
+    quantities: tuple[str, ...]
+    given: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Bound:
+    """What was asked for and what the last round measured.
+
+    errors : by quantity, None where not known; reasons : by quantity, why the bound is not met, empty where it is
+    overrides : that the rounds have added; left : refinements that contribute and could not be made; rounds : runs made
+    """
+
+    wanted: Wanted
+    errors: dict[str, float | None]
+    reasons: dict[str, str]
+    overrides: tuple[str, ...]
+    left: tuple[str, ...]
+    rounds: int
+
+    @property
+    def met(self) -> bool:
+        """Whether every quantity that was asked for has an error below the wanted one."""
+        return not any(self.reasons.values())
+
+    @property
+    def sentence(self) -> str:
+        """Errors, the settings that gave them, and what is missed."""
+        good = [f"{_name(q)} {self.errors[q]:.2g}" for q, why in self.reasons.items() if not why]
+        bad = [f"{_name(q)} ({why})" for q, why in self.reasons.items() if why]
+        settings = f"with {', '.join(self.overrides)}" if self.overrides else "with the scene as it is"
+        said = f"error bound {self.wanted.error:g} {settings}, after {self.rounds} runs"
+        said += f"; met: {', '.join(good)}" if good else ""
+        said += f"; not met: {', '.join(bad)}" if bad else ""
+        said += f"; not counted: {', '.join(self.wanted.given)}" if self.wanted.given else ""
+        return said + (f"; could not be refined: {', '.join(self.left)}" if self.left else "")
+
+
+def parsed(text: str) -> Wanted:
+    """A wanted accuracy such as "1 %", "1 % of life and peak frequency" or "1 % of life given harmonics".
+
+    Raises  ValueError with one sentence
+    """
+    parts = FORM.fullmatch(" ".join(text.lower().split()).rstrip("."))
+    assert parts is not None  # anything is a number so far
+    number, names, given = parts.groups()
+    try:
+        error = to_si(PER_CENT.sub("%", number), "")
+    except ValueError as wrong:
+        raise ValueError(f'--accuracy "{text}": {wrong}') from None
+    if not 0 < error < 1:
+        raise ValueError(f'--accuracy "{text}": give an error above 0 and below 100 %, such as "1 %"')
+    known = {_name(q): q for q in QUANTITIES}
+    asked = () if names is None else _listed(names)
+    for name in asked:
+        if name not in known:
+            raise ValueError(f'--accuracy "{text}": after "of" expected one of {", ".join(known)}, got "{name}"')
+    refinements = () if given is None else _listed(given)
+    for name in refinements:
+        if name not in REFINED:
+            raise ValueError(f'--accuracy "{text}": after "given" expected one of {", ".join(REFINED)}, got "{name}"')
+    return Wanted(error, tuple(known[name] for name in dict.fromkeys(asked)), refinements)
+
+
+def _listed(text: str) -> tuple[str, ...]:
+    """Words of a list "a, b and the c"; "mesh and contact grid" is one."""
+    whole = text.replace("mesh and contact grid", "mesh & contact grid")
+    items = (item.strip().removeprefix("the ") for item in re.split(r",(?: and\b)?| and\b", whole))
+    return tuple(item.replace("&", "and") for item in items)
+
+
+def to_accuracy(
+    file: SceneFile, accuracy: str, run: Runner, say: Callable[[str], None], rounds: Rounds | None = None
+) -> tuple[Result, Bound]:
+    """Run a scene with finer and finer settings until its verdict's errors are below the wanted one.
+
+    accuracy : as `parsed` reads it; nothing is worn where quantities are named and depth and life are not among them
+    run : does the run of a round, counted from 1, and keeps it; say : called with a sentence on every round
+    Returns the result of the last round, and whether the bound is met
+    Raises  ValueError for an accuracy that means nothing, and what the runs raise
+    """
+    wanted, rounds = parsed(accuracy), rounds or Rounds()
+    always = {"verdict.enabled": "true"}
+    if wanted.quantities and not set(wanted.quantities) & set(OF_WEAR):
+        always["wear"] = ""
+    added: dict[str, str] = {}
+    for number in range(1, rounds.most + 1):
+        current = file.changed(*(f"{key}={value}" for key, value in (always | added).items()))
+        result = run(current, number)
+        found = loaded(result.verdict)
+        of = wanted.quantities or tuple(name for name, one in found.statements.items() if one.value is not None)
+        if not of:
+            raise RuntimeError(f"{file.name} has no error: {found.statements['peak_frequency'].reason}")
+        finer = {name: tuple(REFINED[name](current, rounds.finer)) for name in _large(found, wanted, of, rounds.share)}
+        left = tuple(name for name, texts in finer.items() if not texts)
+        bound = _bound(found, wanted, of, added, left, number)
+        say(f"round {number}: {bound.sentence}")
+        if bound.met or not any(finer.values()):
+            break
+        added |= dict(text.split("=", 1) for texts in finer.values() for text in texts)
+    return result, bound
+
+
+def _bound(
+    found: Verdict, wanted: Wanted, of: Sequence[str], added: dict[str, str], left: tuple[str, ...], number: int
+) -> Bound:
+    errors, reasons = dict[str, float | None](), dict[str, str]()
+    for name in of:
+        errors[name], reasons[name] = _error(found, name, wanted.given)
+        error = errors[name]
+        if not reasons[name] and error is not None and error > wanted.error:
+            reasons[name] = f"its error is {error:.2g}"
+    return Bound(wanted, errors, reasons, tuple(f"{k}={v}" for k, v in added.items()), left, number)
+
+
+def _error(found: Verdict, name: str, given: Sequence[str]) -> tuple[float | None, str]:
+    """Total error of a quantity without what is given, and why it is not known."""
+    one = found.statements[name]
+    if not given:
+        return (one.error, "") if one.stated else (None, one.reason or one.status)
+    own = [row for row in found.changes if row.quantity == name and row.refinement not in (*given, Refinement.COMBINED)]
+    if not own or any(row.relative is None for row in own):
+        return None, one.reason or "no refinement was measured"
+    return DEFAULT.total(sum(row.relative or 0.0 for row in own), found.ratio), ""
+
+
+def _large(found: Verdict, wanted: Wanted, of: Sequence[str], share: float) -> list[str]:
+    """Refinements that change a quantity which is asked for much, the largest first."""
+    skipped = (*wanted.given, Refinement.COMBINED)
+    rows = [row for row in found.changes if row.quantity in of and row.refinement not in skipped]
+    sizes = [(float("inf") if row.relative is None else row.relative, row.refinement) for row in rows]
+    large = [one for one in sizes if DEFAULT.factor(found.ratio) * one[0] > share * wanted.error]
+    return list(dict.fromkeys(refinement for _, refinement in sorted(large, key=lambda one: -one[0])))
+
+
+def _harmonics(file: SceneFile, factor: float) -> Iterator[str]:
+    top = max(file.scene.harmonics.kept, default=1)
+    yield from _changes(file, refine.harmonics(file, top + 2))
+
+
+def _mesh(file: SceneFile, factor: float) -> Iterator[str]:
+    try:
+        yield from _changes(file, refine.mesh(file, factor)[0])
+    except refine.NoMesh:
+        return
+
+
+def _modes(file: SceneFile, factor: float) -> Iterator[str]:
+    finer = refine.modes(file, factor)
+    if finer is not None:
+        yield from _changes(file, finer)
+
+
+def _samples(file: SceneFile, factor: float) -> Iterator[str]:
+    yield f"harmonics.samples={2 * file.scene.harmonics.samples}"
+
+
+def _wear_steps(file: SceneFile, factor: float) -> Iterator[str]:
+    if file.scene.wear is not None:
+        yield from _changes(file, refine.wear(file, 3.0))
+
+
+def _changes(file: SceneFile, finer: SceneFile) -> Sequence[str]:
+    return finer.overrides[len(file.overrides) :]
+
+
+REFINED: dict[str, Callable[[SceneFile, float], Iterator[str]]] = {
+    Refinement.HARMONICS: _harmonics, Refinement.MESH: _mesh, Refinement.MODES: _modes,
+    Refinement.SAMPLES: _samples, Refinement.WEAR_STEPS: _wear_steps,
+}  # fmt: skip
+"""Overrides that refine one thing of a scene; none where it cannot be refined."""
+
+
+def _name(quantity: str) -> str:
+    return NAMES.get(quantity, quantity)

@@ -1,0 +1,252 @@
+"""The table of measured changes: one state of the scene followed from its own model to a finer one, step by step.
+
+Modes, then mesh and contact grid, then harmonics are refined, each on top of the one before, so that the rows of single
+refinements sum, with their signs, to the combined one. A refinement that meets a limit of the options is not measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from tribodyn.hbm.contact.sampling import sampling_error
+from tribodyn.hbm.continuation import harmonic_choice
+from tribodyn.hbm.continuation.operating_point import AtFrequency, NoPeak
+from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload, cycles_to_share
+from tribodyn.hbm.wear.step_error import step_error
+from tribodyn.workflows.errors import refine, states
+from tribodyn.workflows.errors.options import DEFAULT, Options
+from tribodyn.workflows.errors.states import Answers, OnCurve, State, relative
+from tribodyn.workflows.result import summary
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.verdict import Change, Refinement
+from tribodyn.workflows.run import modelling, wear_run
+from tribodyn.workflows.run.modelling import Model
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.wear import Wear
+
+OF_STATE = ("peak_frequency", "amplitude", "energy", "preload")
+OF_WEAR = ("depth", "life")
+REFUSALS = (NoPeak, ValueError, RuntimeError)
+
+
+@dataclass
+class Table:
+    """Rows as they are measured.
+
+    first : the scene's own unworn state, None without one, as `why` says
+    ratio : of the refined mesh, None where that was not solved
+    """
+
+    rows: list[Change] = field(default_factory=list)
+    first: State | None = None
+    why: str = ""
+    ratio: float | None = None
+
+    def add(self, refinement: Refinement, before: Answers, after: Answers, how: str) -> None:
+        """What a refinement changed in a state."""
+        for (name, a), (_, b) in zip(before.by_quantity(), after.by_quantity(), strict=True):
+            self.rows.append(Change(refinement, name, a, b, relative(a, b), how))
+
+    def refuse(self, refinement: Refinement, why: str, quantities: tuple[str, ...] = OF_STATE) -> None:
+        """A refinement that was not measured."""
+        self.rows += [Change(refinement, name, None, None, None, why) for name in quantities]
+
+
+def measure(
+    file: SceneFile, model: Model, result: Result, say: Callable[[str], None], options: Options = DEFAULT
+) -> Table:
+    """All rows of a finished result; say : called with what is refined next."""
+    table = Table()
+    try:
+        table.first = states.first_state(file, model.balance, result)
+    except REFUSALS as refusal:
+        table.why = str(refusal)
+        return table
+    finer, ratio, why = refined(file, table.first, result, options)
+    if finer is None:
+        table.refuse(Refinement.COMBINED, why)
+        _on_own_mesh(file, table, say)
+    else:
+        _step_by_step(file, finer, ratio, table, say)
+    _estimates(file, table, result)
+    if result.wear_steps and file.scene.wear is not None:
+        say("wear on the finer model")
+        _worn(file, finer, why, table, result, options)
+    return table
+
+
+def refined(file: SceneFile, first: State, result: Result, options: Options) -> tuple[SceneFile | None, float, str]:
+    """The scene with more elements and modes as far as the limits allow, its ratio, and why there is none."""
+    contact = first.balance.contact.stiffness.size
+    coefficients = 2 * top_of(first, options) + 1
+    why = ""
+    for ratio in options.ratios:
+        try:
+            finer, actual = refine.mesh(file, ratio)
+        except refine.NoMesh as refusal:
+            return None, 1.0, str(refusal)
+        dofs, unknowns = actual**3 * result.facts.full_dofs, actual**2 * contact * coefficients
+        if dofs > options.max_dofs:
+            why = f"the refined mesh has some {dofs:.2g} DOFs, above the limit of {options.max_dofs:g}"
+        elif unknowns > options.max_unknowns:
+            why = f"the refined balance has some {unknowns:.2g} unknowns, above the limit of {options.max_unknowns:g}"
+        else:
+            return refine.modes(finer, options.modes) or finer, actual, ""
+    return None, 1.0, why
+
+
+def top_of(first: State, options: Options = DEFAULT) -> int:
+    """Highest harmonic of the refined balance."""
+    return max(options.harmonics, first.balance.basis.harmonics[-1] + 2)
+
+
+def _step_by_step(file: SceneFile, finer: SceneFile, ratio: float, table: Table, say: Callable[[str], None]) -> None:
+    """Modes, mesh, harmonics, each on top of the one before; the last is the combined refinement."""
+    own = table.first
+    assert own is not None
+    before = _more_modes(file, table, say) or own.answers
+    say(f"a mesh with {ratio:.2g} times the elements")
+    how = f"{ratio:.3g} times the elements along every edge"
+    kept = own.balance.basis.harmonics
+    try:
+        there = states.unworn(finer, modelling.build(finer, None, Progress(), kept), own.site)
+    except REFUSALS as refusal:
+        table.refuse(Refinement.MESH, f"{how}: {refusal}")
+        table.refuse(Refinement.COMBINED, f"{how}: {refusal}")
+        return
+    table.add(Refinement.MESH, before, there.answers, how)
+    last = _more_harmonics(there, table, say)
+    if last is None:
+        table.refuse(Refinement.COMBINED, table.rows[-1].how)
+        return
+    table.ratio = ratio
+    table.add(Refinement.COMBINED, own.answers, last, f"{how}, more modes, harmonics 0 to {top_of(own)}")
+
+
+def _on_own_mesh(file: SceneFile, table: Table, say: Callable[[str], None]) -> None:
+    """What can be refined where the mesh cannot."""
+    assert table.first is not None
+    _more_modes(file, table, say)
+    _more_harmonics(table.first, table, say)
+
+
+def _more_modes(file: SceneFile, table: Table, say: Callable[[str], None]) -> Answers | None:
+    """The own state with more modes, followed from its own solution; None where the scene has no number of modes."""
+    own = table.first
+    assert own is not None
+    other = refine.modes(file, DEFAULT.modes)
+    if other is None:
+        return None
+    say("more modes")
+    try:
+        model = modelling.build(other, None, Progress(), own.balance.basis.harmonics)
+        balance = model.balance.with_load(_load(file))
+        point = own.site.next(balance, own.here.state.omega, own.here.state.x)
+        if not point.solution.converged:
+            raise RuntimeError(str(point.solution.outcome))
+    except REFUSALS as refusal:
+        table.refuse(Refinement.MODES, str(refusal))
+        return None
+    answers = Answers.of(balance, point)
+    table.add(Refinement.MODES, own.answers, answers, f"{DEFAULT.modes} times as many modes")
+    return answers
+
+
+def _load(file: SceneFile) -> float:
+    wear = file.scene.wear
+    return 1.0 if wear is None else wear.duties[0].load
+
+
+def _more_harmonics(state: State, table: Table, say: Callable[[str], None]) -> Answers | None:
+    """A state with more harmonics, followed from its own solution, from the next to the highest ones."""
+    top = top_of(state)
+    say(f"harmonics 0 to {top}")
+    how = f"harmonics 0 to {top}"
+    try:
+        wide = harmonic_choice.widened(state.balance, top, harmonic_choice.ROUGH)
+        wide = wide.with_harmonics(tuple(h for h in wide.basis.harmonics if h <= top))
+        omega, x = state.here.state.omega, state.balance.basis.transfer(state.here.state.x, wide.basis)
+        point = state.site.next(wide, omega, x)
+        if not point.solution.converged:  # no solution is near: the place is looked for as at the start
+            point = state.site.first(wide)
+        if not point.solution.converged:
+            raise RuntimeError(str(point.solution.outcome))
+    except REFUSALS as refusal:
+        table.refuse(Refinement.HARMONICS, f"{how}: {refusal}")
+        return None
+    answers = Answers.of(wide, point)
+    table.add(Refinement.HARMONICS, state.answers, answers, how)
+    return answers
+
+
+def _estimates(file: SceneFile, table: Table, result: Result) -> None:
+    """What the contact law and the wear rule estimate of themselves: samples and wear steps."""
+    own = table.first
+    assert own is not None
+    state = own.here.state
+    error = float(sampling_error(own.balance, state.omega, state.x))
+    for name in OF_STATE[1:]:
+        table.rows.append(Change(Refinement.SAMPLES, name, None, None, error, "estimate: located transitions"))
+    wear = file.scene.wear
+    if wear is not None and result.wear is not None and result.wear_steps:
+        found = step_error(result.wear, wear.tolerance if wear.rule == "error_controlled" else None)
+        for name, one in (("depth", found.depth), ("life", found.cycles)):
+            table.rows.append(Change(Refinement.WEAR_STEPS, name, None, None, float(one), "estimate of the wear rule"))
+
+
+def _worn(file: SceneFile, finer: SceneFile | None, why: str, table: Table, result: Result, options: Options) -> None:
+    """Depth and life of the whole run on the refined scene, with finer wear steps."""
+    own, wear = table.first, result.wear
+    assert own is not None
+    assert wear is not None
+    if finer is None:
+        table.refuse(Refinement.COMBINED, why, OF_WEAR)
+        return
+    ratio, life = table.ratio or options.ratios[0], summary.life(result)
+    if life is None:
+        table.refuse(Refinement.COMBINED, "no life has ended", OF_WEAR)
+        return
+    top = top_of(own, options)
+    work = float(wear.solves.sum()) * ratio**2 * own.balance.contact.stiffness.size * (2 * top + 1)
+    if work > options.max_wear:
+        table.refuse(
+            Refinement.COMBINED,
+            f"the refined wear takes some {work:.2g} solves times unknowns, above the limit of {options.max_wear:g}",
+            OF_WEAR,
+        )
+        return
+    fine = refine.wear(refine.harmonics(finer, top), 2.0)
+    how = f"{ratio:.3g} times the elements along every edge, more modes, harmonics 0 to {top}, half the wear steps"
+    table_of_wear = fine.scene.wear
+    assert table_of_wear is not None
+    try:
+        model = modelling.build(fine, None, Progress())
+        worn = wear_run.worn_out(fine, model, table_of_wear.lost_below)
+        there = life_of(worn, model, table_of_wear)
+        if worn.ended.failed or there is None:
+            raise RuntimeError(str(worn.end))
+    except REFUSALS as refusal:
+        table.refuse(Refinement.COMBINED, f"{how}: {refusal}", OF_WEAR)
+        return
+    pairs = (
+        ("depth", float(result.depth_after(-1).max()), float((worn.depth[-1] + worn.worn[-1]).max())),
+        ("life", life, there),
+    )
+    table.rows += [Change(Refinement.COMBINED, name, a, b, relative(a, b), how) for name, a, b in pairs]
+
+
+def life_of(worn: WearHistory, model: Model, wear: Wear) -> float | None:
+    """Life [cycles] of a wear run as `summary.life` has that of a result; None where it has not ended."""
+    if wear.lost_of != "any":
+        return cycles_to_preload(worn)
+    share = wear.lost_below or LIFE_SHARE
+    forces = (worn.normal_force[:, pairs].sum(axis=1) for pairs in model.reduced.info.joints.values())
+    lives = [cycles_to_share(worn.cycles, force, share) for force in forces]
+    return min((life for life in lives if life is not None), default=None)
+
+
+def at_given_frequency(state: State) -> bool:
+    """Whether the frequency of a state is given by the scene."""
+    return isinstance(state.site, AtFrequency) and not isinstance(state.site, OnCurve)

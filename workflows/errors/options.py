@@ -1,0 +1,49 @@
+"""The numbers of the error system: what is refined, how much work that may be, and the rule of the total error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Options:
+    """Limits count DOFs, unknowns and solves, never seconds: the same scene has the same errors on every machine.
+
+    ratios : elements along every edge over those of the scene; the first that the limits allow is taken
+    modes : retained modes, or their cutoff, over those of the scene
+    harmonics : highest harmonic of the refined balance, at the least; else two more than the scene's highest
+    max_dofs : of the refined mesh; some 20 s to reduce on one core
+    max_unknowns : of the refined balance; some 10 s to find its peak on one core
+    max_wear : unknowns of the refined balance times solves of the scene's own wear; some 40 s on one core
+    max_time_components : of a contact whose motions are integrated in time
+    order : of convergence that is relied on: errors at contact kinks and corners fall with the element size
+    safety : on the extrapolated error (Roache 1994: 1.25)
+    floor : least change that a refinement counts with: two models agree by chance on small errors
+    largest : relative error above which a value is not reported
+    """
+
+    ratios: tuple[float, ...] = (2.0, 1.5)
+    modes: int = 2
+    harmonics: int = 5
+    max_dofs: int = 100_000
+    max_unknowns: int = 5000
+    max_wear: float = 5e5
+    max_time_components: int = 30
+    order: float = 1.0
+    safety: float = 1.25
+    floor: float = 1e-3
+    largest: float = 0.5
+
+    def factor(self, ratio: float | None) -> float:
+        """Total error over the change by a refinement with a ratio of element sizes.
+
+        Source  Roache, J. Fluids Eng. 116 (1994), grid convergence index of the coarser of two grids
+        """
+        return self.safety / (1 - (ratio or self.ratios[0]) ** -self.order)
+
+    def total(self, change: float, ratio: float | None) -> float:
+        """Total relative error of a value that the combined refinement changes so much."""
+        return self.factor(ratio) * max(change, self.floor)
+
+
+DEFAULT = Options()

@@ -1,0 +1,108 @@
+"""A scene with a finer mesh, more modes, more harmonics, finer wear steps: what its errors are measured by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from tribodyn.geometry import parts
+from tribodyn.geometry.sources import cad
+from tribodyn.workflows.scene.body import Geometry
+from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.scene.structure import BodyTable, DeckTable, StructureScene
+
+HALVED = 2.0  # ratio of element sizes where every element of a given mesh is cut into eight
+
+Mesh = Geometry | BodyTable | DeckTable
+
+
+class NoMesh(ValueError):
+    """A scene whose mesh cannot be refined."""
+
+
+class Given(ValueError):
+    """A mesh that was not made here, whose elements can only be cut."""
+
+
+def mesh(file: SceneFile, ratio: float) -> tuple[SceneFile, float]:
+    """The scene with so many times the elements along every edge, and the mean ratio that comes of it.
+
+    Counts are whole numbers that the part accepts; the elements of a given mesh are cut in halves.
+
+    Raises  NoMesh
+    """
+    tables = _meshed(file)
+    try:
+        new = [_rescaled(key, table, file.folder, ratio) for key, table in tables.items()]
+    except Given:
+        return file.changed(*(f"{key}.halved={table.halved + 1}" for key, table in tables.items())), HALVED
+    return file.changed(*(text for texts, _ in new for text in texts)), 1 / float(np.mean([size for _, size in new]))
+
+
+def modes(file: SceneFile, factor: float) -> SceneFile | None:
+    """The scene with so many times its retained modes, or its cutoff; None where it has no such number."""
+    reduction = getattr(file.scene, "reduction", None)
+    if reduction is None or not (reduction.modes or reduction.cutoff):
+        return None
+    if reduction.modes:
+        return file.changed(f"reduction.modes={round(factor * reduction.modes)}")
+    return file.changed(f"reduction.cutoff={factor * reduction.cutoff!r}")
+
+
+def harmonics(file: SceneFile, top: int) -> SceneFile:
+    """The scene with all harmonics up to one, and samples enough for them."""
+    first = 0 if 0 in file.scene.harmonics.kept or file.scene.harmonics.automatic else 1
+    samples = max(file.scene.harmonics.samples, 16 * top)
+    return file.changed(f"harmonics.kept={list(range(first, top + 1))}", f"harmonics.samples={samples}")
+
+
+def wear(file: SceneFile, factor: float) -> SceneFile:
+    """The scene with wear steps finer by a factor, as many more of them allowed."""
+    return file.changed(*_wear(file, factor))
+
+
+def _wear(file: SceneFile, factor: float) -> Iterator[str]:
+    table = file.scene.wear
+    if table is None:
+        return
+    yield f"wear.max_steps={round(2 * factor * table.max_steps)}"
+    if table.rule == "error_controlled" and table.tolerance is not None:
+        yield f"wear.tolerance={table.tolerance / factor!r}"
+    elif table.step is not None and table.step.share is not None:
+        yield f"wear.step={table.step.share / factor!r}"
+    elif table.step is not None and table.step.depth is not None:
+        yield f"wear.step={table.step.depth / factor!r} m"
+
+
+def _meshed(file: SceneFile) -> dict[str, Mesh]:
+    """The tables of a scene that give a mesh, by their keys; raises NoMesh without one."""
+    scene = file.scene
+    if isinstance(scene, PartScene | StructureScene) and scene.geometry is not None:
+        return {"geometry": scene.geometry}
+    if not isinstance(scene, StructureScene):
+        raise NoMesh("matrices come without a mesh")
+    tables: dict[str, Mesh] = {f"bodies.{name}": body for name, body in scene.bodies.items()}
+    return tables | {f"decks.{name}": deck for name, deck in scene.decks.items()}
+
+
+def _rescaled(key: str, table: Mesh, folder: Path, ratio: float) -> tuple[list[str], float]:
+    """Overrides that give a body so many times its elements along every edge, and their mean size over its own.
+
+    Raises  Given where there are none
+    """
+    if not isinstance(table, DeckTable) and table.part_name is not None:
+        part = parts.load(table.part_name)
+        own = part.Parameters(**table.parameters)
+        counts = parts.rescaled(part, own, ratio)
+        if not counts:
+            raise Given(f"the part of [{key}] lists no counts of elements in MESH")
+        size = float(np.mean([getattr(own, name) / count for name, count in counts.items()]))
+        return [f"{key}.{name}={count}" for name, count in counts.items()], size
+    if not isinstance(table, BodyTable) or Path(str(table.mesh)).suffix.lower() not in cad.ENDINGS:
+        raise Given(f"the mesh of [{key}] is given")
+    edge = table.size or table.unit * cad.default_size(folder / str(table.mesh))
+    faces = ", ".join(f'"{name}" = {face / ratio:.6g}' for name, face in table.face_sizes.items())
+    return [f"{key}.size={edge / ratio:.6g}", *([f"{key}.face_sizes={{{faces}}}"] if faces else [])], 1 / ratio

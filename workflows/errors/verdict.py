@@ -1,0 +1,98 @@
+"""The verdict on a result: every quantity with its total error, by one rule from the table of measured changes.
+
+total error = safety x change by the combined refinement / (1 - ratio^-order), see `options.Options.total`.
+How often that holds on scenes that nobody has tuned is measured by ./tribodyn prove scoreboard.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from time import process_time
+
+from tribodyn.workflows.errors import in_time
+from tribodyn.workflows.errors.in_time import Finding
+from tribodyn.workflows.errors.measure import OF_WEAR, Table, at_given_frequency, measure
+from tribodyn.workflows.errors.options import DEFAULT, Options
+from tribodyn.workflows.result import summary
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.verdict import QUANTITIES, Change, Refinement, Statement, Status, Verdict
+from tribodyn.workflows.run.modelling import Model
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.scene_file import SceneFile
+
+
+def with_verdict(file: SceneFile, model: Model, result: Result, progress: Progress) -> Result:
+    """The result with its verdict: what `run` has done after everything else."""
+    return replace(result, verdict=judge(file, model, result, progress).dumped())
+
+
+def judge(file: SceneFile, model: Model, result: Result, progress: Progress, options: Options = DEFAULT) -> Verdict:
+    """Measure what refinements change in a finished result, and what its errors are."""
+    clock = process_time()
+    with progress.stage("errors"):
+        table = measure(file, model, result, progress.say, options)
+    with progress.stage("time integration"):
+        findings = in_time.check(file, model.balance, result, table.first, file.scene.verdict.in_time, options)
+    values = values_of(table, result)
+    statements = {name: _statement(name, values[name], table, findings, result, options) for name in QUANTITIES}
+    return Verdict(statements, tuple(table.rows), table.ratio, process_time() - clock)
+
+
+def values_of(table: Table, result: Result) -> dict[str, float | None]:
+    """The quantities of a result: of its unworn state, and of its whole wear."""
+    values: dict[str, float | None] = dict.fromkeys(QUANTITIES)
+    if table.first is not None:
+        values |= dict(table.first.answers.by_quantity())
+    if result.wear is not None and result.wear_steps:
+        values["depth"] = float(result.depth_after(-1).max())
+        values["life"] = summary.life(result)
+    return values
+
+
+def _statement(
+    name: str, value: float | None, table: Table, findings: Sequence[Finding], result: Result, options: Options
+) -> Statement:
+    if value is None:
+        return Statement(None, None, None, Status.ABSENT, _absent(name, table, result))
+    if name == "peak_frequency" and table.first is not None and at_given_frequency(table.first):
+        return Statement(value, 0.0, None, Status.REPORTED, "given by the scene")
+    own = [row for row in table.rows if row.quantity == name]
+    error, why = error_of(own, table.ratio, options)
+    dominated = dominating(own)
+    concerned = findings if name in OF_WEAR else findings[:1]
+    for finding in () if name == "peak_frequency" else concerned:
+        status, reason = finding.judged(name, error)
+        if status is not None:
+            return Statement(value, error, dominated, status, reason)
+    if error is None:
+        return Statement(value, None, dominated, Status.NOT_KNOWN, why)
+    if error > options.largest:
+        return Statement(value, error, dominated, Status.TOO_LARGE, "")
+    return Statement(value, error, dominated, Status.REPORTED, "measured on this scene")
+
+
+def error_of(rows: Sequence[Change], ratio: float | None, options: Options = DEFAULT) -> tuple[float | None, str]:
+    """Total error of a quantity from its rows, and why it is not known where it is not."""
+    for row in rows:
+        if row.refinement == Refinement.COMBINED:
+            if row.relative is None:
+                return None, row.how
+            return options.total(row.relative, ratio), ""
+    return None, "no refinement was measured"
+
+
+def dominating(rows: Sequence[Change]) -> str | None:
+    """The single refinement that changed a quantity most."""
+    single = [row for row in rows if row.refinement != Refinement.COMBINED and row.relative is not None]
+    return max(single, key=lambda row: row.relative or 0.0).refinement if single else None
+
+
+def _absent(name: str, table: Table, result: Result) -> str:
+    if name not in OF_WEAR:
+        return table.why or "no state was solved"
+    if result.wear is None or not result.wear_steps:
+        return "nothing was worn"
+    if result.wear.ended.survived and name == "life":
+        return f"no life ends here: {result.wear.end}"
+    return f"the preload has not fallen far enough: {result.wear.end}"

@@ -1,0 +1,112 @@
+"""How far the numbers of a result may be off: what refinements of its scene changed, and the total error that follows.
+
+Data and its words alone; `tribodyn.workflows.errors` measures them.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from typing import Any
+
+QUANTITIES = ("peak_frequency", "amplitude", "energy", "preload", "depth", "life")
+NAMES = {"peak_frequency": "peak frequency"}
+UNITS = {"peak_frequency": "Hz", "amplitude": "m", "energy": "J", "preload": "N", "depth": "m", "life": "cycles"}
+
+
+class Refinement(StrEnum):
+    """What is refined in a scene to see what it changes."""
+
+    MODES = "modes"
+    MESH = "mesh and contact grid"
+    HARMONICS = "harmonics"
+    SAMPLES = "samples"
+    WEAR_STEPS = "wear steps"
+    COMBINED = "combined"
+
+
+class Status(StrEnum):
+    """What may be said of a value."""
+
+    REPORTED = "reported"
+    NOT_KNOWN = "error not known"
+    TOO_LARGE = "not reported (error above 50 %)"
+    UNSTABLE = "not reported (the motion is unstable)"
+    CONTRADICTED = "not reported (time integration contradicts it)"
+    NOT_PERIODIC = "not reported (time integration finds no periodic motion)"
+    ABSENT = "none"
+
+
+@dataclass(frozen=True)
+class Change:
+    """One row of the table of measured changes.
+
+    value, refined : of the quantity before and after the refinement, in UNITS; None where there is none
+    relative : change over the refined value, or an estimate of it; None where it was not measured
+    how : what was refined, or why it was not measured
+    """
+
+    refinement: str
+    quantity: str
+    value: float | None
+    refined: float | None
+    relative: float | None
+    how: str
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One quantity of a verdict.
+
+    value : in UNITS, None where there is none; error : total and relative, None where it is not known
+    dominated_by : the refinement that changed most; status : a Status; reason : in words
+    """
+
+    value: float | None
+    error: float | None
+    dominated_by: str | None
+    status: str
+    reason: str
+
+    @property
+    def stated(self) -> bool:
+        """Whether the value has an error that is known and small enough, of a motion that is stable."""
+        return self.status == Status.REPORTED
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The table of changes and what follows for every quantity.
+
+    statements : by QUANTITIES; changes : rows of the table; ratio : elements along every edge of the refined mesh over
+    those of the scene, None where that was not solved; seconds : of one processor, for information alone
+    """
+
+    statements: dict[str, Statement]
+    changes: tuple[Change, ...]
+    ratio: float | None
+    seconds: float
+
+    def dumped(self) -> str:
+        """The verdict as JSON text."""
+        return json.dumps(asdict(self))
+
+
+def loaded(text: str) -> Verdict:
+    """A verdict from its JSON text."""
+    data: dict[str, Any] = json.loads(text)
+    statements = {name: Statement(**item) for name, item in data["statements"].items()}
+    return Verdict(statements, tuple(Change(**item) for item in data["changes"]), data["ratio"], data["seconds"])
+
+
+def record(text: str) -> dict[str, dict[str, Any]] | None:
+    """Statements by quantity for machines, None without a verdict."""
+    if not text:
+        return None
+    return {name: asdict(one) | {"stated": one.stated} for name, one in loaded(text).statements.items()}
+
+
+def table(text: str) -> list[dict[str, Any]]:
+    """The rows of the table for machines; empty without a verdict."""
+    return [asdict(change) for change in loaded(text).changes] if text else []
