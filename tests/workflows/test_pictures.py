@@ -7,17 +7,22 @@ from pathlib import Path
 from typing import Literal
 
 import imageio_ffmpeg
+import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection, TriMesh
+from matplotlib.colors import to_rgb, to_rgba
+from matplotlib.figure import Figure
 from PIL import Image
 
 from tests.helpers.pictures import assert_not_blank
 from tests.helpers.synthetic_result import result
-from tribodyn.workflows.pictures import film, offscreen, plots, render, view
+from tribodyn.workflows.pictures import film, maps, offscreen, plots, render, view
 from tribodyn.workflows.pictures.film_of_cycle import CycleFilm
 from tribodyn.workflows.pictures.film_of_wear import WearFilm
-from tribodyn.workflows.pictures.style import LAYOUT
+from tribodyn.workflows.pictures.style import LAYOUT, MOTION_MAP, RED, STATUS
+from tribodyn.workflows.result.states import shown_states
 
 COARSE = 60  # dots per inch: what is drawn is the same, in a tenth of the time
 
@@ -30,6 +35,53 @@ def test_curves_and_maps(tmp_path: Path) -> None:
         assert_not_blank(path)
 
 
+def drawn(figure: Figure) -> list[np.ndarray]:
+    """Heights of all lines of a figure, without those that only stand in a legend."""
+    heights = (np.asarray(line.get_ydata(), float) for axes in figure.axes for line in axes.lines)
+    return [values[np.isfinite(values)] for values in heights if len(values)]
+
+
+def test_curves_show_the_numbers_of_the_result() -> None:
+    given = result()
+    frf, wear, loops = given.response, given.wear, given.loops
+    assert frf is not None
+    assert wear is not None
+    assert loops is not None
+    assert given.references is not None
+
+    def has(figure: Figure, wanted: np.ndarray) -> bool:
+        return any(len(line) == len(wanted) and np.allclose(line, wanted, rtol=1e-12) for line in drawn(figure))
+
+    curve = plots.response(given)
+    for height in (given.references.free, given.references.stuck, wear.amplitude):
+        assert has(curve, 1e3 * height)
+    stretches = np.concatenate(drawn(curve))
+    assert np.isin(1e3 * frf.amplitude("response"), stretches).all()  # stable and unstable ones, point by point
+    mean = wear.depth @ given.patch.area / given.patch.area.sum()  # type: ignore[union-attr]
+    for height in (wear.depth.max(axis=1), wear.depth.min(axis=1), mean):
+        assert has(plots.wear(given, "depth"), 1e3 * height)
+    assert has(plots.wear(given, "preload"), 1e-3 * wear.preload)
+    assert has(plots.wear(given, "peak"), wear.omega / (2 * np.pi))
+    assert has(plots.wear(given, "cycles_per_step"), 1e-6 * wear.cycles_in_step[:-1])
+    pair = 3
+    for at, loop in enumerate(drawn(plots.hysteresis(given, [pair]))):
+        force = loops.force[at, pair]
+        assert any(np.allclose(loop, np.append(one, one[0])) for one in force)
+
+
+def test_maps_show_the_numbers_of_the_result() -> None:
+    given = result()
+    assert given.wear is not None
+    figure = maps.patch_maps(given, [4])
+    fields = [shown.get_array() for axes in figure.axes for shown in axes.collections if isinstance(shown, TriMesh)]
+    pressure = given.wear.normal_force[4] / given.patch.area  # type: ignore[union-attr]
+    for shown, wanted in zip(fields, (1e3 * given.wear.depth[4], 1e-6 * pressure), strict=True):
+        np.testing.assert_allclose(shown, wanted, rtol=1e-12)
+    (statuses,) = (shown for axes in figure.axes for shown in axes.collections if isinstance(shown, PolyCollection))
+    colors = {to_rgba(STATUS[int(bits)][1]) for bits in given.wear.status[4]}
+    assert {tuple(color) for color in statuses.get_facecolor()} == colors
+
+
 def test_a_response_alone_is_drawn_too(tmp_path: Path) -> None:
     written = plots.draw(replace(result(), wear=None, fields=None, loops=None), tmp_path, dpi=COARSE)
     assert [path.stem for path in written] == ["frf"]
@@ -37,10 +89,19 @@ def test_a_response_alone_is_drawn_too(tmp_path: Path) -> None:
 
 
 def test_renders(tmp_path: Path) -> None:
-    written = render.draw(result(), tmp_path, dpi=100)
-    assert {path.stem for path in written} == {"part", "contact"}
-    for path in written:
-        assert_not_blank(path)
+    """The part has the colours of its scale and the outline of its contact, the contact those of its statuses."""
+    given = result()
+    paths = {path.stem: path for path in render.draw(given, tmp_path, dpi=100)}
+    assert set(paths) == {"part", "contact"}
+    assert given.wear is not None
+    ends = [to_rgb(mpl.colormaps[MOTION_MAP](end)) for end in (0.02, 0.5, 0.98)]
+    status = {STATUS[int(bits)][1] for state in shown_states(given) for bits in np.asarray(state.status)}
+    for name, colors in (("part", [*ends, to_rgb(RED)]), ("contact", [to_rgb(color) for color in status])):
+        with Image.open(paths[name]) as image:
+            pixels = np.asarray(image.convert("RGB"), int).reshape(-1, 3)
+        for color in colors:
+            near = np.abs(pixels - np.round(255 * np.array(color))).max(axis=1) < 12
+            assert near.sum() > 20, f"{name} has no {color}"
 
 
 def test_missing_libraries_are_said_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
