@@ -7,6 +7,7 @@ import pytest
 
 from tests.helpers.pressed_body import N_PAIR, balance_of, pressed_body
 from tests.helpers.verification_models import interface
+from tests.proof.dense import DenseBalance
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.methods import natural
@@ -16,7 +17,6 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.linear.expansion import SingularStuckSystem, UnbalancedLoad
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.reference import DenseBalance
 from tribodyn.reduction.model import ReducedModel
 
 

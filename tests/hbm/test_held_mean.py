@@ -127,7 +127,7 @@ def test_multipliers_while_the_force_stays_are_those_by_hill() -> None:
 
 def test_what_drives_a_motion_away_in_time_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """By the whole monodromy matrix, and by marched periods, of which the force is no part."""
-    monkeypatch.setattr(floquet, "DENSE", 0)
+    monkeypatch.setattr(floquet, "RULES", replace(floquet.RULES, dense=0))
     for force, height, stable in ((1.5, 4e-5, True), (30.0, HEIGHT, False)):
         balance = held(force, 9, height)
         state, options = solved(balance), Options(STEPS, tolerance=1e-9)
@@ -142,7 +142,7 @@ def test_a_push_decides_where_sliders_just_reach_their_limit(monkeypatch: pytest
     kink = problem(model, HEIGHT, 6.0, (0.0, 1.0, -1e-5), tuple(range(8)))
     options = Options(STEPS, tolerance=1e-9)
     whole = floquet.largest(kink, solved(kink), options)
-    monkeypatch.setattr(floquet, "DENSE", 0)
+    monkeypatch.setattr(floquet, "RULES", replace(floquet.RULES, dense=0))
     assert whole < 0.9
     assert floquet.largest(kink, solved(kink), options) > 1.1
     for balance, leaves in ((kink, False), (held(12.0, 7, 4e-5), True), (held(30.0, 7), True)):

@@ -9,6 +9,7 @@ import pytest
 from scipy.linalg import eigvalsh
 
 from tests.helpers import small_wheel as small
+from tests.proof.dense import DenseBalance
 from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.elasticity import assemble
 from tribodyn.fem.prestress import coriolis
@@ -19,7 +20,6 @@ from tribodyn.hbm.contact.law import SLIPS, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear import expansion
 from tribodyn.hbm.linear import travelling_wave as waves
-from tribodyn.hbm.reference import DenseBalance
 from tribodyn.reduction import linear
 from tribodyn.reduction.cyclic import reduce_sector, travelling_wave
 from tribodyn.reduction.damping import modal_damping
@@ -57,8 +57,8 @@ def test_a_face_of_a_wheel_split_into_named_contacts_equals_the_one_contact(tmp_
     The expansion of the compliance is asked for more than the 5e-10 that a run needs. All blades alike in order 0 are
     softest beside the springs: what is left there is rounding of its reduced matrices.
     """
-    monkeypatch.setattr(expansion, "WANTED_ERROR", 1e-13)
-    monkeypatch.setattr(expansion, "ROUNDING", 1e-13)
+    exact = replace(expansion.RULES, wanted_error=1e-13, rounding=1e-13)
+    monkeypatch.setattr(expansion, "RULES", exact)
     mesh, node_sets = small.read(tmp_path / "s.msh")
     groups = dict(mesh.boundaries)
     for side in ("right", "left"):

@@ -17,6 +17,7 @@ from time import process_time
 
 import numpy as np
 
+from tests.proof.dense import DenseBalance
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.branch import Branch
@@ -24,7 +25,6 @@ from tribodyn.hbm.continuation.methods import natural
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.reference import DenseBalance
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.progress import Progress

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tests.proof.dense import DenseBalance
 from tests.proof.extremes_march import held
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
@@ -17,7 +18,6 @@ from tribodyn.hbm.contact.sampling import sampling_error
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.linear import recovery
 from tribodyn.hbm.newton import NewtonOptions, Solution
-from tribodyn.hbm.reference import DenseBalance
 from tribodyn.workflows.errors.options import DEFAULT
 
 CONVERGED, REFUSED, WRONG = "converged", "refused", "wrong"  # what is said of a cell

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import shutil
 import subprocess
@@ -57,6 +58,17 @@ def test_a_wheel_holds_one_package_with_every_file(wheel: Path) -> None:
     }
     assert sorted(needed - held) == []
     assert "tribodyn/py.typed" in held
+    modules = {name for name in held if name.endswith(".py")}
+    assert modules - needed == {f"tribodyn/{path.name}" for path in (ROOT / "src" / "tribodyn").glob("*.py")}
+
+
+def test_the_package_imports_nothing_of_its_tests() -> None:
+    files = [path for folder in (*FOLDERS, "src/tribodyn") for path in sorted((ROOT / folder).glob("**/*.py"))]
+    for path in files:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            assert not {name.partition(".")[0] for name in names} & {"pytest", "hypothesis", "tests"}, path
 
 
 def test_the_wheel_works_from_another_folder_beside_modules_of_the_same_names(wheel: Path, tmp_path: Path) -> None:

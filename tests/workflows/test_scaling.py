@@ -20,7 +20,6 @@ def test_small_sizes_converge_and_memory_is_their_own(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(scaling, "QUICK", (5, 3))
-    monkeypatch.setenv("PYTHONPATH", str(Path(scaling.__file__).parents[3]))  # the measured processes start afresh
     picture = tmp_path / "scaling.png"
     code, out, err = leave(["bench", "--scaling", "--quick", "--json", "--out", str(picture)], capsys, main)
     assert code == 0, err
