@@ -96,15 +96,6 @@ def test_the_same_scene_has_the_same_errors_in_every_digit(small: td.Result) -> 
     assert replace(again, seconds=first.seconds) == first
 
 
-@pytest.mark.parametrize(
-    ("change", "ratio", "total"),
-    [(0.01, 2.0, 0.025), (0.01, 1.5, 0.0375), (0.0, 2.0, 2.5e-3), (0.3, 2.0, 0.75)],
-)
-def test_the_rule(change: float, ratio: float, total: float) -> None:
-    row = Change(Refinement.COMBINED, "energy", 1.0, 1.0, change, "")
-    assert verdict.error_of([row], ratio)[0] == pytest.approx(total)
-
-
 def test_an_error_that_nobody_measured_is_not_known() -> None:
     row = Change(Refinement.COMBINED, "energy", None, None, None, "above the limit")
     assert verdict.error_of([row], None) == (None, "above the limit")
