@@ -7,7 +7,7 @@ from typing import Any
 
 
 def library(name: str) -> Any:
-    """A library of the extra "exports"; raises ValueError with a sentence that says how to install it."""
+    """A library of the extra "exports"; raises ValueError with how to install it."""
     try:
         return importlib.import_module(name)
     except ImportError:

@@ -60,7 +60,7 @@ def write_npz(result: Result, folder: Path) -> list[Path]:
 
 
 def write_mtx(result: Result, folder: Path) -> list[Path]:
-    """reduced_M.mtx and so on in the Matrix Market format, and reduced.json that says what they are."""
+    """reduced_M.mtx and so on in the Matrix Market format, and reduced.json that describes them."""
     model = reduced_model(result)
     written = []
     for name, matrix in arrays(model).items():
@@ -73,14 +73,14 @@ def write_mtx(result: Result, folder: Path) -> list[Path]:
             matrix = matrix.reshape(len(matrix), -1)
         mmwrite(path, matrix, symmetry=kind, precision=17)
         written.append(path)
-    told = folder / "reduced.json"
+    about_file = folder / "reduced.json"
     about = {
         "components": model.interface.components,
         "units": "SI",
         "contact": "x = B q, row pair * n_component + component",
     }
-    told.write_text(json.dumps(about, indent=2), encoding="utf-8")
-    return [*written, told]
+    about_file.write_text(json.dumps(about, indent=2), encoding="utf-8")
+    return [*written, about_file]
 
 
 def write_abaqus(result: Result, folder: Path) -> list[Path]:

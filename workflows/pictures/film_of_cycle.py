@@ -153,7 +153,7 @@ class CycleFilm:
 
 
 def _loop(result: Result, at: int) -> tuple[np.ndarray, np.ndarray, str, str]:
-    """Displacement and force of the pair and direction whose loop says most, and their labels."""
+    """Displacement and force of the pair and direction with the largest loop, and their labels."""
     loops, patch = result.loops, result.patch
     assert loops is not None
     assert patch is not None
@@ -166,7 +166,7 @@ def _loop(result: Result, at: int) -> tuple[np.ndarray, np.ndarray, str, str]:
 
 
 def _busiest(result: Result, at: int) -> tuple[int, int]:
-    """The pair and direction whose loop says most."""
+    """The pair and direction with the largest loop."""
     size = loop_size(result)[at] * _drawn_components(result)
     pair, component = np.unravel_index(int(np.argmax(size)), size.shape)
     return int(pair), int(component)

@@ -47,7 +47,7 @@ def mesh_fields(result: Result, row: int | None = None) -> pv.UnstructuredGrid:
 
 
 def patch_fields(result: Result, row: int = -1) -> pv.PolyData:
-    """The faces of the contact patch with what a wear row says of each pair, all of it of the one state that it solved.
+    """The faces of the contact patch with what a wear row holds for each pair, all of the one state that it solved.
 
     Point data (n_pair,): wear_depth [m] of that state, gap [m] before loading, pressure [Pa] mean over the cycle,
     energy [J] friction work of one cycle, status (bits of hbm.contact.law: 1 sticks, 2 slips, 4 separates)

@@ -15,7 +15,7 @@ PROBE = "import pyvista as pv; view = pv.Plotter(off_screen=True); view.add_mesh
 
 
 class RenderingUnavailable(RuntimeError):
-    """Off-screen rendering does not work on this machine; the message is one sentence that says what to install."""
+    """Off-screen rendering does not work on this machine; the message names what to install."""
 
 
 def check() -> None:

@@ -1,6 +1,6 @@
 """A contact opened like a book: both faces side by side, seen from where they met, in the axes t1, t2, n of the patch.
 
-Body 1 stays; body 2, or the ground where that is not meshed, is turned by half a turn about an edge.
+Body 1 is not moved; body 2, or the ground where that is not meshed, is turned by half a turn about an edge.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Opened:
         return f"contact{of}: body 1 in front, {'body 2' if len(self.faces) > 1 else 'ground'} behind"
 
     def own(self, state: State) -> State:
-        """What a state says of this contact's pairs."""
+        """A state, of this contact's pairs."""
         return state.of(self.pairs)
 
     def view(self, depth: np.ndarray, scale: float, paint: Paint) -> View:

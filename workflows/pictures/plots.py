@@ -279,7 +279,7 @@ def normal_loops(result: Result) -> Figure:
 
 
 def loop_size(result: Result) -> np.ndarray:
-    """How much the loops of every state, pair and component say (n_field, n_pair, n_component).
+    """Size of the loops of every state, pair and component (n_field, n_pair, n_component).
 
     The work of the loop [J] where there is friction, else the swing of the force [N]
     """
@@ -308,7 +308,7 @@ def _loops(result: Result, components: list[int], what: str, asked: Sequence[int
                 axes = grid[line, column]
                 component = components[int(np.argmax(size[column, pair]))]
                 x, force = loops.displacement[column, pair, component], loops.force[column, pair, component]
-                x = x - (x.max() + x.min()) / 2  # the static offset says nothing about the loop
+                x = x - (x.max() + x.min()) / 2  # the static offset is no part of the loop
                 (unit_x, scale_x), (unit_f, scale_f) = length_unit(x.max()), force_unit(np.abs(force).max())
                 axes.plot(scale_x * np.append(x, x[0]), scale_f * np.append(force, force[0]), color=BLUE)
                 axes.locator_params(nbins=5)
@@ -336,7 +336,7 @@ def _wear(result: Result) -> WearHistory:
 
 
 def cycle_axis(axes: Any, wear: WearHistory) -> float:
-    """Label the axis of cycles, and say where the run ends if that is not drawn; returns the factor of the axis."""
+    """Label the axis of cycles, with the end of the run where that is not drawn; returns the factor of the axis."""
     shown, last = shown_cycles(wear), float(wear.cycles[-1])
     unit, scale = _cycles(shown)
     if shown < last:

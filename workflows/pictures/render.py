@@ -95,8 +95,8 @@ def contact_picture(result: Result, contact: Meeting, wear: float | None = None)
     states = [opened.own(state) for state in shown_states(result)]
     depth = np.stack([state.depth for state in states])
     wear = wear or drawing.wear_scale(opened.patch, depth)
-    worn, told = bool(depth.max() > 0), [s for s in states if s.status is not None]
-    rows = [name for name, there in (("depth", worn), ("status", bool(told)), ("pressure", True)) if there]
+    worn, known = bool(depth.max() > 0), [s for s in states if s.status is not None]
+    rows = [name for name, there in (("depth", worn), ("status", bool(known)), ("pressure", True)) if there]
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         figure = Figure(
             figsize=(max(LAYOUT.column * len(states), LAYOUT.least) + 0.2, 2.9 * len(rows) + 0.7), layout="constrained"
@@ -113,7 +113,7 @@ def contact_picture(result: Result, contact: Meeting, wear: float | None = None)
         for axes, state in zip(grid[0], states, strict=True):
             axes.set_title(state.label, fontsize=10)
         if "status" in rows:
-            present = {int(bits) for s in told if s.status is not None for bits in s.status}
+            present = {int(bits) for s in known if s.status is not None for bits in s.status}
             status_legend(figure, present, opened.patch.components)
         told_scale = f", depth in relief × {wear:g}" if worn else ""
         heading(figure, result, f"opened {opened.sides}{told_scale}")

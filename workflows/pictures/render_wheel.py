@@ -28,7 +28,7 @@ from tribodyn.workflows.result.states import shown_states
 
 @dataclass(frozen=True)
 class Wheel:
-    """n_sectors, engine_order, axis as the scene says; turn : (3, 3) by one pitch, to the neighbour on the left."""
+    """n_sectors, engine_order, axis as in the scene; turn : (3, 3) by one pitch, to the neighbour on the left."""
 
     n_sectors: int
     engine_order: int

@@ -131,7 +131,7 @@ def _table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
 def _verdict(result: Result) -> str:
     numbers = result.summary()
     mark = "good" if numbers["finished"] else "bad"
-    said = f'<p class="{mark}"><strong>{escape(result.state[:1].upper() + result.state[1:])}.</strong></p>'
+    html = f'<p class="{mark}"><strong>{escape(result.state[:1].upper() + result.state[1:])}.</strong></p>'
     judged = numbers.get("verdict")
     if isinstance(judged, Mapping):
         rows = []
@@ -143,8 +143,8 @@ def _verdict(result: Result) -> str:
                 str(item.get("dominated_by") or ""), str(item.get("status") or ""), str(item.get("reason") or ""),
             ))  # fmt: skip
         head = ("quantity", "value", "total error", "dominated by", "status", "why")
-        said += _table(rows, head)
-    return said + _table(text.numbers(result))
+        html += _table(rows, head)
+    return html + _table(text.numbers(result))
 
 
 def _number(value: Any) -> str:

@@ -1,4 +1,4 @@
-"""What a result says of its model in single numbers, and how far its run came."""
+"""The model of a result in single numbers, and how far its run came."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Facts:
 
     @property
     def share_of_body_1(self) -> float:
-        """The share of the total depth that is worn off body 1, half where nothing is said."""
+        """The share of the total depth that is worn off body 1, half by default."""
         return 0.5 if self.wear_split is None else self.wear_split
 
     def table(self) -> dict[str, Any]:
@@ -91,7 +91,7 @@ class Facts:
 
     @classmethod
     def of(cls, table: Mapping[str, Any]) -> Facts:
-        """The facts that a table as of `table` tells; what else is in it is passed over."""
+        """The facts in a table as of `table`; what else is in it is ignored."""
         plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in table.items()}
         known = {item.name: plain[item.name] for item in fields(cls) if item.name in plain}
         if "harmonics" in known:

@@ -236,7 +236,7 @@ class Result:
 
     @property
     def state(self) -> str:
-        """Sentence that says how far the run came."""
+        """A sentence on how far the run came."""
         if self.stage is Stage.WEARING and self.wear is not None:
             return f"{self.stage.value}: {len(self.wear.cycles)} wear steps are done"
         if self.stage is Stage.FAILED and self.wear is not None:

@@ -275,8 +275,8 @@ def _read(group: h5py.Group, kind: type, arrays: Mapping[str, Any]) -> Any:
         elif item.name == "end":
             values[item.name] = _outcome(ENDS[kind], str(group.attrs[KIND]), str(group.attrs[item.name]))
         elif item.name == "outcome":
-            said = zip(group.attrs[KINDS], group.attrs[item.name], strict=True)
-            values[item.name] = tuple(_outcome(SolveEnd, str(name), str(text)) for name, text in said)
+            ends = zip(group.attrs[KINDS], group.attrs[item.name], strict=True)
+            values[item.name] = tuple(_outcome(SolveEnd, str(name), str(text)) for name, text in ends)
         else:
             value = group.attrs[item.name]
             values[item.name] = value if isinstance(value, str) else tuple(str(entry) for entry in value)

@@ -30,7 +30,7 @@ def summary(result: Result) -> dict[str, Any]:
     wear_steps, hbm_solves : steps taken and balance solves spent on wear
     peak_hz, peak_m, preload_N : [first, last] of the wear run, or the peak of the response curve without one
     peak_at_end : whether that peak is no peak, but an end of the response curve
-    peak_is_stable : whether that peak of the curve is a motion that stays, None where this was not asked for
+    peak_is_stable : whether that peak of the curve is stable, None where this was not asked for
     stable_peak_hz, stable_peak_m : the highest point of the curve that is
     seconds : of computing, interrupted runs included
     joints : named contact -> pairs, area_m2, and with wear preload_N [first, last], life_cycles until its preload has
@@ -158,7 +158,7 @@ def _peak(result: Result) -> dict[str, Any]:
 
 
 def _stable_peak(result: Result) -> dict[str, Any]:
-    """An unstable motion is a solution of the balance that no vibration stays at, however high it is."""
+    """An unstable motion is a solution of the balance that no vibration remains at, however high it is."""
     frf, marks = result.response, result.stability
     if frf is None or marks is None:
         return dict.fromkeys(("peak_is_stable", "stable_peak_hz", "stable_peak_m"))

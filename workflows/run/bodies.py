@@ -63,8 +63,8 @@ def assembly(scene: StructureScene, folder: Path, scratch: Path) -> Assembly:
         for name, table in scene.bodies.items():
             try:
                 mesh, node_sets, notes = _placed(table, folder, scratch / f"mesh_{name}.msh")
-                told = tuple(f"bodies.{name}: {note}" for note in notes)
-                bodies.append(Body(name, mesh, node_sets, _material(table, scene.materials), told))
+                own = tuple(f"bodies.{name}: {note}" for note in notes)
+                bodies.append(Body(name, mesh, node_sets, _material(table, scene.materials), own))
             except ValueError as trouble:
                 raise ValueError(f"bodies.{name}: {trouble}") from None
         _apart(bodies)

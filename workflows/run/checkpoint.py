@@ -111,7 +111,7 @@ def is_complete(result: Result, scene: Scene) -> bool:
 def same_problem(first: Scene, second: Scene) -> str:
     """Empty where one scene's result can be resumed by the other, else the first key that differs.
 
-    What is drawn, how many wear steps are wanted, how their result is told and how many threads work may differ.
+    What is drawn, how many wear steps are wanted, how their result is reported and how many threads work may differ.
     """
     ignored: dict[str, Any] = {"scene": True, "pictures": True, "solver": {"threads"}}
     ignored["wear"] = {"max_steps", "responses", "split"}

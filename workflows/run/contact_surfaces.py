@@ -33,7 +33,7 @@ def surface_gap(surfaces: Surfaces, interface: ContactInterface, folder: Path) -
     """Gap of a flat contact from the faces that a scene names, files relative to `folder`.
 
     Raises  ValueError where the patch is not flat, or where a height map or the mating height cannot be what the scene
-        says
+        gives
     """
     nodes = patch_coordinates(interface, surfaces.axes)
     size = np.ptp(nodes, axis=0)

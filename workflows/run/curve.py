@@ -41,7 +41,7 @@ def choose_harmonics(
 ) -> HarmonicChoice:
     """Harmonics that make the response of every output right to the tolerance of the options at its resonance.
 
-    The harmonics chosen move the resonance: it is looked for again with them, and they are chosen anew there.
+    The harmonics chosen move the resonance: it is searched again with them, and they are chosen anew there.
     peak : where the resonance is searched, with the harmonics of the balance at first
     most : times that harmonics are chosen; same : relative distance of two peaks that counts as none
     Raises  harmonic_choice.NotSolved

@@ -52,7 +52,7 @@ def structure(name: str, table: Table, materials: Mapping[str, AnyMaterial], fol
     """What the deck of a table brings.
 
     materials : those of the scene, which take the place of the deck's of the same name; folder : of the scene
-    Raises  ValueError, one sentence: the deck cannot be read, lacks a material, or says what cannot be carried over
+    Raises  ValueError, one sentence: the deck cannot be read, lacks a material, or has what cannot be carried over
     """
     path = folder / table.file
     if table.unit not in UNITS:
@@ -61,8 +61,8 @@ def structure(name: str, table: Table, materials: Mapping[str, AnyMaterial], fol
         stamp = path.stat().st_mtime_ns if path.is_file() else 0
         return _Carrying(name, table, materials, _read(path, UNITS[table.unit], stamp)).done()
     except ValueError as trouble:
-        said = str(trouble)
-        raise ValueError(said if said.startswith("decks.") else f"decks.{name}: {said}") from None
+        clause = str(trouble)
+        raise ValueError(clause if clause.startswith("decks.") else f"decks.{name}: {clause}") from None
 
 
 @lru_cache(maxsize=4)
@@ -145,7 +145,7 @@ class _Carrying:
     def _solid(self, one: deck.DeckMaterial) -> AnyMaterial:
         if one.name in self.materials:
             return self.materials[one.name]
-        instead = f"say [materials.{one.name}] in the scene, which takes its place"
+        instead = f"give [materials.{one.name}] in the scene, which takes its place"
         if one.density is None:
             raise ValueError(f"material '{one.name}' of the deck has no density: {instead}")
         along = one.expansion or 0.0
@@ -207,7 +207,7 @@ class _Carrying:
     def _supports(self, supports: Sequence[deck.Support]) -> None:
         moved = [one for one in supports if one.value]
         if moved:
-            self.notes.append(f"{self._what('supports', moved)} with a displacement: say it as [prescribed.NAME]")
+            self.notes.append(f"{self._what('supports', moved)} with a displacement: give it as [prescribed.NAME]")
         held: dict[str, set[int]] = {}
         for one in supports:
             if not one.value:
@@ -277,7 +277,7 @@ class _Carrying:
         return found
 
     def _instead(self, kind: str, table: str) -> str:
-        return f"say it as [{table}.NAME] of the scene and leave {kind} out of decks.{self.name}.use"
+        return f"give it as [{table}.NAME] of the scene and leave {kind} out of decks.{self.name}.use"
 
     def _what(self, kind: str, entries: Sequence[Any]) -> str:
         return f"1 of its {kind}" if len(entries) == 1 else f"{len(entries)} {kind}"

@@ -1,4 +1,4 @@
-"""What a result says about itself before anything is solved: provenance, sizes, patch and mesh."""
+"""What a result holds before anything is solved: provenance, sizes, patch and mesh."""
 
 from __future__ import annotations
 

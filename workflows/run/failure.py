@@ -1,5 +1,5 @@
-"""A solve that fails, as a run tells it."""
+"""A solve that fails, as a run reports it."""
 
 
 class SolveFailed(RuntimeError):
-    """A solve did not converge; the message says where and why, and the result file holds what came before."""
+    """A solve did not converge; the message has where and why, and the result file holds what came before."""

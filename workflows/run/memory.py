@@ -30,7 +30,7 @@ def peak() -> float:
 
 
 def own(pid: int) -> float:
-    """Memory that a process has written and shares with no other one [bytes]; nan where the system does not tell."""
+    """Memory that a process has written and shares with no other one [bytes]; nan where the system cannot count it."""
     try:
         lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
     except OSError:

@@ -120,7 +120,7 @@ def make_mesh(file: SceneFile, folder: Path) -> tuple[Any, dict[str, np.ndarray]
 
 
 def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], folder: Path | None = None) -> Part:
-    """Mass, stiffness, loads, outputs and contact of the mesh, held where the scene says; its files are in `folder`."""
+    """Mass, stiffness, loads, outputs and contact of the mesh, held as the scene asks; its files are in `folder`."""
     sector.check_sectors(scene)
     material = part_reduction.material(scene, mesh)
     loads = {
@@ -209,7 +209,7 @@ def make_load(load: StaticLoad, mesh: Any, material: Any, folder: Path) -> Load:
 
 
 def reduce_part(scene: MeshScene, part: Part) -> ReducedModel:
-    """The part on its contact and load nodes and a few modes, damped and held as the scene says."""
+    """The part on its contact and load nodes and a few modes, damped and held as the scene asks."""
     return part_reduction.with_prescribed(scene, part, damped(scene, plain_model(scene, part)))
 
 

@@ -26,7 +26,7 @@ from tribodyn.workflows.run import joints
 from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
 
 BOLTS = "bolts."  # begins the names of outputs that are elongations of bolts
-MOST_MASTERS = 3000  # contact DOFs up to which all of them stay coordinates by default
+MOST_MASTERS = 3000  # contact DOFs up to which all of them remain coordinates by default
 
 
 def material(scene: MeshScene, mesh: Any = None) -> Any:
@@ -96,10 +96,10 @@ def reduce(scene: MeshScene, part: Part) -> ReducedModel:
 
 
 def without_masters(scene: MeshScene, contact_dofs: int, held: bool) -> bool:
-    """Whether the contact DOFs do not stay coordinates: as the scene says, else where there are thousands of them.
+    """Whether the contact DOFs are no coordinates: as the scene asks, else where there are thousands of them.
 
     held : whether motions are held besides the clamps
-    Raises  ValueError where the scene says so and has what needs them
+    Raises  ValueError where the scene asks for it and has what needs them
     """
     method = scene.reduction.method
     needs = {"[wheel]": scene.wheel, "[prescribed]": scene.prescribed, "no_turning": held}

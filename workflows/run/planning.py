@@ -58,7 +58,7 @@ COSTS = Costs()
 
 @dataclass(frozen=True)
 class Plan:
-    """Sizes, memory [bytes] and time [s] of a scene; wear_steps is None where it cannot be told, 0 without wear."""
+    """Sizes, memory [bytes] and time [s] of a scene; wear_steps is None where it is not known, 0 without wear."""
 
     elements: int
     nodes: int

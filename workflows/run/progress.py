@@ -1,4 +1,4 @@
-"""Telling a user what is going on, with the time left on long work."""
+"""Progress of a run for its user, with the time left on long work."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsed
 from rich.progress import Progress as Bar
 
 NOTE_EVERY = 15.0  # seconds between lines where there is no terminal to draw a bar on
-FORESEEN = 0.02  # share of the work from which on the time left is told: the first steps compile
+FORESEEN = 0.02  # share of the work from which on the time left is given: the first steps compile
 
 
 class Progress:
@@ -26,7 +26,7 @@ class Progress:
 
     @property
     def silent(self) -> bool:
-        """Whether what is said is read by nobody."""
+        """Whether nothing of it is read."""
         return self._console is None and self._log is None
 
     @contextmanager
@@ -44,8 +44,8 @@ class Progress:
             yield self._lines(name, start) if self._log else lambda share, note: None
         elif self._console.is_terminal:
             columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-            told, before = TextColumn("{task.fields[left]}{task.fields[note]}"), compiled()
-            with Bar(*columns, told, console=self._console, transient=True) as bar:
+            left, before = TextColumn("{task.fields[left]}{task.fields[note]}"), compiled()
+            with Bar(*columns, left, console=self._console, transient=True) as bar:
                 task = bar.add_task(name, total=1.0, left="", note="")
                 log = self._lines(name, start, on_console=False) if self._log else None
 
@@ -71,8 +71,8 @@ class Progress:
             if now - last >= NOTE_EVERY and share > 0:
                 last = now
                 left = time_left(share, start, compiling)
-                said = f"{name}: {min(share, 1.0):.0%}{', ' if left else ''}{left}; {note}".rstrip("; ")
-                (self.say if on_console else self._write)(said)
+                line = f"{name}: {min(share, 1.0):.0%}{', ' if left else ''}{left}; {note}".rstrip("; ")
+                (self.say if on_console else self._write)(line)
 
         return advance
 
@@ -90,9 +90,9 @@ class Progress:
 
 
 def time_left(share: float, start: float, compiling: float) -> str:
-    """Seconds left when a share of the work is done, compiling told apart, since it happens once.
+    """Seconds left when a share of the work is done, compiling apart, since it happens once.
 
-    start : of the work, as time.perf_counter tells; compiling : seconds spent on it since then
+    start : of the work, as of time.perf_counter; compiling : seconds spent on it since then
     """
     steady = max(time.perf_counter() - start - compiling, 0.0)
     left = f"{steady * (1 / min(share, 1.0) - 1):.0f} s left" if share >= FORESEEN else ""

@@ -44,8 +44,8 @@ def wear_down(
         keep(replace(result, wear=history(rows, WearEnd.UNFINISHED.say()), stage=Stage.WEARING))
         done = float(patch.area @ (row.depth + row.worn)) / to_wear if to_wear > 0 else 0.0
         deepest, hertz = 1e3 * float((row.depth + row.worn).max()), row.omega / (2 * np.pi)
-        told = f"{row.cycles + row.cycles_in_step:.3g} cycles, peak {hertz:.4g} Hz and {1e3 * row.amplitude:.3g} mm"
-        advance(done, f"step {len(rows)}, {told}, preload {row.preload:.4g} N, depth {deepest:.3g} mm")
+        state = f"{row.cycles + row.cycles_in_step:.3g} cycles, peak {hertz:.4g} Hz and {1e3 * row.amplitude:.3g} mm"
+        advance(done, f"step {len(rows)}, {state}, preload {row.preload:.4g} N, depth {deepest:.3g} mm")
 
     problem = wear_problem(scene, file.folder, model.balance, wear.lost_below, wear.end_at == "at_rest")
     limit = settings.step_limit(scene, patch.free_deflection, patch.area)

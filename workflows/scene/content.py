@@ -13,18 +13,18 @@ COMPUTES = ("geometry", "fem", "reduction", "hbm", "workflows/run", "workflows/s
 LENGTH = 16  # hexadecimal digits of a digest that are kept
 
 
-def files_named(said: Any, folder: Path) -> dict[str, Path]:
+def files_named(table: Any, folder: Path) -> dict[str, Path]:
     """Files that texts in nested tables and lists name, such as a mesh, a height map or a law of one's own."""
     found = {}
-    for value in _texts(said):
+    for value in _texts(table):
         if len(value) < 256 and "\n" not in value and "\0" not in value and (folder / value).is_file():
             found[value] = folder / value
     return dict(sorted(found.items()))
 
 
-def digests(said: Any, folder: Path) -> dict[str, str]:
+def digests(table: Any, folder: Path) -> dict[str, str]:
     """Digest of the contents of every file that is named, by its name."""
-    named = files_named(said, folder)
+    named = files_named(table, folder)
     return {name: digest(path, path.stat().st_mtime_ns)[:LENGTH] for name, path in named.items()}
 
 
@@ -37,12 +37,12 @@ def digest(path: Path, changed: int) -> str:
 @cache
 def code() -> str:
     """Digest of the sources that make numbers of a scene."""
-    told = hashlib.sha256()
+    content = hashlib.sha256()
     for room in COMPUTES:
         for path in sorted((TREE / room).rglob("*.py")):
-            told.update(path.relative_to(TREE).as_posix().encode())
-            told.update(path.read_bytes())
-    return told.hexdigest()[:LENGTH]
+            content.update(path.relative_to(TREE).as_posix().encode())
+            content.update(path.read_bytes())
+    return content.hexdigest()[:LENGTH]
 
 
 def _texts(value: Any) -> Iterator[str]:

@@ -45,7 +45,7 @@ def numbers(
     """The own numbers of a law, a part or a continuation out of a table of a scene, in SI units.
 
     table : its key, such as "contact"; given : what the table has besides `others`, its general keys
-    Raises  ValueError: one is unknown, missing, not in its unit or out of its limits; says which there are
+    Raises  ValueError: one is unknown, missing, not in its unit or out of its limits; lists those that there are
     """
     known = {number.name: number for number in declared}
     found: dict[str, int | float] = {}
@@ -116,7 +116,7 @@ class LawTable(Table):
         given = {name: value for name, value in table.items() if name not in fields}
         law = general.get("law", fields["law"].default)
         if not isinstance(law, str):
-            return general  # the field itself says what a law is
+            return general  # refused by the field itself
         path = beside(folder, law, f"{cls.TABLE}.law") if is_file(law) else cls.LAWS.file_of(law)
         return general | numbers(cls.TABLE, read(path), given, fields)
 

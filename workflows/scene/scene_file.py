@@ -1,4 +1,4 @@
-"""Reading a scene: find the file, apply overrides, check it, and say what is wrong in one sentence."""
+"""Reading a scene: find the file, apply overrides, check it, and report what is wrong in one sentence."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tribodyn.workflows.scene.schema import MeshScene, PartScene, Scene
 from tribodyn.workflows.scene.structure import StructureScene
 
 CASES = Path(__file__).parents[1] / "cases"
-MOST_PROBLEMS = 3  # told in one sentence
+MOST_PROBLEMS = 3  # reported in one sentence
 
 Kind = TypeVar("Kind", bound=BaseModel)
 
@@ -173,8 +173,8 @@ def _override(data: dict[str, Any], text: str) -> None:
 def _of_the_kind_meant(problems: Sequence[Any]) -> list[Any]:
     """Problems without those of the kinds of value that were not meant, where a key takes a list or something else.
 
-    pydantic tells what is wrong with each kind; a list was meant to be one, all else was not. Names of kinds are taken
-    off the end of locations.
+    pydantic reports what is wrong with each kind; a list was meant to be one, all else was not. Names of kinds are
+    taken off the end of locations.
     """
     found = []
     for problem in problems:
@@ -185,14 +185,14 @@ def _of_the_kind_meant(problems: Sequence[Any]) -> list[Any]:
     lists = {place: problem["type"] != "tuple_type" for place, _, listed, problem in found if listed}
 
     def meant(place: tuple[str | int, ...], kinds: bool, listed: bool) -> bool:
-        """Where it belongs to a key of several kinds: whether it tells of the kind that was given."""
+        """Where it belongs to a key of several kinds: whether it is of the kind that was given."""
         within = [
             given for key, given in lists.items() if place[: len(key)] == key and (kinds or len(place) > len(key))
         ]
         return not within or within[0] == listed
 
-    told = [problem for place, kinds, listed, problem in found if meant(place, kinds, listed)]
-    return told or [problem for *_, problem in found]
+    of_the_kind = [problem for place, kinds, listed, problem in found if meant(place, kinds, listed)]
+    return of_the_kind or [problem for *_, problem in found]
 
 
 def _is_kind(item: str | int) -> bool:

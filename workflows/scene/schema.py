@@ -55,7 +55,7 @@ class Heading(Table):
 
 
 class Scene(Table, ABC):
-    """What every scene says, whatever its model is made from; see PartScene, and MatrixScene in matrix_scene."""
+    """What every scene has, whatever its model is made from; see PartScene, and MatrixScene in matrix_scene."""
 
     scene: Heading
     """Title and source."""
@@ -92,7 +92,7 @@ class Scene(Table, ABC):
 
 
 class MeshScene(Scene):
-    """What every scene with a mesh says; see PartScene for one part, StructureScene in structure for several bodies."""
+    """What every scene with a mesh has; see PartScene for one part, StructureScene in structure for several bodies."""
 
     springs: dict[str, SpringTable] = Field(default_factory=dict)
     """Springs by name."""
@@ -135,7 +135,7 @@ class MeshScene(Scene):
         lacking = [name for name, contact in contacts.items() if takes_asperities(contact)]
         try:
             surfaces = Surfaces.model_validate(data["surfaces"]) if lacking else None
-        except ValidationError:  # it is told where the table itself is read
+        except ValidationError:  # reported where the table itself is read
             return data
         if surfaces is None:
             return data

@@ -34,7 +34,7 @@ class FaceRule(Table):
     box: tuple[Point, Point] | None = None
     """Two corners of a box within which the whole facets lie."""
     nearest: Point | None = None
-    """Point whose nearest smooth face is taken: all that goes on from there without an edge."""
+    """Point whose nearest smooth face is taken: all that continues from there without an edge."""
     normal: Direction | None = None
     """Direction in which the facets look, outwards."""
     within: Annotated[Angle, Field(gt=0, le=math.pi)] = math.radians(5.0)
@@ -217,7 +217,7 @@ class NamedContact(FaceContact):
     """A joint: a face against another one, whose mesh need not match, or against the ground."""
 
     wear: JointWearTable | None = None
-    """How this joint wears, instead of what [wear] says for all."""
+    """How this joint wears, instead of [wear], which is for all."""
 
     @model_validator(mode="before")
     @classmethod
@@ -409,5 +409,5 @@ class StructureScene(MeshScene):
                 if {tie.first, tie.second} == {*contact.groups, contact.opposite}:
                     raise ValueError(f"contacts.{name} and ties.{tied} join the same two faces: take one of them out")
             if contact.wear is not None and self.wear is None:
-                raise ValueError(f"contacts.{name}.wear needs [wear], which says how far the wear goes")
+                raise ValueError(f"contacts.{name}.wear needs [wear], which sets how far the wear goes")
         return self
