@@ -14,6 +14,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.workflows.pictures.view import grid_of
 from tribodyn.workflows.result.faces import meetings_of, worn_off
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import State, instant_status, over_a_cycle, shown_states, state_of
@@ -92,13 +93,11 @@ def _vectors(result: Result, components: np.ndarray) -> np.ndarray:
 
 def part_grid(result: Result, state: State) -> Any:
     """The worn part as a pyvista grid with its fields at nodes, of one state."""
-    import pyvista as pv
-
     part = result.part
     assert part is not None
     meetings = meetings_of(result)
     moved = worn_off(meetings, state.depth, len(part.points))
-    grid = pv.UnstructuredGrid({getattr(pv.CellType, part.kind.upper()): part.cells}, part.points + moved)
+    grid = grid_of(part, part.points + moved)
     grid.point_data["worn_off"] = moved
     depth, contact = np.zeros(len(part.points)), np.zeros(len(part.points), np.int8)
     for one in meetings:

@@ -94,10 +94,8 @@ def _links(result: Result, part: PartMesh, body: np.ndarray) -> dict[tuple[int, 
 
 
 def _shell(part: PartMesh, mine: np.ndarray) -> Any:
-    import pyvista as pv
-
     cells = part.cells[mine[part.cells[:, 0]]]
-    shell = drawing.surface(part.points, cells, getattr(pv.CellType, part.kind.upper()), 0).triangulate()
+    shell = drawing.surface(drawing.grid_of(part, cells=cells)).triangulate()
     return shell.compute_normals(consistent_normals=True, auto_orient_normals=True, split_vertices=False)
 
 

@@ -12,8 +12,8 @@ from matplotlib.patches import Patch as Swatch
 
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
 from tribodyn.workflows.pictures import opened as book
-from tribodyn.workflows.pictures.figures import force_unit, heading, length_unit, scale_bar, status_name
-from tribodyn.workflows.pictures.plots import has_friction, loop_size, pair_name
+from tribodyn.workflows.pictures.figures import heading, length_unit, scale_bar, status_name
+from tribodyn.workflows.pictures.loops import loop_of, loop_size
 from tribodyn.workflows.pictures.render import Moving
 from tribodyn.workflows.pictures.shots import shoot, show, with_room
 from tribodyn.workflows.pictures.style import BLUE, INK, LAYOUT, MOTION_MAP, RED, STATUS, STYLE
@@ -40,14 +40,15 @@ class CycleFilm:
             raise ValueError("the result keeps no cycle of a contact: its scene needs pictures.plots = true")
         states = {state.number: state for state in shown_states(result) if state.number in loops.row.tolist()}
         if row is None:
-            row = int(loops.row[np.argmax((loop_size(result) * _drawn_components(result)).sum(axis=(1, 2)))])
+            row = int(loops.row[np.argmax(loop_size(result).sum(axis=(1, 2)))])
         if row not in states:
             raise ValueError(f"the result keeps no cycle of row {row}: it has those of {', '.join(map(str, states))}")
         self.state, self.count = states[row], count
         at = loops.row.tolist().index(row)
         self._status = instant_status(result, at)
-        self._loop = _loop(result, at)
-        busiest = _busiest(result, at)[0]
+        size = loop_size(result)[at]
+        busiest, component = (int(index) for index in np.unravel_index(int(np.argmax(size)), size.shape))
+        self._loop = loop_of(result, at, busiest, component)
         shown = [one for one in book.contacts(result) if busiest in range(*one.pairs.indices(len(patch.area)))]
         self._contact = book.opened(result, shown[0]) if shown else None
         self._moving = None
@@ -74,7 +75,7 @@ class CycleFilm:
             padded = np.full(axes.images[0].get_array().shape, 255, np.uint8)
             padded[: LAYOUT.film_part[1]] = image
             axes.images[0].set_data(padded)
-        x, force = self._loop[:2]
+        x, force = self._loop.displacement, self._loop.force
         self._mark.set_data(x[sample : sample + 1], force[sample : sample + 1])
         share = number / self.count
         self._now.set_xdata([share, share])
@@ -91,7 +92,7 @@ class CycleFilm:
         else:
             lower, self._panels = self.figure.subfigures(1, 1), []
         left, right = lower.subplots(1, 2, width_ratios=[1, 1.6])
-        self._draw_loop(left, result)
+        self._draw_loop(left)
         self._draw_status(right, result)
         hertz = "" if result.wear is None else f", {self.state.omega / (2 * np.pi):.4g} Hz"
         heading(self.figure, result, f"one cycle, {self.state.label}{hertz}")
@@ -125,12 +126,12 @@ class CycleFilm:
             found.append(shoot(view, self._contact.camera, LAYOUT.film_part))
         return found
 
-    def _draw_loop(self, axes: Any, result: Result) -> None:
-        x, force, label_x, label_f = self._loop
+    def _draw_loop(self, axes: Any) -> None:
+        x, force = self._loop.displacement, self._loop.force
         axes.plot(np.append(x, x[0]), np.append(force, force[0]), color=BLUE)
         self._mark = axes.plot([], [], "o", color=RED, ms=7, zorder=5)[0]
-        axes.set_xlabel(label_x, fontsize=10)
-        axes.set_ylabel(label_f, fontsize=10)
+        axes.set_xlabel(self._loop.along, fontsize=10)
+        axes.set_ylabel(self._loop.label, fontsize=10)
         axes.locator_params(nbins=5)
 
     def _draw_status(self, axes: Any, result: Result) -> None:
@@ -150,29 +151,3 @@ class CycleFilm:
         present = [bits for bits in AT_ONCE if (self._status == bits).any()]
         swatches = [Swatch(facecolor=STATUS[b][1], label=status_name(b, patch.components)) for b in present]
         axes.legend(handles=swatches, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
-
-
-def _loop(result: Result, at: int) -> tuple[np.ndarray, np.ndarray, str, str]:
-    """Displacement and force of the pair and direction with the largest loop, and their labels."""
-    loops, patch = result.loops, result.patch
-    assert loops is not None
-    assert patch is not None
-    pair, component = _busiest(result, at)
-    x, f = loops.displacement[at, pair, component], loops.force[at, pair, component]
-    x = x - (x.max() + x.min()) / 2
-    (unit_x, scale_x), (unit_f, scale_f) = length_unit(float(x.max())), force_unit(float(np.abs(f).max()))
-    label_f = f"force at {pair_name(result, pair)} / {unit_f}"
-    return scale_x * x, scale_f * f, f"{patch.components[component]} / {unit_x}", label_f
-
-
-def _busiest(result: Result, at: int) -> tuple[int, int]:
-    """The pair and direction with the largest loop."""
-    size = loop_size(result)[at] * _drawn_components(result)
-    pair, component = np.unravel_index(int(np.argmax(size)), size.shape)
-    return int(pair), int(component)
-
-
-def _drawn_components(result: Result) -> np.ndarray:
-    """(n_component,) 1 for the components that loops are drawn of, 0 for the others: not n where there is friction."""
-    assert result.patch is not None
-    return np.array([float(name != "n" or not has_friction(result)) for name in result.patch.components])

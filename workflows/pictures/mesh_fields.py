@@ -24,7 +24,6 @@ def mesh_fields(result: Result, row: int | None = None) -> pv.UnstructuredGrid:
         wear_depth    total depth of the pair at the node in that state, nan off the patch [m]
     Raises  ValueError where the result keeps no mesh or no field at the row
     """
-    import pyvista as pv
 
     part, fields = result.part, result.fields
     if part is None or fields is None:
@@ -34,7 +33,7 @@ def mesh_fields(result: Result, row: int | None = None) -> pv.UnstructuredGrid:
     if row not in rows:
         raise ValueError(f"the result has no field at wear row {row}: it has those at {', '.join(map(str, rows))}")
     displacement = fields.displacement[rows.index(row)]
-    grid = pv.UnstructuredGrid({getattr(pv.CellType, part.kind.upper()): part.cells}, part.points)
+    grid = view.grid_of(part)
     vibration = view.cycle(displacement, result.harmonics)
     grid.point_data["static"] = view.at_rest(displacement, result.harmonics)
     grid.point_data["vibration"] = view.swing(displacement, result.harmonics)

@@ -12,7 +12,7 @@ import numpy as np
 
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame
 from tribodyn.workflows.pictures.style import BODY, BODY_2, EDGE, LAYOUT, STATUS
-from tribodyn.workflows.pictures.view import polygons
+from tribodyn.workflows.pictures.view import grid_of, polygons
 from tribodyn.workflows.result.faces import Face, Meeting, bodies, meetings_of
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
 from tribodyn.workflows.result.states import State
@@ -95,7 +95,7 @@ class Opened:
         low, high = local[part.cells].min(axis=1), local[part.cells].max(axis=1)
         near = ((high > [x0, y0, -THICK * self.size]) & (low < [x1, y1, THICK * self.size])).all(axis=1)
         cells = part.cells[mine & near & (sign * (low + high)[:, 2] > -0.2 * self.size)]
-        grid = pv.UnstructuredGrid({getattr(pv.CellType, part.kind.upper()): cells}, local)
+        grid = grid_of(part, local, cells)
         cut = grid.clip_box((x0, x1, y0, y1, -THICK * self.size, THICK * self.size), invert=False)
         return cut if cut.n_points else self._block(None, below, depth)
 

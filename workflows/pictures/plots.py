@@ -15,7 +15,6 @@ from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.workflows.pictures import maps
 from tribodyn.workflows.pictures.figures import (
     axes_of,
-    force_unit,
     heading,
     length_unit,
     log_axis,
@@ -23,6 +22,7 @@ from tribodyn.workflows.pictures.figures import (
     status_name,
     titled,
 )
+from tribodyn.workflows.pictures.loops import has_friction, loop_of, loop_size
 from tribodyn.workflows.pictures.style import BLUE, CYCLE, GREEN, GREY, INK, ORANGE, RED, STATUS, STYLE, WEAR_MAP
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import has_states, shown_cycles, state_of
@@ -44,7 +44,7 @@ def figures(result: Result) -> dict[str, Callable[[Result], Figure]]:
         ("outputs", output_amplitudes, result.response is not None and len(result.response.output_names) > 1),
         *((name, draw, worn) for name, draw in COURSES.items()),
         ("hysteresis", hysteresis, result.loops is not None and has_friction(result)),
-        ("normal", normal_loops, result.loops is not None and not has_friction(result)),
+        ("normal", hysteresis, result.loops is not None and not has_friction(result)),
         ("patch", maps.patch_maps, mapped),
         ("status_maps", maps.status_maps, mapped and worn),
     ]
@@ -212,11 +212,6 @@ def energy_against_cycles(result: Result) -> Figure:
     return figure
 
 
-def has_friction(result: Result) -> bool:
-    """Whether the contact has a tangential component, so that it can have hysteresis."""
-    return result.patch is not None and any(name != "n" for name in result.patch.components)
-
-
 def status_against_cycles(result: Result) -> Figure:
     """Share of the patch in each contact status, against cycles."""
     wear, patch = _wear(result), result.patch
@@ -262,72 +257,38 @@ COURSES: dict[str, Callable[[Result], Figure]] = {
 
 
 def hysteresis(result: Result, pairs: Sequence[int] | None = None) -> Figure:
-    """Tangential loops in chosen states (columns) of some pairs (rows), those that dissipate most by default.
+    """Loops in chosen states (columns) of some pairs (rows), those with the largest loops by default.
 
+    Of a contact without friction normal force over approach.
     Raises  ValueError where no loops are kept, or for a pair that there is not
     """
-    patch = result.patch
-    if result.loops is None or patch is None:
-        raise ValueError("the result holds no hysteresis loops: its scene needs a contact and pictures.plots = true")
-    components = [c for c, name in enumerate(patch.components) if name != "n"] or [0]
-    return _loops(result, components, "hysteresis loops by pair", pairs)
-
-
-def normal_loops(result: Result) -> Figure:
-    """Normal force over normal approach in chosen states (columns) of the pairs whose force swings most (rows)."""
-    return _loops(result, [0], "normal force over approach by pair")
-
-
-def loop_size(result: Result) -> np.ndarray:
-    """Size of the loops of every state, pair and component (n_field, n_pair, n_component).
-
-    The work of the loop [J] where there is friction, else the swing of the force [N]
-    """
-    loops = result.loops
-    assert loops is not None
-    if has_friction(result):
-        x = loops.displacement
-        return np.abs(np.sum(loops.force * (np.roll(x, -1, axis=-1) - np.roll(x, 1, axis=-1)), axis=-1)) / 2
-    return np.asarray(np.ptp(loops.force, axis=-1))
-
-
-def _loops(result: Result, components: list[int], what: str, asked: Sequence[int] | None = None) -> Figure:
     loops, patch = result.loops, result.patch
-    assert loops is not None
-    assert patch is not None
-    states = [state_of(result, int(row)) for row in loops.row]
-    size = loop_size(result)[:, :, components]
-    pairs = list(dict.fromkeys(int(np.argmax(one)) for one in size.sum(axis=2))) if asked is None else list(asked)
+    if loops is None or patch is None:
+        raise ValueError("the result holds no hysteresis loops: its scene needs a contact and pictures.plots = true")
+    states, size = [state_of(result, int(row)) for row in loops.row], loop_size(result)
+    largest = dict.fromkeys(int(np.argmax(one)) for one in size.sum(axis=2))
+    pairs = list(largest if pairs is None else pairs)
     if not all(0 <= pair < len(patch.area) for pair in pairs):
         raise ValueError(f"pairs {pairs}: this contact has pairs 0 to {len(patch.area) - 1}")
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(2.7 * len(states) + 0.4, 2.3 * len(pairs) + 0.6), layout="constrained")
         grid = figure.subplots(len(pairs), len(states), squeeze=False)
-        for line, pair in enumerate(pairs):
-            for column, state in enumerate(states):
-                axes = grid[line, column]
-                component = components[int(np.argmax(size[column, pair]))]
-                x, force = loops.displacement[column, pair, component], loops.force[column, pair, component]
-                x = x - (x.max() + x.min()) / 2  # the static offset is no part of the loop
-                (unit_x, scale_x), (unit_f, scale_f) = length_unit(x.max()), force_unit(np.abs(force).max())
-                axes.plot(scale_x * np.append(x, x[0]), scale_f * np.append(force, force[0]), color=BLUE)
+        for pair, line in zip(pairs, grid, strict=True):
+            for at, axes in enumerate(line):
+                loop = loop_of(result, at, pair, int(np.argmax(size[at, pair])))
+                x, force = (np.append(values, values[0]) for values in (loop.displacement, loop.force))
+                axes.plot(x, force, color=BLUE)
                 axes.locator_params(nbins=5)
-                if not force.any():
+                if not loop.force.any():
                     axes.set(ylim=(-1, 1), yticks=[0])
                     axes.text(0.5, 0.6, "open all the cycle", transform=axes.transAxes, ha="center", fontsize=10)
-                axes.set_xlabel(f"{patch.components[component]} / {unit_x}", fontsize=10)
-                axes.set_ylabel(f"force at {pair_name(result, pair)} / {unit_f}", fontsize=10)
-                if line == 0:
-                    axes.set_title(state.label, fontsize=11)
+                axes.set_xlabel(loop.along, fontsize=10)
+                axes.set_ylabel(loop.label, fontsize=10)
+        for axes, state in zip(grid[0], states, strict=True):
+            axes.set_title(state.label, fontsize=11)
+        what = "hysteresis loops by pair" if has_friction(result) else "normal force over approach by pair"
         heading(figure, result, what)
     return figure
-
-
-def pair_name(result: Result, pair: int) -> str:
-    """What a pair is called: its number, and its contact where there are several."""
-    named = result.facts.pairs_of_joints
-    of = next((name for name, pairs in named.items() if pair in range(pairs.start, pairs.stop)), "")
-    return f"pair {pair} of {of.replace('_', ' ')}" if of and len(named) > 1 else f"pair {pair}"
 
 
 def _wear(result: Result) -> WearHistory:

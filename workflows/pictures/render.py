@@ -19,7 +19,7 @@ from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_u
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, show, trimmed, with_room
 from tribodyn.workflows.pictures.style import LAYOUT, MOTION_MAP, PRESSURE_MAP, RED, STYLE, WEAR_MAP
 from tribodyn.workflows.result.faces import Meeting, bodies, meetings_of, worn_off
-from tribodyn.workflows.result.result import PartMesh, Result
+from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import State, has_states, shown_states
 
 
@@ -156,8 +156,7 @@ class Moving:
         self.rest_scale = deformation or drawing.deformation_scale(static, self.size)
         depth = np.stack([state.depth for state in shown_states(result)])
         self.wear = wear or drawing.wear_scale(patch, depth)
-        kind = _cell_type(part)
-        self.shell = drawing.surface(part.points, part.cells, kind, 0)
+        self.shell = drawing.surface(drawing.grid_of(part))
         self.outline = self.shell.extract_feature_edges(30)
         reach = [part.points + self.rest_scale * s for s in static]
         for s in (drawing.swing(d, result.harmonics) for d in fields.displacement):
@@ -216,16 +215,8 @@ class Moving:
 
     def view(self, points: np.ndarray, values: np.ndarray, limits: tuple[float, float]) -> View:
         """The part with its nodes at points (n_node, 3), coloured by values of the nodes."""
-        import pyvista as pv
-
-        grid = pv.UnstructuredGrid({_cell_type(self.part): self.part.cells}, points)
+        grid = drawing.grid_of(self.part, points)
         grid.point_data["shown"] = values
-        body = grid.extract_surface(nonlinear_subdivision=LAYOUT.smooth, algorithm="dataset_surface")
+        body = drawing.surface(grid, LAYOUT.smooth)
         layers = [Layer(body, values=np.asarray(body.point_data["shown"]), map=MOTION_MAP, limits=limits)]
         return View(layers, [self.outline])
-
-
-def _cell_type(part: PartMesh) -> int:
-    import pyvista as pv
-
-    return int(getattr(pv.CellType, part.kind.upper()))

@@ -57,7 +57,7 @@ class Wheel:
 
 @dataclass(frozen=True)
 class Shell:
-    """The surface of some cells of a part, which follows the nodes of the part.
+    """The surface of a part, which follows the nodes of the part.
 
     nodes : (n_point,) nodes of the part on the surface; faces : as VTK wants them
     """
@@ -66,8 +66,8 @@ class Shell:
     faces: np.ndarray
 
     @classmethod
-    def of(cls, part: PartMesh, cells: np.ndarray, cell_type: int) -> Shell:
-        at_rest = drawing.surface(part.points, cells, cell_type, 0)
+    def of(cls, part: PartMesh) -> Shell:
+        at_rest = drawing.surface(drawing.grid_of(part))
         return cls(cKDTree(part.points).query(at_rest.points)[1], np.asarray(at_rest.faces))
 
     def at(self, points: np.ndarray) -> Any:
@@ -88,11 +88,10 @@ def wheel_picture(result: Result, wheel: Wheel, deformation: float | None = None
     part, fields = result.part, result.fields
     assert part is not None
     assert fields is not None
-    import pyvista as pv
 
     states = [state for state in shown_states(result) if state.field is not None]
     radius = wheel.radius(part.points)
-    shell = Shell.of(part, part.cells, getattr(pv.CellType, part.kind.upper()))
+    shell = Shell.of(part)
     camera = wheel.camera(radius)
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         figure = Figure(figsize=(3.4 * len(states) + 0.2, 4.4), layout="constrained")
@@ -155,10 +154,9 @@ class MistunedWheelFilm:
         count: int = 1,
     ):  # fmt: skip
         check()
-        import pyvista as pv
 
         self.count, self._states, self._wheel = count, tuple(states), wheel
-        shell = Shell.of(part, part.cells, getattr(pv.CellType, part.kind.upper()))
+        shell = Shell.of(part)
         self._faces = _repeated(shell.faces, len(shell.nodes), wheel.n_sectors)
         radius = wheel.radius(part.points)
         self._camera = wheel.camera(radius)

@@ -11,7 +11,7 @@ import numpy as np
 
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.workflows.pictures.style import LAYOUT
-from tribodyn.workflows.result.result import Patch, Result
+from tribodyn.workflows.result.result import PartMesh, Patch, Result
 
 
 def at_rest(displacement: np.ndarray, harmonics: tuple[int, ...]) -> np.ndarray:
@@ -54,10 +54,18 @@ def nice(value: float) -> float:
     return float(f"{max(step * power for step in (1, 2, 5) if step * power <= value * (1 + 1e-9)):.6g}")
 
 
-def surface(points: np.ndarray, cells: np.ndarray, cell_type: int, subdivision: int) -> Any:
+def grid_of(part: PartMesh, points: np.ndarray | None = None, cells: np.ndarray | None = None) -> Any:
+    """The mesh of a part as a pyvista grid, or some of its cells; points : (n_node, 3) of its nodes as drawn [m]."""
     import pyvista as pv
 
-    grid = pv.UnstructuredGrid({cell_type: cells}, points)
+    kind = int(getattr(pv.CellType, part.kind.upper()))
+    return pv.UnstructuredGrid(
+        {kind: part.cells if cells is None else cells}, part.points if points is None else points
+    )
+
+
+def surface(grid: Any, subdivision: int = 0) -> Any:
+    """The surface of a grid, faces of curved elements cut into smaller ones so many times."""
     return grid.extract_surface(nonlinear_subdivision=subdivision, algorithm="dataset_surface")
 
 

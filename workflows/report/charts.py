@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.workflows.pictures.plots import loop_size, pair_name
+from tribodyn.workflows.pictures.loops import loop_size, pair_name
 from tribodyn.workflows.pictures.style import CYCLE, GREY, INK
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import state_of
@@ -108,12 +108,11 @@ def _loops(results: Sequence[tuple[str, Result]]) -> Chart:
         loops, patch = result.loops, result.patch
         if loops is None or patch is None:
             continue
-        drawn = [c for c, component in enumerate(patch.components) if component != "n"] or [0]
-        size = loop_size(result)[:, :, drawn]
+        size = loop_size(result)
         busiest = int(np.argmax(size.sum(axis=(1, 2))))
         for at, row in enumerate(loops.row):
             for rank, pair in enumerate(np.argsort(-size[at].sum(axis=1))[:LOOPS]):
-                c = drawn[int(np.argmax(size[at, pair]))]
+                c = int(np.argmax(size[at, pair]))
                 x, f = loops.displacement[at, pair, c], loops.force[at, pair, c]
                 where = f"{pair_name(result, int(pair))}, {patch.components[c]}"
                 label = f"{name}: {state_of(result, int(row)).label}, {where}"

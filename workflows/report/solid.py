@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from tribodyn.workflows.pictures.exploded import apart
 from tribodyn.workflows.pictures.figures import status_name
 from tribodyn.workflows.pictures.style import STATUS
-from tribodyn.workflows.pictures.view import looking, wear_scale
+from tribodyn.workflows.pictures.view import grid_of, looking, wear_scale
 from tribodyn.workflows.report.charts import plain
 from tribodyn.workflows.result.faces import bodies, meetings_of, worn_off
 from tribodyn.workflows.result.result import Result
@@ -106,11 +106,9 @@ def _fields(result: Result, state: State) -> dict[str, list[Any]]:
 
 def _surface(result: Result) -> tuple[np.ndarray, np.ndarray]:
     """Nodes of the mesh on its surface, and the triangles (n, 3) over them; every node of a curved face is a corner."""
-    import pyvista as pv
-
     part = result.part
     assert part is not None
-    grid = pv.UnstructuredGrid({getattr(pv.CellType, part.kind.upper()): part.cells}, part.points)
+    grid = grid_of(part)
     grid.point_data["node"], grid.point_data["body"] = np.arange(len(part.points)), bodies(part)
     shell = grid.extract_surface(nonlinear_subdivision=1, algorithm="dataset_surface").triangulate()
     shell = shell.compute_normals(consistent_normals=True, auto_orient_normals=True, split_vertices=False)

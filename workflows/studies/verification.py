@@ -21,7 +21,7 @@ from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.time_integration import LeftAlone, leave_alone
 from tribodyn.hbm.time.verify import Verification, verify
 from tribodyn.hbm.wear.history import WearRow
-from tribodyn.workflows.pictures.plots import axes_of, force_unit, length_unit
+from tribodyn.workflows.pictures.figures import axes_of, force_unit, length_unit
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
 from tribodyn.workflows.result.provenance import rebuilt
 from tribodyn.workflows.result.result import Result
