@@ -22,6 +22,7 @@ from tribodyn.fem.loads import unit
 from tribodyn.fem.matching import partners
 from tribodyn.fem.part import Part
 from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.geometry.placing import rotation
 
 AXIS = (1.0, 0.0, 0.0)
 
@@ -61,13 +62,6 @@ def phase(index: int, n_sectors: int) -> complex:
     return complex(np.exp(-2j * np.pi * index / n_sectors))
 
 
-def rotation(axis: Sequence[float], angle: float) -> np.ndarray:
-    """Rotation (3, 3) about an axis through the origin by an angle [rad]."""
-    a = unit(axis, "the axis of rotation")
-    cross = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
-
-
 def turned(contacts: Sequence[ContactFaces], n_sectors: int, axis: Sequence[float] = AXIS) -> list[ContactFaces]:
     """Contacts of a sector, face on its right, with the opposite faces of its neighbours on the left, which each meets
     after a turn by one pitch about the axis; raises ValueError as `cut_from` does.
@@ -77,7 +71,7 @@ def turned(contacts: Sequence[ContactFaces], n_sectors: int, axis: Sequence[floa
     missing = [contact.face for contact in contacts if contact.opposite is None]
     if missing:
         raise ValueError(f"contact '{missing[0]}' of a cyclic part needs the opposite face, that of the next sector")
-    turn = rotation(axis, 2 * np.pi / n_sectors)
+    turn = rotation(unit(axis, "the axis of rotation"), 2 * np.pi / n_sectors)
     return [replace(contact, turn=turn) for contact in contacts]
 
 
@@ -98,7 +92,7 @@ def cut_from(
     """
     if n_sectors < 2:
         raise ValueError(f"a wheel of {n_sectors} sectors has no neighbours; give at least 2")
-    turn = rotation(axis, 2 * np.pi / n_sectors)
+    turn = rotation(unit(axis, "the axis of rotation"), 2 * np.pi / n_sectors)
     left = part.rows(_left_halves(part, contacts))
     none = np.empty((0, 3), dtype=int)
     seams = (none, none) if seam is None else _seams(part, seam, turn)

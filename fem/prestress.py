@@ -22,6 +22,7 @@ from tribodyn.fem.loads import unit
 from tribodyn.fem.material import Material
 from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.part import Part
+from tribodyn.geometry.placing import cross
 
 UNSTABLE = (
     "under its static load or speed the part is unstable at rest: its stress and spin softening outweigh its "
@@ -113,5 +114,4 @@ def coriolis(mass: Any, axis: Sequence[float], speed: float) -> csr_matrix:
     Source  Geradin and Rixen, Mechanical Vibrations, 2015, section 2.9
     """
     a = unit(axis, "the axis of rotation")
-    cross = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
-    return csr_matrix(2 * speed * mass @ kron(identity(mass.shape[0] // 3), cross))
+    return csr_matrix(2 * speed * mass @ kron(identity(mass.shape[0] // 3), cross(a)))

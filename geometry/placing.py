@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import skfem
+
+
+def rotation(axis: Sequence[float] | np.ndarray, angle: float) -> np.ndarray:
+    """Rotation (3, 3) about an axis through the origin by an angle [rad], by Rodrigues' formula."""
+    a = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    return np.asarray(np.eye(3) + np.sin(angle) * cross(a) + (1 - np.cos(angle)) * cross(a) @ cross(a))
+
+
+def cross(a: np.ndarray) -> np.ndarray:
+    """(3, 3) matrix of a x: what multiplies a vector by a, crosswise."""
+    return np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
 
 
 def placed(mesh: Any, scale: float, turn: np.ndarray, shift: np.ndarray) -> Any:

@@ -15,9 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
+from tribodyn.geometry.placing import rotation
 from tribodyn.geometry.sources.cells import VOLUMES
 from tribodyn.geometry.sources.keywords import Card, cards
-from tribodyn.geometry.sources.raw import Cells, RawMesh
+from tribodyn.geometry.sources.raw import NOTHING, Cells, RawMesh
 
 # first letters and number of nodes of a solid -> meshio's kind
 SOLIDS = {
@@ -175,13 +176,6 @@ def _instance(card: Card, parts: dict[str, Scope], assembly: Assembly) -> Scope:
     return scope
 
 
-def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
-    """Matrix (3, 3) of a rotation [rad] about an axis. Source  Rodrigues' formula"""
-    x, y, z = axis / np.linalg.norm(axis)
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross)
-
-
 def _mesh_card(card: Card, scope: Scope) -> bool:
     """Put a card on nodes, elements, sets or surfaces into its scope; False where it is another card."""
     if card.name in GENERATORS:
@@ -295,7 +289,7 @@ def raw_of(assembly: Assembly) -> tuple[RawMesh, dict[Node, int]]:
         table = table[:, _HEXAHEDRON_27] if kind == "hexahedron27" else table
         blocks.append(Cells(kind, table, np.array([key[1] for key, _ in elements])))
     if not blocks:
-        return RawMesh(np.empty((0, 3)), np.empty(0, dtype=int), ()), row
+        return NOTHING, row
     unused = [
         f"{count} elements of type {kind}, which are no solids" for kind, count in other.items() if kind != "MASS"
     ]

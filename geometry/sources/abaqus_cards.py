@@ -13,7 +13,7 @@ from tribodyn.geometry.sources import abaqus, deck
 from tribodyn.geometry.sources.abaqus import Assembly, Node
 from tribodyn.geometry.sources.cells import VOLUMES
 from tribodyn.geometry.sources.keywords import Card
-from tribodyn.geometry.sources.raw import RawMesh
+from tribodyn.geometry.sources.raw import RawMesh, listed
 
 # named supports -> axes that they hold
 NAMED_SUPPORTS = {
@@ -345,16 +345,15 @@ class _Cards:
         for row in [row for row in self.references if solid[row]]:
             self.nodes[self.references[row]] = np.array([row])
         points = {name: self.raw.points[row] for row, name in self.references.items() if not solid[row]}
-        named = {name: rows for name, rows in self.raw.nodes.items()}
-        for name, rows in {**named, **self.nodes}.items():
+        named = {**self.raw.nodes, **self.nodes}
+        for name, rows in named.items():
             if len(rows) == 1 and not solid[rows[0]]:
                 points.setdefault(name, self.raw.points[rows[0]])
-        nodes = {name: rows for name, rows in {**named, **self.nodes}.items() if name not in points}
+        nodes = {name: rows for name, rows in named.items() if name not in points}
         unused = list(self.unused)
         if self.ignored:
-            listed = ", ".join(f"*{name}{f' ({count})' if count > 1 else ''}" for name, count in self.ignored.items())
-            unused.append(f"cards {listed}")
-        said = [f"the loads and supports of {self.steps} steps are taken together"] if self.steps > 1 else []
+            unused.append(f"cards {listed({f'*{name}': count for name, count in self.ignored.items()})}")
+        notes = [f"the loads and supports of {self.steps} steps are taken together"] if self.steps > 1 else []
         made = deck.Deck(
             tuple(self._with_groups()),
             tuple(self.ties),
@@ -372,7 +371,7 @@ class _Cards:
             points_of_reference=points,
             deck=made,
             unused=[*self.raw.unused, *unused],
-            said=[*self.raw.said, *said],
+            notes=[*self.raw.notes, *notes],
         )
 
     def _with_groups(self) -> Iterator[deck.DeckMaterial]:

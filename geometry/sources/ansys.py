@@ -6,15 +6,11 @@ Bricks with nodes that coincide are the tetrahedra, prisms and pyramids that the
 from __future__ import annotations
 
 import re
-from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from tribodyn.geometry.sources import deck
-from tribodyn.geometry.sources.made import assembled
-from tribodyn.geometry.sources.raw import RawMesh
+from tribodyn.geometry.sources.raw import LabelledMesh, RawMesh
 
 # equal corners of a brick I..P -> (kind, its corners, its edge nodes) among the twenty nodes
 _TETRA = ("tetra", [0, 1, 2, 4], [8, 9, 11, 16, 17, 18])
@@ -27,46 +23,29 @@ _AXES = {"UX": 0, "UY": 1, "UZ": 2, "FX": 0, "FY": 1, "FZ": 2}
 SOLID_TYPES = {5, 45, 62, 64, 65, 69, 70, 72, 73, 87, 90, 92, 95, 96, 147, 148, 168, 185, 186, 187, 225, 226, 227}
 SOLID_TYPES |= {278, 279, 285, 291}
 SILENT = {
-    "FINISH",
-    "NUMOFF",
-    "DOF",
-    "KEYOPT",
-    "KEYOP",
-    "MPTEMP",
-    "EXTOPT",
-    "ETBLOCK",
-    "-1",
-    "N",
-    "MPDATA",
-    "MP",
-    "SHPP",
-}
+    "FINISH", "NUMOFF", "DOF", "KEYOPT", "KEYOP", "MPTEMP", "EXTOPT", "ETBLOCK", "-1", "N", "MPDATA", "MP", "SHPP",
+}  # fmt: skip
 
 
 def read(path: Path) -> RawMesh:
     """Read an archive. Raises ValueError: one sentence that names the block and the cure."""
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    points: dict[int, list[float]] = {}
-    elements: dict[str, list[tuple[int, list[int]]]] = {}
-    volumes: dict[str, list[int]] = {}
-    node_sets: dict[str, list[int]] = {}
+    mesh = LabelledMesh()
     constants: dict[int, dict[str, float]] = {}
     types: dict[int, int] = {}
-    held: dict[tuple[int, float], list[int]] = {}
     forces: list[deck.Force] = []
-    ignored: Counter[str] = Counter()
     i = 0
     while i < len(lines):
         words = [word.strip() for word in lines[i].split(",")]
         name = words[0].upper()
         i += 1
         if name == "NBLOCK":
-            i = _nblock(lines, i, points, path)
+            i = _nblock(lines, i, mesh.points, path)
         elif name == "EBLOCK" and len(words) > 2 and words[2].upper() == "SOLID":
-            i = _eblock(lines, i, elements, volumes, types, ignored, path)
+            i = _eblock(lines, i, mesh, types, path)
         elif name == "CMBLOCK":
             i, members = _cmblock(lines, i, int(words[3].split()[0]), path)
-            (node_sets if words[2].upper().startswith("NODE") else volumes)[words[1]] = members
+            (mesh.node_sets if words[2].upper().startswith("NODE") else mesh.volumes)[words[1]] = members
         elif name == "ET" and len(words) > 2:
             types[int(words[1])] = int(re.sub(r"\D", "", words[2]) or 0)
         elif name == "MPDATA" and len(words) > 6 and words[3] in _MATERIAL:
@@ -75,31 +54,19 @@ def read(path: Path) -> RawMesh:
             constants.setdefault(int(words[2]), {})[_MATERIAL[words[1].upper()]] = float(words[3])
         elif name == "D" and len(words) > 2 and words[1].isdigit() and words[2] in _AXES:
             value = float(words[3]) if len(words) > 3 and words[3] else 0.0
-            held.setdefault((_AXES[words[2]], value), []).append(int(words[1]))
+            mesh.held.setdefault((_AXES[words[2]], value), []).append(int(words[1]))
         elif name == "F" and len(words) > 3 and words[1].isdigit() and words[2] in _AXES:
-            node_sets[f"node {words[1]}"] = [int(words[1])]
-            forces.append(deck.Force(f"node {words[1]}", _AXES[words[2]], float(words[3])))
+            forces.append(deck.Force(mesh.at(int(words[1])), _AXES[words[2]], float(words[3])))
         elif name and name not in SILENT and not name.startswith(("!", "(", "_", "/", "*")):
-            ignored[name] += 1
-    if not elements:
-        return RawMesh(np.empty((0, 3)), np.empty(0, dtype=int), ())
-    supports: list[deck.Support] = []
-    made: dict[tuple[int, ...], str] = {}
-    for (axis, value), labels in held.items():
-        place = made.setdefault(tuple(sorted(labels)), f"support {len(made) + 1}")
-        node_sets[place] = labels
-        supports.append(deck.Support(place, axis, value))
+            mesh.ignored[name] += 1
     materials = tuple(
         replace(
-            deck.DeckMaterial(f"material {number}", groups=tuple({f"material {number}"} & set(volumes))),
+            deck.DeckMaterial(f"material {number}", groups=tuple({f"material {number}"} & set(mesh.volumes))),
             **given,  # type: ignore[arg-type]
         )
         for number, given in constants.items()
     )
-    blocks = [(kind, [label for label, _ in m], [nodes for _, nodes in m]) for kind, m in elements.items()]
-    unused = [f"commands {', '.join(f'{n} ({c})' if c > 1 else n for n, c in ignored.items())}"] if ignored else []
-    found = deck.Deck(materials=materials, forces=tuple(forces), supports=tuple(supports))
-    return assembled(path, points, blocks, volumes, node_sets, found, unused)
+    return mesh.raw(path, "commands", deck.Deck(materials=materials, forces=tuple(forces)))
 
 
 def _widths(line: str, path: Path) -> tuple[int, int, int]:
@@ -128,15 +95,7 @@ def _nblock(lines: list[str], i: int, points: dict[int, list[float]], path: Path
     return i + 1
 
 
-def _eblock(
-    lines: list[str],
-    i: int,
-    elements: dict[str, list[tuple[int, list[int]]]],
-    volumes: dict[str, list[int]],
-    types: dict[int, int],
-    ignored: Counter[str],
-    path: Path,
-) -> int:
+def _eblock(lines: list[str], i: int, mesh: LabelledMesh, types: dict[int, int], path: Path) -> int:
     width, _, _ = _widths(lines[i], path)
     i += 1
 
@@ -157,11 +116,10 @@ def _eblock(
             nodes += numbers(lines[i])
             i += 1
         if types.get(head[1]) not in SOLID_TYPES and head[1] in types:
-            ignored[f"elements of type {types[head[1]]}, which are no solids"] += 1
+            mesh.ignored[f"elements of type {types[head[1]]}, which are no solids"] += 1
             continue
         kind, members = _solid(nodes[:count])
-        elements.setdefault(kind, []).append((head[10], members))
-        volumes.setdefault(f"material {head[0]}", []).append(head[10])
+        mesh.solid(kind, head[10], members, f"material {head[0]}")
     if i == len(lines):
         raise ValueError(f"'{path}' ends inside its elements (EBLOCK): the file is cut off")
     return i + 1

@@ -146,8 +146,8 @@ def _meshed(gmsh: Any, path: Path, shapes: Mapping[str, int], sizes: Sizes) -> R
     for name, tag in shapes.items():
         model.addPhysicalGroup(3, [tag], name=name)
     raw = msh.from_gmsh(gmsh)
-    said = f"meshed with elements of {everywhere:.4g} in the unit of the file, tetrahedra of second order"
-    return replace(raw, said=(said,))
+    note = f"meshed with elements of {everywhere:.4g} in the unit of the file, tetrahedra of second order"
+    return replace(raw, notes=(note,))
 
 
 def _line(problem: Exception) -> str:

@@ -6,16 +6,12 @@ Free, small and large fields. meshio reads neither sets nor what is fixed, and l
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from tribodyn.geometry.sources import deck
-from tribodyn.geometry.sources.made import assembled
-from tribodyn.geometry.sources.raw import RawMesh
+from tribodyn.geometry.sources.raw import LabelledMesh, RawMesh
 
 # card -> (kind of first order, kind of second order, where meshio's nodes stand)
 SOLIDS = {
@@ -32,21 +28,17 @@ _EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")
 def read(path: Path) -> RawMesh:
     """Read bulk data. Raises ValueError: one sentence that names the card and the cure."""
     text = path.read_text(encoding="utf-8", errors="replace")
-    points: dict[int, list[float]] = {}
-    solids: dict[str, list[tuple[int, int, list[int]]]] = {}
-    sets = dict(_case_sets(text))
+    mesh, sets = LabelledMesh(), dict(_case_sets(text))
     properties: dict[int, int] = {}
     materials: dict[int, deck.DeckMaterial] = {}
-    supports: list[tuple[int, int, float]] = []
-    forces: list[tuple[int, int, float]] = []
-    couplings: list[tuple[int, list[int], list[int]]] = []
-    masses: list[tuple[int, float]] = []
-    ignored: Counter[str] = Counter()
+    forces: list[deck.Force] = []
+    couplings: list[deck.Coupling] = []
+    masses: list[deck.PointMass] = []
     for name, fields in _cards(text, path):
         if name == "GRID":
             if fields[1] not in ("", "0"):
                 raise ValueError(f"GRID {fields[0]} of '{path}' is in system {fields[1]}: write the basic system")
-            points[_int(fields[0], name)] = [_float(x, name) for x in fields[2:5]]
+            mesh.points[_int(fields[0], name)] = [_float(x, name) for x in fields[2:5]]
         elif name in SOLIDS:
             nodes = [_int(x, name) for x in fields[2:] if x]
             low, high, order = SOLIDS[name]
@@ -56,12 +48,11 @@ def read(path: Path) -> RawMesh:
                 )
             whole = len(nodes) >= len(order)
             kept = [nodes[i] for i in order] if whole else nodes[: CORNERS[name]]
-            solids.setdefault(high if whole else low, []).append((_int(fields[0], name), _int(fields[1], name), kept))
+            mesh.solid(high if whole else low, _int(fields[0], name), kept, f"PSOLID {_int(fields[1], name)}")
         elif name == "PSOLID":
             properties[_int(fields[0], name)] = _int(fields[1], name)
         elif name == "MAT1":
-            values = [_float(x, name) if x else None for x in fields[1:6]]
-            young, shear, poisson, density, expansion = values
+            young, shear, poisson, density, expansion = [_float(x, name) if x else None for x in fields[1:6]]
             if poisson is None and young and shear:
                 poisson = young / (2 * shear) - 1
             number = _int(fields[0], name)
@@ -69,63 +60,40 @@ def read(path: Path) -> RawMesh:
         elif name == "SET1":
             sets[_int(fields[0], name)] = _thru(fields[1:])
         elif name in ("SPC1", "SPC"):
-            supports += _supports(name, fields)
+            for label, axis, value in _supports(name, fields):
+                mesh.held.setdefault((axis, value), []).append(label)
         elif name == "FORCE":
-            scale = _float(fields[3], name)
-            forces += [(_int(fields[1], name), i, scale * _float(x, name)) for i, x in enumerate(fields[4:7])]
+            place, scale = mesh.at(_int(fields[1], name)), _float(fields[3], name)
+            values = [scale * _float(x, name) for x in fields[4:7]]
+            forces += [deck.Force(place, axis, value) for axis, value in enumerate(values) if value]
         elif name == "RBE2":
-            couplings.append((_int(fields[1], name), [int(x) - 1 for x in fields[2]], _thru(fields[3:])))
+            group = f"RBE2 {len(couplings) + 1}"
+            mesh.node_sets[group] = _thru(fields[3:])
+            axes = tuple(int(x) - 1 for x in fields[2])
+            couplings.append(deck.Coupling(group, "kinematic", mesh.at(_int(fields[1], name)), group, axes))
         elif name == "CONM2":
-            masses.append((_int(fields[1], name), _float(fields[3], name)))
+            masses.append(deck.PointMass(mesh.at(_int(fields[1], name)), _float(fields[3], name)))
         elif name not in SILENT:
-            ignored[name] += 1
-    if not solids:
-        return RawMesh(np.empty((0, 3)), np.empty(0, dtype=int), ())
-    blocks = [(kind, [e[0] for e in members], [e[2] for e in members]) for kind, members in solids.items()]
-    volumes: dict[str, list[int]] = {}
-    for members in solids.values():
-        for label, property_, _ in members:
-            volumes.setdefault(f"PSOLID {property_}", []).append(label)
-    groups = {
-        number: tuple(f"PSOLID {p}" for p, m in properties.items() if m == number and f"PSOLID {p}" in volumes)
-        for number in materials
-    }
-    labels = {label for members in solids.values() for label, _, _ in members}
-    node_sets: dict[str, list[int]] = {}
-    for number, members_of in sets.items():
-        if all(label in points for label in members_of):
-            node_sets[f"SET {number}"] = members_of
-        elif all(label in labels for label in members_of):
-            volumes[f"SET {number}"] = members_of
+            mesh.ignored[name] += 1
+    labels = {label for elements in mesh.solids.values() for label, _ in elements}
+    for number, members in sets.items():
+        if all(label in mesh.points for label in members):
+            mesh.node_sets[f"SET {number}"] = members
+        elif labels.issuperset(members):
+            mesh.volumes[f"SET {number}"] = members
         else:
-            ignored[f"SET {number}, whose members are neither grid points nor solids"] += 1
-    held: dict[tuple[int, float], list[int]] = {}
-    for label, axis, value in supports:
-        held.setdefault((axis, value), []).append(label)
-    made: dict[tuple[int, ...], str] = {}
-    support_list = []
-    for (axis, value), members_of in held.items():
-        key = tuple(sorted(members_of))
-        place = made.setdefault(key, f"support {len(made) + 1}")
-        node_sets[place] = list(key)
-        support_list.append(deck.Support(place, axis, value))
-    for label, _, _ in forces:
-        node_sets[f"node {label}"] = [label]
-    coupling_list = []
-    for i, (label, axes, members_of) in enumerate(couplings, 1):
-        node_sets[f"node {label}"], node_sets[f"RBE2 {i}"] = [label], members_of
-        coupling_list.append(deck.Coupling(f"RBE2 {i}", "kinematic", f"node {label}", f"RBE2 {i}", tuple(axes)))
-    for label, _ in masses:
-        node_sets[f"node {label}"] = [label]
+            mesh.ignored[f"SET {number}, whose members are neither grid points nor solids"] += 1
+    made_of: dict[int, list[str]] = {}
+    for number, material in properties.items():
+        if f"PSOLID {number}" in mesh.volumes:
+            made_of.setdefault(material, []).append(f"PSOLID {number}")
     found = deck.Deck(
-        materials=tuple(replace(material, groups=groups[number]) for number, material in materials.items()),
-        couplings=tuple(coupling_list),
-        forces=tuple(deck.Force(f"node {label}", axis, value) for label, axis, value in forces if value),
-        supports=tuple(support_list),
-        masses=tuple(deck.PointMass(f"node {label}", value) for label, value in masses),
+        materials=tuple(replace(one, groups=tuple(made_of.get(number, ()))) for number, one in materials.items()),
+        couplings=tuple(couplings),
+        forces=tuple(forces),
+        masses=tuple(masses),
     )
-    unused = [f"cards {', '.join(f'{n} ({c})' if c > 1 else n for n, c in ignored.items())}"] if ignored else []
-    return assembled(path, points, blocks, volumes, node_sets, found, unused)
+    return mesh.raw(path, "cards", found)
 
 
 def _cards(text: str, path: Path) -> Iterator[tuple[str, list[str]]]:

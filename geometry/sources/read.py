@@ -41,7 +41,7 @@ class Source:
     bodies : name -> body; parts of the file that share no nodes, see `solid.bodies`
     deck : materials, ties, loads and supports that the file gives; empty for a mesh
     points : name -> (3,) reference points that belong to no element [m]
-    said : sentences on what was done to it, such as elements raised to second order
+    notes : sentences on what was done to it, such as elements raised to second order
     unused : clauses that name what was found and is not used
     counts : group of nodes -> body -> how many of its nodes the file lists there, before edge nodes were added
     """
@@ -49,7 +49,7 @@ class Source:
     bodies: Mapping[str, Body]
     deck: Deck
     points: Mapping[str, np.ndarray] = field(default_factory=dict)
-    said: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
     counts: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
 
@@ -128,13 +128,13 @@ def lost(raw: RawMesh, built: Mapping[str, Body]) -> tuple[str, ...]:
 
 def done(raw: RawMesh, built: Mapping[str, Body]) -> tuple[str, ...]:
     """Sentences on what was done to a file on the way to bodies."""
-    said = list(raw.said)
+    notes = list(raw.notes)
     low = [cells for cells in raw.cells if is_first_order(cells.kind)]
     if low:
         count = sum(len(cells.nodes) for cells in low)
         names = " and ".join(sorted({common_name(cells.kind) for cells in low}))
-        said.append(f"{count} {names} of first order are computed as second order, with straight edges")
+        notes.append(f"{count} {names} of first order are computed as second order, with straight edges")
     for name, body in built.items():
         if body.cut:
-            said.append(f"the elements of {name} were cut into {body.mesh.nelements} tetrahedra, as their kinds mix")
-    return tuple(said)
+            notes.append(f"the elements of {name} were cut into {body.mesh.nelements} tetrahedra, as their kinds mix")
+    return tuple(notes)

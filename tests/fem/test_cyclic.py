@@ -10,6 +10,7 @@ from tribodyn.fem import cyclic, wheel
 from tribodyn.fem.constraints import Clamp
 from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.modes import modes
+from tribodyn.geometry.placing import rotation
 from tribodyn.reduction.cyclic import nodal_diameters
 from tribodyn.reduction.linear import system_modes
 
@@ -20,12 +21,12 @@ def sector(request, tmp_path_factory):
 
 
 def test_rotation_is_right_handed_about_its_axis():
-    R = cyclic.rotation((0, 0, 2.0), np.pi / 2)
+    R = rotation((0, 0, 2.0), np.pi / 2)
     assert pytest.approx([0, 1, 0]) == R @ [1, 0, 0]
-    R = cyclic.rotation((1, 2, 3), 0.3)
+    R = rotation((1, 2, 3), 0.3)
     assert pytest.approx(np.eye(3)) == R.T @ R
     assert pytest.approx([1, 2, 3]) == R @ [1, 2, 3]
-    assert np.linalg.matrix_power(cyclic.rotation((1, 0, 0), 2 * np.pi / 7), 7) == pytest.approx(np.eye(3))
+    assert np.linalg.matrix_power(rotation((1, 0, 0), 2 * np.pi / 7), 7) == pytest.approx(np.eye(3))
 
 
 def test_every_nodal_diameter_is_that_of_the_assembled_wheel(sector):

@@ -42,7 +42,7 @@ def test_solids_are_bodies_that_stay_apart(blocks):
         areas = {name: facts.area(body.mesh, ids) for name, ids in body.mesh.boundaries.items()}
         assert len(areas) == 6
         assert sum(areas.values()) == pytest.approx(2 * (60 * 20 + 60 * 10 + 20 * 10) * 1e-6)
-    assert any("second order" in sentence for sentence in source.said)
+    assert any("second order" in sentence for sentence in source.notes)
 
 
 def test_sizes_by_body_and_by_face_refine_there(blocks):

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from tribodyn.fem.cyclic import Sector, rotation
+from tribodyn.fem.cyclic import Sector
 from tribodyn.fem.interface import ContactInterface
 from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.geometry.placing import rotation
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import ContactParameters

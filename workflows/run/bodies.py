@@ -12,7 +12,6 @@ import numpy as np
 from tribodyn.fem.assembly import Assembly, Body, Materials
 from tribodyn.fem.constraints import Clamp, Constraint, named
 from tribodyn.fem.couplings import DistributedCoupling, Link, RigidCoupling, Tie
-from tribodyn.fem.cyclic import rotation
 from tribodyn.fem.loads import Load
 from tribodyn.fem.material import AnyMaterial, Material, Orthotropic
 from tribodyn.fem.springs import Mass
@@ -20,6 +19,7 @@ from tribodyn.fem.surface import surface
 from tribodyn.geometry import mesh as mesh_reader
 from tribodyn.geometry import parts, placing, refine
 from tribodyn.geometry.overlap import overlap
+from tribodyn.geometry.placing import rotation
 from tribodyn.geometry.sources import cad, picking
 from tribodyn.workflows.run import decks
 from tribodyn.workflows.scene import structure

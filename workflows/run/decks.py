@@ -96,7 +96,7 @@ class _Carrying:
         self.made.clamps += [Clamp(group) for group in self.table.fixed]
         self.made.clamps += [Clamp(group, axes) for group, axes in self.table.fixed_axes.items()]
         unused = [f"not used: {clause}" for clause in (*self.source.unused, *self.notes)]
-        self.made.notes = [f"decks.{self.name}: {sentence}" for sentence in (*self.source.said, *unused)]
+        self.made.notes = [f"decks.{self.name}: {sentence}" for sentence in (*self.source.notes, *unused)]
         return self.made
 
     # bodies

@@ -11,8 +11,8 @@ import scipy.linalg as sla
 from tests.helpers.coarse_scenes import BLADE as COARSE
 from tests.helpers.pictures import assert_not_blank
 from tribodyn.fem.constraints import named
-from tribodyn.fem.cyclic import rotation
 from tribodyn.fem.elasticity import assemble
+from tribodyn.geometry.placing import rotation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.travelling_wave import at_sector, left_face
 from tribodyn.reduction.cyclic import nodal_diameters
