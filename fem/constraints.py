@@ -16,7 +16,7 @@ AXES = "xyz"
 def named(groups: Mapping[str, np.ndarray], name: str, kind: str = "node set") -> np.ndarray:
     """The group of that name.
 
-    Raises  ValueError that lists the names which exist, or says that the group is empty
+    Raises  ValueError that lists the names which exist, or that the group is empty
     """
     if name not in groups:
         near = get_close_matches(name, groups, 1)

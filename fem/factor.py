@@ -105,7 +105,7 @@ def pardiso_available() -> bool:
     set here, before it loads, forbids it.
     """
     os.environ.setdefault("MKL_CBWR", "AUTO")
-    # pypardiso searches the whole environment, a second of processor at each solver, if it is not told where MKL lies
+    # pypardiso searches the whole environment, a second of processor at each solver, if the place of MKL is not given
     for path in sorted(Path(sys.prefix).glob("lib/libmkl_rt*")) + sorted(Path(sys.prefix).glob("Library/bin/mkl_rt*")):
         os.environ.setdefault("PYPARDISO_MKL_RT", str(path))
     try:

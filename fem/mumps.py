@@ -80,7 +80,7 @@ class Mumps:
             self._process.stdin.write(f"{columns.shape[1]}\n")
             self._process.stdin.flush()
         except OSError:
-            pass  # its last answer says why
+            pass  # its last answer has the reason
         if self._answer() != ["solved"]:
             raise RuntimeError(f"the processes of MUMPS have ended{self._why()}")
         return np.array(found, order="C").reshape(np.shape(rhs))

@@ -23,8 +23,8 @@ def main(folder: Path) -> None:
     n = len(rows) - 1
     start, stop = n * rank // processes, n * (rank + 1) // processes
     own, some = stop - start, slice(int(rows[start]), int(rows[stop]))
-    said = (np.array(a, np.int32) for a in (rows[start : stop + 1] - rows[start], columns[some]))
-    matrix = petsc.Mat().createAIJ(((own, n), (own, n)), csr=(*said, np.array(values[some])), comm=comm)
+    own_rows = (np.array(a, np.int32) for a in (rows[start : stop + 1] - rows[start], columns[some]))
+    matrix = petsc.Mat().createAIJ(((own, n), (own, n)), csr=(*own_rows, np.array(values[some])), comm=comm)
     matrix.setOption(petsc.Mat.Option.SYMMETRIC, True)
     matrix.setOption(petsc.Mat.Option.SPD, (folder / "definite").exists())
     pc = petsc.PC().create(comm)

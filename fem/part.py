@@ -98,7 +98,7 @@ def build(
     constraints: Sequence[Constraint] = (),
     masses: Sequence[Mass] = (),
 ) -> Part:
-    """Assemble a part or an assembly, hold it, and say where it touches, is loaded and is observed.
+    """Assemble a part or an assembly, hold it, and define where it touches, is loaded and is observed.
 
     mesh, node_sets : as geometry.mesh.read gives them, or an Assembly and its node sets
     material : one, or subdomain name -> material; of an assembly one, or body name -> these

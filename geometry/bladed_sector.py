@@ -204,7 +204,7 @@ def build(parameters: Parameters, path: str | Path) -> None:
     blocks.write(path, _disk(parameters), _blade(parameters), _damper(parameters))
 
 
-def _blade(p: Parameters) -> blocks.Body:
+def _blade(p: Parameters) -> blocks.JoinedBlocks:
     upper = p.upper
     rows, columns = (p.n_end, p.n_along - 1, p.n_end), (p.n_side, p.n_through, p.n_side)
     base, shroud = _platform(p), blade.shroud_of(upper)
@@ -272,7 +272,7 @@ def _root(p: Parameters, base: Platform, rows: tuple[int, ...]) -> list[blocks.B
     return found
 
 
-def _disk(p: Parameters) -> blocks.Body:
+def _disk(p: Parameters) -> blocks.JoinedBlocks:
     """Two posts beside the slot and the disk below them, down to the bore."""
     half = p.platform_length / 2
     upper, lower = p.slot(p.lap), p.slot(1 + p.lap)
@@ -329,7 +329,7 @@ def _disk(p: Parameters) -> blocks.Body:
     return blocks.body(parts)
 
 
-def _damper(p: Parameters) -> blocks.Body:
+def _damper(p: Parameters) -> blocks.JoinedBlocks:
     """A wedge whose faces lie on those of the platforms, in the gap on the right of the blade."""
 
     def at(q: np.ndarray) -> np.ndarray:

@@ -41,7 +41,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Body:
+class JoinedBlocks:
     """Joined cells with their names; node numbers count within the body.
 
     nodes : (n, 3) [m]
@@ -58,7 +58,7 @@ class Body:
     points: Mapping[str, np.ndarray]
 
 
-def body(blocks: Sequence[Block], points: Mapping[str, Sequence[float] | np.ndarray] | None = None) -> Body:
+def body(blocks: Sequence[Block], points: Mapping[str, Sequence[float] | np.ndarray] | None = None) -> JoinedBlocks:
     """Join blocks where their nodes coincide, and name nodes by their place.
 
     points : name -> position (3,) or positions (k, 3) of nodes [m]
@@ -85,7 +85,7 @@ def body(blocks: Sequence[Block], points: Mapping[str, Sequence[float] | np.ndar
     all_cells = node_of[all_cells]
     _check_cells(all_cells, len(joined))
     names = np.array(cell_volumes)
-    return Body(
+    return JoinedBlocks(
         nodes=joined,
         cells=all_cells,
         volumes={str(name): np.flatnonzero(names == name) for name in np.unique(names)},
@@ -94,7 +94,7 @@ def body(blocks: Sequence[Block], points: Mapping[str, Sequence[float] | np.ndar
     )
 
 
-def write(path: str | Path, *bodies: Body) -> None:
+def write(path: str | Path, *bodies: JoinedBlocks) -> None:
     """Write bodies, which stay apart even where they touch, as one second-order Gmsh mesh.
 
     path : the .msh file. Equal names in several bodies make one physical group

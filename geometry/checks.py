@@ -1,4 +1,4 @@
-"""Checks that parts make on their parameters; each failure is one sentence that names the key and the cure."""
+"""Limits of the parameters of parts; each failure is one sentence that names the key and the cure."""
 
 from __future__ import annotations
 

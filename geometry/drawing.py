@@ -15,7 +15,7 @@ def mesh_drawing(drawing: str | Path, path: str | Path, numbers: Mapping[str, fl
     drawing : a .geo file; path : the .msh file to write
     numbers : values of names that the drawing introduces with DefineConstant, which they replace
     Returns the number of volume elements
-    Raises  ValueError: no such file, a name that the drawing does not have, what Gmsh says of its text, no volume
+    Raises  ValueError: no such file, a name that the drawing does not have, text that Gmsh cannot read, no volume
     """
     drawing = Path(drawing)
     if not drawing.is_file():

@@ -45,7 +45,7 @@ def session() -> Iterator[Any]:
 def save(gmsh: Any, path: str | Path) -> None:
     """Write the current mesh as binary MSH 4.1, elements of physical groups only.
 
-    Raises  OSError where the file does not come to its end, of which Gmsh itself says nothing
+    Raises  OSError where the file does not come to its end, which Gmsh itself does not report
     """
     gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
     gmsh.option.setNumber("Mesh.Binary", 1)

@@ -1,4 +1,4 @@
-"""How the nodes of second-order elements are numbered, told once, by where they lie.
+"""How the nodes of second-order elements are numbered, once for all, by where they lie.
 
 A node beyond the corners lies at the mean of the corners that support it: two for an edge, four for a face, eight
 for the middle. From that follow reference coordinates, and from two lists of reference coordinates follows the

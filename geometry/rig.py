@@ -170,7 +170,7 @@ def _contact_lines(p: Parameters) -> tuple[np.ndarray, np.ndarray]:
     return along, across
 
 
-def _column(p: Parameters) -> blocks.Body:
+def _column(p: Parameters) -> blocks.JoinedBlocks:
     """Bulk column beside the beam, whose seat on it is the side y = thickness / 2."""
     root, up = _root_lines(p), np.unique(np.concatenate(_height_lines(p)))
     behind = np.array([-p.column_length, root[0]])
@@ -188,7 +188,7 @@ def _column(p: Parameters) -> blocks.Body:
     )
 
 
-def _beam(p: Parameters) -> blocks.Body:
+def _beam(p: Parameters) -> blocks.JoinedBlocks:
     """Beam on edge with its cover plate at the seat and the upper specimen under its free end."""
     along, across = _contact_lines(p)
     root, (_, above) = _root_lines(p), _height_lines(p)
@@ -232,7 +232,7 @@ def _lines_through(stops: list[float], longest: float) -> np.ndarray:
     return np.concatenate([*pieces, stops[-1:]])
 
 
-def _platform(p: Parameters) -> blocks.Body:
+def _platform(p: Parameters) -> blocks.JoinedBlocks:
     """Lower specimen on the separator, whose two limbs stand at 45 degrees on the platform."""
     along, across = _contact_lines(p)
     side = OURS.specimen_side / 2

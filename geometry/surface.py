@@ -1,7 +1,7 @@
 """Measured height maps: is it plausible, mend it, level it, part waviness from roughness.
 
 `prepare` runs the steps in order: refuse what cannot be a machined face, take spikes out, close holes, level, filter.
-Each step that changes measured points says so in a sentence.
+Each step that changes measured points reports it in a sentence.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Read a measured height map from a file; its format is told by content, else by the ending of its name.
+"""Read a measured height map from a file; its format is recognised by content, else by the ending of its name.
 
 Text:    x y z on each line (any order, a point may be missing), or a matrix of heights, one profile along x per line
 SDF:     ISO 25178-71, see surface_sdf

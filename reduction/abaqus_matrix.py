@@ -1,7 +1,7 @@
 """Abaqus global matrices in text: *MATRIX GENERATE with *MATRIX OUTPUT.
 
-Two layouts, told apart by their columns: node, dof, node, dof, value (FORMAT=MATRIX INPUT and LABELS) and row, column,
-value with rows from 1 (FORMAT=COORDINATE). Nodes that Abaqus makes itself have negative numbers.
+Two layouts, by their columns: node, dof, node, dof, value (FORMAT=MATRIX INPUT and LABELS) and row, column, value with
+rows from 1 (FORMAT=COORDINATE). Nodes that Abaqus makes itself have negative numbers.
 """
 
 from __future__ import annotations

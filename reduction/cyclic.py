@@ -164,7 +164,7 @@ class _Indices:
             return system, B, T
         try:
             V = stuck_ritz(system, B, self._springs)
-        except np.linalg.LinAlgError:  # it can move with its contacts stuck, which the compliance says better
+        except np.linalg.LinAlgError:  # it can move with its contacts stuck, which the compliance reports
             return system, B, T
         return projected(system, V), B @ V, T @ V
 

@@ -121,7 +121,7 @@ class ForeignMatrices:
     ) -> ContactInterface:
         """The DOFs that touch, pair by pair, against each other or against the ground (body2 None).
 
-        body1, body2 : (n_pair, n_component) DOFs that are themselves t1, t2, n as `components` says;
+        body1, body2 : (n_pair, n_component) DOFs that are themselves t1, t2, n as of `components`;
             with `normal`, (n_pair, 3) DOFs along x, y, z, and every pair gets its own frame
         area : whole area of the patch [m2], shared equally, or (n_pair,) tributary areas
         components : subset of t1, t2, n in this order
@@ -143,7 +143,7 @@ class ForeignMatrices:
             weights = np.tile(np.diag(_signs(signs, len(kept))), (n_pair, 1, 1))
         else:
             if signs is not None:
-                raise ValueError("signs and normal are both given: the normal already says what closes the gap")
+                raise ValueError("signs and normal are both given: the normal already gives what closes the gap")
             frames = _frames(normal, t1, n_pair)
             weights = frames[:, [COMPONENTS.index(name) for name in kept]]
         rows = np.repeat(np.arange(n_pair * len(kept)), width)

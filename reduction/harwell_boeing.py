@@ -65,7 +65,7 @@ def read(path: Path) -> sp.csr_matrix:
     if kind[1] != "S":
         return matrix.tocsr()
     if sp.tril(matrix, -1).nnz and sp.triu(matrix, 1).nnz:
-        raise ValueError(f"{path.name} says it is symmetric but stores both triangles: export it as RUA")
+        raise ValueError(f"{path.name} is declared symmetric but stores both triangles: export it as RUA")
     return (matrix + matrix.T - sp.diags(matrix.diagonal())).tocsr()
 
 

@@ -10,7 +10,6 @@ from scipy.linalg import null_space
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.reduction.model import ReducedModel
-from tribodyn.reduction.projection import projected
 
 
 def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:
@@ -27,6 +26,6 @@ def hold(model: ReducedModel, rows: np.ndarray) -> ReducedModel:
         raise ValueError("motions can be held only in a model that was reduced from one mesh for all harmonics")
     held = rows @ model.basis
     N = null_space(held / np.linalg.norm(held, axis=1, keepdims=True))
-    held_model = projected(model, N)
+    held_model = model.projected(N)
     frequency, _ = linear_modes(held_model, n=min(LIMITS.reported_modes, N.shape[1]))
     return replace(held_model, info=replace(held_model.info, free_frequency=frequency))

@@ -18,7 +18,6 @@ import scipy.linalg as sla
 from tribodyn.fem.modes import modes
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.model import ReducedModel
-from tribodyn.reduction.projection import projected
 
 
 def interface_modes(
@@ -63,7 +62,7 @@ def interface_modes(
     basis[np.ix_(b, len(a) + np.arange(n_contact))] = contact
     basis[np.arange(n_m, n), np.arange(len(a) + n_contact, basis.shape[1])] = 1.0
     omitted = float(omega[n_modes]) / (2 * np.pi) if n_modes < len(b) else np.inf
-    fewer = projected(model, basis)
+    fewer = model.projected(basis)
     info = replace(
         fewer.info,
         masters=masters[a],

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class ReductionLimits:
-    """Counts unless said otherwise; none of them changes a result beyond what its line says.
+    """Counts where there is no unit; none of them changes a result beyond what its line says.
 
     point_load : DOFs of a load or output above which it is distributed: projected, but it makes no masters
     reported_modes : natural frequencies that a model reports

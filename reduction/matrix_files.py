@@ -25,7 +25,7 @@ NUMBERS = b"0123456789+-.eE \t\r\nnNaAiIfFtTyY"  # what numbers are written with
 def variables(path: Path) -> list[str]:
     """Names of what a container holds; an empty list for a file that is one matrix (also scipy.sparse.save_npz)."""
     _require(path)
-    with _told(path):
+    with _as_one_sentence(path):
         if path.suffix.lower() == ".npz":
             with _opened_npz(path) as archive:
                 return [] if "format" in archive.files else sorted(archive.files)
@@ -50,7 +50,7 @@ def read_matrix(path: Path, variable: str | None = None) -> tuple[sp.csr_matrix,
         raise ValueError(f"{path.name} has no variable '{variable}': it holds {', '.join(known)}")
     if known and variable is None:
         raise ValueError(f"{path.name} holds {', '.join(known)}: name the variable that is wanted")
-    with _told(path):
+    with _as_one_sentence(path):
         if path.suffix.lower() == ".npz":
             matrix = _from_npz(path, variable)
         elif path.suffix.lower() == ".mat":
@@ -65,7 +65,7 @@ def read_array(path: Path, variable: str) -> np.ndarray:
     known = variables(path)
     if variable not in known:
         raise ValueError(f"{path.name} has no variable '{variable}': it holds {', '.join(known) or 'one matrix alone'}")
-    with _told(path):
+    with _as_one_sentence(path):
         found = _from_npz(path, variable) if path.suffix.lower() == ".npz" else _from_mat(path, variable)
     array = found.toarray() if sp.issparse(found) else np.asarray(found)
     if array.dtype.kind not in "fiub" or not np.isfinite(array).all():
@@ -74,7 +74,7 @@ def read_array(path: Path, variable: str) -> np.ndarray:
 
 
 @contextlib.contextmanager
-def _told(path: Path) -> Iterator[None]:
+def _as_one_sentence(path: Path) -> Iterator[None]:
     """What readers of several libraries raise for broken files, as one sentence."""
     try:
         yield

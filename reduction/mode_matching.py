@@ -1,7 +1,7 @@
 """Which mode of one model is which of another, or of a measurement: by shape (MAC), or by the kind of motion.
 
-Frequencies alone mislead where modes cross. Shapes at common points say more; where only the kind of motion is known,
-such as "bending" or "torsion", a mode belongs to a kind by the share of its motion.
+Frequencies alone mislead where modes cross. Shapes at common points distinguish them; where only the kind of motion is
+known, such as "bending" or "torsion", a mode belongs to a kind by the share of its motion.
 """
 
 from __future__ import annotations

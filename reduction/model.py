@@ -104,6 +104,29 @@ class ReducedModel:
             raise ValueError("this model came as matrices: it has no full field to reconstruct")
         return np.tensordot(basis, q, axes=1)
 
+    def projected(self, basis: np.ndarray) -> ReducedModel:
+        """The model in coordinates p, q = basis @ p, with basis (n, n_p) real; matrices are made symmetric to rounding.
+
+        Its info keeps the free frequencies alone
+        """
+
+        def congruent(matrix: np.ndarray) -> np.ndarray:
+            product = basis.T @ matrix @ basis
+            return (product + product.T) / 2
+
+        s = self.system
+        system = SecondOrderSystem(
+            congruent(s.mass),
+            congruent(s.stiffness),
+            None if s.damping is None else congruent(s.damping),
+            {name: basis.T @ load for name, load in s.loads.items()},
+            {name: basis.T @ row for name, row in s.outputs.items()},
+        )
+        interface = replace(self.interface, B=np.asarray(self.interface.B) @ basis)
+        full = None if self.basis is None else self.basis @ basis
+        info = replace(self.info, free_frequency_error=None, stuck_frequency=None, stuck_frequency_error=None)
+        return replace(self, system=system, interface=interface, basis=full, info=info)
+
     def with_damping(self, make: Damping) -> ReducedModel:
         """The same model with another damping: `make` gives the matrix of every system that a harmonic sees.
 

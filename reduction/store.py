@@ -33,7 +33,7 @@ def save(model: ReducedModel, path: str | Path, harmonics: Sequence[int] = ()) -
     Raises  ValueError for such a model without harmonics
     """
     if model.per_harmonic is not None and not harmonics:
-        raise ValueError("this model differs from harmonic to harmonic: say which harmonics are to be stored")
+        raise ValueError("this model differs from harmonic to harmonic: give the harmonics to store")
     path = Path(path)
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     try:

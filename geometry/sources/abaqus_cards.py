@@ -1,4 +1,4 @@
-"""What a deck of Abaqus or CalculiX says beside its mesh: materials, constraints, loads, supports."""
+"""What a deck of Abaqus or CalculiX holds beside its mesh: materials, constraints, loads, supports."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ NAMED_SUPPORTS = {
     "YASYMM": (0, 2, 4),
     "ZASYMM": (0, 1, 5),
 }
-# that order results or steer the solver of the other program, and say nothing about the structure
+# that order results or steer the solver of the other program, and have no effect on the structure
 SILENT = {
     "HEADING", "PREPRINT", "RESTART", "OUTPUT", "NODE OUTPUT", "ELEMENT OUTPUT", "CONTACT OUTPUT", "ENERGY OUTPUT",
     "NODE PRINT", "NODE FILE", "EL PRINT", "EL FILE", "CONTACT PRINT", "CONTACT FILE", "END STEP", "MONITOR", "PRINT",
@@ -261,7 +261,7 @@ class _Cards:
 
     def _contact_pair(self, card: Card) -> None:
         for line in card.data:
-            self.unused.append(f"contact pair {' on '.join(line)}: say it as [contacts.NAME] in the scene")
+            self.unused.append(f"contact pair {' on '.join(line)}: give it as [contacts.NAME] in the scene")
 
     # places
 
@@ -340,7 +340,7 @@ class _Cards:
     # the end
 
     def finished(self) -> RawMesh:
-        """The mesh with everything that the cards say."""
+        """The mesh with everything that the cards give."""
         solid = self.solid
         for row in [row for row in self.references if solid[row]]:
             self.nodes[self.references[row]] = np.array([row])

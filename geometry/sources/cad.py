@@ -40,7 +40,7 @@ class Sizes:
 
 
 def read(path: Path, sizes: Sizes | None = None) -> RawMesh:
-    """Mesh a CAD file. Lengths are those of the file: Gmsh is told not to convert them.
+    """Mesh a CAD file. Lengths are those of the file: Gmsh does not convert them.
 
     Raises  ValueError: a file that cannot be read, has no solid or cannot be meshed, a size for what is not there
     """
@@ -50,7 +50,7 @@ def read(path: Path, sizes: Sizes | None = None) -> RawMesh:
 
 
 def read_drawing(path: Path) -> RawMesh:
-    """Mesh a drawing in Gmsh's language, which says its own sizes. Raises ValueError as `read` does."""
+    """Mesh a drawing in Gmsh's language, which has its own sizes. Raises ValueError as `read` does."""
     with session() as gmsh:
         try:
             gmsh.open(str(path))

@@ -1,4 +1,4 @@
-"""What a file of another FE program says beside its mesh, as plain data.
+"""What a file of another FE program holds beside its mesh, as plain data.
 
 Every place is the name of a group of the source: a node set, a surface or a reference point. Where a card names a bare
 node number, the source gets a node set "node N". Values are in SI units: a file in millimetres is taken to count in N,

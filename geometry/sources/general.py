@@ -23,8 +23,8 @@ def read(path: Path) -> RawMesh:
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             file = meshio.read(path)
     except (Exception, SystemExit) as problem:  # the readers raise what they meet, and where none fits meshio exits
-        said = "" if isinstance(problem, SystemExit) else " ".join(str(problem).split())
-        reason = f" ({said})" if said else ""
+        why = "" if isinstance(problem, SystemExit) else " ".join(str(problem).split())
+        reason = f" ({why})" if why else ""
         raise ValueError(f"mesh file '{path}' cannot be read{reason}: write it as a Gmsh file, MSH 4.1") from None
     names: dict[int, list[str]] = getattr(file, "cell_tags", None) or {}
     cells: list[Cells] = []

@@ -1,4 +1,4 @@
-"""Gmsh's own files, MSH 2.2 and 4.1, text or binary, with what else Gmsh has put in when told to save all.
+"""Gmsh's own files, MSH 2.2 and 4.1, text or binary, with what else Gmsh has put in where all is saved.
 
 meshio reads what it can without Gmsh's system libraries. It fails where some elements belong to no group, does not know
 groups without a name and loses the groups of MSH 2.2: there Gmsh reads its file itself.

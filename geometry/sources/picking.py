@@ -42,7 +42,7 @@ def outline(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def picked(mesh: Any, rule: Rule) -> np.ndarray:
-    """Facets that satisfy a rule; raises ValueError where none does, or where the rule says nothing."""
+    """Facets that satisfy a rule; raises ValueError where none does, or where the rule is empty."""
     found = []
     if rule.box is not None:
         found.append(within_box(mesh, *rule.box))

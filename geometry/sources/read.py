@@ -1,6 +1,6 @@
 """Any file that holds a mesh or a shape -> its bodies, in metres.
 
-The kind of a file is told by its ending; each reader gives a `RawMesh`, and everything after that is common.
+The kind of a file is recognised by its ending; each reader gives a `RawMesh`, and everything after that is common.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from tribodyn.geometry.sources import abaqus_cards, ansys, cad, general, msh, na
 from tribodyn.geometry.sources.cells import common_name, is_first_order
 from tribodyn.geometry.sources.deck import Deck, in_si
 from tribodyn.geometry.sources.raw import RawMesh
-from tribodyn.geometry.sources.solid import Body
+from tribodyn.geometry.sources.solid import SolidBody
 
 # unit of length -> [m], and the force [N] that decks in it count in
 UNITS = {
@@ -46,7 +46,7 @@ class Source:
     counts : group of nodes -> body -> how many of its nodes the file lists there, before edge nodes were added
     """
 
-    bodies: Mapping[str, Body]
+    bodies: Mapping[str, SolidBody]
     deck: Deck
     points: Mapping[str, np.ndarray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -73,7 +73,7 @@ def read(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> S
 
 
 def read_raw(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> RawMesh:
-    """What a file says, lengths in metres. Raises ValueError as `read` does."""
+    """The mesh of a file, lengths in metres. Raises ValueError as `read` does."""
     file = Path(path)
     if unit not in UNITS:
         raise ValueError(f"unit = \"{unit}\" of mesh file '{path}' is no length that is known: give {', '.join(UNITS)}")
@@ -108,7 +108,7 @@ def scaled(raw: RawMesh, metre: float, newton: float = 1.0) -> RawMesh:
     return replace(raw, points=metre * raw.points, points_of_reference=points, deck=made)
 
 
-def lost(raw: RawMesh, built: Mapping[str, Body]) -> tuple[str, ...]:
+def lost(raw: RawMesh, built: Mapping[str, SolidBody]) -> tuple[str, ...]:
     """A clause for each group of the file that no body has."""
     clauses = []
     for name in raw.faces:
@@ -126,7 +126,7 @@ def lost(raw: RawMesh, built: Mapping[str, Body]) -> tuple[str, ...]:
     return tuple(clauses)
 
 
-def done(raw: RawMesh, built: Mapping[str, Body]) -> tuple[str, ...]:
+def done(raw: RawMesh, built: Mapping[str, SolidBody]) -> tuple[str, ...]:
     """Sentences on what was done to a file on the way to bodies."""
     notes = list(raw.notes)
     low = [cells for cells in raw.cells if is_first_order(cells.kind)]

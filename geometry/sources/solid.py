@@ -1,4 +1,4 @@
-"""From what a file says to bodies that scikit-fem can compute: one mesh of one kind for each, with its groups."""
+"""From the mesh of a file to bodies that scikit-fem can compute: one mesh of one kind for each, with its groups."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Groups = dict[str, np.ndarray]
 
 
 @dataclass(frozen=True)
-class Body:
+class SolidBody:
     """mesh : scikit-fem's MeshHex2 or MeshTet2 [m], its boundaries and subdomains named as in the file
     node_sets : group of any kind -> its nodes, sorted columns of mesh.doflocs
     node_of : (n_point,) node that each point of the file is, -1 where it is none of this body
@@ -80,7 +80,7 @@ def _pieces(raw: RawMesh) -> np.ndarray:
     return np.asarray(rank[number])
 
 
-def build(raw: RawMesh, elements: np.ndarray | None = None) -> Body:
+def build(raw: RawMesh, elements: np.ndarray | None = None) -> SolidBody:
     """One body out of elements of a file, all of them by default."""
     cells, number = _chosen(raw, elements)
     fulls = [split.full(block, raw.points) for block in cells]
@@ -110,7 +110,7 @@ def build(raw: RawMesh, elements: np.ndarray | None = None) -> Body:
         if name in raw.skins and len(skin := _skin(mesh, node_sets[name])):
             boundaries[name] = skin
     named = mesh.with_boundaries(boundaries).with_subdomains(subdomains)
-    return Body(named, node_sets, node_of, cut, unmatched)
+    return SolidBody(named, node_sets, node_of, cut, unmatched)
 
 
 def _chosen(raw: RawMesh, elements: np.ndarray | None) -> tuple[list[Cells], list[np.ndarray]]:

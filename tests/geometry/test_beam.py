@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-import scipy.sparse.linalg
 import skfem
-from skfem.helpers import dot
-from skfem.models.elasticity import lame_parameters, linear_elasticity
 
+from tribodyn.fem.elasticity import assemble
+from tribodyn.fem.material import Material
+from tribodyn.fem.modes import modes
 from tribodyn.geometry import beam
 from tribodyn.geometry import mesh as mesh_file
 
@@ -18,13 +18,10 @@ def read(tmp_path, **changes):
 
 def first_frequency(mesh) -> float:
     """Lowest natural frequency of the clamped steel beam [Hz]."""
-    basis = skfem.Basis(mesh, skfem.ElementVector(mesh.elem()), intorder=5)
-    stiffness = linear_elasticity(*lame_parameters(210e9, 0.3)).assemble(basis)
-    mass = skfem.BilinearForm(lambda u, v, w: 7860.0 * dot(u, v)).assemble(basis)
-    free = basis.complement_dofs(basis.get_dofs("clamp"))
-    reduced = [matrix[free][:, free].tocsc() for matrix in (stiffness, mass)]
-    squares = scipy.sparse.linalg.eigsh(reduced[0], 2, reduced[1], sigma=0.0, return_eigenvectors=False)
-    return float(np.sqrt(squares.min()) / (2 * np.pi))
+    mass, stiffness = assemble(mesh, Material(210e9, 0.3, 7860.0))
+    held = 3 * mesh.dofs.get_facet_dofs(mesh.boundaries["clamp"]).flatten()[:, None] + np.arange(3)
+    free = np.setdiff1d(np.arange(mass.shape[0]), held)
+    return float(modes(stiffness[free][:, free], mass[free][:, free], 1)[0][0] / (2 * np.pi))
 
 
 def test_patch_has_the_grid_of_the_thesis(tmp_path):

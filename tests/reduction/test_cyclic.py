@@ -174,7 +174,7 @@ def test_wave_survives_its_file(reduced, tmp_path):
     """Stored harmonic by harmonic: the same matrices, shared where they were, the same way back to the full field."""
     model = waves.travelling_wave(reduced, 4).with_damping(lambda system, B: modal_damping(system, 0.01))
     path = tmp_path / "wave.h5"
-    with pytest.raises(ValueError, match="say which harmonics are to be stored"):
+    with pytest.raises(ValueError, match="give the harmonics to store"):
         save(model, path)
     save(model, path, harmonics=(0, 1, 2, 3))
     back = load(path)

@@ -132,7 +132,7 @@ def _of_file(path: Path, unit: str, material: Material | None, n_modes: int) -> 
         if own is not None and own.young and own.poisson is not None and own.density:
             made = Material(own.young, own.poisson, own.density)
         solids.append(Solid(name, body.mesh, body.node_sets, made))
-    found = measured(solids, (f"{sentence}" for sentence in source.said), source.unused)
+    found = measured(solids, (f"{sentence}" for sentence in source.notes), source.unused)
     if n_modes:
         if any(solid.material is None for solid in solids):
             raise ValueError(f"{path} gives no material to compute modes with: give --young, --poisson and --density")
