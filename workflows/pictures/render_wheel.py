@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.spatial import cKDTree
 
-from tribodyn.fem.cyclic import rotation
+from tribodyn.geometry.placing import rotation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.travelling_wave import at_sector
 from tribodyn.workflows.pictures import view as drawing

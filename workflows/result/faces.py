@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from tribodyn.fem.cyclic import rotation
+from tribodyn.geometry.placing import rotation
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
 
 
