@@ -8,6 +8,7 @@ so that a way ends in a motion or in none.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,9 +17,18 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.threads import single
 
-BELOW, ABOVE = 0.8, 1.25  # frequencies that a way begins at, over the one it goes to
-LARGER = 2.0  # load factor that a way begins at, over the one it goes to
-STEPS = 40
+
+@dataclass(frozen=True)
+class WayRules:
+    """Where the ways to a frequency begin, and their steps."""
+
+    below: float = 0.8  # frequencies that a way begins at, over the one it goes to
+    above: float = 1.25
+    larger: float = 2.0  # load factor that a way begins at, over the one it goes to
+    steps: int = 40
+
+
+RULES = WayRules()
 
 
 @single
@@ -28,10 +38,10 @@ def arrivals(balance: HarmonicBalance, omega: float, options: NewtonOptions | No
     They may be one and the same
     """
     options, load = options or NewtonOptions(), balance.load_factor
-    start = min(ABOVE * omega, balance.omega_max)
-    rising = ((balance, value) for value in np.linspace(BELOW * omega, omega, STEPS + 1))
-    falling = ((balance, value) for value in np.linspace(start, omega, STEPS + 1))
-    weaker = ((balance.with_load(value), omega) for value in np.linspace(LARGER * load, load, STEPS + 1))
+    start = min(RULES.above * omega, balance.omega_max)
+    rising = ((balance, value) for value in np.linspace(RULES.below * omega, omega, RULES.steps + 1))
+    falling = ((balance, value) for value in np.linspace(start, omega, RULES.steps + 1))
+    weaker = ((balance.with_load(value), omega) for value in np.linspace(RULES.larger * load, load, RULES.steps + 1))
     return [last for way in (rising, falling, weaker) if (last := _followed(way, options)) is not None]
 
 

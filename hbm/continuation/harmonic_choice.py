@@ -23,16 +23,10 @@ from tribodyn.hbm.linear.compliance import ContactCompliance
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.threads import single
 
-LINEAR_ACCURACY = 1e-3  # of the linear solves behind the estimate, which is of first order itself
 ROUGH = 1e-5  # error of the compliance at the highest harmonic that estimates at single states may have
-# an output that vibrates less than this share of the largest vibration is measured against that share
-LEAST_VIBRATION_SHARE = 1e-2
-# useful harmonics in a row, the smallest first, after which no more are tried for dropping
-USEFUL_IN_A_ROW = 3
 _WIDE: WeakKeyDictionary[ContactCompliance, ContactCompliance] = WeakKeyDictionary()
 CLIMB = (3, 5, 7, 9)  # highest harmonics that `climb` goes through: each start is near enough for Newton
 FURTHER = 6  # harmonics beyond the kept ones that it looks at, where more than CLIMB are kept
-ALLOWED_SHARE = 0.5  # of the tolerance, that the harmonics left out may use: the estimate sees each on its own
 
 
 @dataclass(frozen=True)
@@ -42,12 +36,30 @@ class ChoiceOptions:
     tolerance : of the response of each output, relative to its vibration
     highest : highest harmonic that may be kept; the estimate looks at half as many again
     rounds : times the set may grow
+    allowed_share : of the tolerance, that the harmonics left out may use: the estimate sees each on its own
+    useful_in_a_row : useful harmonics, the smallest first, after which no more are tried for dropping
     """
 
     tolerance: float = 1e-2
     highest: int = 15
     rounds: int = 8
+    allowed_share: float = 0.5
+    useful_in_a_row: int = 3
     newton: NewtonOptions = field(default_factory=NewtonOptions)
+
+
+@dataclass(frozen=True)
+class EstimateRules:
+    """linear_accuracy : of the linear solves behind an estimate, which is of first order itself
+
+    least_vibration : an output that vibrates less than this share of the largest is measured against that share
+    """
+
+    linear_accuracy: float = 1e-3
+    least_vibration: float = 1e-2
+
+
+RULES = EstimateRules()
 
 
 @dataclass(frozen=True)
@@ -113,7 +125,7 @@ def choose(balance: HarmonicBalance, omega: Sequence[float], options: ChoiceOpti
         history.append((kept, trial.error))
     useful = 0
     for h in [h for h in trial.by_content() if h not in loaded and h != 1]:
-        if trial.error > options.tolerance or useful == USEFUL_IN_A_ROW:
+        if trial.error > options.tolerance or useful == options.useful_in_a_row:
             break
         fewer = tuple(k for k in kept if k != h)
         attempt = _Trial.of(wide, fewer, omega, trial, options, shrinking=True)
@@ -183,7 +195,7 @@ def estimate(wide: HarmonicBalance, kept: tuple[int, ...], omega: float, x: np.n
     linear, point = wide.linearise(state), wide.at(omega)
     direct = wide.outputs(state)
     vibration = np.linalg.norm(response[:, wide.basis.order > 0], axis=1)
-    scale = np.maximum(vibration, LEAST_VIBRATION_SHARE * vibration.max(initial=0.0))
+    scale = np.maximum(vibration, RULES.least_vibration * vibration.max(initial=0.0))
     scale[scale == 0] = np.inf
 
     def measure(change: np.ndarray) -> float:
@@ -191,7 +203,7 @@ def estimate(wide: HarmonicBalance, kept: tuple[int, ...], omega: float, x: np.n
 
     def change(of: set[int]) -> np.ndarray:
         own = np.isin(wide.basis.order, list(of))
-        moved, _, _ = linear.solve(np.where(own, -state.residual, 0.0), LINEAR_ACCURACY)
+        moved, _, _ = linear.solve(np.where(own, -state.residual, 0.0), RULES.linear_accuracy)
         return point.outputs(linear.departure_slope(moved)) + np.where(own, direct, 0.0)
 
     absent = set(wide.basis.harmonics) - set(kept)
@@ -265,7 +277,7 @@ class _Trial:
             rest = np.array([found.shares[h] for h in allowed])
             remaining = np.sqrt(np.cumsum(rest[::-1] ** 2))[::-1]  # of this one and all smaller ones
             for h, left in zip(allowed, remaining, strict=True):
-                if left > ALLOWED_SHARE * options.tolerance:
+                if left > options.allowed_share * options.tolerance:
                     wanted[h] = max(wanted.get(h, 0.0), found.shares[h])
         first = sorted(wanted, key=lambda h: -wanted[h])
         return set(first[: max(2, len(self.kept))])  # a rough solution tells little about the rest

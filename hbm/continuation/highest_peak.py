@@ -18,13 +18,22 @@ from tribodyn.hbm.continuation.branch import Branch, amplitude
 from tribodyn.hbm.continuation.methods.natural import extrapolate
 from tribodyn.hbm.continuation.operating_point import AtPeak, OperatingPoint
 
-TRIED = 3  # peaks that are refined, the highest first
-NEARLY = 0.9  # of the highest peak foreseen, from which on a peak may be the highest
-SURE = 3.0  # errors of the heights foreseen, as the first peak has it, by which another must be lower to be left out
-TOO_HIGH = 2.0  # height foreseen over that of the point in it, from which on it is not believed
-LEAST_DOUBT = 5e-3  # of a height foreseen
-LEVEL = 3e-5  # of the height of a peak, by which a parabola may miss it
-CLOSINGS = 5  # parabolas that are tried
+
+@dataclass(frozen=True)
+class PeakRules:
+    """Which peaks are refined, and when one is met."""
+
+    tried: int = 3  # peaks that are refined, the highest first
+    nearly: float = 0.9  # of the highest peak foreseen, from which on a peak may be the highest
+    # errors of the heights foreseen, as the first peak has it, by which another must be lower to be left out
+    sure: float = 3.0
+    too_high: float = 2.0  # height foreseen over that of the point in it, from which on it is not believed
+    least_doubt: float = 5e-3  # of a height foreseen
+    level: float = 3e-5  # of the height of a peak, by which a parabola may miss it
+    closings: int = 5  # parabolas that are tried
+
+
+RULES = PeakRules()
 
 
 @dataclass(frozen=True)
@@ -44,13 +53,13 @@ def vertex(points: Sequence[Sample]) -> tuple[float, float]:
     bend, slope, least = np.polyfit(w, ratio**2, 2)
     at = float(np.clip(-0.5 * slope / bend, *sorted((w[0], w[2])))) if bend > 0 else 0.0
     level = least + slope * at + bend * at**2
-    if level < TOO_HIGH**-2:  # no such resonance
+    if level < RULES.too_high**-2:  # no such resonance
         return middle.omega, middle.height
     return middle.omega + at, middle.height / float(np.sqrt(level))
 
 
 def candidates(omega: np.ndarray, heights: np.ndarray) -> list[tuple[int, int]]:
-    """Points and outputs of the peaks that may be the highest, the highest foreseen first; at most TRIED.
+    """Points and outputs of the peaks that may be the highest, the highest foreseen first; at most RULES.tried.
 
     omega : (n_point,) [rad/s]; heights : (n_point, n_output) [m]
     """
@@ -60,7 +69,7 @@ def candidates(omega: np.ndarray, heights: np.ndarray) -> list[tuple[int, int]]:
         three = [Sample(omega[i + k], none, heights[i + k, output]) for k in range(3)]
         found.append((vertex(three)[1], int(i) + 1, int(output)))
     found.sort(reverse=True)
-    return [(point, output) for height, point, output in found[:TRIED] if height > NEARLY * found[0][0]]
+    return [(point, output) for height, point, output in found[: RULES.tried] if height > RULES.nearly * found[0][0]]
 
 
 def highest(
@@ -73,7 +82,7 @@ def highest(
     """
     heights = amplitude(branch.response[:, [branch.output_names.index(name) for name in outputs]])
     best: OperatingPoint | None = None
-    solves, doubt, which = len(heights), LEAST_DOUBT, 0
+    solves, doubt, which = len(heights), RULES.least_doubt, 0
     for point, output in candidates(branch.omega, heights):
         near = slice(point - 1, point + 2)
         points = [
@@ -87,7 +96,7 @@ def highest(
         solves += found.solves
         if not found.solution.converged:
             continue
-        doubt = max(doubt, SURE * abs(height / found.amplitude - 1))
+        doubt = max(doubt, RULES.sure * abs(height / found.amplitude - 1))
         if best is None or found.amplitude > best.amplitude:
             best, which = found, output
     return None if best is None else replace(best, solves=solves), which
@@ -97,14 +106,14 @@ def climbed(balance: HarmonicBalance, points: Sequence[Sample], site: AtPeak) ->
     """The peak within three points, by parabolas through the nearest ones; by its slope where these do not close in."""
     solves, start = 0, points[1]
     shape = (balance.contact.n_pair, -1, balance.basis.n_coeff)
-    for _ in range(CLOSINGS):
+    for _ in range(RULES.closings):
         omega, height = vertex(points)
         guess = extrapolate(np.array([p.omega for p in points]), [p.x for p in points], omega)
         solution = newton.solve(balance, omega, guess.reshape(shape), site.newton)
         found = OperatingPoint.of(balance, solution, site.output, solves := solves + 1)
         if not solution.converged:
             break
-        if abs(height / found.amplitude - 1) < LEVEL:
+        if abs(height / found.amplitude - 1) < RULES.level:
             return found
         ordered = sorted((*points, Sample(omega, solution.state.flat, found.amplitude)), key=lambda p: p.omega)
         top = min(max(int(np.argmax([p.height for p in ordered])), 1), len(ordered) - 2)

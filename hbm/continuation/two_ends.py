@@ -41,10 +41,18 @@ from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import CONVERGED, BranchEnd, Outcome
 from tribodyn.hbm.threads import single
 
-SAME_SHARE = 1e-3  # distance of two solutions that are one, in steps of the curve
-SAME_ERROR = 1e3  # the same where the curve hardly moves, in Newton's tolerances of the solution
-TOLD_EVERY = 16  # evaluations after which the other process tells how far it is
-ABRUPT = 1.0  # miss of the extrapolation, in steps, from which on a step of a sweep is tried backwards
+
+@dataclass(frozen=True)
+class MeetingRules:
+    """When two solutions are one, and when a step of a sweep is tried backwards."""
+
+    same_share: float = 1e-3  # distance of two solutions that are one, in steps of the curve
+    same_error: float = 1e3  # the same where the curve hardly moves, in Newton's tolerances of the solution
+    told_every: int = 16  # evaluations after which the other process tells how far it is
+    abrupt: float = 1.0  # miss of the extrapolation, in steps, from which on a step of a sweep is tried backwards
+
+
+RULES = MeetingRules()
 
 
 @single
@@ -105,7 +113,7 @@ class _Work:
 
     def count(self) -> None:
         self.done += 1
-        if self.done % TOLD_EVERY == 0:
+        if self.done % RULES.told_every == 0:
             self.tell(self.done)
 
 
@@ -272,7 +280,7 @@ class _Meeting:
 def _same(x: np.ndarray, y: np.ndarray, before: np.ndarray, options: NewtonOptions) -> bool:
     """Whether two solutions at one value are one, on a curve that comes from the solution before."""
     step, size = float(np.linalg.norm(x - before)), float(np.linalg.norm(x))
-    near = max(SAME_SHARE * step, SAME_ERROR * options.tolerance * size)
+    near = max(RULES.same_share * step, RULES.same_error * options.tolerance * size)
     return float(np.linalg.norm(x - y)) <= near
 
 
@@ -285,7 +293,7 @@ def _leads_back(path: Parameter, builder: BranchBuilder, new: int, options: Newt
         before, here = builder.points[i - 1], builder.points[i]
         known = slice(max(0, i - EXTRAPOLATION_DEGREE - 1), i)
         miss = here.x - extrapolate(np.array(builder.value[known]), builder.x[known], here.value)
-        if i > 1 and np.linalg.norm(miss) <= ABRUPT * np.linalg.norm(here.x - before.x):
+        if i > 1 and np.linalg.norm(miss) <= RULES.abrupt * np.linalg.norm(here.x - before.x):
             continue
         back = newton.solve(*path.place(before.value), here.x, options)
         if not back.converged or not _same(back.state.x, before.x, here.x, options):

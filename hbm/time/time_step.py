@@ -22,12 +22,13 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from tribodyn.hbm.contact.law import SEPARATES
+
 TOLERANCE = 1e-12  # of the contact residual, relative to the largest contact displacement
 SWEEPS, SLOW = 60, 0.5  # at most of Gauss-Seidel; factor per sweep from which on it is slow
 LOCAL, DAMPED = 40, 20  # iterations of one pair; from which on its steps are halved
 NEWTON = 60
 SHORTEST = 0.1  # share of a Newton step that is tried before a worse point is taken all the same
-SEPARATES = 4  # as in hbm.contact.law
 
 
 class Contact(NamedTuple):

@@ -28,9 +28,19 @@ from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_share
 from tribodyn.hbm.wear.step_control import Tolerance, growth, local_error
 
 GAMMA = 1 - 1 / np.sqrt(2)
-FIRST_STEP = 0.3  # depth of the first step, of the tolerance on depth
-REACHED = 0.999  # share of the volume of a leg, from which on it has ended
-SHORTEST = 0.05  # depth of the shortest one, likewise: the scatter of the rates is no error that shorter steps lower
+
+
+@dataclass(frozen=True)
+class StepRules:
+    """How the steps of this rule are placed."""
+
+    first_step: float = 0.3  # depth of the first step, of the tolerance on depth
+    reached: float = 0.999  # share of the volume of a leg, from which on it has ended
+    # depth of the shortest one, likewise: the scatter of the rates is no error that shorter steps lower
+    shortest: float = 0.05
+
+
+RULES = StepRules()
 
 
 @dataclass(frozen=True)
@@ -245,8 +255,8 @@ def evolve(
         over = _over(problem, here, preload, first)
         worn, error, periods = np.zeros_like(depth), 0.0, here.periods
         if over is None:
-            shortest = SHORTEST * tolerance.share * tolerance.scale / float(here.rate.max())
-            stride = stride or FIRST_STEP / SHORTEST * shortest
+            shortest = RULES.shortest * tolerance.share * tolerance.scale / float(here.rate.max())
+            stride = stride or RULES.first_step / RULES.shortest * shortest
             stride = min(stride, walk.left(depth) / float(problem.area @ here.rate))
             while True:
                 worn, deviation, spent = walk.step(depth, cycles, here, stride)
@@ -318,7 +328,7 @@ class _Walk:
 
     def done(self, depth: np.ndarray) -> bool:
         """Whether the last leg has ended."""
-        return float(self._problem.area @ depth) >= REACHED * self._places.ends[-1]
+        return float(self._problem.area @ depth) >= RULES.reached * self._places.ends[-1]
 
     def left(self, depth: np.ndarray) -> float:
         """Volume left to wear on the leg [m3]."""
@@ -327,7 +337,7 @@ class _Walk:
     def at(self, depth: np.ndarray, cycles: float) -> _Rate:
         """Means at a depth, on the leg that it belongs to."""
         removed = float(self._problem.area @ depth)
-        while self._leg < 0 or removed >= REACHED * self._places.ends[self._leg]:
+        while self._leg < 0 or removed >= RULES.reached * self._places.ends[self._leg]:
             self._leg += 1
             states = self._places.start(self._leg, depth)
             for follower, duty, state in zip(self._followers, self._problem.mission, states, strict=True):

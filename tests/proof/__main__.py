@@ -249,6 +249,28 @@ def extremes(*, quick: Flag = False, out: Path = Path("extremes.png"), as_json: 
         raise RuntimeError(f"{wrong} of {len(rows)} extreme settings ended with a wrong number, see the table")
 
 
+def ablations(
+    *rules: str, problems: int = 8, scenes: tuple[str, ...] = ("beam", "blade", "rig"), as_json: Json = False
+) -> None:
+    """Switch off the tuned rules of the solver, one at a time, and count the outcomes that change.
+
+    Parameters
+    ----------
+    rules
+        Names of rules, such as fold_reach; all by default.
+    problems
+        Problems of `branches` that are solved without each.
+    scenes
+        Coarse scenes that are run without each: beam, "beam with harmonics 0 to 5", blade, rig.
+    as_json
+        Print JSON for machines.
+    """
+    from tests.proof import ablations as proof
+
+    rows = proof.run(rules, problems, scenes, aside)
+    print(json.dumps([asdict(row) for row in rows], indent=2) if as_json else proof.as_text(rows))
+
+
 def motion(
     scene: str, *, at: str | None = None, overrides: Overrides = (), out: Path | None = None, as_json: Json = False
 ) -> None:
@@ -303,7 +325,7 @@ def wear_steps(scene: str, *, overrides: Overrides = (), out: Path | None = None
 
 
 app = cyclopts.App(name="prove", help="Proofs of tribodyn: speed, extremes, faults, errors of unseen scenes.")
-for word in (bench, extremes, faults, scoreboard, branches, fuzz, motion, wear_steps, blade, leaf, rig):
+for word in (bench, extremes, faults, scoreboard, branches, ablations, fuzz, motion, wear_steps, blade, leaf, rig):
     app.command(word)
 
 

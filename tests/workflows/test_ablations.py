@@ -1,0 +1,36 @@
+"""Tuned rules switched off: the neutral value acts, and the program is as before afterwards."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from importlib import import_module
+
+from tests.proof import ablations
+from tribodyn.hbm.continuation import curve
+from tribodyn.hbm.continuation.operating_point import AtPeak
+
+
+def test_a_neutral_value_acts_and_is_taken_back():
+    before = curve.RULES
+    with ablations.without("continuation.curve.CurveRules", "fold_turn", 0.0):
+        assert curve.RULES.fold_turn == 0.0
+        assert curve.RULES.largest_slant == before.largest_slant
+    assert curve.RULES is before
+    assert curve.CurveRules() == before
+    with ablations.without("continuation.operating_point.AtPeak", "tried", 1):
+        assert AtPeak("tip", 1.0, 2.0).tried == 1
+    assert AtPeak("tip", 1.0, 2.0).tried == 3
+
+
+def test_every_rule_that_is_listed_is_a_field_with_another_default():
+    for place, rules in ablations.RULES.items():
+        name, _, kind = place.rpartition(".")
+        known = {one.name: one.default for one in fields(getattr(import_module(f"tribodyn.hbm.{name}"), kind))}
+        for rule, neutral in rules.items():
+            assert known[rule] != neutral, rule
+
+
+def test_a_rule_that_finds_hidden_folds_changes_a_branch_problem():
+    with ablations.without("continuation.curve.CurveRules", "nearly_folds", -ablations.NEVER):
+        there = ablations.outcomes([18], [])
+    assert there != ablations.outcomes([18], [])
