@@ -18,15 +18,11 @@ from tribodyn.hbm.threads import single
 class Rules:
     """What Newton takes for zero, for rounding, and for too large; see docs/accuracy/ablations.md."""
 
-    zero_size: float = 1e-6  # size of x, relative to the start, below which a solution counts as zero
     unresisted: float = 1e-9  # singular value over the largest of a Jacobian whose motion counts as not resisted
     most_dense: int = 3000  # unknowns up to which the dense Jacobian serves where Krylov steps fail at rest
     most_direct: int = 25000  # unknowns up to which it serves where Krylov steps fail elsewhere: 5 GB
     most_corrections: int = 8  # of a residual flexibility, and what each leaves of the residual at the most
     corrected: float = 0.5
-    ramp_steps: int = 12  # Newton steps in one step of the load ramp; beyond it a shorter step costs less
-    # residual over that of two Newton steps before, likewise: those that fail mostly stand still
-    ramp_slowest: float = 0.9
     # of the contact forces, wanted where these stretch their springs far less than x is large
     force_accuracy: float = 1e-4
     least_tolerance: float = 1e-12  # residual over displacement that rounding still lets through
@@ -121,9 +117,9 @@ Solution = Solved[State]
 """Where Newton ended on a `HarmonicBalance`."""
 
 
-def relative_residual(state: Evaluation, x_lin: np.ndarray, least: float = 0.0) -> float:
-    """|R| / max(|x|, |x_lin|, least), Euclidean, 1 where only these vanish; invariant to the units."""
-    scale = max(float(np.linalg.norm(state.x)), float(np.linalg.norm(x_lin)), least)
+def relative_residual(state: Evaluation, x_lin: np.ndarray) -> float:
+    """|R| / max(|x|, |x_lin|), Euclidean, 1 where only these vanish; invariant to the units."""
+    scale = max(float(np.linalg.norm(state.x)), float(np.linalg.norm(x_lin)))
     return float(np.linalg.norm(state.residual) / scale) if scale > 0 else float(state.residual.any())
 
 
@@ -153,13 +149,13 @@ def _solve_with_rest(balance: HarmonicBalance, omega: float, start: np.ndarray, 
     steps = products = 0
     before = np.inf
     exact = balance.evaluate(omega, start)
-    x_lin, least = balance.x_lin(omega), RULES.zero_size * float(np.linalg.norm(start))
+    x_lin = balance.x_lin(omega)
     history: tuple[float, ...] = ()
     closer = replace(options, tolerance=0.3 * options.tolerance)
     for _ in range(RULES.most_corrections):
-        error = relative_residual(exact, x_lin, least)
+        error = relative_residual(exact, x_lin)
         history += (error,)
-        if error <= min(options.tolerance, _finer(balance, exact, x_lin, least)):
+        if error <= min(options.tolerance, _finer(balance, exact, x_lin)):
             return Solved(exact, CONVERGED, steps, products, history)
         if not error < RULES.corrected * before:
             break
@@ -178,13 +174,12 @@ def _solve(
 ) -> Solved[Evaluated]:
     """The same with Newton's method alone, from a state evaluated with its derivative."""
     x_lin = balance.x_lin(omega)
-    least = RULES.zero_size * float(np.linalg.norm(state.x))
-    error = relative_residual(state, x_lin, least)
+    error = relative_residual(state, x_lin)
     history = [error]
     forcing = 1e-3
     products = 0
     for step in range(1, options.max_steps + 1):
-        goal = wanted(balance, state, x_lin, options, least)
+        goal = wanted(balance, state, x_lin, options)
         if error <= goal:
             return Solved(state, CONVERGED, step - 1, products, tuple(history))
         if not np.isfinite(error):
@@ -212,7 +207,7 @@ def _solve(
             except np.linalg.LinAlgError:  # nothing holds the contact in some direction
                 why = SolveEnd.SINGULAR.say(f" {error:.1e}")
                 return Solved(state, why, step, products, tuple(history))
-        state, new_error = _search(balance, omega, state, direction, error, x_lin, least, options.shortest)
+        state, new_error = _search(balance, omega, state, direction, error, x_lin, options.shortest)
         history.append(new_error)
         if new_error >= error * (1 - 1e-10):
             if new_error <= options.tolerance:
@@ -225,7 +220,7 @@ def _solve(
     outcome = CONVERGED
     if error > options.tolerance:
         outcome = SolveEnd.STEPS_SPENT.say(f" {options.max_steps} steps: {error:.1e}")
-    off = error * RULES.force_accuracy / _finer(balance, state, x_lin, least)
+    off = error * RULES.force_accuracy / _finer(balance, state, x_lin)
     if error <= options.tolerance and off > RULES.force_unknown and _leans(balance, state, x_lin):
         far = float(np.abs(state.x).max())
         outcome = SolveEnd.SLIDES_AWAY.say(
@@ -251,18 +246,17 @@ def wanted(
     state: Evaluated,
     x_lin: np.ndarray,
     options: NewtonOptions,
-    least: float = 0.0,
 ) -> float:
     """The relative residual that is wanted: the tolerance, or less where the contact forces need it."""
-    return min(options.tolerance, _finer(balance, state, x_lin, least))
+    return min(options.tolerance, _finer(balance, state, x_lin))
 
 
-def _finer(balance: Balance[Frequency, Evaluated], state: Evaluated, x_lin: np.ndarray, least: float) -> float:
+def _finer(balance: Balance[Frequency, Evaluated], state: Evaluated, x_lin: np.ndarray) -> float:
     """The relative residual that leaves the contact forces exact enough; infinite where nothing touches or moves."""
     k = balance.reference_stiffness[:, None]
     stretch = np.divide(state.cycle.force.reshape(state.g.shape), k, out=np.zeros_like(state.g), where=k > 0)
     size = float(np.linalg.norm(stretch))
-    scale = max(float(np.linalg.norm(state.x)), float(np.linalg.norm(x_lin)), least)
+    scale = max(float(np.linalg.norm(state.x)), float(np.linalg.norm(x_lin)))
     if size == 0.0 or scale == 0.0:
         return np.inf
     return max(RULES.force_accuracy * size / scale, RULES.least_tolerance)
@@ -275,7 +269,6 @@ def _search(
     direction: np.ndarray,
     error: float,
     x_lin: np.ndarray,
-    least: float,
     shortest: float,
 ) -> tuple[Evaluated, float]:
     """Backtrack until the residual falls; the derivative has kinks, so the best trial is kept if none falls enough.
@@ -287,7 +280,7 @@ def _search(
     while length > shortest:
         with np.errstate(over="ignore", invalid="ignore"):  # steep laws grow beyond all numbers
             trial = balance.evaluate(omega, state.x + length * direction.reshape(state.x.shape))
-            trial_error = relative_residual(trial, x_lin, least)
+            trial_error = relative_residual(trial, x_lin)
         if not np.isfinite(trial_error):
             length *= 0.25
             continue
@@ -304,8 +297,7 @@ def _search(
 def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptions | None = None) -> Solution:
     """Solve without a neighbouring solution: from the stuck response, else by raising the vibration load in steps.
 
-    The ramp halves its step where Newton fails or takes long, as it does when it leaves for another solution; only
-    where that ends does Newton get its time. Products and steps of the whole way are counted in the Solution.
+    The ramp halves its step where Newton fails. Products and steps of the whole way are counted in the Solution.
     """
     first = solve(balance, omega, balance.stuck(omega), options)
     if first.converged:
@@ -317,21 +309,18 @@ def solve_from_rest(balance: HarmonicBalance, omega: float, options: NewtonOptio
     if not last.converged and balance.n_unknown <= RULES.most_dense:
         thorough = replace(options, least_motion=True, max_steps=2 * options.max_steps)
         last = solve(balance.with_load(0.0), omega, start, thorough)
-    hasty = replace(
-        options, max_steps=min(options.max_steps, RULES.ramp_steps), slowest=min(options.slowest, RULES.ramp_slowest)
-    )
     factor = 0.0
-    for patience in (hasty, options) if last.converged else ():
 
-        def loaded(target: float, _: float, patience: NewtonOptions = patience) -> bool:
-            nonlocal last, steps, products
-            trial = solve(balance.with_load(target * balance.load_factor), omega, last.state.x, patience)
-            steps, products = steps + trial.steps, products + trial.products
-            last = trial if trial.converged else last
-            return trial.converged
+    def loaded(target: float, _: float) -> bool:
+        nonlocal last, steps, products
+        trial = solve(balance.with_load(target * balance.load_factor), omega, last.state.x, options)
+        steps, products = steps + trial.steps, products + trial.products
+        last = trial if trial.converged else last
+        return trial.converged
 
+    if last.converged:
         factor = lead(factor, 1.0, SHARES, loaded)
-        if factor == 1.0:
-            return Solution(last.state, CONVERGED, steps, products, last.history)
+    if factor == 1.0:
+        return Solution(last.state, CONVERGED, steps, products, last.history)
     outcome = first.outcome.kind.say(f"{first.outcome.detail}; load ramp stopped at {factor:.0%}: {CURES}")
     return Solution(first.state, outcome, steps, products, first.history)

@@ -23,9 +23,6 @@ class CurveRules:
     fold_newton_share: float = 1e-3
     fold_trials: int = 80
     fold_tangent_accuracy: float = 1e-10  # relative; the sign of their frequency part says where the fold is
-    # A step whose cubic has less than this share of the parameter that its ends have may hide two folds: contact
-    # makes the slope change by pieces, which a cubic rounds off.
-    nearly_folds: float = 0.5
     # Slant of a step, the angle between its chord and the mean of its tangents, up to which it needs no check [rad]:
     # the slant of a smooth curve falls with the square of the step, and few steps have more.
     largest_slant: float = 0.03
@@ -119,20 +116,8 @@ class Segment:
 
     @property
     def hides_folds(self) -> bool:
-        """Whether there may be two folds more between the ends than their tangents tell.
-
-        Where these agree, the cubic through the ends turns back twice, or nearly; where they do not, they lie far apart
-        """
-        if self.turns:
-            return RULES.turn_at_fold < self.angle <= RULES.kink_angle
-        slopes = np.array([self.start.tangent.p, self.end.tangent.p]) * self.length
-        rise = self.chord.p
-        a = 3 * (slopes[0] + slopes[1] - 2 * rise)  # derivative of the Hermite cubic: a s^2 + b s + c
-        b = 6 * rise - 4 * slopes[0] - 2 * slopes[1]
-        if a == 0.0 or not 0.0 < -b / (2 * a) < 1.0:
-            return False
-        extreme = slopes[0] - b * b / (4 * a)
-        return bool(extreme * np.sign(slopes[0]) < RULES.nearly_folds * np.min(np.abs(slopes)))
+        """Whether a step over a fold may have passed two more: its tangents lie far apart."""
+        return self.turns and RULES.turn_at_fold < self.angle <= RULES.kink_angle
 
     @property
     def doubtful(self) -> bool:

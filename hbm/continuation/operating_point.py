@@ -117,10 +117,8 @@ class AtPeak:
     coarsest : longest step of the first search, share of its range
     overtakes : amplitude over that of the tracked peak, from which on another resonance dominates: what fewer harmonics
         miss of a peak is less, and a peak that emerges passes this at once
-    apart : relative distance of frequencies from which on two peaks are two
     near : relative distance to the peak within which a point beside failed solves is taken for it
     reach : half widths between the points beside a maximum of a scan, by which its peak may lie outside them
-    astray : of its frequency, by which a peak may move with more harmonics
     tried : maxima of a scan that are refined in turn, the highest first
     Those from `scanned_above` on: see docs/accuracy/ablations.md
     """
@@ -137,10 +135,8 @@ class AtPeak:
     scan_misses: float = 0.15
     coarsest: float = 0.05
     overtakes: float = 1.2
-    apart: float = 1e-3
     near: float = 1e-3
     reach: float = 2.0
-    astray: float = 0.05
     tried: int = 3
     newton: NewtonOptions = field(default_factory=NewtonOptions)
 
@@ -192,7 +188,7 @@ class AtPeak:
             more = balance if kept == balance.basis.harmonics else balance.with_harmonics(kept)
             x, omega = _carried(known, point, more), point.state.omega
             found = self.next(more, omega, x)
-            if not found.solution.converged or abs(found.state.omega - omega) > self.astray * omega:
+            if not found.solution.converged:
                 found = self._at(more, omega, x, found.solves)
             found = replace(found, solves=found.solves + point.solves)
             if far_enough and not found.solution.converged:
@@ -259,7 +255,7 @@ class AtPeak:
         parts = [(low, tracked, few), (tracked, high, fewer)] if few.basis != fewer.basis else [(low, high, few)]
         found, solves = None, 0
         for start, stop, scanned in parts:
-            if found is None and stop - start > self.apart * tracked:
+            if found is None and stop > start:
                 part = replace(self, start=start, stop=stop)
                 found, further = part._higher(scanned, balance, point)
                 solves += further
@@ -288,9 +284,8 @@ class AtPeak:
 
     def _is_higher(self, found: OperatingPoint, point: OperatingPoint) -> bool:
         omega = found.state.omega
-        apart = abs(omega - point.state.omega) > self.apart * point.state.omega
         higher = found.amplitude > self.overtakes * point.amplitude
-        return self._contains(omega) and apart and found.solution.converged and higher
+        return self._contains(omega) and found.solution.converged and higher
 
     @single
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:

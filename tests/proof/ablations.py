@@ -27,8 +27,7 @@ NEVER = math.inf
 # class -> its rules with their neutral values
 RULES: dict[str, dict[str, Any]] = {
     "continuation.curve.CurveRules": {
-        "fold_newton_share": 1.0, "nearly_folds": -NEVER, "fold_turn": 0.0, "turn_at_fold": NEVER,
-        "largest_slant": NEVER,
+        "fold_newton_share": 1.0, "fold_turn": 0.0, "turn_at_fold": NEVER, "largest_slant": NEVER,
     },
     "continuation.stepper.StepRules": {"least_length_ratio": 0.0, "fold_reach": NEVER, "largest_miss": NEVER},
     "continuation.methods.arc_length.Rules": {"max_gaps": 0, "max_rewinds": 0, "max_landings": 0},
@@ -39,7 +38,7 @@ RULES: dict[str, dict[str, Any]] = {
         "least_spacing": 0.0, "max_fold_points": 10**9, "trial_shortest": 4e-4, "trial_slowest": 1.0,
     },
     "continuation.operating_point.AtPeak": {
-        "scan_misses": 0.0, "overtakes": 1.0, "apart": 0.0, "near": NEVER, "reach": 1e9, "astray": NEVER, "tried": 1,
+        "scan_misses": 0.0, "overtakes": 1.0, "near": NEVER, "reach": 1e9, "tried": 1,
     },
     "wear.error_controlled_rule.StepRules": {
         "error_trend_power": 0.0, "unexpected": NEVER, "retreats": 0, "further_moved": NEVER,

@@ -31,6 +31,6 @@ def test_every_rule_that_is_listed_is_a_field_with_another_default():
 
 
 def test_a_rule_that_finds_hidden_folds_changes_a_branch_problem():
-    with ablations.without("continuation.curve.CurveRules", "nearly_folds", -ablations.NEVER):
+    with ablations.without("continuation.curve.CurveRules", "fold_turn", 0.0):
         there = ablations.outcomes([18], [])
     assert there != ablations.outcomes([18], [])
