@@ -28,7 +28,7 @@ def two() -> bool:
 def forked(body: Callable[[Connection], None]) -> Iterator[Connection]:
     """A fork of this process that calls `body` with a connection to write to, and ends with it or with the context.
 
-    Yields the connection to read from: EOFError tells that the fork has ended, or that there was no room for one
+    Yields the connection to read from: EOFError means that the fork has ended, or that there was no room for one
     """
     context = get_context("fork")
     reader, writer = context.Pipe(duplex=False)

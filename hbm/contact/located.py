@@ -54,7 +54,7 @@ def cycle(
     else:
         load[:, 0] = parameters.numbers["normal_load"]
     grid = _grid(basis.dynamic)
-    n = grid.shape[1] // 5  # told, as there may be no pair
+    n = grid.shape[1] // 5  # given, as there may be no pair
     x_grid, load_grid = (full @ grid).reshape(n_pair, n_comp, 5, n), (load @ grid).reshape(n_pair, 5, n)
     # of one layout, as numba compiles the kernel for each that it meets
     k, memory = np.ascontiguousarray(parameters.stiffness), np.ascontiguousarray(memory)
@@ -226,7 +226,7 @@ def _contact(load, grid, hs, contact, closed):
     n = _roots(load, hs, grid[0], grid[1], grid[3], contact, 1)
     contact[n] = TURN
     n_closed = 0
-    for j in range(n):  # without a change of sign the mean tells it, else the signs alternate
+    for j in range(n):  # without a change of sign the mean decides, else the signs alternate
         closed[j] = load[0] > 0.0 if n == 1 else (grid[3, -1] >= 0.0) == (j % 2 == 0)
         n_closed += closed[j]
     return n, n_closed

@@ -92,7 +92,7 @@ def highest(
         height = vertex(points)[1]
         if best is not None and (1 + doubt) * height < best.amplitude:
             continue
-        found = climbed(balance, points, replace(site, output=outputs[output]))
+        found = refined(balance, points, replace(site, output=outputs[output]))
         solves += found.solves
         if not found.solution.converged:
             continue
@@ -102,7 +102,7 @@ def highest(
     return None if best is None else replace(best, solves=solves), which
 
 
-def climbed(balance: HarmonicBalance, points: Sequence[Sample], site: AtPeak) -> OperatingPoint:
+def refined(balance: HarmonicBalance, points: Sequence[Sample], site: AtPeak) -> OperatingPoint:
     """The peak within three points, by parabolas through the nearest ones; by its slope where these do not close in."""
     solves, start = 0, points[1]
     shape = (balance.contact.n_pair, -1, balance.basis.n_coeff)

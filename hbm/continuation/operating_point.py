@@ -107,7 +107,7 @@ class AtPeak:
         up to five times as long as of so many points
     tolerance : relative, on the frequency of the peak
     highest : amplitude that no linear response inside the range passes, with the contact free or stuck, at load factor
-        1 [m]: a tracked peak as high is not overtaken, and none is looked for
+        1 [m]: a tracked peak as high stays the highest, and none is looked for
     scanned : highest harmonic of the scans for peaks: a contact that lifts drives higher modes by harmonics of the
         load, and such a superharmonic resonance may be the highest. With more of them a scan takes longer than
         a wear step; a peak that is found is solved with all
@@ -244,7 +244,7 @@ class AtPeak:
         """The higher peak that a sweep with rising frequency meets, None where the tracked one is the highest.
 
         point : the tracked peak
-        Returns the peak and the balance solves spent, those of a sweep without any peak apart. Where pairs hammer and
+        Returns the peak and the balance solves spent, those of a sweep without any peak apart. Where pairs impact and
         no solution with all harmonics is found beside that with fewer, the peak has fewer, and zeros in the others
         """
         if self.overtakes * point.amplitude >= self.highest * balance.load_factor:

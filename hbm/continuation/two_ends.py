@@ -48,7 +48,7 @@ class MeetingRules:
 
     same_share: float = 1e-3  # distance of two solutions that are one, in steps of the curve
     same_error: float = 1e3  # the same where the curve hardly moves, in Newton's tolerances of the solution
-    told_every: int = 16  # evaluations after which the other process tells how far it is
+    sent_every: int = 16  # evaluations after which the other process sends how far it is
     abrupt: float = 1.0  # miss of the extrapolation, in steps, from which on a step of a sweep is tried backwards
 
 
@@ -113,7 +113,7 @@ class _Work:
 
     def count(self) -> None:
         self.done += 1
-        if self.done % RULES.told_every == 0:
+        if self.done % RULES.sent_every == 0:
             self.tell(self.done)
 
 
@@ -312,16 +312,16 @@ class _Other:
         """Strides that are there; where to wait, after one message more. None once the process has ended."""
         while self.work < np.inf and (wait or self._strides.poll()):
             try:
-                told = self._strides.recv()
+                message = self._strides.recv()
             except EOFError:
                 self.work = np.inf
                 return
             wait = False
-            if isinstance(told, _Stride):
-                self.work = told.work if told.end is None else np.inf
-                yield told
+            if isinstance(message, _Stride):
+                self.work = message.work if message.end is None else np.inf
+                yield message
             else:
-                self.work = told
+                self.work = message
 
 
 def _send(strides: Iterator[_Stride], work: _Work, writer: Connection) -> None:
@@ -346,9 +346,9 @@ def _way_back(begin: Callable[[], Walk], path: Parameter, options: NewtonOptions
 
 
 def _feed(waiting: SimpleQueue[_Stride | int | None], writer: Connection) -> None:
-    while (told := waiting.get()) is not None:
+    while (message := waiting.get()) is not None:
         try:
-            writer.send(told)
+            writer.send(message)
         except OSError:  # nobody reads any more
             os._exit(0)
 

@@ -1,7 +1,7 @@
 """What a motion does on average over its periods, whether it repeats itself or not.
 
 A plain march goes where a machine goes: to a stable periodic motion, to one that takes several periods, or to one that
-never repeats itself. Energy and wear per cycle then are means over periods, and their scatter is told with them.
+never repeats itself. Energy and wear per cycle then are means over periods, and their scatter is given with them.
 """
 
 from __future__ import annotations

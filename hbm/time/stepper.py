@@ -104,7 +104,7 @@ class TimeStepper:
         samples = basis.functions(2 * np.pi * np.arange(1, options.steps + 1) / options.steps)
         base = balance.excitation.base
         self._base = np.zeros((len(B), basis.n_coeff)) if base is None else balance.loaded(base)
-        E, Q, kick = _exact_step(self.lam, full, flow, diagonal, self.h, self._modal_load, basis, omega)
+        E, Q, impulse = _exact_step(self.lam, full, flow, diagonal, self.h, self._modal_load, basis, omega)
         static = int(basis.has_static)
         self.hold = Hold.of(balance, force[:, :static].sum(axis=1), self._base[:, :static].sum(axis=1))
         at = np.zeros((len(phi), 0)) if self.hold is None else self.hold.at
@@ -115,7 +115,7 @@ class TimeStepper:
         modal = moving.T @ at
         self._of_hold = modal, Q @ modal, follows @ (rest.T @ at), (rows @ rest) @ (rest.T @ at)
         self.linear = time_step.Linear(
-            E, Q, U, np.ascontiguousarray(outputs), np.ascontiguousarray(np.roll(samples, 1, axis=0) @ kick.T),
+            E, Q, U, np.ascontiguousarray(outputs), np.ascontiguousarray(np.roll(samples, 1, axis=0) @ impulse.T),
             np.ascontiguousarray(samples @ self.rest.T), np.ascontiguousarray(samples @ output_rest.T),
         )  # fmt: skip
         compliance = 0.5 * U @ (Q[:m] @ U.T) + self.static
@@ -219,9 +219,9 @@ class TimeStepper:
         )  # fmt: skip
         linear = self.linear
         if self.hold is not None:
-            _, kick, rest, output_rest = self._of_hold
+            _, impulse, rest, output_rest = self._of_hold
             linear = linear._replace(
-                kick=linear.kick + kick @ start.hold,
+                impulse=linear.impulse + impulse @ start.hold,
                 rest=linear.rest + rest @ start.hold,
                 output_rest=linear.output_rest + output_rest @ start.hold,
             )
@@ -259,13 +259,13 @@ def _exact_step(
     basis: HarmonicBasis,
     omega: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """E, Q and the kick per coefficient of the loads (2 m, n_coeff) at the start of the step; see `time_step`.
+    """E, Q and the impulse per coefficient of the loads (2 m, n_coeff) at the start of the step; see `time_step`.
 
     load : (m, n_coeff) modal load. All are exponentials of the step's motion together with what drives it
     """
     m = len(lam)
     groups = [[i] for i in range(m)] if diagonal else [list(range(m))]
-    E, Q, kick = np.zeros((2 * m, 2 * m)), np.zeros((2 * m, m)), np.zeros((2 * m, basis.n_coeff))
+    E, Q, impulse = np.zeros((2 * m, 2 * m)), np.zeros((2 * m, m)), np.zeros((2 * m, basis.n_coeff))
     turn = basis.rate * (omega * h)  # of the basis functions within a step
     for g in groups:
         n, rows = len(g), [*g, *(m + i for i in g)]
@@ -283,5 +283,5 @@ def _exact_step(
         whole = sla.expm(rate)
         E[np.ix_(rows, rows)] = whole[: 2 * n, : 2 * n]
         Q[np.ix_(rows, g)] = h**2 * whole[: 2 * n, 2 * n : 3 * n]
-        kick[rows] = h**2 * scale * whole[: 2 * n, 3 * n :]
-    return E, Q, kick
+        impulse[rows] = h**2 * scale * whole[: 2 * n, 3 * n :]
+    return E, Q, impulse

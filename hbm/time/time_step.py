@@ -2,10 +2,10 @@
 
 In modal coordinates of the structure, contact open, a step from t_0 to t_1 = t_0 + h with z = (eta, h v) is
 
-    z_1 = E z_0 + kick - Q (f_0 + f_1) / 2,      x_1 = U eta_1 + rest_1 - W f_1.
+    z_1 = E z_0 + impulse - Q (f_0 + f_1) / 2,      x_1 = U eta_1 + rest_1 - W f_1.
 
-E = exp(A h) and the kick of the loads are exact, whatever h is. The contact force f acts with its mean over the step,
-which keeps the second order and the stability of the trapezoidal rule at any contact stiffness and adds no damping.
+E = exp(A h) and the impulse of the loads are exact, whatever h is. The contact force f acts with its mean over the
+step, which keeps the second order and the stability of the trapezoidal rule at any contact stiffness and adds no damping.
 Modes far above what a step resolves follow without inertia (W, and `rest` under the loads).
 What is left of a step is x_1 = x_free - A f(x_1) with one constant compliance A for all steps: pair after pair
 (block Gauss-Seidel), and by Newton's method for all of them where the pairs are too stiffly coupled for that.
@@ -49,14 +49,14 @@ class Linear(NamedTuple):
     """The linear part of every step of a period.
 
     E : (2 m, 2 m), Q : (2 m, m); U : (n_contact, m), outputs : (n_output, 2 m + n_contact) of (z, f)
-    kick : (n_step, 2 m), rest : (n_step, n_contact), output_rest : (n_step, n_output) under the loads
+    impulse : (n_step, 2 m), rest : (n_step, n_contact), output_rest : (n_step, n_output) under the loads
     """
 
     E: np.ndarray
     Q: np.ndarray
     U: np.ndarray
     outputs: np.ndarray
-    kick: np.ndarray
+    impulse: np.ndarray
     rest: np.ndarray
     output_rest: np.ndarray
 
@@ -425,9 +425,9 @@ def march(step, contact, linear, moving, record):
     of_z = np.ascontiguousarray(linear.outputs[:, : 2 * m])
     of_f = np.ascontiguousarray(linear.outputs[:, 2 * m :])
     speed = 0.0
-    for j in range(linear.kick.shape[0]):
+    for j in range(linear.impulse.shape[0]):
         half_pull = 0.5 * np.dot(f.ravel(), linear.U)
-        z_free = np.dot(linear.E, z) + linear.kick[j] - np.dot(linear.Q, half_pull)
+        z_free = np.dot(linear.E, z) + linear.impulse[j] - np.dot(linear.Q, half_pull)
         x_free = np.dot(linear.U, z_free[:m]) + linear.rest[j]
         f_new = np.where(f == 0.0, 0.0, 2.0 * f - f_before)
         x_new = (x_free - times(contact.A, f_new)).reshape(n_pair, c)

@@ -117,11 +117,13 @@ def evolve(
             on_row(rows[-1])
         if reason:
             break
-    return history(rows, end.kind.say(end.detail + _jumps(rows) + fewer_harmonics.told(problem.balance.basis, rows)))
+    return history(
+        rows, end.kind.say(end.detail + _jumps(rows) + fewer_harmonics.reported(problem.balance.basis, rows))
+    )
 
 
 def jumps(rows: Sequence[WearRow]) -> list[int]:
-    """Rows of this rule after which wear went on at another peak: what follows a jump or a leap has no plan."""
+    """Rows after which wear went on at another peak: what follows a jump or an explicit step has no plan."""
     pairs = enumerate(pairwise(rows))
     return [i for i, (a, b) in pairs if a.plan.size and not a.plan.any() and abs(b.omega / a.omega - 1) > LARGEST_SHIFT]
 
@@ -163,7 +165,7 @@ def _step(whole: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequ
         fewer = fewer_harmonics.with_fewer(problem)
         if fewer is None:
             problem = settled
-            taken = _leap(whole, problem, start, tolerance, taken.failure, rows)
+            taken = _explicit_step(whole, problem, start, tolerance, taken.failure, rows)
             break
         problem, state = fewer, fewer_harmonics.carried(fewer, start)
     row, after = taken.row, taken.after
@@ -187,8 +189,8 @@ def _step_of(
     searched = fewer_harmonics.searched_with(whole, problem)
     last = fewer_harmonics.with_fewer(problem) is None
     smallest = 1e-9 * tolerance.scale / float(state.rate.max())
-    leap = EXPLICIT_STEPS[0] * tolerance.share * tolerance.scale / float(state.rate.max())
-    stride = 10 * leap
+    shortest = EXPLICIT_STEPS[0] * tolerance.share * tolerance.scale / float(state.rate.max())
+    stride = 10 * shortest
     drift, slopes = np.zeros(len(state.points)), np.full(len(state.points), RULES.unknown_slope)
     if rows and rows[-1].plan[0] > 0:
         stride, slopes = float(rows[-1].plan[0]), rows[-1].plan[1:]
@@ -198,7 +200,7 @@ def _step_of(
             drift = (omega - rows[-1].duty_omega) / (state.cycles - rows[-1].cycles)
     target = _event(problem, state, rows)
     solves, longest = state.solves, np.inf
-    stays = 0.0  # stride after which the tracked peak is still the highest
+    highest_until = 0.0  # stride after which the tracked peak is still the highest
     jumped: tuple[float, WearState, WearState, float, tuple[OperatingPoint, ...]] | None = None  # ... and where not
     higher: tuple[OperatingPoint, ...] | None = None
     while True:
@@ -225,10 +227,10 @@ def _step_of(
                 elif jumped is None:
                     break
                 else:
-                    stays = stride
-                if jumped[0] - stays <= RULES.overtaking_accuracy * tolerance.share * second.cycles:
+                    highest_until = stride
+                if jumped[0] - highest_until <= RULES.overtaking_accuracy * tolerance.share * second.cycles:
                     break
-                stride = 0.5 * (stays + jumped[0])
+                stride = 0.5 * (highest_until + jumped[0])
                 continue
             longest = stride
             stride *= _share_to(target, problem.preload(state.points[0].state), preload)
@@ -236,7 +238,7 @@ def _step_of(
             break
         else:
             stride = min(stride * growth(error), 0.5 * longest if lost else np.inf)
-        if stride < ((leap if last else 10 * leap) if lost else smallest):
+        if stride < ((shortest if last else 10 * shortest) if lost else smallest):
             return _Lost(second.failure or (SHIFTED if lost else None), solves)
     if jumped is not None:
         stride, first, second, error, higher = jumped
@@ -286,7 +288,7 @@ def _overtaken(problem: WearProblem, state: WearState) -> tuple[tuple[OperatingP
     return tuple(new or old for (new, _), old in zip(searched, state.points, strict=True)), solves
 
 
-def _leap(
+def _explicit_step(
     whole: WearProblem,
     problem: WearProblem,
     state: WearState,
@@ -298,7 +300,7 @@ def _leap(
 
     The response folds, or the tracked peak merges with a valley: no solution follows on the one here. A step that did
     not get over it, or behind which none was found, is followed by a longer one, up to the tolerance. Where pairs
-    hammer and branches are short, the rule continues in such steps.
+    impact and branches are short, the rule continues in such steps.
     problem : that the state is solved in; it is looked for with the harmonics of scans, failing that with fewer
     """
     nothing = np.zeros_like(problem.area)
@@ -371,7 +373,7 @@ def _stage(
     omega: np.ndarray,
     searches: Sequence[_Search],
 ) -> WearState:
-    """Solve depth = base + stretch rate(depth) with every duty at its site; `near` tells the wear per work to try."""
+    """Solve depth = base + stretch rate(depth) with every duty at its site; the wear per work of `near` is tried."""
     duties = problem.mission
     unworn = [problem.in_duty(duty) for duty in duties]
     gain = _gain(problem, near)

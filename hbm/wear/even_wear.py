@@ -1,7 +1,7 @@
 """How deep a contact may wear evenly until its preload is gone, to first order.
 
 For structures that hold together by their contacts alone: elsewhere the deflection of the part without its contact
-tells the depth.
+gives the depth.
 """
 
 from __future__ import annotations

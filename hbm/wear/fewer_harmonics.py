@@ -1,4 +1,4 @@
-"""Wear with fewer harmonics where no solution with all of them follows: contacts that hammer.
+"""Wear with fewer harmonics where no solution with all of them follows: contacts that impact.
 
 A run keeps the harmonics that it was asked for. Where a step finds no solution with them, the lower half carries on,
 and each later step takes up more again, as far as they have a solution. Rows keep all coefficients, with zeros in the
@@ -117,8 +117,8 @@ def top_harmonic(basis: HarmonicBasis, displacements: Sequence[np.ndarray]) -> i
     return int(order.max()) if order.size and order.max() > 0 else basis.harmonics[-1]
 
 
-def told(basis: HarmonicBasis, rows: Sequence[WearRow]) -> str:
-    """What to say of rows that no solution with all harmonics was found for; empty where there are none."""
+def reported(basis: HarmonicBasis, rows: Sequence[WearRow]) -> str:
+    """What is reported of rows that no solution with all harmonics was found for; empty where there are none."""
     tops = [top_harmonic(basis, list(row.duty_displacement)) for row in rows]
     few = [i for i, top in enumerate(tops) if top < basis.harmonics[-1]]
     if not few:

@@ -1,8 +1,8 @@
 """The preload that is left when the vibration stops, along a wear run.
 
 Two preloads differ. The static force of a vibrating contact is a mean over the cycle: a contact that lifts off in each
-cycle carries a mean force by hammering even where no interference is left. The force without the harmonic loads is the
-interference that wear uses up, and what a torque wrench or a load cell at a standing machine tells.
+cycle carries a mean force by impacts even where no interference is left. The force without the harmonic loads is the
+interference that wear uses up, and what a torque wrench or a load cell at a standing machine measures.
 """
 
 from __future__ import annotations

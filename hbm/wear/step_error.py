@@ -1,4 +1,4 @@
-"""What the wear steps of a run cost, told from its own history."""
+"""The error by the wear steps of a run, estimated from its own history."""
 
 from __future__ import annotations
 

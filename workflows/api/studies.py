@@ -20,8 +20,8 @@ from tribodyn.hbm.outcome import CONVERGED, BranchEnd, WearEnd
 from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.stability.chatter import Chatter, chatter
 from tribodyn.hbm.stability.exponents import BranchStability
+from tribodyn.hbm.stability.folds_in_time import Coexisting, FoldInTime, coexisting, fold_in_time, solutions_at
 from tribodyn.hbm.time import verify as hbm_verify
-from tribodyn.hbm.time.folds_in_time import Coexisting, FoldInTime, coexisting, fold_in_time, solutions_at
 from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.hbm.time.stepper import Options as TimeOptions
 from tribodyn.hbm.time.verify import Verification

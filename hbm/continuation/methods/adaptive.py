@@ -1,7 +1,7 @@
 """Adaptive continuation: natural steps, dense only where the response bends.
 
 After each step the response extrapolated through the last four points is compared with the solved one. The difference
-tells the fourth derivative, hence the error of a cubic interpolation between the points; the step is chosen so that
+gives the fourth derivative, hence the error of a cubic interpolation between the points; the step is chosen so that
 this error stays at the tolerance. A step that was too long is kept as a point further on. At a fold the sweep jumps,
 as a measured one does, and says where.
 """

@@ -5,8 +5,8 @@ The step grows and shrinks with the Newton steps and the turn of the tangent. Ki
 crossed where their two legs are straight and meet; behind one that turns by more than a right angle the curve is looked
 for in the directions that the derivative there offers. A step whose chord is not along its tangents is halved until it
 shows whether it stays on its branch, and none is taken to a neighbouring one. A walk that comes back onto its own way
-took a wrong turn: it is rewound and resumes in shorter steps. Where all that fails, as where pairs hammer and the curve
-has gaps, the parameter alone takes a short step over the place, and the branch says where.
+took a wrong turn: it is rewound and resumes in shorter steps. Where all that fails, as where contacts impact and the
+curve has gaps, the parameter alone takes a short step over the place, and the branch says where.
 Source  Keller 1977 (pseudo arc length); step control and kinks ours.
 """
 
@@ -214,8 +214,8 @@ class _Walk:
         if len(builder.value) >= self._options.max_points:
             return BranchEnd.ENDED.say(f" {here}: {self._options.max_points} points were allowed")
         if self._stays():
-            told = f"{self._options.patience} points brought it hardly further than {path.say(self._milestone)}"
-            return BranchEnd.ENDED.say(f" {here}: {told}")
+            why = f"{self._options.patience} points brought it hardly further than {path.say(self._milestone)}"
+            return BranchEnd.ENDED.say(f" {here}: {why}")
         parts = self._stepper.advance()
         if not parts:
             if self._jump():
@@ -282,8 +282,8 @@ class _Walk:
         builder, here, newton_options = self.builder, self._path.say(self.builder.value[-1]), self._options.newton
         growth = self._options.max_growth
         if np.linalg.norm(builder.x[-1]) > growth * self._size > 0:
-            told = f"the response grows without bound, {growth:.0e} times that of the first point"
-            return BranchEnd.ENDED.say(f" {here}: {told}")
+            why = f"the response grows without bound, {growth:.0e} times that of the first point"
+            return BranchEnd.ENDED.say(f" {here}: {why}")
         assert self._first is not None
         old = self._stepper.segments
         if len(old) > 3 and any(p.passes(self._path, self._first, 1.0, newton_options) for p in parts):

@@ -11,8 +11,8 @@ from tribodyn.hbm.continuation import two_ends
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.outcome import SolveEnd
+from tribodyn.hbm.stability.folds_in_time import FoldInTime, fold_in_time
 from tribodyn.hbm.threads import limited
-from tribodyn.hbm.time.folds_in_time import FoldInTime, fold_in_time
 from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed

@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from tests.proof.cases.leaf_seal.figures import MICRO, draw_curve
 from tests.proof.cases.leaf_seal.response import LINER_NODE, LeafResponse, respond
-from tribodyn.hbm.time.folds_in_time import Coexisting, FoldInTime, coexisting, fold_in_time
+from tribodyn.hbm.stability.folds_in_time import Coexisting, FoldInTime, coexisting, fold_in_time
 from tribodyn.style import BLUE, GREEN, INK, ORANGE, RED, STYLE
 from tribodyn.workflows.studies.scenes import read_scene
 

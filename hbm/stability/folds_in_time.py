@@ -110,7 +110,7 @@ def fold_in_time(
 ) -> FoldInTime:
     """Bisect for the frequency at which, in time, the stable branch ends that a fold of the balance ends.
 
-    fold : index of the fold's point, one of branch.folds; output : whose amplitude is told
+    fold : index of the fold's point, one of branch.folds; output : whose amplitude is given
     bracket : distance to the fold, relative, within which the end is looked for
     Raises  ValueError where the point is no fold; IntegrationFailed as time integration does
     """
