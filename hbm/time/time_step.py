@@ -5,8 +5,8 @@ In modal coordinates of the structure, contact open, a step from t_0 to t_1 = t_
     z_1 = E z_0 + impulse - Q (f_0 + f_1) / 2,      x_1 = U eta_1 + rest_1 - W f_1.
 
 E = exp(A h) and the impulse of the loads are exact, whatever h is. The contact force f acts with its mean over the
-step, which keeps the second order and the stability of the trapezoidal rule at any contact stiffness and adds no damping.
-Modes far above what a step resolves follow without inertia (W, and `rest` under the loads).
+step, which keeps the second order and the stability of the trapezoidal rule at any contact stiffness and adds no
+damping. Modes far above what a step resolves follow without inertia (W, and `rest` under the loads).
 What is left of a step is x_1 = x_free - A f(x_1) with one constant compliance A for all steps: pair after pair
 (block Gauss-Seidel), and by Newton's method for all of them where the pairs are too stiffly coupled for that.
 A pair that closes within the step is first brought to the instant at which it touches, on the straight line between
