@@ -99,7 +99,7 @@ def _scaling(quick: bool, out: Path, as_json: bool) -> None:
 def scoreboard(
     *, scenes: int = 40, seed: int = 1, seconds: float = 60.0, out: Path = Path("scoreboard"), as_json: Json = False
 ) -> None:
-    """Hold verdicts and promises on scenes drawn at random against references that are finer in every knob.
+    """Hold verdicts and promises on scenes drawn at random against references that are finer in every parameter.
 
     Exit code 3 where a true error is above the stated one. Rows are kept: the same command goes on where it was ended.
 

@@ -1,4 +1,4 @@
-"""Verdicts and promises on scenes that nobody has tuned, held against a reference that is finer in every knob.
+"""Verdicts and promises on scenes that nobody has tuned, held against a reference that is finer in every parameter.
 
 Scenes are drawn by `scoreboard_scenes`. Each is run and judged as a user gets it; then it is run with more elements,
 modes, harmonics, samples, points and wear steps. A row is kept as soon as its scene is done.

@@ -1,4 +1,4 @@
-"""What speed costs in accuracy, knob by knob: each setting of a knob on one scene, against a finer reference."""
+"""What wear steps cost and how far they are off: both rules, against finer steps."""
 
 from __future__ import annotations
 

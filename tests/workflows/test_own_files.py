@@ -1,4 +1,4 @@
-"""Files of one's own beside a scene: part, contact and wear law, continuation, scene, knob; nothing else touched."""
+"""Files of one's own beside a scene: part, contact and wear law, continuation, scene, study; nothing else touched."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tribodyn.hbm.contact import law as contact_law
 from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear import law as wear_law
-from tribodyn.workflows.errors import knobs
+from tribodyn.workflows.errors import ladders
 from tribodyn.workflows.run import planning
 from tribodyn.workflows.scene import scene_file
 
@@ -109,7 +109,7 @@ def follow(problem, start, stop, options, on_point=None):
 """
 
 STUDY = """
-[knobs.my_grid]
+[parameters.my_grid]
 sizes = [3, 5]
 set = [["geometry.n_patch=3"], ["geometry.n_patch=5"]]
 """
@@ -154,7 +154,7 @@ def test_a_scene_runs_with_all_its_own_files(scene: Path) -> None:
     low, high = scene_file.read(str(scene)).scene.response.frequency
     spacing = np.median(np.diff(result.response.omega)) / (2 * np.pi)
     assert spacing == pytest.approx((high - low) / round((high - low) / 120.0))
-    assert [knob.name for knob in knobs.study_of(scene_file.read(str(scene))).knobs] == ["my_grid"]
+    assert [parameter.name for parameter in ladders.study_of(scene_file.read(str(scene))).parameters] == ["my_grid"]
 
 
 @pytest.mark.parametrize(

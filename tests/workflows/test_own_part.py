@@ -57,8 +57,8 @@ def test_a_study_beside_the_scene_is_found(folder: Path, capsys: pytest.CaptureF
     ("study", "sentence"),
     [
         ("", "has no study of its grids"),
-        ("[knob.x]", "a study has no knob, but knobs"),
-        ("knobs = 3", "is no study"),
+        ("[knobs.x]", "a study has no knobs, but parameters"),
+        ("parameters = 3", "is no study"),
         ("[converge.x]\nsizes = [1, 2]", "needs sizes"),
         ("[converge", "arm.study.toml"),
     ],

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.errors import choice, converge, knob_trade, knobs, trade_table
+from tribodyn.workflows.errors import choice, converge, ladders, trade, trade_table
 from tribodyn.workflows.errors.limit import limit_of
 from tribodyn.workflows.errors.trade_table import Trade, TradeRow
 from tribodyn.workflows.scene import scene_file
@@ -31,19 +31,20 @@ def dear_by_size(trade: Trade) -> Trade:
     """The trade as of a clock by which each finer setting takes half as long again: so machines choose alike."""
 
     def rank(row: TradeRow) -> int:
-        return sum(other.size < row.size or np.isnan(row.size) for other in trade.of(row.knob) if other is not row)
+        others = [other for other in trade.of(row.parameter) if other is not row]
+        return sum(other.size < row.size or np.isnan(row.size) for other in others)
 
     return replace(trade, base_seconds=1.0, rows=tuple(replace(row, share=1.5 ** rank(row)) for row in trade.rows))
 
 
 @pytest.fixture(scope="module")
 def table() -> Trade:
-    return dear_by_size(knob_trade.run("beam", TRADED, NO_WEAR, lambda text: None))
+    return dear_by_size(trade.run("beam", TRADED, NO_WEAR, lambda text: None))
 
 
-def knobs_of(scene: str) -> tuple[knobs.Knob, ...]:
+def parameters_of(scene: str) -> tuple[ladders.Parameter, ...]:
     file = scene_file.read(scene)
-    return knobs.knobs_of(file, knobs.study_of(file))
+    return ladders.parameters_of(file, ladders.study_of(file))
 
 
 def set_of(overrides: tuple[str, ...]) -> list[str]:
@@ -51,9 +52,9 @@ def set_of(overrides: tuple[str, ...]) -> list[str]:
 
 
 def test_each_knob_is_held_against_where_it_tends_to(table: Trade) -> None:
-    assert table.knobs == TRADED
-    for knob in TRADED:
-        rows = table.of(knob)
+    assert table.parameters == TRADED
+    for parameter in TRADED:
+        rows = table.of(parameter)
         assert all(row.outcome == "converged" and row.seconds > 0 and row.memory > 1e7 for row in rows)
         errors = [choice.error_of(rows, place, "peak_m") for place in range(len(rows))]
         assert errors[-1] <= errors[0]
@@ -86,7 +87,7 @@ def test_the_table_survives_its_file(table: Trade, tmp_path: Path) -> None:
     path = tmp_path / "trade.json"
     trade_table.save(table, path)
     again = trade_table.load(path)
-    assert knob_trade.as_records(again) == knob_trade.as_records(table)
+    assert trade.as_records(again) == trade.as_records(table)
     assert json.loads(path.read_text())["key"] == table.key
     path.write_text("[]")
     with pytest.raises(ValueError, match="no trade table of this version"):
@@ -108,26 +109,26 @@ ASKED["rig"] = ("interface_rank", "1 %")
 
 
 def test_a_knob_that_the_scene_has_not_is_refused() -> None:
-    with pytest.raises(ValueError, match="the scene has the knobs fe_mesh, contact_grid, nodes, modes"):
-        knob_trade.run("beam", ("wheels",), NO_WEAR, lambda text: None)
-    known = {scene: knobs_of(scene) for scene in ("beam", "blade", "leaf_seal", "rig")}
-    has = {scene: {knob.name for knob in found} for scene, found in known.items()}
+    with pytest.raises(ValueError, match="the scene has the parameters fe_mesh, contact_grid, nodes, modes"):
+        trade.run("beam", ("wheels",), NO_WEAR, lambda text: None)
+    known = {scene: parameters_of(scene) for scene in ("beam", "blade", "leaf_seal", "rig")}
+    has = {scene: {parameter.name for parameter in found} for scene, found in known.items()}
     assert {"wear", "friction", "interface_rank"} <= has["beam"]
     assert not {"wear", "friction", "nodes"} & has["leaf_seal"]
     assert all({"fe_mesh", "contact_grid", "harmonics", "samples", "points"} <= found for found in has.values())
     assert all({"wear", "wear_thesis", "friction"} <= has[scene] for scene in ("beam", "blade", "rig"))
     assert "interface_rank" not in has["blade"]
-    friction = {scene: knob for scene, found in known.items() for knob in found if knob.name == "friction"}
-    assert {scene: knob.wears(knob.settings[0]) for scene, knob in friction.items()} == {
+    friction = {scene: one for scene, found in known.items() for one in found if one.name == "friction"}
+    assert {scene: one.wears(one.settings[0]) for scene, one in friction.items()} == {
         "beam": True, "blade": True, "rig": False,
     }  # fmt: skip
 
 
 def test_every_setting_of_every_knob_is_a_scene() -> None:
     for scene in scene_file.names():
-        study = knobs.study_of(scene_file.read(scene))
-        for knob in knobs.knobs_of(scene_file.read(scene, study.base), study):
-            for setting in knob.settings:
+        study = ladders.study_of(scene_file.read(scene))
+        for parameter in ladders.parameters_of(scene_file.read(scene, study.base), study):
+            for setting in parameter.settings:
                 assert scene_file.read(scene, (*study.base, *setting.overrides)).name == scene
         for ladder in study.ladders:
             for setting in ladder.settings:
@@ -135,12 +136,12 @@ def test_every_setting_of_every_knob_is_a_scene() -> None:
                     scene_file.read(scene, (*ladder.base, *setting.overrides, *placement))
 
 
-def made_up(knob: str, cost: float, error: float) -> TradeRow:
+def made_up(parameter: str, cost: float, error: float) -> TradeRow:
     values: dict[str, float | None] = {**dict.fromkeys(trade_table.QUANTITIES), "peak_m": 1 + error}
     errors: dict[str, float | None] = {**dict.fromkeys(trade_table.QUANTITIES), "peak_m": error}
-    label = f"{knob}={cost:g}"
+    label = f"{parameter}={cost:g}"
     doubts = {name: None if e is None else 0.0 for name, e in errors.items()}
-    return TradeRow(knob, label, cost, (label,), values, errors, doubts, cost, cost / 4, 0.0, "converged", True)
+    return TradeRow(parameter, label, cost, (label,), values, errors, doubts, cost, cost / 4, 0.0, "converged", True)
 
 
 def test_the_cheapest_combination_is_found() -> None:

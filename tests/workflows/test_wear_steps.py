@@ -62,6 +62,6 @@ def test_roughness_of_a_plane_is_nothing_and_of_a_spike_is_its_share() -> None:
 
 def test_a_scene_without_wear_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as left:
-        cli.main(["trade", "beam", "--knob", "wear_step", "--set", "wear="])
+        cli.main(["wear-steps", "beam", "--set", "wear="])
     assert left.value.code == 2
     assert capsys.readouterr().err.count("\n") == 1

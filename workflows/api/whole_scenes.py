@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from tribodyn.fem.material import Material
 from tribodyn.workflows.errors import converge as grids
-from tribodyn.workflows.errors import knob_trade
+from tribodyn.workflows.errors import trade as settings
 from tribodyn.workflows.errors.converge import Study as GridStudy
 from tribodyn.workflows.errors.trade_table import Trade
 from tribodyn.workflows.result.result import Result
@@ -130,7 +130,7 @@ def folds(source: Source, within: float = 0.02, *, overrides: Overrides = (), pr
 
 def trade(
     scene: Place,
-    knobs: Sequence[str] = (),
+    parameters: Sequence[str] = (),
     *,
     most: int = 99,
     overrides: Overrides = (),
@@ -138,13 +138,13 @@ def trade(
     keep: Callable[[Trade], None] = lambda trade: None,
     earlier: Trade | None = None,
 ) -> Trade:
-    """What each knob of a scene costs and what it is worth, against where it tends to on the same scene.
+    """What each parameter of a scene costs and what it is worth, against where it tends to on the same scene.
 
-    knobs : all that the scene has by default; most : settings of each knob, the finest ones
-    keep : called with what is there after each knob; earlier : table whose other knobs are taken over
+    parameters : all that the scene has by default; most : settings of each parameter, the finest ones
+    keep : called with what is there after each parameter; earlier : table whose other parameters are taken over
     """
     texts = override_texts(overrides)
-    return knob_trade.run(fspath(scene), knobs, texts, reporter(progress).say, most, keep, earlier)
+    return settings.run(fspath(scene), parameters, texts, reporter(progress).say, most, keep, earlier)
 
 
 def converge(

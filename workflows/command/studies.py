@@ -40,7 +40,7 @@ def trade(
     if most < 1:
         raise ValueError(f"--most {most}: a setting needs one value at least")
     from tribodyn.workflows.api import whole_scenes
-    from tribodyn.workflows.errors import choice, knob_trade, trade_picture, trade_table
+    from tribodyn.workflows.errors import choice, trade, trade_picture, trade_table
 
     make_room(out, (".json",))
     path = out or Path("results") / Path(scene).stem / "trade.json"
@@ -54,9 +54,9 @@ def trade(
     )
     trade_picture.picture(found).savefig(path.with_suffix(".png"))
     if as_json:
-        print(json.dumps(knob_trade.as_records(found), indent=2))
+        print(json.dumps(trade.as_records(found), indent=2))
     else:
-        print(knob_trade.as_text(found))
+        print(trade.as_text(found))
         print(*choice.advice(found), path, path.with_suffix(".png"), sep="\n")
 
 

@@ -22,7 +22,7 @@ from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from tribodyn.workflows.errors import limit
 from tribodyn.workflows.errors.cost import Measured, measure
-from tribodyn.workflows.errors.knobs import Ladder, Setting, study_of, study_path
+from tribodyn.workflows.errors.ladders import Ladder, Setting, study_of, study_path
 from tribodyn.workflows.errors.limit import Limit
 from tribodyn.workflows.errors.trade_table import ANSWERED, NAMES, QUANTITIES
 from tribodyn.workflows.pictures.style import BLUE, GREEN, GREY, ORANGE, STYLE

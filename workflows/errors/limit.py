@@ -1,4 +1,4 @@
-"""Where the answers of a knob tend to as it gets finer, and how much of that is doubtful."""
+"""Where the answers of a parameter tend to as it gets finer, and how much of that is doubtful."""
 
 from __future__ import annotations
 

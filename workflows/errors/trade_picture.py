@@ -1,4 +1,4 @@
-"""The trade as a picture: what each setting of each knob costs against what it is worth."""
+"""The trade as a picture: what each setting of each parameter costs against what it is worth."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MARKERS = "osD^v<>PX*hp"
 def picture(trade: Trade) -> Figure:
     """Error in amplitude, energy and life, as far as there are any, against seconds; the Pareto front as a line.
 
-    The front is of settings of all knobs together, as they are chosen for smaller and smaller errors.
+    The front is of settings of all parameters together, as they are chosen for smaller and smaller errors.
     """
     shown = [q for q in SHOWN if any(row.errors[q] is not None for row in trade.rows)]
     with mpl.rc_context(STYLE):
@@ -27,14 +27,18 @@ def picture(trade: Trade) -> Figure:
         panes = figure.subplots(1, len(shown), squeeze=False)[0]
         colours = mpl.colormaps["tab20"].colors  # type: ignore[attr-defined]
         for pane, quantity in zip(panes, shown, strict=True):
-            for i, knob in enumerate(trade.knobs):
-                rows = [row for row in trade.of(knob) if row.values[quantity] is not None and np.isfinite(row.size)]
+            for i, parameter in enumerate(trade.parameters):
+                rows = [
+                    row for row in trade.of(parameter) if row.values[quantity] is not None and np.isfinite(row.size)
+                ]
                 if not rows:
                     continue
                 off = [abs(row.errors[quantity] or 0.0) + (row.doubts[quantity] or 0.0) for row in rows]
                 error = np.maximum(off, FLOOR)
                 style = {"color": colours[i % 20], "marker": MARKERS[i % len(MARKERS)], "linestyle": "none"}
-                pane.plot([row.seconds for row in rows], error, label=knob.replace("_", " "), markersize=5, **style)
+                pane.plot(
+                    [row.seconds for row in rows], error, label=parameter.replace("_", " "), markersize=5, **style
+                )
             together = front(trade, quantity)
             at = [[getattr(choice, name) for choice in together] for name in ("seconds", "error")]
             pane.plot(*at, color=INK, linewidth=0.8, marker=".", zorder=0, label="all together, as chosen")

@@ -1,4 +1,4 @@
-"""The knobs of a scene that trade speed for accuracy: each a list of overrides from coarse to a finer reference."""
+"""The parameters of a scene that trade speed for accuracy: each a list of overrides from coarse to fine."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ CUTOFFS = (0.25, 0.5, 1, 2)  # over that of the scene
 RANKS = (3, 6, 12, 24)
 WEAR_STEPS = (0.1, 0.05)  # of delta_max
 WEAR_TOLERANCES = (0.3, 0.1, 0.03, 0.01, 0.003)
-TEXTS = ("base", "unworn", "check", "check_worn")  # keys of a study that are lists of texts
+TEXTS = ("base", "unworn")  # keys of a study that are lists of texts
 EXACT = float("nan")  # size of a setting that leaves no error
 
 
 @dataclass(frozen=True)
 class Setting:
-    """One position of a knob: overrides of the scene, and how fine it is: its error falls with a power of size.
+    """One position of a parameter: overrides of the scene, and how fine it is: its error falls with a power of size.
 
     refined : whether the peak is refined, or is the highest point of the curve, as a run states it
     """
@@ -49,8 +49,8 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Knob:
-    """A knob of a scene.
+class Parameter:
+    """A parameter of a scene.
 
     settings : from coarse to the finest, which is the last
     tunable : whether finer is closer to the truth, so that a wanted accuracy may choose it; else it is another model
@@ -87,19 +87,16 @@ class Ladder:
 class Study:
     """How a scene is studied.
 
-    base : overrides that make its trade affordable; knobs : that only its geometry has, or with settings of its own
+    base : overrides that make its trade affordable
+    parameters : that only its geometry has, or with settings of its own
     ladders : grids and meshes of its convergence study
-    unworn : knobs whose depth and life are not measured, because that takes too long
-    check, check_worn : overrides that a promised accuracy is checked against, beside the finest setting of every knob;
-        of its response, and of its depth and life
+    unworn : parameters whose depth and life are not measured, because that takes too long
     """
 
     base: tuple[str, ...] = ()
-    knobs: tuple[Knob, ...] = ()
+    parameters: tuple[Parameter, ...] = ()
     ladders: tuple[Ladder, ...] = ()
     unworn: tuple[str, ...] = ()
-    check: tuple[str, ...] = ()
-    check_worn: tuple[str, ...] = ()
 
 
 def study_path(file: SceneFile) -> Path:
@@ -121,12 +118,12 @@ def study_of(file: SceneFile) -> Study:
 
 
 def _study(table: dict[str, Any]) -> Study:
-    unknown = set(table) - {"knobs", "converge", *TEXTS}
+    unknown = set(table) - {"parameters", "converge", *TEXTS}
     if unknown:
-        raise ValueError(f"a study has no {', '.join(sorted(unknown))}, but knobs, converge, {', '.join(TEXTS)}")
-    knobs = tuple(
-        Knob(knob, _settings(given), worn_up_to=float(given.get("worn_up_to", math.inf)))
-        for knob, given in table.get("knobs", {}).items()
+        raise ValueError(f"a study has no {', '.join(sorted(unknown))}, but parameters, converge, {', '.join(TEXTS)}")
+    parameters = tuple(
+        Parameter(parameter, _settings(given), worn_up_to=float(given.get("worn_up_to", math.inf)))
+        for parameter, given in table.get("parameters", {}).items()
     )
     ladders = tuple(
         Ladder(
@@ -140,26 +137,28 @@ def _study(table: dict[str, Any]) -> Study:
         for ladder, given in table.get("converge", {}).items()
     )
     said = {name: tuple(table.get(name, ())) for name in TEXTS}
-    return Study(knobs=knobs, ladders=ladders, **said)
+    return Study(parameters=parameters, ladders=ladders, **said)
 
 
 def _settings(table: dict[str, Any]) -> tuple[Setting, ...]:
     sizes, texts = table.get("sizes", ()), table.get("set", ())
     if not sizes or len(sizes) != len(texts) or not all(isinstance(one, list) for one in texts):
-        raise ValueError('every knob and ladder needs sizes = [1, 2] and as many set = [["section.key=value"], []]')
+        raise ValueError(
+            'every parameter and ladder needs sizes = [1, 2] and as many set = [["section.key=value"], []]'
+        )
     return tuple(Setting(float(size), tuple(one)) for size, one in zip(sizes, texts, strict=True))
 
 
-def knobs_of(file: SceneFile, study: Study) -> tuple[Knob, ...]:
-    """The knobs that a scene has: those of its study, then those that any scene may have and the study has not."""
-    own = {knob.name: knob.settings for knob in study.knobs}
-    found = (*study.knobs, *(knob for knob in _of_any(file, own) if knob.name not in own))
-    return tuple(replace(knob, worn_up_to=0.0) if knob.name in study.unworn else knob for knob in found)
+def parameters_of(file: SceneFile, study: Study) -> tuple[Parameter, ...]:
+    """The parameters that a scene has: those of its study, then those that any scene may have and the study has not."""
+    own = {parameter.name: parameter.settings for parameter in study.parameters}
+    found = (*study.parameters, *(one for one in _of_any(file, own) if one.name not in own))
+    return tuple(replace(one, worn_up_to=0.0) if one.name in study.unworn else one for one in found)
 
 
-def _of_any(file: SceneFile, own: dict[str, tuple[Setting, ...]]) -> list[Knob]:
+def _of_any(file: SceneFile, own: dict[str, tuple[Setting, ...]]) -> list[Parameter]:
     scene = file.scene
-    found: list[Knob] = []
+    found: list[Parameter] = []
     if isinstance(scene, PartScene):
         found += _of_a_part(scene)
     found += [*_of_harmonics(scene)]
@@ -172,58 +171,59 @@ def _of_any(file: SceneFile, own: dict[str, tuple[Setting, ...]]) -> list[Knob]:
         finer = [(1 / a, tuple(f"response.options.{key}={a:g}" for key in ("step", "max_step", "angle"))) for a in ARCS]
     if finer:  # wear finds its own peak
         settings = tuple(Setting(size, texts, refined=False) for size, texts in finer)
-        found.append(Knob("points", (*settings, Setting(EXACT, ())), worn_up_to=0))
+        found.append(Parameter("points", (*settings, Setting(EXACT, ())), worn_up_to=0))
     if scene.wear is not None and scene.wear.max_steps > 0:
         rule = 'wear.rule="error_controlled"'
         controlled = tuple(Setting(1 / t, (rule, f"wear.tolerance={t:g}")) for t in WEAR_TOLERANCES)
         thesis = tuple(Setting(1 / s, ('wear.rule="thesis"', f"wear.step={s:g}")) for s in WEAR_STEPS)
-        found.append(Knob("wear", controlled))
+        found.append(Parameter("wear", controlled))
         finest = Setting(EXACT, own.get("wear", controlled)[-1].overrides)
-        found.append(Knob("wear_thesis", (*thesis, finest), tunable=False))
+        found.append(Parameter("wear_thesis", (*thesis, finest), tunable=False))
     return found
 
 
-def chosen(known: Sequence[Knob], names: Sequence[str]) -> tuple[Knob, ...]:
-    """Knobs by name, all where none is named; raises ValueError for one that the scene does not have."""
-    missing = [name for name in names if name not in {knob.name for knob in known}]
+def chosen(known: Sequence[Parameter], names: Sequence[str]) -> tuple[Parameter, ...]:
+    """Parameters by name, all where none is named; raises ValueError for one that the scene does not have."""
+    missing = [name for name in names if name not in {parameter.name for parameter in known}]
     if missing:
-        raise ValueError(f"--knob {missing[0]}: the scene has the knobs {', '.join(knob.name for knob in known)}")
-    return tuple(knob for knob in known if not names or knob.name in names)
+        names_known = ", ".join(parameter.name for parameter in known)
+        raise ValueError(f"--setting {missing[0]}: the scene has the parameters {names_known}")
+    return tuple(parameter for parameter in known if not names or parameter.name in names)
 
 
-def _of_a_part(scene: PartScene) -> list[Knob]:
+def _of_a_part(scene: PartScene) -> list[Parameter]:
     found = []
     if scene.contact.plane is None and not scene.surfaces:
         corners = Setting(1.0, ("contact.vertices_only=true",))
-        found.append(Knob("nodes", (corners, Setting(EXACT, ("contact.vertices_only=false",))), tunable=False))
+        found.append(Parameter("nodes", (corners, Setting(EXACT, ("contact.vertices_only=false",))), tunable=False))
     modes = scene.reduction.modes
     if modes:
         counts = sorted({0, modes // 3, modes, 3 * modes})
-        found.append(Knob("modes", tuple(Setting(n, (f"reduction.modes={n}",)) for n in counts)))
+        found.append(Parameter("modes", tuple(Setting(n, (f"reduction.modes={n}",)) for n in counts)))
     if scene.reduction.cutoff:
         cutoffs = [factor * scene.reduction.cutoff for factor in CUTOFFS]
-        found.append(Knob("modes", tuple(Setting(c, (f"reduction.cutoff={c:g}",)) for c in cutoffs)))
+        found.append(Parameter("modes", tuple(Setting(c, (f"reduction.cutoff={c:g}",)) for c in cutoffs)))
     if scene.wheel is not None:
         return found
     ranks = tuple(Setting(n, (f"reduction.interface_modes={n}",)) for n in RANKS)
-    found.append(Knob("interface_rank", (*ranks, Setting(EXACT, ("reduction.interface_modes=",)))))
+    found.append(Parameter("interface_rank", (*ranks, Setting(EXACT, ("reduction.interface_modes=",)))))
     return found
 
 
-def _of_harmonics(scene: Scene) -> list[Knob]:
+def _of_harmonics(scene: Scene) -> list[Parameter]:
     needed = {load.harmonic for load in scene.loads.harmonic.values()} | set(scene.harmonics.kept[:1]) & {0}
     tops = [top for top in TOPS if top >= max(needed)]
     first = 0 if 0 in needed or scene.harmonics.automatic else 1
     more = ("harmonics.samples=128",) if scene.harmonics.samples < 128 else ()
     kept = tuple(Setting(top, (f"harmonics.kept={list(range(first, top + 1))}", *more)) for top in tops)
-    found = [Knob("harmonics", kept, worn_up_to=WORN_TOP)] if len(kept) > 1 else []
+    found = [Parameter("harmonics", kept, worn_up_to=WORN_TOP)] if len(kept) > 1 else []
     if all(hasattr(law.load(contact.law_name), "located") for contact in scene.joints.values()):
         top = max(scene.harmonics.kept, default=1)
         sampled = tuple(
             Setting(n, (f"harmonics.samples={n}", 'harmonics.transitions="sampled"')) for n in SAMPLES if n > 2 * top
         )
         located = ("harmonics.samples=128", 'harmonics.transitions="located"')
-        found.append(Knob("samples", (*sampled, Setting(EXACT, located))))
+        found.append(Parameter("samples", (*sampled, Setting(EXACT, located))))
     one = scene.joints.get("contact")
     if one is not None and one.components == ("t1", "t2", "n") and one.law == "jenkins":
         common = ["harmonics.samples=256", 'harmonics.transitions="sampled"']
@@ -231,9 +231,9 @@ def _of_harmonics(scene: Scene) -> list[Knob]:
             common += ['wear.rule="thesis"', f"wear.step={WEAR_STEPS[0]:g}"]
         names = ("jenkins", "coulomb_planar")  # directions that know nothing of each other, or one planar slider
         laws = tuple(Setting(EXACT, (f'contact.law="{name}"', *common)) for name in names)
-        found.append(Knob("friction", laws, tunable=False))
+        found.append(Parameter("friction", laws, tunable=False))
     return found
 
 
-def _numbers(name: str, key: str, values: tuple[float, ...]) -> Knob:
-    return Knob(name, tuple(Setting(1 / value, (f"{key}={value:g}",)) for value in values))
+def _numbers(name: str, key: str, values: tuple[float, ...]) -> Parameter:
+    return Parameter(name, tuple(Setting(1 / value, (f"{key}={value:g}",)) for value in values))

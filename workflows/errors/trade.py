@@ -1,4 +1,4 @@
-"""The trade of a scene: every setting of every knob against where that knob tends to, with what it costs."""
+"""The trade of a scene: every setting of every parameter against where that parameter tends to, with what it costs."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from tribodyn.workflows.errors.cost import Measured, measure
-from tribodyn.workflows.errors.knobs import Knob, Setting, chosen, knobs_of, study_of
+from tribodyn.workflows.errors.ladders import Parameter, Setting, chosen, parameters_of, study_of
 from tribodyn.workflows.errors.limit import limit_of
 from tribodyn.workflows.errors.trade_table import (
     ANSWERED,
@@ -32,29 +32,29 @@ def run(
     keep: Callable[[Trade], None] = lambda trade: None,
     earlier: Trade | None = None,
 ) -> Trade:
-    """Measure knobs of a scene, all that it has where none is named.
+    """Measure parameters of a scene, all that it has where none is named.
 
-    overrides : of the scene, on top of its study's base; most : settings of each knob, the finest ones
-    keep : called after each knob with what is there
-    earlier : table of the same scene, whose other knobs are taken over
-    Raises  ValueError for a knob that the scene does not have
+    overrides : of the scene, on top of its study's base; most : settings of each parameter, the finest ones
+    keep : called after each parameter with what is there
+    earlier : table of the same scene, whose other parameters are taken over
+    Raises  ValueError for a parameter that the scene does not have
     """
     plain = scene_file.read(scene, overrides)
     study = study_of(plain)
     base = (*study.base, *overrides)
     file = scene_file.read(scene, base)
-    knobs = chosen(knobs_of(file, study), names)
+    parameters = chosen(parameters_of(file, study), names)
     measure(file, wears=False)  # compiles what the others only use
     meter = Meter()
     response, once = meter.of(file, wears=False), meter.of(file)
     say(f"{BASE}: {once.seconds:.1f} s, {once.outcome}")
     found = Trade.begun(plain, base, once.seconds)
-    if earlier is not None and not earlier.changed(plain) and earlier.base == found.base:
-        measured = {knob.name for knob in knobs}
-        found = replace(found, rows=tuple(row for row in earlier.rows if row.knob not in measured))
-    for knob in knobs:
+    if earlier is not None and (earlier.key, earlier.base) == (found.key, found.base):
+        measured = {parameter.name for parameter in parameters}
+        found = replace(found, rows=tuple(row for row in earlier.rows if row.parameter not in measured))
+    for parameter in parameters:
         rows = []
-        for row in _rows_of(scene, knob, knob.settings[-most:], base, meter, say):
+        for row in _rows_of(scene, parameter, parameter.settings[-most:], base, meter, say):
             worn = row.values["life_cycles"] is not None or once.values["life_cycles"] is None
             less = 0.0 if worn else once.seconds - response.seconds
             rows.append(replace(row, share=(row.seconds + less) / once.seconds))
@@ -64,7 +64,7 @@ def run(
 
 
 class Meter:
-    """Measures every scene once, however many knobs have it among their settings."""
+    """Measures every scene once, however many parameters have it among their settings."""
 
     def __init__(self) -> None:
         self._known: dict[str, Measured] = {}
@@ -80,7 +80,7 @@ class Meter:
 
 def _rows_of(
     scene: str,
-    knob: Knob,
+    parameter: Parameter,
     settings: Sequence[Setting],
     base: tuple[str, ...],
     meter: Meter,
@@ -90,19 +90,19 @@ def _rows_of(
     for setting in settings:
         file = scene_file.read(scene, (*base, *setting.overrides))
         try:
-            measured = meter.of(file, knob.wears(setting), setting.refined)
+            measured = meter.of(file, parameter.wears(setting), setting.refined)
         except ValueError as refusal:  # such as more interface modes than there are contact DOFs
-            say(f"{knob.name}: {setting.label}: left out: {refusal}")
+            say(f"{parameter.name}: {setting.label}: left out: {refusal}")
             continue
-        say(f"{knob.name}: {setting.label}: {measured.seconds:.1f} s, {measured.outcome}")
-        found.append(_row(knob, setting, measured))
+        say(f"{parameter.name}: {setting.label}: {measured.seconds:.1f} s, {measured.outcome}")
+        found.append(_row(parameter, setting, measured))
     return judged(found)
 
 
-def _row(knob: Knob, setting: Setting, measured: Measured) -> TradeRow:
+def _row(parameter: Parameter, setting: Setting, measured: Measured) -> TradeRow:
     unknown: dict[str, float | None] = dict.fromkeys(QUANTITIES)
     return TradeRow(
-        knob=knob.name,
+        parameter=parameter.name,
         setting=setting.label,
         size=setting.size,
         overrides=setting.overrides,
@@ -113,12 +113,12 @@ def _row(knob: Knob, setting: Setting, measured: Measured) -> TradeRow:
         share=1.0,
         memory=measured.memory,
         outcome=measured.outcome,
-        tunable=knob.tunable and bool(setting.overrides),
+        tunable=parameter.tunable and bool(setting.overrides),
     )
 
 
 def judged(rows: Sequence[TradeRow]) -> list[TradeRow]:
-    """The rows of a knob with their errors, and with what is doubtful about the limit that these are relative to."""
+    """The rows of a parameter with their errors, and with what is doubtful about their limit."""
     known = {name: known_of(rows, name) for name in QUANTITIES}
     limits = {name: limit_of(*zip(*points, strict=True)) for name, points in known.items() if points}
 
@@ -136,25 +136,25 @@ def judged(rows: Sequence[TradeRow]) -> list[TradeRow]:
 
 
 def as_records(trade: Trade) -> list[dict[str, Any]]:
-    """The rows for JSON, with the observed orders of their knob."""
-    orders = {knob: {name: trade.order(knob, name) for name in QUANTITIES} for knob in trade.knobs}
-    return [{**plain(asdict(row)), "scene": trade.scene, "order": orders[row.knob]} for row in trade.rows]
+    """The rows for JSON, with the observed orders of their parameter."""
+    orders = {parameter: {name: trade.order(parameter, name) for name in QUANTITIES} for parameter in trade.parameters}
+    return [{**plain(asdict(row)), "scene": trade.scene, "order": orders[row.parameter]} for row in trade.rows]
 
 
 def as_text(trade: Trade) -> str:
-    """The table for people: errors in per cent of the limit of each knob; ~ with what is doubtful about that limit."""
-    lines = [f"{'knob':15} {'setting':46} {'seconds':>7} {'MB':>6} " + " ".join(f"{name:>16}" for name in NAMES)]
-    for knob in trade.knobs:
-        for row in trade.of(knob):
+    """The table for people: errors in per cent of the limit of each parameter; behind ~ the doubt in it."""
+    lines = [f"{'parameter':15} {'setting':46} {'seconds':>7} {'MB':>6} " + " ".join(f"{name:>16}" for name in NAMES)]
+    for parameter in trade.parameters:
+        for row in trade.of(parameter):
             cells = [_cell(row, name) for name in QUANTITIES]
-            head = f"{knob:15} {row.setting[:46]:46} {row.seconds:7.2f} {row.memory / 1e6:6.0f} "
+            head = f"{parameter:15} {row.setting[:46]:46} {row.seconds:7.2f} {row.memory / 1e6:6.0f} "
             lines.append(head + " ".join(f"{cell:>16}" for cell in cells) + _failure(row))
-        orders = [trade.order(knob, name) for name in QUANTITIES]
+        orders = [trade.order(parameter, name) for name in QUANTITIES]
         if any(order is not None for order in orders):
             cells = ["" if order is None else f"order {order:.1f}" for order in orders]
-            lines.append(f"{knob:15} {'':46} {'':7} {'':6} " + " ".join(f"{cell:>16}" for cell in cells))
-    lines.append(f"every knob alone on {trade.scene} with {'; '.join(trade.base) or 'nothing changed'}")
-    lines.append("errors from where the knob tends to, behind ~ the doubt in that")
+            lines.append(f"{parameter:15} {'':46} {'':7} {'':6} " + " ".join(f"{cell:>16}" for cell in cells))
+    lines.append(f"every parameter alone on {trade.scene} with {'; '.join(trade.base) or 'nothing changed'}")
+    lines.append("errors from where the parameter tends to, behind ~ the doubt in that")
     return "\n".join(lines)
 
 
