@@ -51,7 +51,7 @@ def set_of(overrides: tuple[str, ...]) -> list[str]:
     return [word for text in overrides for word in ("--set", text)]
 
 
-def test_each_knob_is_held_against_where_it_tends_to(table: Trade) -> None:
+def test_each_parameter_is_held_against_where_it_tends_to(table: Trade) -> None:
     assert table.parameters == TRADED
     for parameter in TRADED:
         rows = table.of(parameter)
@@ -108,7 +108,7 @@ ASKED = {"beam": ("wear", "30 % of life, depth"), "blade": ("samples", "1 %"), "
 ASKED["rig"] = ("interface_rank", "1 %")
 
 
-def test_a_knob_that_the_scene_has_not_is_refused() -> None:
+def test_a_parameter_that_the_scene_has_not_is_refused() -> None:
     with pytest.raises(ValueError, match="the scene has the parameters fe_mesh, contact_grid, nodes, modes"):
         trade.run("beam", ("wheels",), NO_WEAR, lambda text: None)
     known = {scene: parameters_of(scene) for scene in ("beam", "blade", "leaf_seal", "rig")}
@@ -124,7 +124,7 @@ def test_a_knob_that_the_scene_has_not_is_refused() -> None:
     }  # fmt: skip
 
 
-def test_every_setting_of_every_knob_is_a_scene() -> None:
+def test_every_setting_of_every_parameter_is_a_scene() -> None:
     for scene in scene_file.names():
         study = ladders.study_of(scene_file.read(scene))
         for parameter in ladders.parameters_of(scene_file.read(scene, study.base), study):

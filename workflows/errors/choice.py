@@ -14,8 +14,9 @@ OF_WEAR = ("depth_m", "life_cycles")
 
 @dataclass(frozen=True)
 class Rules:
-    """wanted : errors of the Pareto front; worth : of the time that a coarser setting must save, since no clock is better.
+    """How settings are chosen.
 
+    wanted : errors of the Pareto front; worth : of the time that a coarser setting must save, since no clock is better
     margin : of the wanted error that all parameters together may use up: they were measured one by one
     """
 
