@@ -103,7 +103,7 @@ def test_what_is_not_used_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        (("*Density\n 7.85e-09,\n", ""), "has no density: say .materials.Steel. in the scene"),
+        (("*Density\n 7.85e-09,\n", ""), "has no density: give .materials.Steel. in the scene"),
         (("*Solid Section, elset=All, material=Steel\n,\n", ""), 'with decks.lap.material = "name"'),
         (("ref node=RP", "ref node=Block-1.9"), "its reference node belongs to the mesh"),
         (("Lower, Upper", "Tips, Upper"), "is a set of nodes that make no face|is no node and no set|has not"),
