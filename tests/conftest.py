@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-ROOMS = ("geometry", "fem", "reduction", "hbm", "workflows", "properties", "cases", "documentation")
+ROOMS = ("geometry", "fem", "reduction", "hbm", "workflows", "properties", "proof", "cases", "documentation")
 PROCESSES = ("subprocess", "multiprocessing")  # a test module that imports one of them starts processes
 LONG = (  # more than 20 s of processor each, the longest first
     "test_pages", "test_report", "test_rig", "test_scene_leaf_seal", "test_scene_brb", "test_scene_blade",

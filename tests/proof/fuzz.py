@@ -23,7 +23,7 @@ from tests.proof.fuzz_runs import ACCEPTED, REFUSED, Case, Command, Runs, Tried
 from tests.proof.time_limit import TimeUp, processor_seconds
 from tribodyn.workflows.scene import scene_file
 
-NASTY = (
+INPUTS = (
     "-1", "0", "1", "1e-300", "1e300", "-1e300", "nan", "inf", "-inf", "3.5", "1000000", "true", '""', '"abc"', "[]",
     "[1]", "[[1]]", "{}", '"1 parsec"', '"-1 mm"', '"1e300 kN"', '"1e-300 s"', '"0 Hz"', '"nan Hz"', '"inf N"',
     '"250 %"', '"1e12 N/um"', '"../x"', "[1, 2, 3, 4, 5, 6, 7]", '["a", "b"]',
@@ -51,7 +51,7 @@ def _names(table: dict[str, Any], above: str) -> Iterator[str]:
 
 def cases(scene: str, overrides: Sequence[str], count: int | None = None, seed: int = 0) -> list[Case]:
     """Pairs of a key and a value, all of them or some drawn at random."""
-    every = [(key, value) for key in keys(scene, overrides) for value in NASTY]
+    every = [(key, value) for key in keys(scene, overrides) for value in INPUTS]
     if count is None or count >= len(every):
         return every
     chosen = np.random.default_rng(seed).choice(len(every), count, replace=False)
@@ -71,7 +71,7 @@ def fuzz(
     *,
     command: Command,
 ) -> list[Tried]:
-    """Try nasty values of the keys of a scene, one at a time: all are read, and the scenes that come out of it are run.
+    """Try fuzz inputs for the keys of a scene, one at a time: all are read, and the scenes that come out of it are run.
 
     overrides : that make the scene small, so that a run takes a second; values : how many pairs of key and value, all
     by default; runs : how many of the scenes that are accepted, all by default; both are drawn with `seed`
@@ -97,7 +97,7 @@ def fuzz(
     for who, *others in scenes:
         first = rows.run.get(who, Tried(scene, *who, ACCEPTED, "", 0.0))
         found += [first, *(replace(first, key=k, value=v, like="=".join(who)) for k, v in others)]
-    return sorted(found, key=lambda one: (one.key, NASTY.index(one.value)))
+    return sorted(found, key=lambda one: (one.key, INPUTS.index(one.value)))
 
 
 def _read_all(

@@ -1,4 +1,4 @@
-"""What is wrong with the result of a nasty scene: a number that is none, a verdict that says what cannot be."""
+"""What is wrong with the result of a fuzzed scene: a number that is not finite, a verdict that contradicts itself."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs of nasty scenes: each is the command `tribodyn run` in a process of its own, and how it ended.
+"""Runs of fuzzed scenes: each is the command `tribodyn run` in a process of its own, and how it ended.
 
 The processes are forked from one that has run the scene as it is, with all packages and compiled kernels in its memory.
 A limit of its processor seconds kills a run that does not end.

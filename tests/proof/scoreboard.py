@@ -1,4 +1,4 @@
-"""Verdicts and promises on scenes that nobody has tuned, held against a reference that is finer in every parameter.
+"""Stated errors and error bounds on unseen scenes, compared with a reference that is finer in every setting.
 
 Scenes are drawn by `scoreboard_scenes`. Each is run and judged as a user gets it; then it is run with more elements,
 modes, harmonics, samples, points and wear steps. A row is kept as soon as its scene is done.
@@ -118,9 +118,9 @@ def run(scenes: int, seed: int, folder: Path, seconds: float, say: Callable[[str
         with (folder / ROWS).open("a", encoding="utf-8") as file:
             file.write("\n" * _torn(folder) + row.record() + "\n")
         kept.append(row)
-        broken = ", ".join(one.quantity for one in (*row.judged, *row.bound) if one.violated)
+        violated = ", ".join(one.quantity for one in (*row.judged, *row.bound) if one.violated)
         spent = "/".join(f"{one:.0f}" for one in row.seconds)
-        say(f"{row.family} {number}: {row.outcome}, {spent} s{f'; VIOLATED: {broken}' if broken else ''}")
+        say(f"{row.family} {number}: {row.outcome}, {spent} s{f'; VIOLATED: {violated}' if violated else ''}")
     return sorted((row for row in kept if not scenes or row.number < scenes), key=lambda row: row.number)
 
 

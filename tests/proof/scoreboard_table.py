@@ -47,15 +47,15 @@ def summary(rows: Sequence[Row]) -> str:
         unsaid = [sum(not one.stated for one in of), sum(one.stated and one.error is None for one in of)]
         name = "all" if quantity is None else NAMES.get(quantity, quantity)
         lines.append(f"{name:15} {counts[0]:8d} {counts[1]:8d} {median:>19} {unsaid[0]:10d} {unsaid[1]:9d}")
-    promised = [one for row in rows for one in row.bound if one.counted]
-    lines.append(f"--accuracy: {len(promised)} bounds, {sum(one.violated for one in promised)} violated")
-    for row, one in _broken(rows):
+    bounds = [one for row in rows for one in row.bound if one.counted]
+    lines.append(f"--accuracy: {len(bounds)} bounds, {sum(one.violated for one in bounds)} violated")
+    for row, one in _violated(rows):
         name = NAMES.get(one.quantity, one.quantity)
         lines.append(f"violated: {row.family} {row.number}, {name}: stated {one.error:.2g}, true {one.true:.2g}")
     return "\n".join(lines)
 
 
-def _broken(rows: Sequence[Row]) -> Iterator[tuple[Row, Judged]]:
+def _violated(rows: Sequence[Row]) -> Iterator[tuple[Row, Judged]]:
     yield from ((row, one) for row in rows for one in (*row.judged, *row.bound) if one.violated)
 
 

@@ -1,4 +1,4 @@
-"""Nasty values in the keys of a scene, a few of them; and that a wrong end is seen."""
+"""Fuzz inputs in the keys of a scene, a few of them; and that a wrong end is seen."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ def test_every_run_ends_as_a_run_may(tmp_path: Path) -> None:
 def test_every_key_is_tried() -> None:
     names = fuzz.keys("beam", TINY)
     assert {"contact.friction", "wear.law", "response.points", "geometry.n_patch", "scene.title"} <= set(names)
-    assert len(fuzz.cases("beam", TINY)) == len(names) * len(fuzz.NASTY)
-    assert len(set(fuzz.NASTY)) == 30
+    assert len(fuzz.cases("beam", TINY)) == len(names) * len(fuzz.INPUTS)
+    assert len(set(fuzz.INPUTS)) == 30
 
 
 @pytest.mark.parametrize(
