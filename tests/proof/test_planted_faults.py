@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -33,6 +34,9 @@ def test_every_planted_fault_still_has_its_place() -> None:
     assert {fault.file.partition("/")[0] for fault in faults} == {"fem", "reduction", "hbm", "workflows"}
     assert [test for room in rooms.values() for test in room.tests if not (TREE / test).exists()] == []
     assert {run for room in rooms.values() for run in room.runs} == set(reference_runs.RUNS)
+    with (TREE / "docs" / "accuracy" / "planted_faults.csv").open(encoding="utf-8") as file:
+        shown = [(row["file"], row["fault"]) for row in csv.DictReader(file)]
+    assert sorted(shown) == sorted((fault.file, fault.does) for fault in faults)
 
 
 def test_a_fault_is_planted_in_a_child_alone() -> None:
