@@ -99,7 +99,7 @@ def _scaling(quick: bool, out: Path, as_json: bool) -> None:
 def scoreboard(
     *, scenes: int = 40, seed: int = 1, seconds: float = 60.0, out: Path = Path("scoreboard"), as_json: Json = False
 ) -> None:
-    """Hold verdicts and promises on scenes drawn at random against references that are finer in every parameter.
+    """Compare stated errors and error bounds of random scenes with references that are finer in every setting.
 
     Exit code 3 where a true error is above the stated one. Rows are kept: the same command goes on where it was ended.
 
@@ -163,7 +163,7 @@ def fuzz(
     overrides: Overrides = (),
     as_json: Json = False,
 ) -> None:
-    """Give every key of a scene thirty nasty values, one at a time, and tell how the runs end.
+    """Give every key of a scene thirty fuzz inputs, one at a time, and report how the runs end.
 
     All are read; the scenes that come out of those which reading accepts are run. Each ends well, is refused, or fails
     with a sentence; exit code 3 where one does not.

@@ -17,16 +17,14 @@ import pytest
 from tests.helpers.synthetic_result import result
 from tribodyn.hbm.outcome import Outcome, WearEnd
 from tribodyn.workflows.result import store
-from tribodyn.workflows.result.facts import Around, BudgetEntry, Stage
+from tribodyn.workflows.result.facts import Around, Stage
 
 WRITER = """
 import sys
 from dataclasses import replace
 from pathlib import Path
 from tests.helpers.synthetic_result import result
-from tribodyn.hbm.outcome import Outcome, WearEnd
 from tribodyn.workflows.result import store
-from tribodyn.workflows.result.facts import Around, BudgetEntry, Stage
 full = result(60)
 for n in range(10**6):
     store.save(Path(sys.argv[1]), replace(full, verdict=f"checkpoint {n}"))
@@ -114,11 +112,10 @@ def test_stage_and_ends_of_a_run_come_back(tmp_path: Path, stage: Stage, end: Ou
     assert read.wear.end == end
 
 
-def test_facts_of_a_wheel_and_the_budget_come_back(tmp_path: Path) -> None:
+def test_facts_of_a_wheel_come_back(tmp_path: Path) -> None:
     from dataclasses import replace
 
     facts = replace(result().facts, around=Around(40, 3, np.array([1.0, 0.0, 0.0])), free_hz=np.array([12.5]))
-    budget = (BudgetEntry("modes", "free frequencies", None, "nobody knows"), BudgetEntry("samples", "x", 1e-3, "y"))
-    written = replace(result(), facts=facts, budget=budget)
+    written = replace(result(), facts=facts)
     store.save(tmp_path / "result.h5", written)
     assert same(written, store.load(tmp_path / "result.h5"))
