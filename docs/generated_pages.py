@@ -235,8 +235,7 @@ def _meanings(kind: type) -> dict[str, str]:
 def commands(program: App) -> str:
     """A section for each command, from the help that the command itself prints."""
     lines: list[str] = []
-    for name in sorted(word for word in program if not word.startswith("-")):
-        command = program[name]
+    for name, command in _words(program, ""):
         lines += [f"## `tribodyn {name}`", "", _paragraph(command.help.split("Parameters\n")[0]), ""]
         arguments = command.assemble_argument_collection(parse_docstring=True)
         rows = []
@@ -246,6 +245,16 @@ def commands(program: App) -> str:
             rows.append((words, _argument_default(argument), _paragraph(argument.parameter.help or "")))
         lines += _table(("argument", "default", "meaning"), rows)
     return "\n".join(lines)
+
+
+def _words(program: App, before: str) -> Iterator[tuple[str, App]]:
+    """Every word that does something, with those of its groups before it."""
+    for name in sorted(word for word in program if not word.startswith("-")):
+        command = program[name]
+        if command.default_command is None:
+            yield from _words(command, f"{before}{name} ")
+        else:
+            yield f"{before}{name}", command
 
 
 def _argument_default(argument: Any) -> str:

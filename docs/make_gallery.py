@@ -162,18 +162,18 @@ def screenshots(name: str, file: Path, place: Path) -> Iterator[Path]:
 
 def studies(folder: Path) -> Iterator[Path]:
     """What the studies draw: modes of the blade's wheel, a backbone of the beam, lives of a drawn beam."""
-    wheel = td.build_wheel(td.read_scene("blade"))
+    wheel = td.wheel.build(td.read_scene("blade"))
     families = {state: wheel.diagram(range(21), 4, state == "stuck") for state in ("free", "stuck")}
     orders = (1, 2, 3, 5, 8, 12, 20)
-    speeds, waves = td.campbell(wheel, 150.0, 5, orders, 1)
-    critical = {o: td.critical_speeds(speeds, waves["stuck"][:, i, 0], o) for i, o in enumerate(orders)}
-    bone = td.follow_backbone(td.read_scene("beam", COARSE_BEAM), 1e-6, 2e-3)
-    table = td.study(STUDY, folder / "study", workers=1)
+    speeds, waves = td.wheel.campbell(wheel, 150.0, 5, orders, 1)
+    critical = {o: td.wheel.critical_speeds(speeds, waves["stuck"][:, i, 0], o) for i, o in enumerate(orders)}
+    bone = td.studies.backbone("beam", 1e-6, 2e-3, overrides=COARSE_BEAM)
+    table = td.studies.grid(STUDY, folder / "study", workers=1)
     for name, figure in {
-        "blade_nodal_diameters": td.plot_nodal_diameters(families, "blade"),
-        "blade_safe": td.plot_safe(families, wheel.n_sectors, 110.0, 120.0, "blade"),
-        "blade_campbell": td.plot_campbell(speeds, waves, orders, critical, "blade"),
-        "beam_backbone": td.plot_backbone(bone, "beam"),
+        "blade_nodal_diameters": td.plot.nodal_diameters(families, "blade"),
+        "blade_safe": td.plot.safe(families, wheel.n_sectors, 110.0, 120.0, "blade"),
+        "blade_campbell": td.plot.campbell(speeds, waves, orders, critical, "blade"),
+        "beam_backbone": bone.plot(),
         "beam_study": table.plot(),
         "beam_life": table.plot_distribution(),
     }.items():

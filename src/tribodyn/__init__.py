@@ -6,444 +6,46 @@
     print(result.summary()["peak_hz"])
     td.plot.response(result).savefig("response.png")
 
-    matrices = td.read_matrices("part.npz")         # or td.from_arrays(M, K)
+    life = td.studies.lives("scatter.toml")
+    print(*life.lines(), sep="\\n")
+
+    matrices = td.matrices.read("part.npz")         # or td.matrices.from_arrays(M, K)
     rows = matrices.contact_rows([[1, 0, -1]], ("t1",), area=1e-4)  # x = q_0 - q_2
-    rub = td.Contact("rub", rows, "jenkins_constant", 1e5, numbers={"friction": 0.5, "normal_load": 20.0})
-    structure = td.reduce(matrices, rub, loads={"shaker": 2}, outputs={"tip": 2}, damping_ratio=0.01)
+    rub = td.matrices.Contact("rub", rows, "jenkins_constant", 1e5, numbers={"friction": 0.5, "normal_load": 20.0})
+    structure = td.matrices.reduce(matrices, rub, loads={"shaker": 2}, outputs={"tip": 2}, damping_ratio=0.01)
     balance = structure.balance((1, 3, 5), up_to=200.0, harmonic={1: {"shaker": 5.0}})
     curve = balance.response(20.0, 200.0, points=100)
     print(curve.frequency, curve.amplitude("tip"))
 
+Studies are in `td.studies`, those of wheels in `td.wheel`, one's own matrices in `td.matrices`, pictures in `td.plot`.
 Units are SI, frequencies are in Hz on both sides. What is not in `__all__` may change without notice. Names are
-imported when they are first used, so that this import takes no time.
+imported when they are first used, so that this import takes no time; their homes stand in `__init__.pyi`.
 """
 
 from __future__ import annotations
 
+import ast
 import importlib
 import sys
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
-if TYPE_CHECKING:
-    from tribodyn.hbm.contact.law import names as contact_laws
-    from tribodyn.hbm.continuation import names as continuations
-    from tribodyn.hbm.wear.law import names as wear_laws
-    from tribodyn.reduction.foreign import ForeignMatrices as Matrices
-    from tribodyn.reduction.foreign import from_arrays, read_matrices
-    from tribodyn.workflows.api.designs import lives, optimise, study
-    from tribodyn.workflows.api.studies import (
-        CONVERGED,
-        OUTPUT,
-        SEPARATES,
-        SLIPS,
-        STICKS,
-        Bench,
-        Branch,
-        BranchEnd,
-        BranchStability,
-        Chatter,
-        Coexisting,
-        Exposure,
-        FoldInTime,
-        HarmonicBalance,
-        Identification,
-        IntegrationFailed,
-        JointSprings,
-        Measured,
-        Mistuned,
-        Parameter,
-        Part,
-        PartScene,
-        Patch,
-        ReducedModel,
-        References,
-        Scene,
-        State,
-        TimeOptions,
-        Varied,
-        Verification,
-        WearEnd,
-        WearHistory,
-        Wheel,
-        body_forces,
-        build_wheel,
-        campbell,
-        changed,
-        chatter,
-        coexisting,
-        contact_patch,
-        critical_speeds,
-        cycle_at,
-        cycles_to_preload,
-        delta_max,
-        draw_field,
-        draw_status,
-        fold_in_time,
-        follow_adaptive,
-        follow_arc_length,
-        follow_backbone,
-        follow_response,
-        identify,
-        impact_work,
-        joint_springs,
-        length_unit,
-        linear_references,
-        mac,
-        mark_stability,
-        match_kinds,
-        match_modes,
-        mistuned,
-        mistuned_patterns,
-        patch_maps,
-        peak_memory,
-        plot_axes,
-        plot_backbone,
-        plot_campbell,
-        plot_mistuned,
-        plot_nodal_diameters,
-        plot_patterns,
-        plot_safe,
-        published_wear_steps,
-        reaction,
-        result_of,
-        shades,
-        solutions_at,
-        state_at,
-        support_wear,
-        support_work,
-        vary,
-        verify_in_time,
-        wear,
-        wear_mistuned,
-        worn,
-        write_mistuned,
-        write_whole,
-    )
-    from tribodyn.workflows.api.whole_scenes import (
-        converge,
-        export,
-        fit,
-        folds,
-        inspect,
-        posterior,
-        report,
-        track,
-        trade,
-        verify,
-        verify_wear,
-        wear_in_time,
-    )
-    from tribodyn.workflows.result.result import Result
-    from tribodyn.workflows.result.store import ResultError
-    from tribodyn.workflows.run.failure import SolveFailed
-    from tribodyn.workflows.run.modelling import Model
-    from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
-    from tribodyn.workflows.studies.fits.posterior import Posterior
-    from tribodyn.workflows.studies.many.lives import Lives
-    from tribodyn.workflows.studies.many.optimum import Optimum
-    from tribodyn.workflows.studies.many.table import StudyTable
-    from tribodyn.workflows.studies.matrices import Balance, Contact, Cycle, Structure, reduce, wear_law
-    from tribodyn.workflows.studies.scenes import build, load, plan, read_scene, run, run_to_accuracy, scene_names
-    from tribodyn.workflows.studies.surfaces import Asperities, HeightMap, asperities
-
-# name here -> module, and name there where it is another one
-_HOME: dict[str, tuple[str, ...]] = {
-    "Asperities": ("tribodyn.workflows.studies.surfaces",),
-    "Balance": ("tribodyn.workflows.studies.matrices",),
-    "Contact": ("tribodyn.workflows.studies.matrices",),
-    "Cycle": ("tribodyn.workflows.studies.matrices",),
-    "HeightMap": ("tribodyn.workflows.studies.surfaces",),
-    "Lives": ("tribodyn.workflows.studies.many.lives",),
-    "Matrices": ("tribodyn.reduction.foreign", "ForeignMatrices"),
-    "Model": ("tribodyn.workflows.run.modelling",),
-    "Optimum": ("tribodyn.workflows.studies.many.optimum",),
-    "Posterior": ("tribodyn.workflows.studies.fits.posterior",),
-    "Result": ("tribodyn.workflows.result.result",),
-    "ResultError": ("tribodyn.workflows.result.store",),
-    "SceneError": ("tribodyn.workflows.scene.scene_file",),
-    "SceneFile": ("tribodyn.workflows.scene.scene_file",),
-    "SolveFailed": ("tribodyn.workflows.run.failure",),
-    "Structure": ("tribodyn.workflows.studies.matrices",),
-    "StudyTable": ("tribodyn.workflows.studies.many.table",),
-    "__version__": ("tribodyn.version",),
-    "asperities": ("tribodyn.workflows.studies.surfaces",),
-    "build": ("tribodyn.workflows.studies.scenes",),
-    "contact_laws": ("tribodyn.hbm.contact.law", "names"),
-    "continuations": ("tribodyn.hbm.continuation", "names"),
-    "from_arrays": ("tribodyn.reduction.foreign",),
-    "lives": ("tribodyn.workflows.api.designs",),
-    "optimise": ("tribodyn.workflows.api.designs",),
-    "load": ("tribodyn.workflows.studies.scenes",),
-    "plan": ("tribodyn.workflows.studies.scenes",),
-    "read_matrices": ("tribodyn.reduction.foreign",),
-    "read_scene": ("tribodyn.workflows.studies.scenes",),
-    "reduce": ("tribodyn.workflows.studies.matrices",),
-    "run": ("tribodyn.workflows.studies.scenes",),
-    "run_to_accuracy": ("tribodyn.workflows.studies.scenes",),
-    "scene_names": ("tribodyn.workflows.studies.scenes",),
-    "study": ("tribodyn.workflows.api.designs",),
-    "wear_law": ("tribodyn.workflows.studies.matrices",),
-    "wear_laws": ("tribodyn.hbm.wear.law", "names"),
+_HOME = {
+    alias.asname or alias.name: (str(line.module), alias.name)
+    for line in ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")).body
+    if isinstance(line, ast.ImportFrom)
+    for alias in line.names
 }
-
-# of studies; see tribodyn.workflows.api.studies
-_HOME |= dict.fromkeys(
-    (
-        "CONVERGED",
-        "OUTPUT",
-        "SEPARATES",
-        "SLIPS",
-        "STICKS",
-        "Bench",
-        "Branch",
-        "BranchEnd",
-        "BranchStability",
-        "Chatter",
-        "Coexisting",
-        "Exposure",
-        "FoldInTime",
-        "HarmonicBalance",
-        "Identification",
-        "IntegrationFailed",
-        "JointSprings",
-        "Measured",
-        "Mistuned",
-        "Parameter",
-        "Part",
-        "PartScene",
-        "Patch",
-        "ReducedModel",
-        "References",
-        "Scene",
-        "State",
-        "TimeOptions",
-        "Varied",
-        "Verification",
-        "WearEnd",
-        "WearHistory",
-        "Wheel",
-        "body_forces",
-        "build_wheel",
-        "campbell",
-        "changed",
-        "chatter",
-        "coexisting",
-        "contact_patch",
-        "critical_speeds",
-        "cycle_at",
-        "cycles_to_preload",
-        "delta_max",
-        "draw_field",
-        "draw_status",
-        "fold_in_time",
-        "follow_adaptive",
-        "follow_arc_length",
-        "follow_backbone",
-        "follow_response",
-        "identify",
-        "impact_work",
-        "joint_springs",
-        "length_unit",
-        "linear_references",
-        "mac",
-        "mark_stability",
-        "match_kinds",
-        "match_modes",
-        "mistuned",
-        "mistuned_patterns",
-        "patch_maps",
-        "peak_memory",
-        "plot_axes",
-        "plot_backbone",
-        "plot_campbell",
-        "plot_mistuned",
-        "plot_nodal_diameters",
-        "plot_patterns",
-        "plot_safe",
-        "published_wear_steps",
-        "reaction",
-        "result_of",
-        "shades",
-        "solutions_at",
-        "state_at",
-        "support_wear",
-        "support_work",
-        "vary",
-        "verify_in_time",
-        "wear",
-        "wear_in_time",
-        "wear_mistuned",
-        "worn",
-        "write_mistuned",
-        "write_whole",
-    ),
-    ("tribodyn.workflows.api.studies",),
-)
-
-# of whole scenes; see tribodyn.workflows.api.whole_scenes
-_HOME |= dict.fromkeys(
-    (
-        "converge",
-        "export",
-        "fit",
-        "folds",
-        "posterior",
-        "inspect",
-        "report",
-        "track",
-        "trade",
-        "verify",
-        "verify_wear",
-        "wear_in_time",
-    ),
-    ("tribodyn.workflows.api.whole_scenes",),
-)
-
-__all__ = [
-    "CONVERGED",
-    "OUTPUT",
-    "SEPARATES",
-    "SLIPS",
-    "STICKS",
-    "Asperities",
-    "Balance",
-    "Bench",
-    "Branch",
-    "BranchEnd",
-    "BranchStability",
-    "Chatter",
-    "Coexisting",
-    "Contact",
-    "Cycle",
-    "Exposure",
-    "FoldInTime",
-    "HarmonicBalance",
-    "HeightMap",
-    "Identification",
-    "IntegrationFailed",
-    "JointSprings",
-    "Lives",
-    "Matrices",
-    "Measured",
-    "Mistuned",
-    "Model",
-    "Optimum",
-    "Parameter",
-    "Part",
-    "PartScene",
-    "Patch",
-    "Posterior",
-    "ReducedModel",
-    "References",
-    "Result",
-    "ResultError",
-    "Scene",
-    "SceneError",
-    "SceneFile",
-    "SolveFailed",
-    "State",
-    "Structure",
-    "StudyTable",
-    "TimeOptions",
-    "Varied",
-    "Verification",
-    "WearEnd",
-    "WearHistory",
-    "Wheel",
-    "__version__",
-    "asperities",
-    "body_forces",
-    "build",
-    "build_wheel",
-    "campbell",
-    "changed",
-    "chatter",
-    "coexisting",
-    "contact_laws",
-    "contact_patch",
-    "continuations",
-    "converge",
-    "critical_speeds",
-    "cycle_at",
-    "cycles_to_preload",
-    "delta_max",
-    "draw_field",
-    "draw_status",
-    "export",
-    "fit",
-    "fold_in_time",
-    "folds",
-    "follow_adaptive",
-    "follow_arc_length",
-    "follow_backbone",
-    "follow_response",
-    "from_arrays",
-    "identify",
-    "impact_work",
-    "inspect",
-    "joint_springs",
-    "length_unit",
-    "linear_references",
-    "lives",
-    "load",
-    "mac",
-    "mark_stability",
-    "match_kinds",
-    "match_modes",
-    "mistuned",
-    "mistuned_patterns",
-    "optimise",
-    "patch_maps",
-    "peak_memory",
-    "plan",
-    "plot_axes",
-    "plot_backbone",
-    "plot_campbell",
-    "plot_mistuned",
-    "plot_nodal_diameters",
-    "plot_patterns",
-    "plot_safe",
-    "posterior",
-    "published_wear_steps",
-    "reaction",
-    "read_matrices",
-    "read_scene",
-    "reduce",
-    "report",
-    "result_of",
-    "run",
-    "run_to_accuracy",
-    "scene_names",
-    "shades",
-    "solutions_at",
-    "state_at",
-    "study",
-    "support_wear",
-    "support_work",
-    "track",
-    "trade",
-    "vary",
-    "verify",
-    "verify_in_time",
-    "verify_wear",
-    "wear",
-    "wear_in_time",
-    "wear_law",
-    "wear_laws",
-    "wear_mistuned",
-    "worn",
-    "write_mistuned",
-    "write_whole",
-]
+__all__ = sorted(_HOME)
 
 
 def __getattr__(name: str) -> Any:
-    if name in ("plot", "style"):
-        return importlib.import_module(f"tribodyn.{name}")
     if name not in _HOME:
         raise AttributeError(f"module 'tribodyn' has no attribute '{name}'")
-    module, *there = _HOME[name]
-    value = getattr(importlib.import_module(module), there[0] if there else name)
+    module, there = _HOME[name]
+    if module == __name__:
+        return importlib.import_module(f"{module}.{there}")
+    value = getattr(importlib.import_module(module), there)
     globals()[name] = value
     return value
 

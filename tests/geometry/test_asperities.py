@@ -35,12 +35,12 @@ def test_caps_give_their_radius_density_and_gaps():
 
 def test_two_faces_of_caps_that_meet_have_half_the_radius_and_both_heights():
     first = caps(RADIUS, some_heights(), APART, STEP)
-    single, both = td.asperities(first), td.asperities(first, first)
+    single, both = td.studies.asperities(first).found, td.studies.asperities(first, first).found
     assert both.radius == pytest.approx(RADIUS / 2, rel=1e-4)
     np.testing.assert_allclose(np.sort(both.gap), 2 * np.sort(single.gap), atol=1e-12)
     lower = first.with_heights(first.z * (1 - 0.4 * (first.x < first.x.mean()))[:, None])
-    turned = td.asperities(lower, lower, mirror="x")
-    assert turned.height.std() < 0.8 * td.asperities(lower, lower).height.std()
+    turned = td.studies.asperities(lower, lower, mirror="x").found
+    assert turned.height.std() < 0.8 * td.studies.asperities(lower, lower).found.height.std()
 
 
 def test_two_random_faces_of_different_grids_have_the_sum_of_their_moments():
@@ -102,7 +102,7 @@ def stepped() -> HeightMap:
         (lambda: identify(caps(RADIUS, some_heights(4), APART, STEP)), "16 summits are too few"),
         (lambda: identify(caps(RADIUS, np.full((8, 8), 5e-7), APART, STEP)).table(1), "a table of 1 rows"),
         (lambda: summits(HeightMap(*2 * (np.arange(5.0),), np.full((5, 5), np.nan))), "without height"),
-        (lambda: td.asperities(stepped(), mirror="x"), "one face only"),
+        (lambda: td.studies.asperities(stepped(), mirror="x"), "one face only"),
     ],
 )
 def test_what_has_no_asperities_is_one_sentence(call, words):
@@ -118,14 +118,14 @@ def test_heights_in_steps_are_cured_by_the_filter_that_the_sentence_names():
 def test_the_command_writes_the_table_that_a_contact_takes(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     face, _ = gaussian(128, 1e-6, 40e-6, 12e-6, 0.3e-6, 7)
     np.savetxt(tmp_path / "scan.txt", face.z.T * 1e6)
-    units = ["--spacing", "1um,1um", "--lateral-unit", "m", "--height-unit", "um"]
-    out = tmp_path / "asperities.csv"
-    code, said, err = leave(["asperities", str(tmp_path / "scan.txt"), *units, "--out", str(out), "--json"], capsys)
+    units = ["--spacing", "1um,1um", "--lateral-unit", "1 m", "--height-unit", "1um"]
+    out, command = tmp_path / "asperities.csv", ["geometry", "asperities", str(tmp_path / "scan.txt")]
+    code, said, err = leave([*command, *units, "--out", str(tmp_path), "--json"], capsys)
     assert code == 0, err
     record, found = json.loads(said), identify(face)
     assert record["radius_m"] == pytest.approx(found.radius, rel=1e-6)
     np.testing.assert_allclose(np.loadtxt(out, delimiter=","), found.table(), rtol=1e-6, atol=1e-3)
-    code, said, _ = leave(["asperities", str(tmp_path / "scan.txt"), *units, "--out", str(out)], capsys)
+    code, said, _ = leave([*command, *units, "--out", str(tmp_path)], capsys)
     assert code == 0
     assert 'law = "rough", table = "asperities.csv", radius = "' in said
     contact = {
@@ -137,6 +137,6 @@ def test_the_command_writes_the_table_that_a_contact_takes(capsys: pytest.Captur
     scene = td.read_scene(beam, {f"contact.{key}": value for key, value in contact.items()}).scene
     assert len(scene.contact.table) == 101
     for words, cure in ((["--spacing", "1um"], "give two steps"), (["--cutoff", "soon"], "--cutoff")):
-        code, _, err = leave(["asperities", str(tmp_path / "scan.txt"), *units[2:], *words], capsys)
+        code, _, err = leave([*command, *units[2:], *words], capsys)
         assert code == 2
         assert cure in err

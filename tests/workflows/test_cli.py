@@ -44,7 +44,7 @@ BAD = {
     "no load group": (["run", "beam", "--set", "loads.static.press.group=top"], "no node set 'top'"),
     "no output group": (["plan", "beam", "--set", "response.group=tip"], "no node set 'tip'"),
     "no result": (["show", "nowhere"], 'no result file "nowhere"'),
-    "nothing to render": (["render", "nowhere"], 'no result file "nowhere"'),
+    "nothing to render": (["draw", "nowhere"], 'no result file "nowhere"'),
 }
 
 
@@ -74,9 +74,9 @@ def test_a_mesh_file_that_is_not_there(capsys: pytest.CaptureFixture[str], tmp_p
 
 WRITING = {
     "a folder at a file": (["run", "beam"], "file", "no folder can be made at .*file, file exists"),
-    "a folder in a file": (["converge", "beam"], "file/folder", "no folder can be made"),
-    "a table that is none": (["trade", "beam"], "table.png", "give a file that ends with .json"),
-    "a table at a folder": (["trade", "beam"], "folder.json", "a folder is there, give a file"),
+    "a folder in a file": (["study", "converge", "beam"], "file/folder", "no folder can be made"),
+    "a page that is none": (["report", "nowhere"], "page.png", "give a file that ends with .html"),
+    "a page at a folder": (["report", "nowhere"], "folder.html", "a folder is there, give a file"),
 }
 
 
@@ -85,7 +85,7 @@ def test_what_cannot_be_written_is_refused_before_long_work(
     case: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     (tmp_path / "file").touch()
-    (tmp_path / "folder.json").mkdir()
+    (tmp_path / "folder.html").mkdir()
     words, out, says = WRITING[case]
     code, _, err = leave([*words, "--out", str(tmp_path / out)], capsys)
     assert code == 2
@@ -94,13 +94,13 @@ def test_what_cannot_be_written_is_refused_before_long_work(
 
 
 def test_closed_standard_streams_do_not_matter() -> None:
-    command = f"{sys.executable} -m tribodyn list >&-"
+    command = f"{sys.executable} -m tribodyn cases >&-"
     done = subprocess.run(command, shell=True, cwd=ROOT, capture_output=True, check=False)
     assert (done.returncode, done.stderr) == (0, b"")
 
 
 def test_list_names_every_scene(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, _ = leave(["list"], capsys)
+    code, out, _ = leave(["cases"], capsys)
     assert code == 0
     assert "beam" in out
 
@@ -144,7 +144,7 @@ def test_show_for_people(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
 
 
 def test_a_reader_that_has_seen_enough_ends_the_command_in_silence(tmp_path: Path) -> None:
-    """As in `tribodyn list | head -1`; here nobody reads at all."""
+    """As in `tribodyn cases | head -1`; here nobody reads at all."""
     store.save(tmp_path / "result.h5", result(9))
     for words in (["show", str(tmp_path)], ["show", str(tmp_path), "--json"], ["list"]):
         read_end, write_end = os.pipe()
@@ -246,7 +246,7 @@ def test_a_result_before_any_solve_has_a_summary() -> None:
 
 def test_render_draws_the_pictures_of_a_result(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     store.save(tmp_path / "result.h5", result())
-    code, out, _ = leave(["render", str(tmp_path)], capsys)
+    code, out, _ = leave(["draw", str(tmp_path)], capsys)
     assert code == 0
     assert (tmp_path / "pictures" / "frf.png").is_file()
     assert "part.png" in out or "no renders: " in out

@@ -1,4 +1,4 @@
-"""tribodyn identify: numbers of a scene that made the measured ones are found again, and bad files end well."""
+"""tribodyn study identify: numbers of a scene that made the measured ones are found again, and bad files end well."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ import pytest
 
 from tests.helpers.coarse_scenes import BLADE, RIG
 from tests.helpers.pages import ROOT, fences
-from tribodyn.workflows.api.studies import cycle_at
+from tests.proof.problems import cycle_at
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.fits import fit_file
@@ -25,10 +26,6 @@ BEAM = (
     "geometry.n_patch=3", "reduction.modes=5", "harmonics.samples=32", "harmonics.transitions=sampled",
     "response.points=20", "wear.tolerance=20 %", "wear.at=700 Hz",
 )  # fmt: skip
-
-
-def quiet(sentence):
-    pass
 
 
 def found_again(scene, overrides, true, looked, measured):
@@ -45,7 +42,8 @@ def found_again(scene, overrides, true, looked, measured):
             },
         }
     )
-    return fit_file.run(scene, overrides, task, quiet)
+    fit = fit_file.best(scene_file.read(scene, overrides), task, Progress())
+    return fit.found, fit.changes
 
 
 def test_contact_springs_and_friction_are_found_again():
@@ -87,7 +85,8 @@ def test_mating_height_is_found_from_the_preload_and_the_part_is_made_once(monke
             "measured": {"rest": {"of": "preload", "value": "36 N"}},
         }
     )
-    found, changes = fit_file.run("rig", RIG, task, quiet)
+    fit = fit_file.best(scene_file.read("rig", RIG), task, Progress())
+    found, changes = fit.found, fit.changes
     assert len(made) == 1
     assert 1e-6 < found.values[0] < 4e-6
     assert changes[0].endswith(" m")
@@ -167,7 +166,7 @@ MEASURED = '[measured.e]\nof = "energy"\nat = "290 Hz"\nvalue = "1 mJ"\n'
 def test_a_bad_file_is_one_sentence_and_exit_code_2(text, words, tmp_path, capsys):
     (tmp_path / "fit.toml").write_text(text, encoding="utf-8")
     with pytest.raises(SystemExit) as stop:
-        cli.main(["identify", "rig", str(tmp_path / "fit.toml"), *(w for o in RIG for w in ("--set", o))])
+        cli.main(["study", "identify", "rig", str(tmp_path / "fit.toml"), *(w for o in RIG for w in ("--set", o))])
     assert stop.value.code == 2
     sentence = capsys.readouterr().err.strip().splitlines()[-1]
     assert sentence.startswith("tribodyn: ")
@@ -186,9 +185,9 @@ def test_the_file_that_comes_with_the_program_is_sound_and_the_command_prints(tm
     task = fit_file.read(scene_file.CASES / "rig" / "rig.fit.toml")
     assert set(task.parameters) == {"mating_height", "damping"}
     (shown,) = (fence.text for fence in fences(ROOT / "docs/howto/identify.md") if fence.word == "rig.fit.toml")
-    assert fit_file.parse(tomllib.loads(shown)) == task
+    assert fit_file.read(tomllib.loads(shown)) == task
     (tmp_path / "fit.toml").write_text(PARAMETER + MEASURED, encoding="utf-8")
-    words = ["identify", "rig", str(tmp_path / "fit.toml"), *(w for o in RIG for w in ("--set", o))]
+    words = ["study", "identify", "rig", str(tmp_path / "fit.toml"), *(w for o in RIG for w in ("--set", o))]
     with pytest.raises(SystemExit) as stop:
         cli.main([*words, "--json"])
     assert not stop.value.code

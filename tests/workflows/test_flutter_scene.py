@@ -36,20 +36,20 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_waves_of_a_scene_have_the_eigenvalues_of_its_coefficients(scene: Path) -> None:
     """Also by nodal diameter, which is the same flow written otherwise."""
     file = scene_file.read(str(scene))
-    found = flutter.study(file).eigenvalues
+    found = flutter.flutter(file).eigenvalues
     wheel = wheels.build(file)
     calm = modelling.damped(wheel.scene, travelling_wave(wheel.reduced, 1))
     expected = aeroelastic(calm, wheel.springs, Flow(COEFFICIENTS))
     assert found == pytest.approx(expected, rel=1e-9)
     assert min(value.real for value in found.values()) < 0 < max(value.real for value in found.values())
     waves = [[j, (c := Flow(COEFFICIENTS).of_index(j, 6)).real, c.imag] for j in range(-2, 4)]
-    again = flutter.study(file.changed("flow.influence=", f"flow.by_diameter={waves}")).eigenvalues
+    again = flutter.flutter(file.changed("flow.influence=", f"flow.by_diameter={waves}")).eigenvalues
     assert again == pytest.approx(found, rel=1e-9)
 
 
 def test_a_limit_cycle_needs_no_load(scene: Path) -> None:
     """It attracts, and the balance in the flow holds there without harmonic loads and without added damping."""
-    found = flutter.study(scene_file.read(str(scene)), 1e-6, 1e-3, 20)
+    found = flutter.flutter(scene, 1e-6, 1e-3, points=20)
     flutters = {index for index, ratio in found.damping.items() if ratio < 0}
     assert set(found.cycles) == flutters
     cycles = [one for cycles in found.cycles.values() if not isinstance(cycles, str) for one in cycles]
@@ -63,14 +63,14 @@ def test_a_limit_cycle_needs_no_load(scene: Path) -> None:
 
 
 def test_the_command_tells_which_waves_flutter(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    cli.app(["flutter", str(scene), "--out", str(tmp_path), "--json"], result_action="return_value")
+    cli.app(["wheel", "flutter", str(scene), "--out", str(tmp_path), "--json"], result_action="return_value")
     said = json.loads(capsys.readouterr().out)
     assert {wave["index"] for wave in said["waves"]} == set(range(-2, 4))
     assert any(wave["damping"] < 0 for wave in said["waves"])
     assert (tmp_path / "flutter.png").stat().st_size > 5000
     assert (tmp_path / "flutter.csv").read_text(encoding="utf-8").startswith("index,frequency_Hz,damping")
     with pytest.raises(ValueError, match="give both amplitudes"):
-        flutter.study(scene_file.read(str(scene)), 1e-6)
+        flutter.flutter(scene, 1e-6)
 
 
 @pytest.mark.parametrize(
@@ -88,4 +88,4 @@ def test_what_cannot_be_is_one_sentence(scene: Path, changes: tuple[str, ...], s
 
 def test_a_scene_without_flow_is_refused() -> None:
     with pytest.raises(SceneError, match=r"blade has no \[flow\]"):
-        flutter.study(scene_file.read("blade"))
+        flutter.flutter("blade")

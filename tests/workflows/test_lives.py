@@ -15,7 +15,7 @@ from scipy import stats
 
 import tribodyn as td
 from tests.helpers.command import leave
-from tribodyn.workflows.studies.many import design, pool, quantiles, sensitivity_picture, study_file
+from tribodyn.workflows.studies.many import design, pictures, pool, quantiles, sensitivity, study_file
 from tribodyn.workflows.studies.many import study as studies
 from tribodyn.workflows.studies.many.quantiles import Sample
 from tribodyn.workflows.studies.many.sensitivity import influences
@@ -40,7 +40,7 @@ def _no_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
     """They take longer than all the rest."""
     if "command" not in request.node.name:
         monkeypatch.setattr(studies, "draw", lambda study, found, folder: None)
-        monkeypatch.setattr(td.Lives, "plot", lambda self: Figure())
+        monkeypatch.setattr(td.studies.Lives, "plot", lambda self: Figure())
 
 
 def study(vary: dict[str, Any] = VARY, runs: int = 32, seed: int = 3, **more: Any) -> dict[str, Any]:
@@ -147,7 +147,7 @@ def test_the_claimed_confidence_is_kept_on_fifty_planted_problems() -> None:
 
 def test_quantiles_and_indices_are_those_of_the_closed_form(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pool, "finished", engine(lambda values, task: {"life_cycles": lasts(values)}))
-    found = td.lives(study(lives={"model_error": 0.1}), tmp_path)
+    found = td.studies.lives(study(lives={"model_error": 0.1}), tmp_path)
     for q, name in zip(found.quantiles, ("P10", "P50", "P90"), strict=True):
         assert q.name == name
         assert q.value == pytest.approx(exact(q.share), rel=2e-3)
@@ -174,7 +174,7 @@ def test_runs_are_added_for_a_rare_life_and_taken_again(tmp_path: Path, monkeypa
 
     monkeypatch.setattr(pool, "finished", engine(life))
     tables = study(runs=16, lives={"model_error": 0, "within": "4 %", "most": 48})
-    found = td.lives(tables, tmp_path, rare=1e-4)
+    found = td.studies.lives(tables, tmp_path, rare=1e-4)
     rare = exact(1e-4)
     truth = rare * math.exp(0.2 * math.sin(6 * math.log(rare / MEDIAN)))
     assert found.quantiles[0].share == 1e-4
@@ -184,7 +184,7 @@ def test_runs_are_added_for_a_rare_life_and_taken_again(tmp_path: Path, monkeypa
     assert 16 < found.runs <= 48
     count = len(asked)
     assert count == found.runs
-    again = td.lives(tables, tmp_path, rare=1e-4, resume=True)
+    again = td.studies.lives(tables, tmp_path, rare=1e-4, resume=True)
     assert len(asked) == count
     assert again.quantiles[0] == found.quantiles[0]
 
@@ -198,8 +198,8 @@ def test_few_full_runs_correct_many_cheap_ones(tmp_path: Path, monkeypatch: pyte
 
     monkeypatch.setattr(pool, "finished", engine(life))
     both = {"model_error": 0, "cheap": ["harmonics.samples=32"], "cheap_runs": 96}
-    one = td.lives(study(runs=16, lives={"model_error": 0}), tmp_path / "one")
-    two = td.lives(study(runs=16, lives=both), tmp_path / "two")
+    one = td.studies.lives(study(runs=16, lives={"model_error": 0}), tmp_path / "one")
+    two = td.studies.lives(study(runs=16, lives=both), tmp_path / "two")
     assert (two.runs, two.cheap_runs) == (16, 96)
     of = space(study())
     many = of.draw(17, seed=99)[0]
@@ -215,7 +215,7 @@ def test_missing_runs_widen_what_is_told(tmp_path: Path, monkeypatch: pytest.Mon
         return None if task.number % 16 == 0 else {"life_cycles": lasts(values)}
 
     monkeypatch.setattr(pool, "finished", engine(life))
-    found = td.lives(study(lives={"model_error": 0}), tmp_path)
+    found = td.studies.lives(study(lives={"model_error": 0}), tmp_path)
     assert found.missing == 2
     ten = found.quantiles[0]
     lost = 2 / 32
@@ -232,11 +232,11 @@ def test_lives_that_did_not_end_are_lower_bounds(tmp_path: Path, monkeypatch: py
         return {"cycles": limit} if own > limit else {"cycles": own, "life_cycles": own}
 
     monkeypatch.setattr(pool, "finished", engine(life))
-    found = td.lives(study(runs=64, lives={"model_error": 0}), tmp_path)
+    found = td.studies.lives(study(runs=64, lives={"model_error": 0}), tmp_path)
     assert [q.at_least for q in found.quantiles] == [False, False, True]
     assert found.quantiles[0].value == pytest.approx(exact(0.1), rel=0.05)
     assert "at least" in found.lines()[-len(VARY) - 2]
-    few = td.lives(study(runs=64, lives={"model_error": 0, "shares": [0.8]}), tmp_path / "few")
+    few = td.studies.lives(study(runs=64, lives={"model_error": 0, "shares": [0.8]}), tmp_path / "few")
     assert few.quantiles[0].at_least  # below the lowest bound, but as many as that may survive
 
 
@@ -258,12 +258,12 @@ def test_a_study_of_lists_has_the_indices_of_its_box(tmp_path: Path) -> None:
     rows = design.runs(read)
     a, b = (np.array([row[key] for row in rows]) for key in "ab")
     columns = {"run": np.arange(1, 17), "status": np.full(16, "complete", dtype=object), "a": a, "b": b}
-    table = td.StudyTable("mine", columns | {"peak_hz_first": np.exp(a + 2 * b)}, ("a", "b"))
-    told = sensitivity_picture.indices(Space.of(read, lists=True), table)
+    table = td.studies.StudyTable("mine", columns | {"peak_hz_first": np.exp(a + 2 * b)}, ("a", "b"))
+    told = sensitivity.indices(Space.of(read, lists=True), table)
     found = {one.key: one.first for one in told["peak_hz_first"][1]}
     whole = 3.0**2 + (2 * 1.5) ** 2  # variance of a linear function of uniform variables
     assert found == pytest.approx({"a": 9 / whole, "b": 9 / whole}, abs=0.01)
-    sensitivity_picture.picture("mine", told).savefig(tmp_path / "mine.png")
+    pictures.sensitivities("mine", told).savefig(tmp_path / "mine.png")
     texts = {"study": {"scene": "beam", "design": "grid"}, "vary": {"a": ["x", "y"]}}
     with pytest.raises(td.SceneError, match=r"vary.a: expected a distribution"):
         Space.of(study_file.parse(texts, "mine.toml", Path()), lists=True)
@@ -300,7 +300,7 @@ def test_what_cannot_be_is_refused(
 ) -> None:
     monkeypatch.setattr(pool, "finished", engine(lambda values, task: {"life_cycles": 1e6}))
     with pytest.raises(ValueError, match=sentence):
-        td.lives(study() | change, tmp_path)
+        td.studies.lives(study() | change, tmp_path)
 
 
 def test_the_command_tells_the_verdict_with_the_distribution(
@@ -315,7 +315,7 @@ def test_the_command_tells_the_verdict_with_the_distribution(
         f'[vary]\n{FRICTION} = {{ distribution = "uniform", low = 0.4, high = 0.6 }}\n'
         '[lives]\nnumber = "peak_m_first"\n'
     )
-    code, out, _ = leave(["lives", str(file), "--out", str(tmp_path / "out")], capsys)
+    code, out, _ = leave(["study", "lives", str(file), "--out", str(tmp_path / "out")], capsys)
     assert code == 0
     assert "verdict on the run at the medians" in out
     assert (tmp_path / "out" / "lives.png").stat().st_size > 5000

@@ -49,12 +49,12 @@ def test_factors_that_move_on_by_a_sector_move_the_amplitudes_on(scene: Path) ->
 
 
 def test_sectors_alike_are_amplified_by_nothing(scene: Path) -> None:
-    found = mistuning.respond(scene_file.read(str(scene)), np.ones(6))
+    found = mistuning.mistuned(scene, np.ones(6))
     assert found.amplification == pytest.approx(1.0, rel=5e-3)
 
 
 def test_the_command_takes_any_wheel(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    cli.app(["mistuned", str(scene), "--spread", "3 %", "--seed", "2", "--out", str(tmp_path), "--json"],
+    cli.app(["wheel", "mistuned", str(scene), "--spread", "3 %", "--seed", "2", "--out", str(tmp_path), "--json"],
             result_action="return_value")  # fmt: skip
     said = json.loads(capsys.readouterr().out)
     np.testing.assert_allclose(said["stiffness"], mistuning.deviations(6, 0.03, 2))
@@ -63,6 +63,6 @@ def test_the_command_takes_any_wheel(scene: Path, tmp_path: Path, capsys: pytest
 
 def test_what_cannot_be_is_one_sentence(scene: Path) -> None:
     with pytest.raises(ValueError, match=r"beam has no \[wheel\]"):
-        mistuning.respond(scene_file.read("beam"))
+        mistuning.mistuned("beam")
     with pytest.raises(ValueError, match="6 sectors, but there are 2 factors"):
-        mistuning.respond(scene_file.read(str(scene)), [1.0, 1.1])
+        mistuning.mistuned(scene, [1.0, 1.1])

@@ -10,11 +10,10 @@ import pytest
 
 from tests.helpers.wheel_scene import WHEEL
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.sectors import Mistuning
-from tribodyn.workflows.studies.wheels import mistuned_motion, mistuned_wear, patterns
+from tribodyn.workflows.studies.wheels import mistuned_wear, patterns
 
 CHANGED = {
     '["400 Hz", "404 Hz"]': '["750 Hz", "880 Hz"]',
@@ -63,7 +62,7 @@ def test_a_pattern_depends_on_seed_and_number_alone() -> None:
 def test_the_command_draws_patterns_and_resumes(
     scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["mistuning", str(scene), "--workers", "1", "--out", str(tmp_path), "--json"]
+    words = ["wheel", "patterns", str(scene), "--workers", "1", "--out", str(tmp_path), "--json"]
     cli.app(words, result_action="return_value")
     said = json.loads(capsys.readouterr().out)
     assert said["complete"] == 2
@@ -86,7 +85,7 @@ def test_blades_alike_amplify_nothing(scene: Path) -> None:
 
 def test_blades_that_differ_wear_by_their_own_work(scene: Path, tmp_path: Path) -> None:
     """Worn volume differs by blade, is that of its own work, and changes whose amplitude is how large."""
-    found = mistuned_wear.study(scene_file.read(str(scene)), 1)
+    found = mistuned_wear.pattern_wear(scene, 1)
     assert len(found.history.cycles) == 2
     volume = found.volume[-1]
     assert volume.min() >= 0
@@ -94,20 +93,17 @@ def test_blades_that_differ_wear_by_their_own_work(scene: Path, tmp_path: Path) 
     work = found.history.work[:-1].sum(axis=0).reshape(6, -1).sum(axis=1)
     np.testing.assert_allclose(volume, 1e-13 * work, rtol=1e-6)
     assert np.abs(found.heights[-1] / found.heights[0] - 1).max() > 1e-4
-    mistuned_wear.write(found, tmp_path / "wear.csv")
-    mistuned_wear.picture(found).savefig(tmp_path / "wear.png")
-    assert (tmp_path / "wear.csv").read_text(encoding="utf-8").startswith("cycles,peak_Hz,amplitude_m@0")
-    blades = patterns.Blades.of(scene_file.read(str(scene)))
-    states = mistuned_motion.worn_states(blades, found)
+    table, _, drawn = found.write(tmp_path)
+    assert table.read_text(encoding="utf-8").startswith("cycles,peak_Hz,amplitude_m@0")
+    states = found.state(0), found.state(-1)
     tips = np.linalg.norm(np.linalg.norm(states[1].displacement[..., 1:], axis=-1), axis=-1).max(axis=1)
     assert np.corrcoef(tips, states[1].heights)[0, 1] > 0.9  # who vibrates most does so in the picture too
-    (drawn,) = mistuned_motion.write(blades, states, tmp_path)
     assert drawn.stat().st_size > 50_000
 
 
 def test_what_cannot_be_is_one_sentence(scene: Path, tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=r"blade has no \[mistuning\]"):
-        patterns.run(scene_file.read("blade"), tmp_path, Progress())
+        patterns.patterns("blade", tmp_path)
     with pytest.raises(SceneError, match=r"mistuning is for a \[wheel\]"):
         scene_file.read("beam", ('mistuning.frequency="1 %"',))
     with pytest.raises(SceneError, match=r"mistuning\.frequency"):

@@ -1,4 +1,4 @@
-"""`tribodyn backbone`: from the stuck to the free mode of a small beam, and what is refused."""
+"""`tribodyn curve backbone`: from the stuck to the free mode of a small beam, and what is refused."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tribodyn.workflows.pictures.maps import backbone_motion
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import read
-from tribodyn.workflows.studies.curves import backbones as modes
+from tribodyn.workflows.studies.curves import backbones
 
 SMALL = [
     "harmonics.kept=[0, 1]",
@@ -31,7 +31,8 @@ def test_the_backbone_goes_from_the_stuck_to_the_free_mode(capsys: pytest.Captur
     model = modelling.build(read("beam", SMALL), tmp_path, Progress())
     free = linear_modes(model.reduced, n=1)[0][0]
     code, out, err = leave(
-        ["backbone", "beam", *SET, "--from", "0.01um", "--to", "10mm", "--out", str(tmp_path), "--json"], capsys
+        ["curve", "backbone", "beam", *SET, "--from", "0.01um", "--to", "10mm", "--out", str(tmp_path), "--json"],
+        capsys,
     )
     assert code == 0, err
     found = json.loads(out)
@@ -46,7 +47,8 @@ def test_the_backbone_goes_from_the_stuck_to_the_free_mode(capsys: pytest.Captur
     assert (tmp_path / "backbone.png").is_file()
     assert (tmp_path / "backbone_maps.png").stat().st_size > 10_000
     code, out, _ = leave(
-        ["backbone", "beam", *SET, "--from", "1um", "--to", "4um", "--points", "5", "--out", str(tmp_path)], capsys
+        ["curve", "backbone", "beam", *SET, "--from", "1um", "--to", "4um", "--points", "5", "--out", str(tmp_path)],
+        capsys,
     )
     assert code == 0
     assert "at rest" in out
@@ -59,7 +61,7 @@ def test_changes_of_the_scene_say_what_they_do_to_its_backbone(capsys: pytest.Ca
         "loads.static.press.value=40 kN",
     ]
     given = [word for change in changes for word in ("--change", change)]
-    words = ["backbone", "beam", *SET, *given]
+    words = ["curve", "backbone", "beam", *SET, *given]
     words += ["--from", "0.1um", "--to", "1um", "--points", "3", "--out", str(tmp_path)]
     code, out, err = leave([*words, "--json"], capsys)
     assert code == 0, err
@@ -77,8 +79,8 @@ def test_changes_of_the_scene_say_what_they_do_to_its_backbone(capsys: pytest.Ca
 
 
 def test_maps_along_the_backbone_hold_its_friction_work_and_its_motion() -> None:
-    model, found = modes.follow_with_model(read("beam", SMALL), modes.Way(1e-7, 2e-4, points=6), Progress())
-    balance, slides = model.balance, []
+    bone = backbones.backbone("beam", 1e-7, 2e-4, points=6, overrides=SMALL)
+    found, balance, slides = bone.mode, bone.balance, []
     for at in range(len(found.omega)):
         slide, gap, work = backbone_motion(balance, found, at)
         assert work @ balance.model.interface.area == pytest.approx(found.energy[at], rel=1e-12)
@@ -103,7 +105,7 @@ def test_maps_along_the_backbone_hold_its_friction_work_and_its_motion() -> None
 def test_what_cannot_be_is_refused(
     arguments: list[str], words: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    code, _, err = leave(["backbone", "beam", *SET, *arguments, "--out", str(tmp_path)], capsys)
+    code, _, err = leave(["curve", "backbone", "beam", *SET, *arguments, "--out", str(tmp_path)], capsys)
     assert code == 2
     assert words in err
     assert err.count("\n") == 1

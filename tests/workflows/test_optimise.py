@@ -14,7 +14,6 @@ import tribodyn as td
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.studies.many import study_file
-from tribodyn.workflows.studies.many.optimum import values_of
 from tribodyn.workflows.studies.many.proposal import Known, best_trades, propose
 from tribodyn.workflows.studies.many.table import StudyTable
 
@@ -89,10 +88,13 @@ def test_the_linear_scene_comes_to_its_corner_and_resumes(tmp_path: Path, capsys
     """Least amplitude of a linear structure: least force and most damping; the command and Python say the same."""
     file, folder = tmp_path / "corner.toml", tmp_path / "found"
     file.write_text(tomli_w.dumps(tables(finer=["harmonics.kept=[0, 1, 2]"])), encoding="utf-8")
-    cli.app(["optimise", str(file), "--workers", "1", "--out", str(folder), "--json"], result_action="return_value")
+    cli.app(
+        ["study", "optimise", str(file), "--workers", "1", "--out", str(folder), "--json"], result_action="return_value"
+    )
     said, rows = json.loads(capsys.readouterr().out), (folder / "rows.jsonl").read_text(encoding="utf-8")
+    assert len(said.pop("files")) == 2
     assert (folder / "optimum.png").stat().st_size > 5000
-    found = td.optimise(file, folder, workers=1, resume=True)
+    found = td.studies.optimise(file, folder, workers=1, resume=True)
     assert found.record() == said == json.loads((folder / "optimum.json").read_text(encoding="utf-8"))
     assert (folder / "rows.jsonl").read_text(encoding="utf-8") == rows
     keys, amplitude = found.keys(found.best), found.values(found.best)["peak_m_first"]
@@ -111,7 +113,7 @@ def test_a_contact_that_survives_lives_longest() -> None:
         "life_cycles": np.array([5e6, np.nan, np.nan, np.nan]), "cycles": np.array([6e6, 2e6, 3e6, 0.0]),
         "survives": np.array([np.nan, 1.0, np.nan, 1.0]),
     }  # fmt: skip
-    values, least = values_of(StudyTable("made up", columns, ()), "life_cycles")
+    values, least = StudyTable("made up", columns, ()).values_of("life_cycles")
     assert values.tolist() == [5e6, 5e6, 3e6, 5e6]
     assert least.tolist() == [False, True, True, True]
 
@@ -128,6 +130,6 @@ def test_what_cannot_be_is_one_sentence(tmp_path: Path) -> None:
         parsed(study={**LINEAR, "same": {"contact.friction": "nothing"}})
     normal = {"distribution": "normal", "mean": "15 N", "cov": "10 %"}
     with pytest.raises(SceneError, match="needs a range, give low and high"):
-        td.optimise({**tables(), "vary": {FORCE: normal}}, tmp_path)
+        td.studies.optimise({**tables(), "vary": {FORCE: normal}}, tmp_path)
     with pytest.raises(SceneError, match='begins with runs that are drawn, give design = "sobol"'):
-        td.optimise({"study": {"scene": "beam", "design": "grid"}, "vary": {FORCE: ["10 N"]}}, tmp_path)
+        td.studies.optimise({"study": {"scene": "beam", "design": "grid"}, "vary": {FORCE: ["10 N"]}}, tmp_path)

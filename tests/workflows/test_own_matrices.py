@@ -10,6 +10,7 @@ import scipy.io
 import scipy.sparse as sp
 
 import tribodyn as td
+from tribodyn import matrices as own
 from tribodyn.hbm.linear.recovery import coordinates
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.reduction.matrix_files import read_matrix
@@ -22,21 +23,21 @@ RUB, STOP = np.array([1.0, -0.5, 0.0, 0.3]), np.array([[0.0, 0.2, 1.0, -1.0]])
 LOADS = {"shaker": 3, "press": 2}
 
 
-def structure(damping_ratio: float | None = 0.02, damping: np.ndarray | None = None) -> td.Structure:
+def structure(damping_ratio: float | None = 0.02, damping: np.ndarray | None = None) -> own.Structure:
     """A rod that rubs along one row under a constant load, and a stop along another row."""
-    matrices = td.from_arrays(MASS, sp.csr_matrix(STIFFNESS), damping)
-    rub = td.Contact(
+    matrices = own.from_arrays(MASS, sp.csr_matrix(STIFFNESS), damping)
+    rub = own.Contact(
         "rub",
         matrices.contact_rows(RUB, ("t1",), area=1e-4),
         "jenkins_constant",
         tangential_stiffness=2e5,
         numbers={"friction": 0.5, "normal_load": 40.0},
     )
-    stop = td.Contact("stop", matrices.contact_rows(STOP, ("n",), area=1e-4, gap=1e-4), "unilateral", 0.0, 1e5)
-    return td.reduce(matrices, (rub, stop), loads=LOADS, outputs={"tip": 3, "bow": RUB}, damping_ratio=damping_ratio)
+    stop = own.Contact("stop", matrices.contact_rows(STOP, ("n",), area=1e-4, gap=1e-4), "unilateral", 0.0, 1e5)
+    return own.reduce(matrices, (rub, stop), loads=LOADS, outputs={"tip": 3, "bow": RUB}, damping_ratio=damping_ratio)
 
 
-def balance(made: td.Structure, force: float = 15.0) -> td.Balance:
+def balance(made: own.Structure, force: float = 15.0) -> own.Balance:
     loads = {1: {"shaker": force}}
     return made.balance(tuple(range(10)), up_to=100.0, static={"press": 20.0}, harmonic=loads, samples=512)
 
@@ -86,16 +87,16 @@ def test_two_laws_on_any_rows_fulfil_the_equation_of_motion() -> None:
 
 
 def test_one_law_on_any_rows_agrees_with_integration_in_time() -> None:
-    matrices = td.from_arrays(MASS, STIFFNESS)
+    matrices = own.from_arrays(MASS, STIFFNESS)
     rows = np.vstack([RUB, [0.4, 0.0, -1.0, 0.2]])
-    rub = td.Contact(
+    rub = own.Contact(
         "rub",
         matrices.contact_rows(rows, ("t1",), area=1.0),
         "jenkins_constant",
         4e5,
         numbers={"friction": 0.5, "normal_load": np.array([40.0, 15.0])},
     )
-    made = td.reduce(matrices, rub, loads=LOADS, outputs={"tip": 3}, damping_ratio=0.02)
+    made = own.reduce(matrices, rub, loads=LOADS, outputs={"tip": 3}, damping_ratio=0.02)
     problem = made.balance((1, 3, 5, 7), up_to=100.0, harmonic={1: {"shaker": 40.0}}, samples=512)
     cycle = problem.peak(30.0, 70.0)
     assert (cycle.status & 2).any()
@@ -128,14 +129,14 @@ def test_a_curve_its_stability_a_mode_and_wear_are_told_in_hz() -> None:
     assert 40.0 < peak.frequency < 70.0
     backbone = problem.nonlinear_mode(1e-6, 1e-3, output="tip", points=10)
     assert backbone.frequency[0] == pytest.approx(backbone.reference_frequency, rel=1e-3)
-    worn = problem.wear({"rub": td.wear_law("energy", coefficient=1e-12)}, at=45.0, step=1e-6, max_steps=2)
+    worn = problem.wear({"rub": own.wear_law("energy", coefficient=1e-12)}, at=45.0, step=1e-6, max_steps=2)
     assert worn.frequency == pytest.approx(45.0)
     assert (worn.depth[-1, 0] > 0, worn.depth[-1, 1]) == (True, 0.0)
     assert worn.depth[-1, 0] == pytest.approx(1e-12 * worn.work[:-1, 0].sum() / 1e-4, rel=1e-6)
 
 
 def test_rows_that_pick_dofs_are_the_contact_of_those_dofs() -> None:
-    matrices = td.from_arrays(MASS, STIFFNESS)
+    matrices = own.from_arrays(MASS, STIFFNESS)
     picked = np.zeros((2, 4))
     picked[[0, 1], [0, 3]], picked[[0, 1], [1, 2]] = 1.0, -1.0
     one = matrices.contact([[0], [3]], [[1], [2]], components=("n",), area=2.0)
@@ -152,20 +153,23 @@ def test_rows_that_pick_dofs_are_the_contact_of_those_dofs() -> None:
         (lambda m: m.contact_rows(np.zeros((1, 4)), ("n",), area=1.0), "can never move"),
         (lambda m: m.contact_rows(np.full((1, 4), np.nan), ("n",), area=1.0), "not finite"),
         (lambda m: m.contact_rows(RUB, ("n", "t1"), area=1.0), "in this order"),
-        (lambda m: td.from_arrays(MASS, STIFFNESS[:3, :3]), "4 rows but the stiffness matrix has 3"),
-        (lambda m: td.from_arrays(MASS, np.triu(STIFFNESS)), "one triangle only"),
-        (lambda m: td.reduce(m, (), loads=LOADS, outputs={"tip": 3}), "at least one contact"),
+        (lambda m: own.from_arrays(MASS, STIFFNESS[:3, :3]), "4 rows but the stiffness matrix has 3"),
+        (lambda m: own.from_arrays(MASS, np.triu(STIFFNESS)), "one triangle only"),
+        (lambda m: own.reduce(m, (), loads=LOADS, outputs={"tip": 3}), "at least one contact"),
         (lambda m: structure(0.01, np.eye(4)), "hold a damping matrix"),
         (lambda m: balance(structure()).response(1, 2, nonsense=3), "nonsense"),
         (lambda m: balance(structure()).response(1, 2, threads=0), "threads: expected 1 or more, got 0"),
         (lambda m: balance(structure()).response(1, 2, method="magic"), "no continuation 'magic'"),
         (lambda m: balance(structure()).peak(1, 2, "toe"), "no output 'toe': there are tip, bow"),
-        (lambda m: balance(structure()).wear(td.wear_law("energy", coefficient=1.0), at=50.0), "needs either step"),
+        (
+            lambda m: balance(structure()).wear(own.wear_law("energy", coefficient=1.0), at=50.0),
+            "needs either step",
+        ),
     ],
 )
 def test_what_cannot_be_is_one_sentence(call, words: str) -> None:
     with pytest.raises(ValueError, match=words):
-        call(td.from_arrays(MASS, STIFFNESS))
+        call(own.from_arrays(MASS, STIFFNESS))
 
 
 @pytest.mark.parametrize(

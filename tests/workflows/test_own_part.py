@@ -44,7 +44,16 @@ def test_a_study_beside_the_scene_is_found(folder: Path, capsys: pytest.CaptureF
     for size in (20, 15, 10):
         mesh_drawing(folder / "arm.geo", folder / f"arm_{size}.msh", {"size": 1e-3 * size})
     (folder / "arm.study.toml").write_text(GRIDS)
-    words = ["converge", str(folder / "arm.toml"), "--set", "response.points=20", "--json", "--out", str(folder)]
+    words = [
+        "study",
+        "converge",
+        str(folder / "arm.toml"),
+        "--set",
+        "response.points=20",
+        "--json",
+        "--out",
+        str(folder),
+    ]
     cli.app(words, result_action="return_value")
     rows = json.loads(capsys.readouterr().out)
     assert [row["size"] for row in rows] == [1, 1.33, 2]
@@ -68,7 +77,7 @@ def test_a_study_that_is_none_is_refused(
 ) -> None:
     (folder / "arm.study.toml").write_text(study)
     with pytest.raises(SystemExit) as left:
-        cli.main(["converge", str(folder / "arm.toml")])
+        cli.main(["study", "converge", str(folder / "arm.toml")])
     assert left.value.code == 2
     said = capsys.readouterr().err
     assert sentence in said

@@ -79,7 +79,7 @@ def test_the_wheel_works_from_another_folder_beside_modules_of_the_same_names(wh
         (site / f"{name}.py").write_text(OTHERS)
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
-    code = "import tribodyn as td; print(td.__file__, td.__version__, *td.scene_names()); td.build; td.Balance; td.load"
+    code = "import tribodyn as td; print(td.__file__, td.__version__, *td.scene_names()); td.build; td.matrices.Balance"
     environment = {**os.environ, "PYTHONPATH": str(site)}
 
     def said(*words: str) -> str:

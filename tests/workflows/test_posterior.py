@@ -112,7 +112,7 @@ def test_a_planted_truth_of_a_scene_is_in_its_interval(tmp_path: Path, capsys: p
         },
         "predict": AHEAD,
     }
-    found = td.posterior("beam", task, trials=48, overrides=list(BEAM))
+    found = td.studies.posterior("beam", task, trials=48, overrides=list(BEAM))
     for one, value in zip(found.summaries(), (300e6, 0.42, truth[2]), strict=True):
         assert one.low < value < one.high, one.name
     assert found.doubts == []
@@ -120,7 +120,7 @@ def test_a_planted_truth_of_a_scene_is_in_its_interval(tmp_path: Path, capsys: p
     lines = ["[parameters.mu]", 'keys = ["contact.friction"]', "low = 0.2", "high = 0.7", "[measured.energy]"]
     lines += ['of = "energy"', 'at = "700 Hz"', "load = 2.0", f"value = {float(truth[1])}"]
     (tmp_path / "fit.toml").write_text("\n".join(lines))
-    words = ["identify", "beam", str(tmp_path / "fit.toml"), "--posterior", "--trials", "8"]
+    words = ["study", "posterior", "beam", str(tmp_path / "fit.toml"), "--trials", "8"]
     words += [word for text in (*BEAM, TRUTH[0]) for word in ("--set", text)]
     code, _, error = leave(words, capsys)
     assert code == 2

@@ -11,7 +11,7 @@ import pytest
 
 from tests.helpers.command import leave
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.curves import backbones as modes
+from tribodyn.workflows.studies.curves import backbones
 from tribodyn.workflows.studies.published import published_backbone
 
 TABLE = """[backbone]
@@ -33,7 +33,7 @@ def test_ours_stands_at_the_published_amplitudes_that_it_has_reached(tmp_path: P
     assert published is not None
     a = np.geomspace(1e-7, 5e-5, 60)
     found = SimpleNamespace(converged=a > 0, modal_amplitude=a, frequency=200 - np.log10(a), damping=1e-3 + 0 * a)
-    said = modes.beside(found, published)
+    said = backbones.beside(found, published)
     assert said["source"] == "others"
     assert [row["modal_amplitude"] for row in said["rows"]] == [1e-6, 1e-5]
     last = said["rows"][-1]
@@ -46,7 +46,17 @@ def test_ours_stands_at_the_published_amplitudes_that_it_has_reached(tmp_path: P
 @pytest.mark.parametrize("change", [("damping", "dumping"), ("[100, 99, 96]", "[100, 99]"), ("1e-5", "1e-7")])
 def test_an_incomplete_table_is_one_sentence(tmp_path: Path, change: tuple[str, str], capsys):
     given(tmp_path, TABLE.replace(*change))
-    words = ["backbone", str(tmp_path / "mine.toml"), "--from", "1um", "--to", "2um", "--out", str(tmp_path / "out")]
+    words = [
+        "curve",
+        "backbone",
+        str(tmp_path / "mine.toml"),
+        "--from",
+        "1um",
+        "--to",
+        "2um",
+        "--out",
+        str(tmp_path / "out"),
+    ]
     code, _, err = leave(words, capsys)
     assert code == 2
     assert "mine.published.toml: [backbone] needs" in err

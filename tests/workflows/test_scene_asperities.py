@@ -30,7 +30,8 @@ def scene(tmp_path: Path) -> Path:
 
 def test_the_scan_gives_radius_and_table(scene: Path):
     read = scene_file.read(str(scene), [NO_TABLE, "contacts.lap.radius=", *FACES]).scene.joints["lap"]
-    found = td.asperities(scene.parent / "scan.txt", cutoff=CUTOFF, shortest=SHORTEST, spacing=(SPACING, SPACING))
+    scales = {"cutoff": CUTOFF, "shortest": SHORTEST, "spacing": (SPACING, SPACING)}
+    found = td.studies.asperities(scene.parent / "scan.txt", **scales).found
     assert read.numbers["radius"] == pytest.approx(found.radius, rel=1e-12)
     np.testing.assert_allclose(np.array(read.table), found.table(), rtol=1e-12)
     given = scene_file.read(str(scene), [NO_TABLE, *FACES]).scene.joints["lap"]

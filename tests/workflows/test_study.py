@@ -23,7 +23,7 @@ from tests.helpers import dying
 from tests.helpers.command import leave
 from tribodyn.workflows.run import reuse
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.many import design, parallel_picture, pool, study_file, task
+from tribodyn.workflows.studies.many import design, pictures, pool, study_file, task
 from tribodyn.workflows.studies.many.journal import Journal
 from tribodyn.workflows.studies.many.task import Row, Task
 
@@ -108,7 +108,7 @@ def test_correlations_are_those_of_a_gaussian_copula() -> None:
 )
 def test_what_cannot_be_is_refused_with_a_sentence(change: dict[str, Any], sentence: str, tmp_path: Path) -> None:
     with pytest.raises(td.SceneError, match=sentence):
-        td.study(TABLES | change, tmp_path)
+        td.studies.grid(TABLES | change, tmp_path)
     assert not list(tmp_path.iterdir())
 
 
@@ -131,7 +131,7 @@ def test_a_wrong_distribution_is_refused(table: dict[str, Any], sentence: str) -
 def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The study done by two processes."""
     folder = tmp_path_factory.mktemp("two")
-    td.study(TABLES, folder, workers=2)
+    td.studies.grid(TABLES, folder, workers=2)
     return folder
 
 
@@ -155,7 +155,7 @@ def test_a_row_is_what_the_run_itself_gives(done: Path) -> None:
 
 
 def test_the_table_does_not_depend_on_the_workers(done: Path, tmp_path: Path) -> None:
-    td.study(TABLES, tmp_path, workers=1)
+    td.studies.grid(TABLES, tmp_path, workers=1)
     for name in ("study.csv", "study.h5"):
         assert (tmp_path / name).read_bytes() == (done / name).read_bytes()
 
@@ -174,16 +174,16 @@ def test_resuming_repeats_nothing_and_takes_what_a_larger_study_shares(
             yield Row(one.number, one.key, "failed", "at 400 Hz")
 
     monkeypatch.setattr(pool, "finished", pretend)
-    found = td.study(TABLES, tmp_path, resume=True)
+    found = td.studies.grid(TABLES, tmp_path, resume=True)
     assert asked == []
     assert (tmp_path / "study.h5").read_bytes() == (done / "study.h5").read_bytes()
     larger = TABLES | {"vary": {FRICTION: [0.2, 0.3], PRESS: ["10 kN", "20 kN"]}}
-    found = td.study(larger, tmp_path, resume=True)
+    found = td.studies.grid(larger, tmp_path, resume=True)
     assert asked == [1, 2]
     assert list(found.columns["status"]) == ["failed", "failed", "complete", "complete"]
-    td.study(larger, tmp_path, resume=True)
+    td.studies.grid(larger, tmp_path, resume=True)
     assert asked == [1, 2]  # what failed fails again
-    td.study(larger, tmp_path, retry=True)
+    td.studies.grid(larger, tmp_path, retry=True)
     assert asked == [1, 2, 1, 2]
 
 
@@ -213,7 +213,7 @@ def test_the_command_resumes_a_study_that_was_killed(
         f'[study]\nscene = "beam"\ndesign = "grid"\nset = {json.dumps(TINY)}\n'
         f'[vary]\n{FRICTION} = [0.3, -0.5]\n{PRESS} = ["10 kN", "20 kN"]\n'
     )
-    words = ["study", str(file), "--workers", "1", "--out", str(tmp_path / "out")]
+    words = ["study", "grid", str(file), "--workers", "1", "--out", str(tmp_path / "out")]
     process = subprocess.Popen([sys.executable, "-m", "tribodyn", *words], stdout=subprocess.DEVNULL)
     journal = Journal(tmp_path / "out")
     while not journal.rows() and process.poll() is None:
@@ -257,11 +257,11 @@ def test_processes_share_what_is_made_once(tmp_path: Path, monkeypatch: pytest.M
             yield solve(one)
 
     monkeypatch.setattr(pool, "finished", every_process_new)
-    found = td.study(TABLES | {"vary": both}, tmp_path, workers=2)
+    found = td.studies.grid(TABLES | {"vary": both}, tmp_path, workers=2)
     assert found.count("complete") == 4
     assert len(made) == 2
     assert not (tmp_path / "models").exists()
-    assert parallel_picture.picture(found).axes
+    assert pictures.parallel(found).axes
 
 
 def test_the_parts_of_all_scenes_can_be_stored() -> None:

@@ -137,7 +137,7 @@ def reference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The study done without any engine."""
     with monkeypatch.context() as patch:
         patch.setattr(pool, "finished", lambda tasks, workers, solve: map(solve, tasks))
-        td.study(TABLES, tmp_path / "here", workers=1)
+        td.studies.grid(TABLES, tmp_path / "here", workers=1)
     return tmp_path / "here"
 
 
@@ -152,7 +152,7 @@ def test_a_killed_worker_and_a_killed_scheduler_lose_nothing(kind: Any, tmp_path
 
     def study() -> None:
         try:
-            td.study(TABLES, folder, scheduler=engine.address)
+            td.studies.grid(TABLES, folder, scheduler=engine.address)
         except td.SolveFailed as failure:
             failures.append(str(failure))
 
@@ -168,7 +168,7 @@ def test_a_killed_worker_and_a_killed_scheduler_lose_nothing(kind: Any, tmp_path
     assert 2 <= len(before) < RUNS
 
     again = kind() if kind is InProcess else None
-    found = td.study(TABLES, folder, workers=1, scheduler=again.address if again else "local", resume=True)
+    found = td.studies.grid(TABLES, folder, workers=1, scheduler=again.address if again else "local", resume=True)
     if again:
         again.kill_scheduler()
     assert found.count("complete") == RUNS

@@ -16,7 +16,6 @@ from rich.console import Console
 import tribodyn
 from tests.helpers.synthetic_result import result
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.command.found import commands
 from tribodyn.workflows.run import progress
 
 
@@ -25,8 +24,18 @@ def test_an_unknown_command_is_answered_with_all_of_them(capsys: pytest.CaptureF
         cli.main(["fly"])
     said = capsys.readouterr().err
     assert stop.value.code == 2
-    for name in ("run", "list", "show", "render", "verify", "plan", *(c.__name__.rstrip("_") for c in commands())):
-        assert re.search(rf"\b{name.replace('_', '-')}\b", said), name
+    for name in cli.WORDS:
+        assert re.search(rf"\b{name}\b", said), name
+
+
+@pytest.mark.parametrize("old", cli.SUCCESSORS)
+def test_a_former_word_is_answered_with_its_successor(old: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        cli.main([old, "beam"])
+    said = capsys.readouterr().err
+    assert stop.value.code == 2
+    assert said.count("\n") == 1
+    assert f"tribodyn {cli.SUCCESSORS[old]}" in said
 
 
 def test_quiet_prints_nothing_and_the_log_has_every_line(

@@ -1,4 +1,4 @@
-"""`tribodyn track`: peaks and folds against load, gap and wear are those of the problem made anew at the value."""
+"""`curve track`: peaks and folds against load, gap and wear are those of the problem made anew at the value."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_a_fold_against_the_load_is_that_of_a_branch_traced_anew(
     lifting: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["--against", "load", "--from", "1", "--to", "1.4", "--fold", "2", "--out", str(tmp_path), "--json"]
-    code, out, err = leave(["track", lifting, *arguments], capsys)
+    code, out, err = leave(["curve", "track", lifting, *arguments], capsys)
     assert code == 0, err
     found = json.loads(out)
     assert (found["what"], found["against"], found["end"]) == ("fold", "load factor", "reached load factor 1.4")
@@ -91,7 +91,7 @@ def test_peaks_are_those_of_the_problem_made_anew(
 ) -> None:
     sets = [word for override in SMALL for word in ("--set", override)]
     arguments = ["--against", against, "--from", start, "--to", stop, "--points", "3", "--out", str(tmp_path)]
-    code, out, err = leave(["track", "beam", *sets, *arguments, "--json"], capsys)
+    code, out, err = leave(["curve", "track", "beam", *sets, *arguments, "--json"], capsys)
     assert code == 0, err
     found = json.loads(out)
     assert len(found["value"]) == 3
@@ -116,7 +116,7 @@ def test_a_wear_of_one_is_the_end_of_the_worn_result(tmp_path: Path, capsys: pyt
     assert result.wear is not None
     sets = [word for override in overrides for word in ("--set", override)]
     arguments = ["--against", "wear", "--worn", str(tmp_path), "--from", "0", "--to", "1", "--points", "4"]
-    code, out, err = leave(["track", "beam", *sets, *arguments, "--out", str(tmp_path), "--json"], capsys)
+    code, out, err = leave(["curve", "track", "beam", *sets, *arguments, "--out", str(tmp_path), "--json"], capsys)
     assert code == 0, err
     found = json.loads(out)
     for at, row in ((0, 0), (-1, -1)):
@@ -136,6 +136,6 @@ def test_a_wear_of_one_is_the_end_of_the_worn_result(tmp_path: Path, capsys: pyt
 def test_what_cannot_be_is_one_sentence(
     arguments: list[str], words: str, lifting: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code, _, err = leave(["track", lifting, *arguments], capsys)
+    code, _, err = leave(["curve", "track", lifting, *arguments], capsys)
     assert code == 2
     assert words in err

@@ -41,7 +41,7 @@ def test_the_command_draws_the_modes_of_a_wheel(tmp_path: Path, capsys: pytest.C
     changes = [word for text in (*FEW_SECTORS, "geometry.n_span=3") for word in ("--set", text)]
     speeds = ["--from", "3000rpm", "--to", "9000rpm", "--speeds", "2", "--families", "2", "--order", "1", "2"]
     with pytest.raises(SystemExit) as stop:
-        cli.main(["wheel", "blade", *changes, *speeds, "--out", str(tmp_path), "--json"])
+        cli.main(["wheel", "modes", "blade", *changes, *speeds, "--out", str(tmp_path), "--json"])
     assert stop.value.code == 0
     said = json.loads(capsys.readouterr().out)
     assert {Path(name).name for name in said["files"]} == {
@@ -60,7 +60,7 @@ def test_the_command_draws_the_modes_of_a_wheel(tmp_path: Path, capsys: pytest.C
 
 def test_a_part_without_a_wheel_has_no_diagrams(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stop:
-        cli.main(["wheel", "beam"])
+        cli.main(["wheel", "modes", "beam"])
     assert stop.value.code == 2
     assert "has no [wheel]" in capsys.readouterr().err
 

@@ -16,7 +16,7 @@ Overrides = Annotated[
 Changes = Annotated[tuple[str, ...], Parameter(name="--change", negative=(), consume_multiple=False)]
 Start = Annotated[str | None, Parameter(name="--from")]
 Stop = Annotated[str | None, Parameter(name="--to")]
-Json = Annotated[bool, Parameter(name="--json", negative=())]
+Json = Annotated[bool, Parameter(name="--json", negative=(), help="Print JSON for machines.")]
 Flag = Annotated[bool, Parameter(negative=())]
 PICTURE = (".png", ".pdf", ".svg")
 

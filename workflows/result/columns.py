@@ -1,9 +1,9 @@
-"""Named columns of numbers as a file of comma-separated values."""
+"""Named columns of numbers as a file of comma-separated values, and names with values as lines."""
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,3 +16,8 @@ def write_columns(columns: Mapping[str, Any], path: Path) -> None:
         table = csv.writer(stream)
         table.writerow(columns)
         table.writerows(zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True))
+
+
+def named_lines(values: Iterable[tuple[str, str]]) -> list[str]:
+    """Names and values in two columns."""
+    return [f"{name:14} {value}" for name, value in values]

@@ -226,8 +226,27 @@ def _scale(file: h5py.File, dimension: str, size: int) -> h5py.Dataset:
     return file[dimension]
 
 
-def load(path: Path) -> Result:
-    """Read a result file; raises ResultError where there is none, or where it has changed since it was written."""
+Held = Result | str | os.PathLike[str]
+"""A result, or where one is: its folder, or the file result.h5 itself."""
+
+
+def held(result: Held) -> Result:
+    """A result that is given, or read from where it is; raises ResultError."""
+    return result if isinstance(result, Result) else load(result)
+
+
+def result_file(path: str | os.PathLike[str]) -> Path:
+    """File of a result that is given by its folder or by itself."""
+    path = Path(path)
+    return path / "result.h5" if path.is_dir() else path
+
+
+def load(path: str | os.PathLike[str]) -> Result:
+    """Read a result: its folder, or the file result.h5 itself.
+
+    Raises  ResultError where there is none, or where it has changed since it was written
+    """
+    path = result_file(path)
     try:
         data = path.read_bytes()
     except FileNotFoundError:

@@ -123,6 +123,17 @@ class CallbackProgress(Progress):
         self._callback(text, None)
 
 
+Report = Progress | Callback | None
+"""Who is informed of what goes on: a function (text, share done or None), a Progress, or nobody."""
+
+
+def reporter(progress: Report) -> Progress:
+    """A Progress of what a caller gives."""
+    if progress is None:
+        return Progress()
+    return progress if isinstance(progress, Progress) else CallbackProgress(progress)
+
+
 def compiled() -> float:
     """Seconds that numba has compiled in this process since this was first asked, 0 where numba is not in use."""
     global _timer

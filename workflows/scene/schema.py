@@ -47,7 +47,7 @@ class Heading(Table):
     """What the scene is and where its numbers come from."""
 
     title: str
-    """What the scene is, in one line; `tribodyn list` and every picture show it."""
+    """What the scene is, in one line; `tribodyn cases` and every picture show it."""
     source: str = ""
     """Where its numbers come from."""
     notes: str = ""
@@ -70,7 +70,7 @@ class Scene(Table, ABC):
     preload: Preload = Preload()
     """How the contact comes to its preload."""
     backbone: NonlinearMode | None = None
-    """The nonlinear mode that `tribodyn backbone` follows by itself."""
+    """The nonlinear mode that `tribodyn curve backbone` follows by itself."""
     wear: Wear | None = None
     """Wear; left out, nothing wears."""
     pictures: Pictures = Pictures()
@@ -113,7 +113,7 @@ class MeshScene(Scene):
     mistuning: Mistuning | None = None
     """How far its blades differ."""
     flow: FlowTable | None = None
-    """The flow round its blades, for `tribodyn flutter`."""
+    """The flow round its blades, for `tribodyn wheel flutter`."""
 
     one_body: ClassVar[bool] = False
     """Whether it can have a single body only."""

@@ -36,7 +36,7 @@ Spread = Annotated[Number, Field(ge=0, le=0.3)]
 
 
 class Mistuning(Table):
-    """Blades that differ: what is drawn for `tribodyn mistuning`, blade by blade and pattern by pattern.
+    """Blades that differ: what is drawn for `tribodyn wheel patterns`, blade by blade and pattern by pattern.
 
     All deviations are normally distributed and cut off at three standard deviations.
     """

@@ -240,7 +240,7 @@ class Preload(Table):
 
 
 class NonlinearMode(Table):
-    """The nonlinear mode that `tribodyn backbone` follows where its options are not given."""
+    """The nonlinear mode that `tribodyn curve backbone` follows where its options are not given."""
 
     modal_amplitude: tuple[Annotated[Number, Field(gt=0)], Annotated[Number, Field(gt=0)]]
     """First and last amplitude of the mass-normalised mode, in m kg^0.5."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +22,7 @@ from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene
+from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 
 TOLERANCE = 1e-12  # of the contact at rest: the balance of forces is to be seen to 1e-8
 
@@ -48,12 +48,51 @@ class BodyForces:
         return float(np.linalg.norm(forces.sum(axis=0))) / scale if scale > 0 else 0.0
 
 
-def study(file: SceneFile) -> list[BodyForces]:
-    """Forces on every body at rest under the static loads of the scene, harmonic loads away.
+@dataclass(frozen=True)
+class Forces:
+    """Static forces on the bodies of a scene."""
 
+    bodies: tuple[BodyForces, ...]
+
+    def record(self) -> dict[str, Any]:
+        """For machines."""
+        return {
+            one.body: {
+                "load_N": one.load.tolist(),
+                "joints_N": {name: force.tolist() for name, force in one.joints.items()},
+                "imbalance": one.imbalance,
+                "held": one.held,
+            }
+            for one in self.bodies
+        }
+
+    def lines(self) -> list[str]:
+        """For people."""
+        said = []
+        for one in self.bodies:
+            said.append(f"{one.body}: static load {_vector(one.load)} N")
+            said += [f"  {name}: {_vector(force)} N" for name, force in one.joints.items()]
+            if one.held:
+                said.append(f"  supports and neighbours: {_vector(-one.load - sum(one.joints.values()))} N")
+            else:
+                said.append(f"  out of balance by {one.imbalance:.1e} of the largest")
+        return said
+
+
+def forces(scene: Source, *, overrides: Overrides = ()) -> Forces:
+    """Show the static forces on every body of a scene, joint by joint, and whether they balance.
+
+    At rest under the static loads, centrifugal force included; harmonic loads are away.
+
+    scene : name of a scene with a mesh, or a .toml file
     Raises  SceneError for a scene of matrices; SolveFailed where the contact does not settle
     """
-    scene = file.mesh_scene
+    file = read_scene(scene, overrides)
+    return of_scene(file, file.mesh_scene)
+
+
+def of_scene(file: SceneFile, scene: MeshScene) -> Forces:
+    """The forces of a scene that was read."""
     with limited(scene.solver.threads):
         model = modelling.build(file, None, Progress())
         part, balance = model.part, model.balance.with_load(0.0)
@@ -77,7 +116,7 @@ def study(file: SceneFile) -> list[BodyForces]:
         joints = {joint: on[nodes].sum(axis=0) for joint, on in contact.items() if on[nodes].any()}
         held = not free.reshape(-1, 3)[nodes].all() or part.follow is not None or bool(scene.springs)
         found.append(BodyForces(name, load[nodes].sum(axis=0), joints, held))
-    return found
+    return Forces(tuple(found))
 
 
 def _loads(scene: MeshScene, part: Part, excitation: Excitation, q: np.ndarray) -> np.ndarray:
@@ -106,32 +145,6 @@ def _contact_forces(scene: MeshScene, part: Part, force: np.ndarray) -> dict[str
             on = second.T @ own - interface.B.T @ own
         found[contact.joint] = found.get(contact.joint, 0.0) + on.reshape(-1, 3)
     return found
-
-
-def lines(found: Sequence[BodyForces]) -> list[str]:
-    """What was found, for people."""
-    said = []
-    for one in found:
-        said.append(f"{one.body}: static load {_vector(one.load)} N")
-        said += [f"  {name}: {_vector(force)} N" for name, force in one.joints.items()]
-        if one.held:
-            said.append(f"  supports and neighbours: {_vector(-one.load - sum(one.joints.values()))} N")
-        else:
-            said.append(f"  out of balance by {one.imbalance:.1e} of the largest")
-    return said
-
-
-def record(found: Sequence[BodyForces]) -> dict[str, Any]:
-    """What was found, for machines."""
-    return {
-        one.body: {
-            "load_N": one.load.tolist(),
-            "joints_N": {name: force.tolist() for name, force in one.joints.items()},
-            "imbalance": one.imbalance,
-            "held": one.held,
-        }
-        for one in found
-    }
 
 
 def _vector(force: np.ndarray) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -16,8 +16,12 @@ from tribodyn.fem.material import Material
 from tribodyn.fem.modes import modes
 from tribodyn.geometry.facts import area, facts
 from tribodyn.geometry.sources import read as sources
+from tribodyn.workflows.pictures import groups as group_pictures
+from tribodyn.workflows.result.columns import named_lines
 from tribodyn.workflows.run import modelling, part_reduction, sanity_checks
 from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.fields import Number, Pressure, quantity
+from tribodyn.workflows.scene.source import AnyPath, Overrides, read_scene
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,7 @@ class Inspection:
             "remarks": list(self.remarks),
         }
 
-    def lines(self) -> list[tuple[str, str]]:
+    def lines(self) -> list[str]:
         """For people."""
         mass = "not known, no density is given" if self.mass is None else f"{self.mass:.6g} kg"
         lines = [
@@ -98,28 +102,45 @@ class Inspection:
             lines.append(("free modes", ", ".join(f"{f:.5g}" for f in self.frequencies) + " Hz"))
         lines += [("done", sentence) for sentence in self.said]
         lines += [("not used", clause) for clause in self.unused]
-        return lines + [("warning", sentence) for sentence in self.remarks]
+        return named_lines(lines + [("warning", sentence) for sentence in self.remarks])
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write groups.png: the groups in colour."""
+        folder.mkdir(parents=True, exist_ok=True)
+        group_pictures.draw(self.solids, folder / "groups.png")
+        return [folder / "groups.png"]
 
 
 def inspect(
-    what: str,
-    overrides: Sequence[str] = (),
+    what: AnyPath,
+    *,
     unit: str = "m",
-    material: Material | None = None,
-    n_modes: int = 0,
+    young: Pressure | None = None,
+    poisson: Number = 0.3,
+    density: Annotated[float | None, quantity("kg/m3")] = None,
+    modes: int = 0,
+    overrides: Overrides = (),
 ) -> Inspection:
-    """Inspect a mesh, a deck, a CAD file, or a scene.
+    """Show what a mesh, a deck, a CAD file or a scene holds: size, mass, bodies, groups, worst element, gaps, warnings.
 
-    what : name of a scene, or path of a .toml file or of a file that `geometry.sources.read` knows
-    unit : of length of a file that is no scene; material : of its bodies where the file gives none
-    n_modes : how many free frequencies are wanted; supports and springs of a scene hold, contacts are open
+    what : a file of a mesh, a deck or a CAD program, a scene's name, or a .toml file
+    unit : unit of length of a file: m, mm, cm, um, in, ft
+    young : Young's modulus of a file that gives no material, such as 210GPa
+    poisson : Poisson's ratio likewise
+    density : density likewise, such as "7860 kg/m3"
+    modes : number of natural frequencies to compute, free of contact; supports and springs of a scene hold
     Raises  ValueError: what cannot be, one sentence
     """
+    if modes < 0:
+        raise ValueError(f"--modes {modes}: give a number of modes, 0 for none")
+    if (young is None) != (density is None):
+        raise ValueError("--young and --density go together: give both or none")
+    material = None if young is None or density is None else Material(young, poisson, density)
     if Path(what).suffix.lower() in sources.ENDINGS:
-        return _of_file(Path(what), unit, material, n_modes)
+        return _of_file(Path(what), unit, material, modes)
     if unit != "m" or material is not None:
-        raise ValueError("--unit, --young, --poisson and --density are for files: a scene says them itself")
-    return _of_scene(scene_file.read(what, overrides), n_modes)
+        raise ValueError("--unit, --young, --poisson and --density are for files: a scene has its own")
+    return _of_scene(read_scene(what, overrides), modes)
 
 
 def _of_file(path: Path, unit: str, material: Material | None, n_modes: int) -> Inspection:

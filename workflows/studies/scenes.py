@@ -2,55 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
-
-import numpy as np
-import tomli_w
+from typing import Literal
 
 from tribodyn.workflows.errors import accuracy as errors
 from tribodyn.workflows.errors.accuracy import Bound
 from tribodyn.workflows.errors.verdict import with_verdict
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.store import Held
 from tribodyn.workflows.run import checkpoint, modelling, pipeline, planning
 from tribodyn.workflows.run.modelling import Model
-from tribodyn.workflows.run.progress import CallbackProgress, Progress
+from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneFile
-
-Source = SceneFile | str | PathLike[str] | Mapping[str, Any]
-"""A scene: one that was read, a name that `scene_names` lists, the path of a .toml file, or its tables as a dict."""
-
-Overrides = Sequence[str] | Mapping[str, Any]
-"""Changes of keys: ["wear.step=5 %"] or {"wear.step": "5 %"}; None takes a key out."""
-
-Report = Progress | Callable[[str, float | None], None] | None
-"""How to tell what goes on: a function (text, share done or None), or nothing."""
+from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
 
 
 def scene_names() -> list[str]:
     """Names of the scenes that come with the program."""
     return scene_file.names()
-
-
-def read_scene(source: Source, overrides: Overrides = (), *, folder: str | PathLike[str] | None = None) -> SceneFile:
-    """Read and check a scene; quantities are numbers in SI units or texts with a unit, such as "20 kN".
-
-    source : name, path of a .toml file, tables as a dict, or a scene that was read before
-    overrides : keys to change, on top of those that the scene has
-    folder : where relative file names of a dict begin, the current folder by default
-    Raises  SceneError: one sentence that names the key and what is expected
-    """
-    texts = override_texts(overrides)
-    if isinstance(source, SceneFile):
-        return scene_file.parse(source.text, f"{source.name}.toml", (*source.overrides, *texts), source.folder)
-    if isinstance(source, Mapping):
-        text = tomli_w.dumps(_plain(source))
-        return scene_file.parse(text, "scene.toml", texts, Path(folder or ".").resolve())
-    return scene_file.read(str(source), texts)
 
 
 def plan(source: Source, overrides: Overrides = ()) -> planning.Plan:
@@ -129,16 +102,6 @@ def run_to_accuracy(
     return result, bound
 
 
-def load(path: str | PathLike[str]) -> Result:
-    """Read a result: its folder, or the file result.h5 itself. Raises ResultError."""
-    return store.load(result_file(Path(path)))
-
-
-def result_file(path: Path) -> Path:
-    """File of a result that is given by its folder or by itself."""
-    return path / "result.h5" if path.is_dir() else path
-
-
 def draw(
     result: Result, folder: Path, formats: Sequence[str] = ("png",), dpi: int | None = None
 ) -> tuple[list[Path], str]:
@@ -184,36 +147,30 @@ def animate(
     return film(result, folder, over, row, formats, images, dpi, *factors)
 
 
-def reporter(progress: Report) -> Progress:
-    """A Progress of what a caller gives."""
-    if progress is None:
-        return Progress()
-    return progress if isinstance(progress, Progress) else CallbackProgress(progress)
+def export(result: Held, to: Sequence[str], folder: AnyPath, mesh_ending: str = ".xdmf") -> list[Path]:
+    """Write a result in the formats of other programs, each into a folder of its name; the files written.
+
+    to : of vtk, csv, parquet, mat, uff, mesh, npz, mtx, abaqus; mesh_ending : format of the mesh
+    """
+    from tribodyn.workflows.export import formats
+
+    return list(formats.write(store.held(result), to, Path(folder), mesh_ending))
 
 
-def override_texts(overrides: Overrides) -> tuple[str, ...]:
-    """Changes of keys as the texts "section.key=value" of the command line."""
-    if isinstance(overrides, str):
-        raise ValueError(f'overrides is "{overrides}": give a list of texts "section.key=value" or a dict')
-    if not isinstance(overrides, Mapping):
-        return tuple(overrides)
-    return tuple(
-        f"{key}=" if value is None else f"{key}={_on_one_line(tomli_w.dumps({'v': _plain(value)}).partition('=')[2])}"
-        for key, value in overrides.items()
-    )
+def report(results: Sequence[AnyPath], path: AnyPath) -> Path:
+    """Write one HTML file that shows results and opens anywhere, without a network; its path.
 
+    results : folders or files; several are shown side by side, with differences from the first
+    """
+    from tribodyn.workflows.report import page
 
-def _on_one_line(toml: str) -> str:
-    """An array over several lines as one: results keep a change in each line."""
-    return " ".join(line.strip() for line in toml.strip().splitlines())
-
-
-def _plain(value: Any) -> Any:
-    """A value as TOML has it: arrays as lists, paths as texts; keys whose value is None are left out."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items() if item is not None}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, (np.ndarray, np.generic)):
-        return value.tolist()
-    return str(value) if isinstance(value, PathLike) else value
+    if not results:
+        raise ValueError("report: give the folder or file of a result")
+    given = [Path(one) for one in results]
+    files, loaded = [store.result_file(one) for one in given], [store.load(one) for one in given]
+    names = [str(one.provenance["scene_name"]) for one in loaded]
+    if len(set(names)) < len(names):
+        names = [file.parent.name or str(one) for file, one in zip(files, given, strict=True)]
+    if len(set(names)) < len(names):
+        names = [str(file) for file in files]
+    return page.write(list(zip(names, loaded, files, strict=True)), Path(path))

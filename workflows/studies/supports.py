@@ -1,8 +1,8 @@
 """Impact wear at the supports of a part: pins, stops and hangers that a scene models as springs.
 
-A support rubs and hammers its seat. The work that the part puts into its spring per cycle, before the spring gives it
-back, is what an impact wear law takes; the wear of the seat does not change the motion, so that it follows from a
-response that is already computed.
+A support rubs on its seat and strikes it. The work that the part puts into its spring per cycle, before the spring
+gives it back, is what an impact wear law takes; the wear of the seat does not change the motion, so that it follows
+from a response that is already computed.
 """
 
 from __future__ import annotations
@@ -10,17 +10,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear.laws.impact import loading_work
-from tribodyn.workflows.result.columns import write_columns
-from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.store import Held, held
 from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.scene.fields import quantity
 from tribodyn.workflows.scene.schema import PartScene, Scene
+from tribodyn.workflows.studies.files import write_files
 
 SAMPLES = 256  # of a cycle, at the least
 
@@ -98,47 +99,67 @@ def wear_of(
     return SupportWear(support, branch.frequency, work, depth)
 
 
-def support_wear(
-    result: Result, areas: Mapping[str, float] | None = None, coefficient: float | None = None
-) -> list[SupportWear]:
-    """Wear at every support along the response curve of a result.
+@dataclass(frozen=True)
+class Supports:
+    """Wear at every support of a part."""
 
-    areas : bearing area of the seat of a spring [m2], by its name; coefficient : of impact wear [m3/J]
+    found: tuple[SupportWear, ...]
+
+    def record(self) -> list[dict[str, Any]]:
+        """For machines: every support where it takes most work."""
+        rows = []
+        for one in self.found:
+            top = int(np.argmax(one.work))
+            depth = float(one.depth[top])
+            rows.append(
+                {
+                    "support": one.support.name,
+                    "hz": float(one.frequency[top]),
+                    "work_J": float(one.work[top]),
+                    "depth_m_per_cycle": depth if np.isfinite(depth) else None,
+                }
+            )
+        return rows
+
+    def lines(self) -> list[str]:
+        """For people."""
+        said = []
+        for row in self.record():
+            depth = row["depth_m_per_cycle"]
+            worn = "" if depth is None else f", {depth:.4g} m of depth"
+            said.append(f"{row['support']:16} at most {row['work_J']:.4g} J per cycle{worn}, at {row['hz']:.6g} Hz")
+        return said
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write supports.csv: work and depth per cycle of every support over frequency."""
+        work = {f"{one.support.name}_work_J": one.work for one in self.found}
+        depth = {f"{one.support.name}_depth_m_per_cycle": one.depth for one in self.found}
+        return write_files(folder, {"supports": {"frequency_Hz": self.found[0].frequency, **work, **depth}}, {})
+
+
+def supports(
+    result: Held,
+    areas: Annotated[Mapping[str, float] | None, quantity("m2")] = None,
+    coefficient: Annotated[float | None, quantity("m3/J")] = None,
+) -> Supports:
+    """Wear by impacts at the supports of a part, springs to the ground whose displacement is observed.
+
+    result : folder or file of a result with a response curve
+    areas : bearing area of a support's seat, such as "left_pin=9.8 mm2"; can be repeated
+    coefficient : coefficient of impact wear, such as "2e3 um3/J"
     Raises  ValueError for a result without a response curve, supports or a spring of that name
     """
+    result = held(result)
     scene = scene_file.from_json(result.provenance["scene"])
-    supports, areas = supports_of(scene), areas or {}
-    unknown = [name for name in areas if name not in [support.name for support in supports]]
+    there, areas = supports_of(scene), areas or {}
+    unknown = [name for name in areas if name not in [support.name for support in there]]
     if unknown:
         raise ValueError(
-            f'no support is called "{unknown[0]}", there are {", ".join(support.name for support in supports)}'
+            f'no support is called "{unknown[0]}", there are {", ".join(support.name for support in there)}'
         )
     if result.response is None:
         raise ValueError("the result has no response curve: run its scene")
     highest = result.harmonics[-1]
     basis = HarmonicBasis(result.harmonics, max(SAMPLES, 32 * highest, scene.harmonics.samples))
-    return [wear_of(result.response, basis, support, areas.get(support.name), coefficient) for support in supports]
-
-
-def record(found: list[SupportWear]) -> list[dict[str, Any]]:
-    """For machines: every support where it takes most work."""
-    rows = []
-    for one in found:
-        top = int(np.argmax(one.work))
-        depth = float(one.depth[top])
-        rows.append(
-            {
-                "support": one.support.name,
-                "hz": float(one.frequency[top]),
-                "work_J": float(one.work[top]),
-                "depth_m_per_cycle": depth if np.isfinite(depth) else None,
-            }
-        )
-    return rows
-
-
-def write(found: list[SupportWear], path: Path) -> None:
-    """Work and depth per cycle of every support over frequency as comma-separated values."""
-    work = {f"{one.support.name}_work_J": one.work for one in found}
-    depth = {f"{one.support.name}_depth_m_per_cycle": one.depth for one in found}
-    write_columns({"frequency_Hz": found[0].frequency, **work, **depth}, path)
+    curve = result.response
+    return Supports(tuple(wear_of(curve, basis, one, areas.get(one.name), coefficient) for one in there))

@@ -1,45 +1,117 @@
-"""Measured faces from Python, as the command `tribodyn asperities` reads them."""
+"""The asperities of measured faces, as the contact law `rough` takes them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Any, Literal
+
+import numpy as np
 
 from tribodyn.geometry import surface_io
 from tribodyn.geometry.asperities import Asperities, identify
 from tribodyn.geometry.surface import HeightMap
 from tribodyn.geometry.surface_pair import mirrored
+from tribodyn.workflows.result.columns import named_lines
+from tribodyn.workflows.scene.fields import Length, quantity
 
 Face = HeightMap | str | PathLike[str]
+
+
+@dataclass(frozen=True)
+class FaceAsperities:
+    """Asperities with the table of the contact law `rough`. rows : of the table"""
+
+    found: Asperities
+    rows: int
+
+    def record(self) -> dict[str, Any]:
+        """For machines."""
+        found, m = self.found, self.found.moments
+        return {
+            "summits": len(found.height),
+            "radius_m": found.radius,
+            "density_per_m2": found.density,
+            "deviation_m": float(found.height.std()),
+            "mean_height_m": float(found.height.mean()),
+            "largest_gap_m": float(found.gap.max()),
+            "moments": {"m0_m2": m.m0, "m2": m.m2, "m4_per_m2": m.m4, "alpha": m.alpha},
+            "gaussian": {
+                "radius_m": m.radius,
+                "density_per_m2": m.density,
+                "deviation_m": m.deviation,
+                "mean_height_m": m.mean,
+            },
+            "repairs": list(found.repairs),
+        }
+
+    def lines(self) -> list[str]:
+        """For people; the last one is for the table of a contact."""
+        found, m = self.found, self.found.moments
+        return named_lines(
+            [
+                ("summits", f"{len(found.height)} on {found.area:.3g} m2"),
+                ("", f"{'found':>12} {'if Gaussian':>12}"),
+                ("radius", f"{found.radius:12.4g} {m.radius:12.4g} m"),
+                ("density", f"{found.density:12.4g} {m.density:12.4g} 1/m2"),
+                ("deviation", f"{found.height.std():12.4g} {m.deviation:12.4g} m, of their heights"),
+                ("mean height", f"{found.height.mean():12.4g} {m.mean:12.4g} m, above the mean plane"),
+                ("moments", f"m0 {m.m0:.4g} m2, m2 {m.m2:.4g}, m4 {m.m4:.4g} 1/m2, alpha {m.alpha:.3g}"),
+                *(("repaired", sentence) for sentence in found.repairs),
+                ("for a contact", f'law = "rough", table = "asperities.csv", radius = "{found.radius:.6g} m"'),
+            ]
+        )
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write asperities.csv for the key `table` of a contact."""
+        folder.mkdir(parents=True, exist_ok=True)
+        path, header = folder / "asperities.csv", "gap m, asperities per m2 and m of gap"
+        np.savetxt(path, self.found.table(self.rows), delimiter=",", header=header, fmt="%.9g")
+        return [path]
 
 
 def asperities(
     first: Face,
     second: Face | None = None,
     *,
-    cutoff: float | None = None,
-    shortest: float | None = None,
+    cutoff: Length | None = None,
+    shortest: Length | None = None,
     mirror: Literal["x", "y"] | None = None,
-    spacing: tuple[float, float] | None = None,
-    lateral_unit: float = 1.0,
-    height_unit: float = 1.0,
-) -> Asperities:
-    """The asperities of a rough face against a plane, or of two faces against each other: see `Asperities`.
+    spacing: Annotated[Sequence[float] | None, quantity("m")] = None,
+    lateral_unit: Length = 1.0,
+    height_unit: Length = 1.0,
+    rows: int = 101,
+) -> FaceAsperities:
+    """Find the asperities of a rough face, or of two that touch: the numbers and the table of the contact law `rough`.
 
-    first, second : height maps or files of them;  cutoff, shortest : wavelengths [m] between which the roughness is
+    first : height map: text, SDF, or what the optional package surfalize reads
+    second : height map of the face that touches it; a plane by default
+    cutoff : wavelength above which waves are no roughness, such as 0.8mm; only the mean plane is taken off by default
+    shortest : wavelength below which waves are noise of the instrument; all are kept by default
     mirror : axis of the second map that is reversed before it faces the first
-    spacing, lateral_unit, height_unit : of text files, steps along x and y, and what one unit is in metres
+    spacing : steps along x and y of text files that hold a matrix of heights, such as "1um, 1um"
+    lateral_unit : unit of lateral coordinates in text files, such as 1um
+    height_unit : unit of heights in text files, such as 1um
+    rows : rows of the table
     Raises  ValueError: a map that cannot be one, heights in steps, too few summits
     """
-    options = {"spacing": spacing, "lateral_unit": lateral_unit, "height_unit": height_unit}
+    if spacing is not None and len(spacing) != 2:
+        raise ValueError('--spacing: give two steps, along x and y, such as "1um, 1um"')
+    for option, unit in (("--lateral-unit", lateral_unit), ("--height-unit", height_unit)):
+        if not unit > 0:
+            raise ValueError(f"{option} {unit:g}: give a unit of length such as 1um")
+    steps = None if spacing is None else (spacing[0], spacing[1])
 
     def face(of: Face) -> HeightMap:
-        return of if isinstance(of, HeightMap) else surface_io.read(Path(of), **options)  # type: ignore[arg-type]
+        if isinstance(of, HeightMap):
+            return of
+        return surface_io.read(Path(of), spacing=steps, lateral_unit=lateral_unit, height_unit=height_unit)
 
     other = None if second is None else face(second)
     if mirror is not None:
         if other is None:
             raise ValueError("mirror reverses the second face, and there is one face only: leave it out")
         other = mirrored(other, mirror)
-    return identify(face(first), other, cutoff, shortest)
+    return FaceAsperities(identify(face(first), other, cutoff, shortest), rows)

@@ -15,8 +15,9 @@ from threadpoolctl import threadpool_limits
 from tribodyn.hbm.continuation.operating_point import NoPeak
 from tribodyn.workflows.errors import cost
 from tribodyn.workflows.errors.trade_table import ANSWERED
-from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
 from tribodyn.workflows.studies.fits import fit_file
 
 Answers = Mapping[str, float | None]
@@ -36,13 +37,30 @@ class Varied:
     outcome: str = ANSWERED
 
 
-def changed(scene: str, overrides: Sequence[str], changes: Sequence[str]) -> dict[str, SceneFile]:
-    """The scene, and the scene with each of the changes; raises SceneError for one that it does not know."""
-    files = {"": scene_file.read(scene, overrides)}
-    for change in changes:
-        own = [one.strip() for one in change.split(";")]
-        files[change] = scene_file.read(scene, (*overrides, *own))
-    return files
+@dataclass(frozen=True)
+class Variation:
+    """A scene and its changes, the scene itself first."""
+
+    rows: tuple[Varied, ...]
+
+    def record(self) -> list[dict[str, Any]]:
+        """For machines, SI units."""
+        return [
+            {"change": row.change, **row.values, "fitted": list(row.fitted), "outcome": row.outcome}
+            for row in self.rows
+        ]
+
+    def lines(self) -> list[str]:
+        """A table: answers in SI units, those of a change with the difference from the scene's."""
+        names = list(dict.fromkeys(n for row in self.rows for n, value in row.values.items() if value is not None))
+        lines = ["".join(f"{name:>24}" for name in names) + "  change"]
+        for row in self.rows:
+            own: Answers = {} if row is self.rows[0] else self.rows[0].values
+            cells = "".join(f"{_beside(row.values.get(name), own.get(name)):>24}" for name in names)
+            why = "" if row.outcome == ANSWERED else f": {row.outcome}"
+            fitted = f" (fitted: {'; '.join(row.fitted)})" if row.fitted else ""
+            lines.append(f"{cells}  {row.change or 'the scene'}{fitted}{why}")
+        return lines
 
 
 def answers(file: SceneFile) -> tuple[Answers, str]:
@@ -52,69 +70,70 @@ def answers(file: SceneFile) -> tuple[Answers, str]:
 
 
 def vary(
-    scene: str,
+    scene: Source,
     changes: Sequence[str],
-    overrides: Sequence[str] = (),
-    task: fit_file.Task | None = None,
-    tell: Callable[[str], None] = lambda sentence: None,
-    ask: Callable[[SceneFile], tuple[Answers, str]] = answers,
-) -> list[Varied]:
-    """The scene, then the scene with each of the changes alone.
+    *,
+    fit: AnyPath | Mapping[str, Any] | None = None,
+    overrides: Overrides = (),
+    progress: Report = None,
+) -> Variation:
+    """Change one thing of a scene at a time: what each change does to its peak, energy, depth and life.
 
-    scene : name or path; task : a fit that is done for each of them first; ask : what is wanted of a scene
-    tell : called with a sentence on what is under way
     A change that cannot be solved has a row that says why; it does not stop the others.
+
+    scene : name of a scene or a .toml file
+    changes : key to change, such as "damping.modal=2 %", or several joined by ";"; can be repeated
+    fit : file of a fit, as for `identify`, that is done again for every change, such as of a preload
     Raises  SceneError for a change that the scene does not know, before anything is computed
     """
+    if not changes:
+        raise ValueError('--change: give what is to change, such as --change "damping.modal=2 %"')
+    return each(scene, changes, overrides, None if fit is None else fit_file.read(fit), reporter(progress), answers)
+
+
+def changed(scene: Source, overrides: Overrides, changes: Sequence[str]) -> dict[str, SceneFile]:
+    """The scene, and the scene with each of the changes; raises SceneError for one that it does not know."""
+    base = read_scene(scene, overrides)
+    own = {change: [one.strip() for one in change.split(";") if one.strip()] for change in changes}
+    return {"": base} | {change: base.changed(*keys) for change, keys in own.items()}
+
+
+def each(
+    scene: Source,
+    changes: Sequence[str],
+    overrides: Overrides,
+    task: fit_file.Task | None,
+    progress: Progress,
+    ask: Callable[[SceneFile], tuple[Answers, str]],
+) -> Variation:
+    """The scene, then the scene with each of the changes alone. ask : what is wanted of a scene"""
     rows = []
     for change, file in changed(scene, overrides, changes).items():
-        tell(change or "the scene")
+        progress.say(change or "the scene")
         with threadpool_limits(1):
-            rows.append(_row(scene, change, file, task, tell, ask))
-    return rows
+            rows.append(_row(change, file, task, progress, ask))
+    return Variation(tuple(rows))
 
 
 def _row(
-    scene: str,
     change: str,
     file: SceneFile,
     task: fit_file.Task | None,
-    tell: Callable[[str], None],
+    progress: Progress,
     ask: Callable[[SceneFile], tuple[Answers, str]],
 ) -> Varied:
     fitted: tuple[str, ...] = ()
     try:
         if task is not None:
-            _, found = fit_file.run(scene, file.overrides, task, tell)
-            fitted = tuple(found)
-            file = scene_file.read(scene, (*file.overrides, *fitted))
+            fitted = fit_file.best(file, task, progress).changes
+            file = file.changed(*fitted)
         values, outcome = ask(file)
     except (RuntimeError, NoPeak) as failure:
         return Varied(change, {}, fitted, str(failure))
     return Varied(change, values, fitted, outcome)
 
 
-def as_text(rows: Sequence[Varied]) -> str:
-    """A table for people: answers in SI units, those of a change with the difference from the scene's."""
-    names = [name for name, value in rows[0].values.items() if value is not None]
-    names += [name for row in rows[1:] for name, v in row.values.items() if v is not None and name not in names]
-    names = list(dict.fromkeys(names))
-    lines = ["".join(f"{name:>24}" for name in names) + "  change"]
-    for row in rows:
-        own: Answers = {} if row is rows[0] else rows[0].values
-        cells = "".join(f"{_beside(row.values.get(name), own.get(name)):>24}" for name in names)
-        why = "" if row.outcome == ANSWERED else f": {row.outcome}"
-        fitted = f" (fitted: {'; '.join(row.fitted)})" if row.fitted else ""
-        lines.append(f"{cells}  {row.change or 'the scene'}{fitted}{why}")
-    return "\n".join(lines)
-
-
 def _beside(value: float | None, own: float | None) -> str:
     if value is None:
         return ""
     return f"{value:.5g}" if not own else f"{value:.5g} ({100 * (value / own - 1):+.2g} %)"
-
-
-def as_records(rows: Sequence[Varied]) -> list[dict[str, Any]]:
-    """For machines, SI units."""
-    return [{"change": row.change, **row.values, "fitted": list(row.fitted), "outcome": row.outcome} for row in rows]

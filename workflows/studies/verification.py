@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,18 +17,24 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.stability.stays import stays
 from tribodyn.hbm.threads import limited
+from tribodyn.hbm.time import verify as march
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.time_integration import LeftAlone, leave_alone
-from tribodyn.hbm.time.verify import Verification, verify
+from tribodyn.hbm.time.verify import Verification
 from tribodyn.hbm.wear.history import WearRow
 from tribodyn.workflows.pictures.figures import axes_of, force_unit, length_unit
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
+from tribodyn.workflows.result.columns import named_lines
 from tribodyn.workflows.result.provenance import rebuilt
 from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.store import Held, held
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.progress import Progress, Report, reporter
+from tribodyn.workflows.scene.fields import Frequency
 from tribodyn.workflows.scene.schema import Scene
+from tribodyn.workflows.scene.source import Overrides, override_texts
+from tribodyn.workflows.studies.files import write_files
 
 STEPS, STEPS_PER_HARMONIC = 256, 32  # per period; per period of the highest harmonic kept
 TOLERANCE = 1e-6  # drift over a period, far below the differences that are looked for
@@ -116,8 +122,8 @@ class Comparison:
             "periods": seen.periods,
         }
 
-    def lines(self) -> list[tuple[str, str]]:
-        """The comparison as pairs of a name and a readable value."""
+    def lines(self) -> list[str]:
+        """For people."""
         record = self.record()
         worn = "unworn" if self.row is None else f"worn as in row {self.row}"
         harmonics = ", ".join(map(str, record["harmonics"]))
@@ -144,28 +150,74 @@ class Comparison:
         if (seen := self.left_alone) is not None:
             spread = f"{seen.energy:.6g} J per cycle on average, spread {seen.energy_spread:.2g} J"
             shown.append(("left alone", f"{spread}, drift {seen.drift:.1e} after {seen.periods} periods"))
-        return shown
+        return named_lines(shown)
+
+    @property
+    def failure(self) -> str:
+        """Why there is no comparison, empty where there is one."""
+        found = self.found
+        return "" if found.motion.periodic else f"the time integration found no periodic motion: {found.outcome}"
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write verify_FREQUENCY.png."""
+        name = f"verify_{self.hertz:.6g}Hz{'' if self.row is None else f'_row{self.row}'}"
+        return write_files(folder, {}, {name: self.plot()})
+
+    def plot(self) -> Figure:
+        """Waveform of the first output over a period, and the loop of the pair that dissipates most, both ways."""
+        balance, state, motion = self.balance, self.solution.state, self.found.motion
+        angle = self.found.omega * motion.time
+        ours = balance.outputs(state)[0] @ balance.basis.functions(angle).T
+        theirs = motion.outputs[0]
+        mean = theirs.mean()
+        with axes_of(9.0, 3.8, columns=2) as (figure, (left, right)):
+            unit, scale = length_unit(np.abs(theirs - mean).max())
+            phase = angle / (2 * np.pi)
+            left.plot(phase, scale * (theirs - mean), color=ORANGE, lw=3.0, alpha=0.6, label="time integration")
+            left.plot(phase, scale * (ours - mean), color=BLUE, lw=1.2, label="harmonic balance")
+            name = balance.compliance.output_names[0]
+            left.set(xlabel="period", ylabel=f"{name} about its mean / {unit}", title=f"{self.hertz:.6g} Hz")
+            left.legend(loc="best", fontsize=9)
+            pair = int(np.argmax(np.abs(motion.energy)))
+            component = int(np.argmax(np.abs(_loop_areas(motion.force[pair], motion.x[pair]))))
+            x, force = balance.history(state)
+            unit, scale = length_unit(np.ptp(motion.x[pair, component]))
+            unit_f, scale_f = force_unit(np.abs(motion.force[pair, component]).max())
+            middle = motion.x[pair, component].mean()
+            for a, b, style in (
+                (motion.x, motion.force, {"color": ORANGE, "lw": 3.0, "alpha": 0.6}),
+                (x, force, {"color": BLUE, "lw": 1.2}),
+            ):
+                closed = [np.append(v[pair, component], v[pair, component, 0]) for v in (a, b)]
+                right.plot(scale * (closed[0] - middle), scale_f * closed[1], **style)
+            direction = balance.contact.components[component]
+            right.set(xlabel=f"{direction} / {unit}", ylabel=f"force / {unit_f}", title=f"Pair {pair}")
+        return figure
 
 
-def compare(
-    result: Result,
-    at: float | None,
-    row: int | None,
-    overrides: Sequence[str],
-    steps: int | None,
-    progress: Progress,
+def verify(
+    result: Held,
+    at: Frequency | None = None,
+    *,
+    row: int | None = None,
+    steps: int | None = None,
+    overrides: Overrides = (),
+    progress: Report = None,
 ) -> Comparison:
-    """Rebuild the model of a result, solve the balance at a frequency and integrate it in time.
+    """Check a result against direct time integration of the same model with the same contact law.
 
-    at : [rad/s]; the peak of the response, or the frequency of the row, where None
-    row : of the wear history whose depth the contact has, None for unworn
-    overrides : "section.key=value" on top of those of the run, such as more harmonics; steps : per period
+    result : folder or file of a result
+    at : frequency such as 410Hz; the peak of the response, or the frequency of the row, by default
+    row : wear row whose depth the contact has; unworn by default
+    steps : time steps per period; 256 or 32 for each harmonic by default
     Raises  ValueError: the result has no such row or no solution to start from; SolveFailed: no balance solution
     """
-    file = rebuilt(result, overrides)
+    found, report = held(result), reporter(progress)
+    file = rebuilt(found, override_texts(overrides))
     with limited(file.scene.solver.threads):
-        unworn = modelling.build(file, None, progress, result.harmonics).balance
-    return held_against(result, file.scene, unworn, at, row, steps, progress)
+        unworn = modelling.build(file, None, report, found.harmonics).balance
+    omega = None if at is None else 2 * np.pi * at
+    return held_against(found, file.scene, unworn, omega, row, steps, report)
 
 
 def held_against(
@@ -177,7 +229,7 @@ def held_against(
     steps: int | None,
     progress: Progress,
 ) -> Comparison:
-    """The same with the model at hand: the scene that a result was computed from and its unworn problem."""
+    """The comparison with the model at hand: the scene of a result and its unworn problem; at : [rad/s]."""
     start = time.perf_counter()
     with limited(scene.solver.threads):
         balance, omega, x = _start(result, scene, unworn, at, row)
@@ -194,7 +246,7 @@ def held_against(
         steps = steps or steps_of(balance)
         with progress.stage("time integration"):
             options = Options(steps, tolerance=TOLERANCE, max_periods=PERIODS)
-            found = verify(balance, solution.state, options)
+            found = march.verify(balance, solution.state, options)
             stable, how = stays(balance, solution.state, found, options)
             left_alone = None
             if not stable or not found.motion.periodic:
@@ -256,38 +308,6 @@ def _walk(
         if solution.converged:
             x = solution.state.x
     return solution if solution.converged else newton.solve_from_rest(balance, target, options)
-
-
-def picture(comparison: Comparison) -> Figure:
-    """Waveform of the first output over a period, and the loop of the pair that dissipates most, both ways."""
-    balance, state, motion = comparison.balance, comparison.solution.state, comparison.found.motion
-    angle = comparison.found.omega * motion.time
-    ours = balance.outputs(state)[0] @ balance.basis.functions(angle).T
-    theirs = motion.outputs[0]
-    mean = theirs.mean()
-    with axes_of(9.0, 3.8, columns=2) as (figure, (left, right)):
-        unit, scale = length_unit(np.abs(theirs - mean).max())
-        phase = angle / (2 * np.pi)
-        left.plot(phase, scale * (theirs - mean), color=ORANGE, lw=3.0, alpha=0.6, label="time integration")
-        left.plot(phase, scale * (ours - mean), color=BLUE, lw=1.2, label="harmonic balance")
-        name = balance.compliance.output_names[0]
-        left.set(xlabel="period", ylabel=f"{name} about its mean / {unit}", title=f"{comparison.hertz:.6g} Hz")
-        left.legend(loc="best", fontsize=9)
-        pair = int(np.argmax(np.abs(motion.energy)))
-        component = int(np.argmax(np.abs(_loop_areas(motion.force[pair], motion.x[pair]))))
-        x, force = balance.history(state)
-        unit, scale = length_unit(np.ptp(motion.x[pair, component]))
-        unit_f, scale_f = force_unit(np.abs(motion.force[pair, component]).max())
-        middle = motion.x[pair, component].mean()
-        for a, b, style in (
-            (motion.x, motion.force, {"color": ORANGE, "lw": 3.0, "alpha": 0.6}),
-            (x, force, {"color": BLUE, "lw": 1.2}),
-        ):
-            closed = [np.append(v[pair, component], v[pair, component, 0]) for v in (a, b)]
-            right.plot(scale * (closed[0] - middle), scale_f * closed[1], **style)
-        direction = balance.contact.components[component]
-        right.set(xlabel=f"{direction} / {unit}", ylabel=f"force / {unit_f}", title=f"Pair {pair}")
-    return figure
 
 
 def _loop_areas(force: np.ndarray, x: np.ndarray) -> np.ndarray:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import csv
+import os
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,9 +22,10 @@ from tribodyn.hbm.wear.step_control import Tolerance
 from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
 from tribodyn.workflows.result.provenance import rebuilt
-from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.store import Held, held
 from tribodyn.workflows.run import modelling, wear_run
-from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.progress import Report, reporter
+from tribodyn.workflows.scene.source import AnyPath, Overrides, override_texts
 from tribodyn.workflows.studies import verification
 
 TOLERANCE = 0.05  # of a wear step in time
@@ -40,7 +41,7 @@ COLUMNS = (
 class LifeInTime:
     """A wear run, and its contact worn along the motion in time.
 
-    steps : per period; tolerance : of a wear step in time; seconds : spent
+    steps : per period; tolerance : of a wear step in time; seconds : spent; folder : of table and picture
     """
 
     run: WearHistory
@@ -48,6 +49,7 @@ class LifeInTime:
     steps: int
     tolerance: float
     seconds: float
+    folder: Path | None = None
 
     @property
     def unsettled(self) -> float:
@@ -102,6 +104,35 @@ class LifeInTime:
             shown.append(f"for {self.unsettled:.0%} of the cycles the mean work had not come to rest")
         return shown
 
+    @property
+    def files(self) -> list[Path]:
+        """Table and picture."""
+        return [] if self.folder is None else [self.folder / f"wear_in_time.{ending}" for ending in ("csv", "png")]
+
+    def plot(self) -> Figure:
+        """Preload and work per cycle over the cycles, of the run and in time, and how long no pair carries a force.
+
+        A dot is the work of one period: there are two where a motion takes two periods, and many where it never repeats
+        itself.
+        """
+        found, run = self.found, self.run
+        with axes_of(12.5, 3.8, columns=3) as (figure, (left, middle, right)):
+            left.plot(1e-6 * run.cycles, run.preload, color=BLUE, label="run")
+            left.plot(1e-6 * found.cycles, found.preload, color=ORANGE, label="in time")
+            left.set(xlabel="cycles / 1e6", ylabel="preload / N")
+            left.legend(loc="best", fontsize=9)
+            middle.plot(1e-6 * run.cycles, run.energy.sum(axis=1), color=BLUE)
+            middle.plot(1e-6 * found.cycles, found.energy.sum(axis=1), color=ORANGE)
+            dots = np.repeat(found.cycles, found.works.shape[1])
+            middle.plot(1e-6 * dots, found.works.ravel(), ".", color=ORANGE, ms=3, alpha=0.6)
+            middle.set(xlabel="cycles / 1e6", ylabel="friction work per cycle / J", yscale="log")
+            right.plot(1e-6 * found.cycles, found.apart, color=ORANGE)
+            right.set(xlabel="cycles / 1e6", ylabel="share of the time with no contact", ylim=(0, 1))
+            shown = 1.2 * max(float(run.cycles[-1]), found.life(LONG_TAIL) or 0.0)
+            for axes in (left, middle, right):
+                axes.set_xlim(0.0, 1e-6 * min(shown, max(float(found.cycles[-1]), float(run.cycles[-1]))))
+        return figure
+
 
 def _columns(found: WearInTime, i: int) -> tuple[Any, ...]:
     return (
@@ -120,32 +151,41 @@ def _columns(found: WearInTime, i: int) -> tuple[Any, ...]:
     )
 
 
-def compare(
-    result: Result,
-    overrides: Sequence[str],
-    steps: int | None,
-    rows: Path,
-    progress: Progress,
+def wear_in_time(
+    result: Held,
+    folder: AnyPath | None = None,
+    *,
+    steps: int | None = None,
+    overrides: Overrides = (),
+    progress: Report = None,
 ) -> LifeInTime:
-    """Wear the contact of a run along its motion in time, at the frequencies that the run took its cycles at.
+    """Wear the contact along the motion in time, at the frequencies of a run, and compare its life with the run's.
 
-    overrides : "section.key=value" on top of those of the run; steps : per period
-    rows : table of what is computed, row by row as soon as it is done
+    The motion is marched on while the contact wears, with mean wear rates where it does not repeat itself.
+
+    result : folder or file of a result with a wear run
+    folder : folder of wear_in_time.csv, a row as soon as it is done, and its picture; none by default
+    steps : time steps per period; 256 or 32 for each harmonic by default
     Raises  ValueError: the result has no wear run, or its motion cannot be marched; IntegrationFailed
     """
+    result, report = held(result), reporter(progress)
+    place = None if folder is None else Path(folder)
+    if place is not None:
+        place.mkdir(parents=True, exist_ok=True)
+    rows = Path(os.devnull) if place is None else place / "wear_in_time.csv"
     if result.wear is None or not result.wear.depth[-1].max() > 0:
         raise ValueError("the result has no wear run in which something wears: take a scene with [wear]")
     start = time.perf_counter()
-    file = rebuilt(result, overrides)
+    file = rebuilt(result, override_texts(overrides))
     scene = file.scene
     assert scene.wear is not None
     with limited(scene.solver.threads):
-        balance = modelling.build(file, None, progress, result.harmonics).balance
+        balance = modelling.build(file, None, report, result.harmonics).balance
         problem = wear_run.wear_problem(scene, file.folder, balance, scene.wear.lost_below)
         scale = float(result.wear.depth[-1].max())
         steps = steps or verification.steps_of(balance)
         whole = float(problem.area @ result.wear.depth[-1])
-        with progress.track("wear in time") as advance, rows.open("w", newline="", encoding="utf-8") as file_of_rows:
+        with report.track("wear in time") as advance, rows.open("w", newline="", encoding="utf-8") as file_of_rows:
             table = csv.writer(file_of_rows)
             table.writerow(COLUMNS)
 
@@ -165,29 +205,7 @@ def compare(
                 MeanOptions(steps),
                 on_row=on_row,
             )
-    return LifeInTime(result.wear, found, steps, TOLERANCE, time.perf_counter() - start)
-
-
-def picture(life: LifeInTime) -> Figure:
-    """Preload and work per cycle over the cycles, of the run and in time, and how long no pair carries a force.
-
-    A dot is the work of one period: there are two where a motion takes two periods, and many where it never repeats
-    itself.
-    """
-    found, run = life.found, life.run
-    with axes_of(12.5, 3.8, columns=3) as (figure, (left, middle, right)):
-        left.plot(1e-6 * run.cycles, run.preload, color=BLUE, label="run")
-        left.plot(1e-6 * found.cycles, found.preload, color=ORANGE, label="in time")
-        left.set(xlabel="cycles / 1e6", ylabel="preload / N")
-        left.legend(loc="best", fontsize=9)
-        middle.plot(1e-6 * run.cycles, run.energy.sum(axis=1), color=BLUE)
-        middle.plot(1e-6 * found.cycles, found.energy.sum(axis=1), color=ORANGE)
-        dots = np.repeat(found.cycles, found.works.shape[1])
-        middle.plot(1e-6 * dots, found.works.ravel(), ".", color=ORANGE, ms=3, alpha=0.6)
-        middle.set(xlabel="cycles / 1e6", ylabel="friction work per cycle / J", yscale="log")
-        right.plot(1e-6 * found.cycles, found.apart, color=ORANGE)
-        right.set(xlabel="cycles / 1e6", ylabel="share of the time with no contact", ylim=(0, 1))
-        shown = 1.2 * max(float(run.cycles[-1]), found.life(LONG_TAIL) or 0.0)
-        for axes in (left, middle, right):
-            axes.set_xlim(0.0, 1e-6 * min(shown, max(float(found.cycles[-1]), float(run.cycles[-1]))))
-    return figure
+    life = LifeInTime(result.wear, found, steps, TOLERANCE, time.perf_counter() - start, place)
+    if place is not None:
+        life.plot().savefig(place / "wear_in_time.png")
+    return life

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,10 +18,13 @@ from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREEN, ORANGE
 from tribodyn.workflows.result.provenance import rebuilt
 from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.result.store import Held, held
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.progress import Report, reporter
+from tribodyn.workflows.scene.source import Overrides, override_texts
 from tribodyn.workflows.studies import verification
+from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.verification import Comparison
 
 
@@ -87,25 +90,65 @@ def spread(wear: WearHistory, count: int) -> list[int]:
     return sorted({int(np.argmin(np.abs(wear.cycles - cycles))) for cycles in parts})
 
 
-def compare(
-    result: Result, count: int, overrides: Sequence[str], steps: int | None, progress: Progress
-) -> list[WornState]:
-    """Hold states of a wear run against time integration; arguments as for `verification.compare`.
+@dataclass(frozen=True)
+class WornStates:
+    """States of a wear run beside time integration."""
 
+    result: Result
+    states: tuple[WornState, ...]
+
+    def record(self) -> dict[str, Any]:
+        """For machines."""
+        return {"states": [state.record() for state in self.states]}
+
+    def lines(self) -> list[str]:
+        """For people."""
+        return [HEADER, *(state.line() for state in self.states)]
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write verify_states.png."""
+        return write_files(folder, {}, {"verify_states": self.plot()})
+
+    def plot(self) -> Figure:
+        """Energy per cycle over the cycles: of the run, of time integration, and of the motion that was left alone."""
+        assert self.result.wear is not None
+        with axes_of() as (figure, ax):
+            ax.plot(1e-6 * self.result.wear.cycles, self.result.wear.energy.sum(axis=1), color=BLUE, label="run")
+            millions = [1e-6 * state.cycles for state in self.states]
+            ax.plot(millions, [s.time_energy for s in self.states], "o", color=ORANGE, label="time integration")
+            alone = [(1e-6 * s.cycles, s.left_alone) for s in self.states if s.left_alone is not None]
+            if alone:
+                at, seen = zip(*alone, strict=True)
+                heights, spreads = [s.energy for s in seen], [s.energy_spread for s in seen]
+                ax.errorbar(at, heights, spreads, fmt="s", color=GREEN, capsize=3, label="left alone, mean and spread")
+            ax.set(xlabel="cycles / 1e6", ylabel="friction work per cycle / J", yscale="log")
+            ax.legend(loc="best", fontsize=9)
+        return figure
+
+
+def verify_states(
+    result: Held, states: int, *, steps: int | None = None, overrides: Overrides = (), progress: Report = None
+) -> WornStates:
+    """Check so many states of a wear run, spread over its cycles, against direct time integration.
+
+    result : folder or file of a result with a wear run
+    states : number of the states
+    steps : time steps per period; 256 or 32 for each harmonic by default
     Raises  ValueError: the result has no wear run, or less than one state is asked for
     """
+    result, report = held(result), reporter(progress)
     if result.wear is None:
         raise ValueError("the result has no wear run: take a scene with [wear]")
-    if count < 1:
-        raise ValueError(f"--states must be at least 1, not {count}")
-    file = rebuilt(result, overrides)
+    if states < 1:
+        raise ValueError(f"--states must be at least 1, not {states}")
+    file = rebuilt(result, override_texts(overrides))
     with limited(file.scene.solver.threads):
-        unworn = modelling.build(file, None, progress, result.harmonics).balance
+        unworn = modelling.build(file, None, report, result.harmonics).balance
     found = []
-    for row in spread(result.wear, count):
+    for row in spread(result.wear, states):
         comparison, alone, why = None, None, ""
         try:
-            comparison = verification.held_against(result, file.scene, unworn, None, row, steps, progress)
+            comparison = verification.held_against(result, file.scene, unworn, None, row, steps, report)
             alone = comparison.left_alone
         except (SolveFailed, IntegrationFailed) as error:
             why = str(error)
@@ -114,21 +157,4 @@ def compare(
         wear = result.wear
         at = (float(wear.cycles[row]), float(wear.frequency[row]), float(wear.energy[row].sum()))
         found.append(WornState(row, *at, comparison, alone, why))
-    return found
-
-
-def picture(result: Result, states: Sequence[WornState]) -> Figure:
-    """Energy per cycle over the cycles: of the run, of time integration, and of the motion that was left alone."""
-    assert result.wear is not None
-    with axes_of() as (figure, ax):
-        ax.plot(1e-6 * result.wear.cycles, result.wear.energy.sum(axis=1), color=BLUE, label="run")
-        millions = [1e-6 * state.cycles for state in states]
-        ax.plot(millions, [s.time_energy for s in states], "o", color=ORANGE, label="time integration")
-        alone = [(1e-6 * s.cycles, s.left_alone) for s in states if s.left_alone is not None]
-        if alone:
-            at, seen = zip(*alone, strict=True)
-            heights, spreads = [s.energy for s in seen], [s.energy_spread for s in seen]
-            ax.errorbar(at, heights, spreads, fmt="s", color=GREEN, capsize=3, label="left alone, mean and spread")
-        ax.set(xlabel="cycles / 1e6", ylabel="friction work per cycle / J", yscale="log")
-        ax.legend(loc="best", fontsize=9)
-    return figure
+    return WornStates(result, tuple(found))

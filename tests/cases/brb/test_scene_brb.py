@@ -16,11 +16,11 @@ from tests.helpers.browser import chromium, clicked_zoomed_and_turned
 from tests.helpers.command import leave
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, backbone
+from tribodyn.hbm.time import ring_down as time_ring_down
 from tribodyn.workflows.run import modelling, tightening
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.curves import decay
 
 __all__ = ["chromium"]
 
@@ -129,7 +129,16 @@ def test_rough_faces_soften_and_damp_along_the_backbone(name):
 def test_the_command_gives_rows_by_modal_amplitude(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch):
     model = built("brb")
     monkeypatch.setattr(modelling, "build", lambda file, *_: model)
-    words = ["backbone", "brb_flat", "--points", "4", "--out", str(tmp_path), "--json"]  # beside what is published
+    words = [
+        "curve",
+        "backbone",
+        "brb_flat",
+        "--points",
+        "4",
+        "--out",
+        str(tmp_path),
+        "--json",
+    ]  # beside what is published
     code, out, err = leave(words, capsys)
     assert code == 0, err
     said = json.loads(out)
@@ -151,11 +160,11 @@ def test_the_beam_rings_down_from_one_amplitude_to_the_other(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch
 ):
     """From --to down to --from, along the backbone of faces that have yielded: frequency 0.1 %, damping 3 %."""
-    model, follow, found = built("brb_flat"), decay.follow, []
+    model, follow, found = built("brb_flat"), time_ring_down.ring_down, []
     monkeypatch.setattr(modelling, "build", lambda file, *_: model)
-    monkeypatch.setattr(decay, "follow", lambda *asked: found.append(follow(*asked)) or found[-1])
+    monkeypatch.setattr(time_ring_down, "ring_down", lambda *asked: found.append(follow(*asked)) or found[-1])
     words = ["--from", "11um", "--to", "16um", "--points", "8", "--steps", "96", "--out", str(tmp_path), "--json"]
-    code, out, err = leave(["ring-down", "brb_flat", *words], capsys)
+    code, out, err = leave(["curve", "ring-down", "brb_flat", *words], capsys)
     assert code == 0, err
     said = json.loads(out)
     assert said["largest_frequency_difference"] < 1e-3
@@ -166,7 +175,7 @@ def test_the_beam_rings_down_from_one_amplitude_to_the_other(
     assert np.ptp(swing[:96]) / 2 == pytest.approx(16e-6, rel=0.03)
     assert 10.5e-6 < np.ptp(swing[-96:]) / 2 < 11.1e-6
     assert "give more with --periods" in replace(found[0], asked=1e-6).end
-    code, out, err = leave(["ring-down", "brb_flat", "--from", "60um", "--to", "40um"], capsys)
+    code, out, err = leave(["curve", "ring-down", "brb_flat", "--from", "60um", "--to", "40um"], capsys)
     assert code == 2
     assert "--from below --to" in err
 

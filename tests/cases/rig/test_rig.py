@@ -30,7 +30,7 @@ from tribodyn.workflows.run.joints import contact_stiffness
 from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.fits.identification import Measured, Parameter, fit
-from tribodyn.workflows.studies.forces import study as body_forces
+from tribodyn.workflows.studies.forces import forces
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ def test_the_force_at_the_screws_is_the_preload(rig):
 
 def test_forces_at_rest_leave_a_prescribed_height_to_what_holds_the_part():
     """Both contact faces are of the one part: what they give to it adds up to nothing."""
-    (part,) = body_forces(scene_file.read("rig_thesis", COARSE))
+    (part,) = forces("rig_thesis", overrides=COARSE).bodies
     assert part.held
     assert not part.load.any()
     assert np.abs(part.joints["contact"]).max() < 1e-9

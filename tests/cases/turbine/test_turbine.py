@@ -10,8 +10,10 @@ import pytest
 
 import tribodyn as td
 from tests.helpers.browser import chromium, clicked_zoomed_and_turned
+from tests.proof.problems import result_of, wear
 from tribodyn.geometry import bladed_sector
 from tribodyn.workflows.result import summary
+from tribodyn.workflows.studies.forces import BodyForces
 
 COARSE = (
     *("bodies.blade.n_span=2", "bodies.blade.n_along=3", "bodies.blade.n_up=2", "bodies.disk.n_axial=2"),
@@ -22,12 +24,12 @@ JOINTS = {"root_right", "root_left", "damper_right", "damper_left", "shroud"}
 
 
 @pytest.fixture(scope="module")
-def found() -> dict[str, td.BodyForces]:
-    return {one.body: one for one in td.body_forces(td.read_scene("turbine", COARSE))}
+def found() -> dict[str, BodyForces]:
+    return {one.body: one for one in td.studies.forces("turbine", overrides=COARSE).bodies}
 
 
 @pytest.mark.parametrize("body", ["blade", "damper"])
-def test_contact_forces_carry_the_centrifugal_load(found: dict[str, td.BodyForces], body: str) -> None:
+def test_contact_forces_carry_the_centrifugal_load(found: dict[str, BodyForces], body: str) -> None:
     """Forces on a body that only contact holds, to 1e-8."""
     one = found[body]
     assert not one.held
@@ -36,7 +38,7 @@ def test_contact_forces_carry_the_centrifugal_load(found: dict[str, td.BodyForce
     assert found["disk"].held
 
 
-def test_centrifugal_load_of_the_damper_is_that_of_its_drawing(found: dict[str, td.BodyForces]) -> None:
+def test_centrifugal_load_of_the_damper_is_that_of_its_drawing(found: dict[str, BodyForces]) -> None:
     """Mass of the trapezoidal prism times speed squared times the radius of its centre; it moves out by some 1e-3."""
     p, speed, density = bladed_sector.Parameters(), 2 * np.pi * 100, 8200.0
     low, high = (p.gap_bottom + share * (p.gap_top - p.gap_bottom) for share in (p.damper_low, p.damper_high))
@@ -59,7 +61,7 @@ def worn() -> td.Result:
     )
     file = td.read_scene("turbine", (*COARSE, *changes, 'contacts.damper_left.wear={coefficient = "1e4 um3/J"}'))
     model = td.build(file)
-    return td.result_of(file, model.part, model.balance, td.wear(file, model.balance))
+    return result_of(file, model.part, model.balance, wear(file, model.balance))
 
 
 @pytest.mark.slow  # the report of another wheel, the blade, is always clicked

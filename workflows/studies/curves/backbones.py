@@ -1,9 +1,15 @@
-"""The backbone of a scene: frequency and damping of one nonlinear mode of the unworn contact against its amplitude."""
+"""The backbone of a scene: frequency and damping of one nonlinear mode of the unworn contact against its amplitude.
+
+Followed again with changes of the scene: what finer harmonics, samples and meshes change is its error.
+"""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -11,24 +17,33 @@ from matplotlib.figure import Figure
 from scipy.interpolate import PchipInterpolator
 
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation.nonlinear_modes import Backbone, BackboneOptions, backbone
+from tribodyn.hbm.continuation import nonlinear_modes
+from tribodyn.hbm.continuation.nonlinear_modes import Backbone, BackboneOptions
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, named
+from tribodyn.workflows.pictures.maps import backbone_maps
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE
-from tribodyn.workflows.result.columns import write_columns
+from tribodyn.workflows.result.columns import named_lines
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.progress import Progress, Report, reporter
+from tribodyn.workflows.scene.fields import Length
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.studies.published import PublishedBackbone
+from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.studies.files import write_files
+from tribodyn.workflows.studies.published import PublishedBackbone, published_backbone
+
+COMPARED = 9  # amplitudes at which two backbones are compared
+LATE: Any = {"harmonics": True, "solver": True, "loads": {"static": {"__all__": {"value", "pressure"}}}}
+"""What a scene may change without another part or reduction."""
 
 
 @dataclass(frozen=True)
-class Way:
+class AmplitudeRange:
     """From which amplitude to which, of which mode.
 
     start, stop : of the observed displacement [m], or where `modal` of the mass-normalised mode [m kg^0.5]
-    mode : its number about the static equilibrium, from 0; points : on an easy way
+    mode : its number about the static equilibrium, from 0; points : where the backbone bends little
     """
 
     start: float
@@ -37,69 +52,242 @@ class Way:
     points: int = 40
     modal: bool = False
 
+    @classmethod
+    def of(
+        cls, file: SceneFile, start: float | None, stop: float | None, mode: int | None, points: int | None
+    ) -> AmplitudeRange:
+        """What is asked for, else what the scene has in [backbone]; raises ValueError where neither has it."""
+        own = file.scene.backbone
+        mode = mode if mode is not None else own.mode if own else 0
+        points = points if points is not None else own.points if own else 40
+        if start is not None and stop is not None:
+            return cls(start, stop, mode, points)
+        if start is not None or stop is not None or own is None:
+            raise ValueError(
+                f"--{'to' if start is not None else 'from'} is missing: give both ends of the backbone, "
+                "or backbone.modal_amplitude in the scene"
+            )
+        return cls(*own.modal_amplitude, mode, points, modal=True)
 
-def way(file: SceneFile, start: float | None, stop: float | None, mode: int | None, points: int | None) -> Way:
-    """What is asked for, else what the scene says in [backbone]; raises ValueError where neither says it."""
-    said = file.scene.backbone
-    mode = mode if mode is not None else said.mode if said else 0
-    points = points if points is not None else said.points if said else 40
-    if start is not None and stop is not None:
-        return Way(start, stop, mode, points)
-    if start is not None or stop is not None or said is None:
-        raise ValueError(
-            f"--{'to' if start is not None else 'from'} is missing: give both ends of the backbone, "
-            "or backbone.modal_amplitude in the scene"
-        )
-    return Way(*said.modal_amplitude, mode, points, modal=True)
+
+@dataclass(frozen=True)
+class Changed:
+    """What a change of the scene does to its backbone.
+
+    change : overrides, joined by ";"; modal_amplitude : (n,) [m kg^0.5]
+    frequency, damping : (n,) differences there from the backbone of the scene, relative to it
+    seconds : of the processor, with a model of its own where the change asks for one
+    """
+
+    change: str
+    modal_amplitude: np.ndarray
+    frequency: np.ndarray
+    damping: np.ndarray
+    seconds: float
+
+    def record(self) -> dict[str, Any]:
+        """For machines."""
+        columns = {"modal_amplitude": self.modal_amplitude, "frequency": self.frequency, "damping": self.damping}
+        return {"change": self.change, "seconds": self.seconds, "rows": _rows(columns)}
 
 
-def follow(file: SceneFile, asked: Way, progress: Progress) -> Backbone:
+@dataclass(frozen=True)
+class SceneBackbone:
     """The backbone of a scene.
 
+    balance : of the scene; mode : its points; published : of the same mode by others, None for none
+    changes : what changes of the scene do to it
+    """
+
+    name: str
+    balance: HarmonicBalance
+    mode: Backbone
+    published: PublishedBackbone | None = None
+    changes: tuple[Changed, ...] = ()
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """Numbers of the converged points (n,), SI units."""
+        mode = self.mode
+        columns = {
+            "modal_amplitude": mode.modal_amplitude,
+            "frequency_hz": mode.frequency,
+            "damping": mode.damping,
+            "amplitude_m": mode.amplitude,
+            "acceleration_m_s2": mode.acceleration,
+            "energy_J": mode.energy,
+        }
+        return {name: values[mode.converged] for name, values in columns.items()}
+
+    def record(self) -> dict[str, Any]:
+        """For machines: the converged points, what is published, and what changes do."""
+        found = {
+            "reference_hz": self.mode.reference_omega / (2 * np.pi),
+            **{name: values.tolist() for name, values in self.columns.items()},
+            "rows": _rows(self.columns),
+            "end": str(self.mode.end),
+        }
+        if self.published is not None:
+            found["published"] = beside(self.mode, self.published)
+        if self.changes:
+            found["changes"] = [one.record() for one in self.changes]
+        return found
+
+    def lines(self) -> list[str]:
+        """For people."""
+        hertz, damping = self.mode.frequency, 100 * self.mode.damping
+        return named_lines(
+            [
+                ("at rest", f"{self.mode.reference_omega / (2 * np.pi):.6g} Hz"),
+                ("frequency", f"{hertz[0]:.6g} -> {hertz[-1]:.6g} Hz"),
+                ("damping", f"{damping[0]:.4g} -> {damping[-1]:.4g} %, largest {damping.max():.4g} %"),
+                *self._published_lines(),
+                *self._change_lines(),
+                ("end", str(self.mode.end)),
+            ]
+        )
+
+    def _published_lines(self) -> Iterator[tuple[str, str]]:
+        """What is published, at three of its amplitudes, ours after it."""
+        rows = [] if self.published is None else beside(self.mode, self.published)["rows"]
+        for row in (rows[0], rows[len(rows) // 2], rows[-1]) if rows else ():
+            yield (
+                self.published.source if self.published is not None and row is rows[0] else "",
+                f"at {row['modal_amplitude']:.3g} m kg^0.5: {row['frequency_hz']:.5g} Hz ({100 * row['shift']:+.2f} "
+                f"%), {100 * row['damping']:.3g} %; here {row['our_frequency_hz']:.5g} Hz "
+                f"({100 * row['our_shift']:+.2f} %), {100 * row['our_damping']:.3g} %",
+            )
+
+    def _change_lines(self) -> Iterator[tuple[str, str]]:
+        """What changes do at the first, a middle and the last amplitude, and at most all together."""
+        for one in self.changes:
+            at = [0, len(one.modal_amplitude) // 2, -1]
+            frequency, damping = (", ".join(f"{100 * v[i]:+.3g}" for i in at) for v in (one.frequency, one.damping))
+            yield one.change, f"frequency {frequency} %, damping {damping} % in {one.seconds:.3g} s"
+        if self.changes:
+            sums = [
+                np.sum([np.abs(getattr(one, name)) for one in self.changes], axis=0)
+                for name in ("frequency", "damping")
+            ]
+            frequency, damping = (f"{100 * each.max():.3g} %" for each in sums)
+            yield "all of them", f"frequency {frequency}, damping {damping} at most, summed without signs"
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write backbone.csv, backbone.png and, where faces rub, backbone_maps.png."""
+        pictures = {"backbone": self.plot()}
+        maps = backbone_maps(self.balance, self.mode, self.name)
+        if maps is not None:
+            pictures["backbone_maps"] = maps
+        return write_files(folder, {"backbone": self.columns}, pictures)
+
+    def plot(self) -> Figure:
+        """Frequency and damping ratio against amplitude, what is published beside them."""
+        mode, published = self.mode, self.published
+        good = mode.converged
+        unit, scale = length_unit(mode.amplitude[good].max())
+        amplitude = scale * mode.amplitude[good]
+        with axes_of(7.2, 5.6, rows=2) as (figure, (upper, lower)):
+            upper.plot(amplitude, mode.omega[good] / (2 * np.pi), ".-", color=BLUE, ms=4)
+            upper.axhline(mode.reference_omega / (2 * np.pi), color=GREY, ls="--", lw=1.2, label="at rest")
+            if published is not None:
+                reached = published.modal_amplitude <= mode.modal_amplitude[good].max()
+                of_mode = mode.amplitude[good][0] / mode.modal_amplitude[good][0]
+                there = scale * of_mode * published.modal_amplitude[reached]
+                kind = {"color": GREY, "marker": "o", "ms": 4, "lw": 1, "mfc": "none", "label": published.source}
+                upper.plot(there, published.frequency[reached], **kind)
+                lower.plot(there, 100 * published.damping[reached], **kind)
+            upper.set(ylabel="frequency / Hz", title=named(self.name, "backbone"))
+            upper.legend(loc="best", fontsize=9)
+            lower.plot(amplitude, 100 * mode.damping[good], ".-", color=ORANGE, ms=4)
+            lower.set(xscale="log", xlabel=f"amplitude in the mode at rest / {unit}", ylabel="damping ratio / %")
+            lower.set_ylim(bottom=0)
+        return figure
+
+
+def backbone(
+    scene: Source,
+    start: Length | None = None,
+    stop: Length | None = None,
+    *,
+    mode: int | None = None,
+    points: int | None = None,
+    changes: Sequence[str] = (),
+    overrides: Overrides = (),
+    progress: Report = None,
+) -> SceneBackbone:
+    """Follow a nonlinear mode: frequency and damping against amplitude; harmonic loads play no part.
+
+    Where NAME.published.toml beside the scene has a table [backbone], what it has stands beside it.
+
+    scene : name of a scene or a .toml file
+    start : amplitude of the response to begin at, such as 1um; [backbone] of the scene by default
+    stop : amplitude to end at, such as 1mm
+    mode : number of the mode about the static equilibrium, from 0; 0 or that of [backbone] by default
+    points : points where the backbone bends little; there are more elsewhere. 40 or those of [backbone] by default
+    changes : follow it again with this changed and report the difference, such as "harmonics.samples=256", or several
+        keys joined by ";"; can be repeated
     Raises  ValueError for what cannot be; SolveFailed where not even the first point is found
     """
-    return follow_with_model(file, asked, progress)[1]
-
-
-def follow_with_model(file: SceneFile, asked: Way, progress: Progress) -> tuple[modelling.Model, Backbone]:
-    """The same with the model that it was followed in, for what the contact does."""
+    file, report = read_scene(scene, overrides), reporter(progress)
+    asked = AmplitudeRange.of(file, start, stop, mode, points)
+    published = published_backbone(file)
+    others = {text: file.changed(*(part.strip() for part in text.split(";") if part.strip())) for text in changes}
     with limited(file.scene.solver.threads):
-        model = modelling.build(file, None, progress)
-        found = along(file, model.balance, asked, progress)
+        model = modelling.build(file, None, report)
+        found = along(file, model.balance, asked, report)
     if not found.converged.any():
         raise SolveFailed(f"the backbone {found.end}")
-    return model, found
+    changed = _changed(file, asked, model, found, others, report)
+    return SceneBackbone(file.name, model.balance, found, published, changed)
 
 
-def along(file: SceneFile, balance: HarmonicBalance, asked: Way, progress: Progress) -> Backbone:
+def along(file: SceneFile, balance: HarmonicBalance, asked: AmplitudeRange, progress: Progress) -> Backbone:
     """The backbone of a scene whose balance is made already."""
     with progress.stage("backbone"):
         options = BackboneOptions(asked.points, newton=settings.newton_options(file.scene))
-        return backbone(balance, asked.start, asked.stop, asked.mode, settings.OUTPUT, options, asked.modal)
+        output, modal = settings.OUTPUT, asked.modal
+        return nonlinear_modes.backbone(balance, asked.start, asked.stop, asked.mode, output, options, modal)
 
 
-def follow_backbone(file: SceneFile, start: float, stop: float, *, mode: int = 0, points: int = 40) -> Backbone:
-    """The backbone of a scene between two amplitudes [m], without telling what goes on, see `follow`."""
-    return follow(file, Way(start, stop, mode, points), Progress())
+def _changed(
+    file: SceneFile,
+    asked: AmplitudeRange,
+    model: modelling.Model,
+    found: Backbone,
+    others: Mapping[str, SceneFile],
+    progress: Progress,
+) -> tuple[Changed, ...]:
+    """The backbone of a scene again with changes of it; of its model is used what a change leaves as it is.
+
+    Raises  SolveFailed where a changed backbone is not found
+    """
+    done = []
+    for text, other in others.items():
+        clock = process_time()
+        with limited(other.scene.solver.threads), progress.stage(text):
+            if _early(other) == _early(file):
+                balance = modelling.make_model(other.scene, model.part, model.reduced).balance
+            else:
+                balance = modelling.build(other, None, progress).balance
+            there = along(other, balance, asked, progress)
+        if not there.converged.any():
+            raise SolveFailed(f"the backbone with {text} {there.end}")
+        ends = [f(b.modal_amplitude[b.converged]) for f in (min, max) for b in (found, there)]
+        low, high = max(ends[:2]), min(ends[2:])
+        if not low < high:
+            raise SolveFailed(
+                f"the backbone with {text} has no amplitude in common with that of the scene: {there.end}"
+            )
+        a = np.geomspace(low, high, COMPARED)
+        a[[0, -1]] = low, high
+        off = [t / o - 1 for t, o in zip(_at(there, a), _at(found, a), strict=True)]
+        done.append(Changed(text, a, off[0], off[1], process_time() - clock))
+    return tuple(done)
 
 
-def record(found: Backbone) -> dict[str, Any]:
-    """The converged points for machines."""
-    good = found.converged
-    columns = {
-        "modal_amplitude": found.modal_amplitude,
-        "frequency_hz": found.frequency,
-        "damping": found.damping,
-        "amplitude_m": found.amplitude,
-        "acceleration_m_s2": found.acceleration,
-        "energy_J": found.energy,
-    }
-    return {
-        "reference_hz": found.reference_omega / (2 * np.pi),
-        **{name: values[good].tolist() for name, values in columns.items()},
-        "rows": [dict(zip(columns, map(float, row), strict=True)) for row in np.array([*columns.values()]).T[good]],
-        "end": str(found.end),
-    }
+def _early(file: SceneFile) -> str:
+    """What part and reduction are made of: equal texts, equal models."""
+    return json.dumps(file.scene.model_dump(mode="json", exclude=LATE), sort_keys=True)
 
 
 def beside(found: Backbone, published: PublishedBackbone) -> dict[str, Any]:
@@ -110,7 +298,7 @@ def beside(found: Backbone, published: PublishedBackbone) -> dict[str, Any]:
     reached = found.modal_amplitude[found.converged]
     inside = (published.modal_amplitude >= reached.min()) & (published.modal_amplitude <= reached.max())
     a = published.modal_amplitude[inside]
-    ours, theirs = at(found, a), (published.frequency[inside], published.damping[inside])
+    ours, theirs = _at(found, a), (published.frequency[inside], published.damping[inside])
     columns = {
         "modal_amplitude": a,
         "frequency_hz": theirs[0],
@@ -120,10 +308,10 @@ def beside(found: Backbone, published: PublishedBackbone) -> dict[str, Any]:
         "shift": theirs[0] / theirs[0][:1] - 1,
         "our_shift": ours[0] / ours[0][:1] - 1,
     }
-    return {"source": published.source, "rows": rows(columns)}
+    return {"source": published.source, "rows": _rows(columns)}
 
 
-def at(found: Backbone, modal_amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _at(found: Backbone, modal_amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Frequency [Hz] and damping ratio between the points of a backbone."""
     good = found.converged
     a, order = np.unique(found.modal_amplitude[good], return_index=True)
@@ -131,35 +319,6 @@ def at(found: Backbone, modal_amplitude: np.ndarray) -> tuple[np.ndarray, np.nda
     return tuple(PchipInterpolator(np.log(a), v)(np.log(modal_amplitude)) for v in values)
 
 
-def rows(columns: dict[str, np.ndarray]) -> list[dict[str, float]]:
+def _rows(columns: Mapping[str, np.ndarray]) -> list[dict[str, float]]:
     """Columns (n,) as rows for machines."""
     return [dict(zip(columns, map(float, row), strict=True)) for row in np.array([*columns.values()]).T]
-
-
-def write(found: Backbone, path: Path) -> None:
-    """The converged points as comma-separated values."""
-    columns = {name: value for name, value in record(found).items() if isinstance(value, list) and name != "rows"}
-    write_columns(columns, path)
-
-
-def picture(found: Backbone, scene: str = "", published: PublishedBackbone | None = None) -> Figure:
-    """Frequency and damping ratio against amplitude; scene : its name, for the title; published : drawn beside."""
-    good = found.converged
-    unit, scale = length_unit(found.amplitude[good].max())
-    amplitude = scale * found.amplitude[good]
-    with axes_of(7.2, 5.6, rows=2) as (figure, (upper, lower)):
-        upper.plot(amplitude, found.omega[good] / (2 * np.pi), ".-", color=BLUE, ms=4)
-        upper.axhline(found.reference_omega / (2 * np.pi), color=GREY, ls="--", lw=1.2, label="at rest")
-        if published is not None:
-            reached = published.modal_amplitude <= found.modal_amplitude[good].max()
-            of_mode = found.amplitude[good][0] / found.modal_amplitude[good][0]
-            there = scale * of_mode * published.modal_amplitude[reached]
-            kind = {"color": GREY, "marker": "o", "ms": 4, "lw": 1, "mfc": "none", "label": published.source}
-            upper.plot(there, published.frequency[reached], **kind)
-            lower.plot(there, 100 * published.damping[reached], **kind)
-        upper.set(ylabel="frequency / Hz", title=named(scene, "backbone"))
-        upper.legend(loc="best", fontsize=9)
-        lower.plot(amplitude, 100 * found.damping[good], ".-", color=ORANGE, ms=4)
-        lower.set(xscale="log", xlabel=f"amplitude in the mode at rest / {unit}", ylabel="damping ratio / %")
-        lower.set_ylim(bottom=0)
-    return figure

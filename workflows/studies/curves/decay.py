@@ -14,18 +14,19 @@ from tribodyn.hbm import rest
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone
 from tribodyn.hbm.threads import limited
+from tribodyn.hbm.time import ring_down as time_ring_down
 from tribodyn.hbm.time.decrement import decrement
-from tribodyn.hbm.time.ring_down import RingDown, ring_down
+from tribodyn.hbm.time.ring_down import RingDown
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, log_axis
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
-from tribodyn.workflows.result.columns import write_columns
+from tribodyn.workflows.result.columns import named_lines
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.studies.curves import backbones as modes
-
-TOLD = 4  # digits of amplitudes in sentences
+from tribodyn.workflows.run.progress import Report, reporter
+from tribodyn.workflows.scene.fields import Length
+from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.studies.curves.backbones import AmplitudeRange, along
+from tribodyn.workflows.studies.files import write_files
 
 
 @dataclass(frozen=True)
@@ -50,31 +51,122 @@ class Decay:
     @property
     def end(self) -> str:
         """Why the decay ends, as a sentence."""
-        last, asked = (f"{x:.{TOLD}g} m" for x in (self.decay.last, self.asked))
+        last, asked = (f"{x:.4g} m" for x in (self.decay.last, self.asked))
         if self.decay.last <= self.asked:
             return f"fell to the {asked} asked for"
         return f"ended at {last} after all its periods, above the {asked} asked for: give more with --periods"
 
+    def record(self) -> dict[str, Any]:
+        """The decay for machines, with the backbone at its amplitudes (None beyond its ends)."""
+        d = self.decay
+        columns = {
+            "amplitude_m": d.amplitude,
+            "frequency_hz": d.omega / (2 * np.pi),
+            "damping": d.damping,
+            "backbone_frequency_hz": self.at(self.mode.omega) / (2 * np.pi),
+            "backbone_decrement": self.at(self.expected),
+            "backbone_damping": self.at(self.mode.damping),
+        }
+        rows = np.array([*columns.values()]).T
+        return {
+            "rows": [
+                {n: float(v) if np.isfinite(v) else None for n, v in zip(columns, row, strict=True)} for row in rows
+            ],
+            "largest_frequency_difference": _largest(d.omega, self.at(self.mode.omega)),
+            "largest_decrement_difference": _largest(d.damping, self.at(self.expected)),
+            "largest_damping_difference": _largest(d.damping, self.at(self.mode.damping)),
+            "end": self.end,
+        }
 
-def follow(file: SceneFile, asked: modes.Way, periods: int, steps: int, progress: Progress) -> Decay:
-    """Follow the backbone up, then let the structure swing freely from its last point down to the first amplitude.
+    def lines(self) -> list[str]:
+        """For people."""
+        said = self.record()
+        first, last = said["rows"][0], said["rows"][-1]
+        off = {name: said[f"largest_{name}_difference"] for name in ("frequency", "decrement", "damping")}
+        frequency, of_decrement, damping = (
+            "(no common amplitude)" if share is None else f"{100 * share:.3g} %" for share in off.values()
+        )
+        return named_lines(
+            [
+                ("amplitude", f"{first['amplitude_m']:.4g} -> {last['amplitude_m']:.4g} m"),
+                ("frequency", f"{first['frequency_hz']:.6g} -> {last['frequency_hz']:.6g} Hz"),
+                ("damping", f"{100 * first['damping']:.4g} -> {100 * last['damping']:.4g} %"),
+                ("from the backbone", f"frequency at most {frequency} off"),
+                ("", f"damping at most {of_decrement} off its decrement"),
+                ("", f"and {damping} off its damping ratio, which counts otherwise"),
+                ("end", said["end"]),
+            ]
+        )
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write ring_down.csv, the displacement over time, and ring_down.png."""
+        columns = {"time_s": self.decay.time, "displacement_m": self.decay.displacement}
+        return write_files(folder, {"ring_down": columns}, {"ring_down": self.plot()})
+
+    def plot(self) -> Figure:
+        """The decay, and frequency and damping from it beside the backbone."""
+        d = self.decay
+        unit, scale = length_unit(d.amplitude.max())
+        with axes_of(7.2, 7.6, rows=3, share=False) as (figure, (top, upper, lower)):
+            top.plot(1e3 * d.time, scale * d.displacement, color=BLUE, lw=0.7)
+            top.set(xlabel="time / ms", ylabel=f"displacement / {unit}", title="Free decay")
+            upper.plot(scale * self.mode.first_harmonic, self.mode.frequency, color=BLUE, label="backbone")
+            upper.plot(scale * d.amplitude, d.omega / (2 * np.pi), ".", color=ORANGE, ms=4, label="free decay")
+            upper.set(ylabel="frequency / Hz")
+            upper.legend(fontsize=9)
+            lower.plot(scale * self.mode.first_harmonic, 100 * self.expected, color=BLUE, label="its decrement")
+            given = 100 * self.mode.damping
+            lower.plot(scale * self.mode.first_harmonic, given, color=BLUE, ls="--", lw=1, label="its damping ratio")
+            lower.plot(scale * d.amplitude, 100 * d.damping, ".", color=ORANGE, ms=4)
+            lower.set(xlabel=f"amplitude / {unit}", ylabel="damping ratio / %")
+            lower.set_ylim(bottom=0)
+            for axes in (upper, lower):
+                log_axis(axes.xaxis, self.mode.first_harmonic.min(), self.mode.first_harmonic.max())
+            lower.legend(fontsize=9)
+        return figure
+
+
+def ring_down(
+    scene: Source,
+    start: Length | None = None,
+    stop: Length | None = None,
+    *,
+    mode: int | None = None,
+    points: int | None = None,
+    periods: int = 400,
+    steps: int = 256,
+    overrides: Overrides = (),
+    progress: Report = None,
+) -> Decay:
+    """Let a nonlinear mode decay freely in time: frequency and damping from its output, beside the backbone.
 
     Where the largest swing leaves a mark on the faces, as asperities that yield do, the backbone beside the decay is
     that of the faces as they are after it.
+
+    scene : name of a scene or a .toml file; its harmonic loads play no part
+    start : amplitude of the response at which the decay ends, such as 1um; [backbone] of the scene by default
+    stop : amplitude at which it begins, such as 1mm
+    mode : number of the mode about the static equilibrium, from 0; 0 or that of [backbone] by default
+    points : points of the backbone where it bends little; 40 or those of [backbone] by default
+    periods : periods after which the decay ends at the latest
+    steps : time steps per period
     Raises  ValueError for what cannot be; SolveFailed where the backbone ends before the amplitude asked for
     """
+    file, report = read_scene(scene, overrides), reporter(progress)
+    asked = AmplitudeRange.of(file, start, stop, mode, points)
     if not asked.stop > asked.start:
         raise ValueError("a free decay ends at a smaller amplitude than it begins at: give --from below --to")
     with limited(file.scene.solver.threads):
-        balance = modelling.build(file, None, progress).balance
-        mode = _reached(modes.along(file, balance, asked, progress))
-        marked = _marked(balance, mode)
+        balance = modelling.build(file, None, report).balance
+        swung = _reached(along(file, balance, asked, report))
+        marked = _marked(balance, swung)
         if marked is not None:
             balance = marked
-            mode = _reached(modes.along(file, balance, asked, progress))
-        with progress.stage("free decay"):
-            least = float(mode.first_harmonic[0])
-            return Decay(mode, ring_down(balance, mode, periods, steps, least), decrement(balance, mode), least)
+            swung = _reached(along(file, balance, asked, report))
+        with report.stage("free decay"):
+            least = float(swung.first_harmonic[0])
+            swing = time_ring_down.ring_down(balance, swung, periods, steps, least)
+            return Decay(swung, swing, decrement(balance, swung), least)
 
 
 def _reached(mode: Backbone) -> Backbone:
@@ -94,57 +186,8 @@ def _marked(balance: HarmonicBalance, mode: Backbone) -> HarmonicBalance | None:
     return balance.with_memory(rest.memory(balance, deepest))
 
 
-def record(found: Decay) -> dict[str, Any]:
-    """The decay for machines, with the backbone at its amplitudes (None beyond its ends)."""
-    d = found.decay
-    columns = {
-        "amplitude_m": d.amplitude,
-        "frequency_hz": d.omega / (2 * np.pi),
-        "damping": d.damping,
-        "backbone_frequency_hz": found.at(found.mode.omega) / (2 * np.pi),
-        "backbone_decrement": found.at(found.expected),
-        "backbone_damping": found.at(found.mode.damping),
-    }
-    rows = np.array([*columns.values()]).T
-    return {
-        "rows": [{n: float(v) if np.isfinite(v) else None for n, v in zip(columns, row, strict=True)} for row in rows],
-        "largest_frequency_difference": _largest(d.omega, found.at(found.mode.omega)),
-        "largest_decrement_difference": _largest(d.damping, found.at(found.expected)),
-        "largest_damping_difference": _largest(d.damping, found.at(found.mode.damping)),
-        "end": found.end,
-    }
-
-
 def _largest(ours: np.ndarray, reference: np.ndarray) -> float | None:
     """Largest relative difference where both are known."""
     apart = np.abs(ours / reference - 1)
     apart = apart[np.isfinite(apart)]
     return float(apart.max()) if len(apart) else None
-
-
-def write(found: Decay, path: Path) -> None:
-    """The displacement of the decay as comma-separated values."""
-    write_columns({"time_s": found.decay.time.tolist(), "displacement_m": found.decay.displacement.tolist()}, path)
-
-
-def picture(found: Decay) -> Figure:
-    """The decay, and frequency and damping from it beside the backbone."""
-    d = found.decay
-    unit, scale = length_unit(d.amplitude.max())
-    with axes_of(7.2, 7.6, rows=3, share=False) as (figure, (top, upper, lower)):
-        top.plot(1e3 * d.time, scale * d.displacement, color=BLUE, lw=0.7)
-        top.set(xlabel="time / ms", ylabel=f"displacement / {unit}", title="Free decay")
-        upper.plot(scale * found.mode.first_harmonic, found.mode.frequency, color=BLUE, label="backbone")
-        upper.plot(scale * d.amplitude, d.omega / (2 * np.pi), ".", color=ORANGE, ms=4, label="free decay")
-        upper.set(ylabel="frequency / Hz")
-        upper.legend(fontsize=9)
-        lower.plot(scale * found.mode.first_harmonic, 100 * found.expected, color=BLUE, label="its decrement")
-        given = 100 * found.mode.damping
-        lower.plot(scale * found.mode.first_harmonic, given, color=BLUE, ls="--", lw=1, label="its damping ratio")
-        lower.plot(scale * d.amplitude, 100 * d.damping, ".", color=ORANGE, ms=4)
-        lower.set(xlabel=f"amplitude / {unit}", ylabel="damping ratio / %")
-        lower.set_ylim(bottom=0)
-        for axes in (upper, lower):
-            log_axis(axes.xaxis, found.mode.first_harmonic.min(), found.mode.first_harmonic.max())
-        lower.legend(fontsize=9)
-    return figure

@@ -16,8 +16,9 @@ from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.progress import Progress
-from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.run.progress import Report, reporter
+from tribodyn.workflows.scene.fields import Number
+from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 
 
 @dataclass(frozen=True)
@@ -41,31 +42,47 @@ class FoldsFound:
             for fold in self.folds
         ]
 
+    def lines(self) -> list[str]:
+        """For people."""
+        said = [] if self.folds else [f"no folds: the response {self.branch.end}"]
+        for fold in self.folds:
+            hertz, in_time = fold.omega / (2 * np.pi), fold.in_time / (2 * np.pi)
+            found = f": {fold.outcome}"
+            if fold.found:
+                found = f", in time {in_time:.6g} Hz (known to {100 * fold.resolution:.2g} %): the balance is "
+                found += f"{100 * (hertz / in_time - 1):+.3g} % off"
+            said.append(f"balance {hertz:.6g} Hz{found}")
+        return said
 
-def find(file: SceneFile, progress: Progress, bracket: float = 0.02) -> FoldsFound:
-    """The folds of a scene's response within its range of frequencies, each looked for in time too.
 
-    bracket : distance to the fold of the balance, relative, within which its end in time is looked for
+def folds(scene: Source, within: Number = 0.02, *, overrides: Overrides = (), progress: Report = None) -> FoldsFound:
+    """Find the folds of the response by harmonic balance, and where the same branches end in time integration.
+
+    scene : name of a scene or a .toml file
+    within : relative distance to the fold of the balance within which its end in time is looked for, such as "2 %"
     Raises  SolveFailed where the curve has no first point; ValueError for a sector of a wheel, whose perturbations are
     other waves than its motion
     """
+    if not 0 < within < 1:
+        raise ValueError(f"--within {within:g}: give a share between 0 and 100 %")
+    file, report = read_scene(scene, overrides), reporter(progress)
     if getattr(file.scene, "wheel", None):
         raise ValueError(f"{file.name} has a [wheel]: its folds cannot be looked for in time")
     low, high = settings.response_range(file.scene)
     with limited(file.scene.solver.threads):
-        balance = modelling.build(file, None, progress).balance
-        with progress.stage("frequency response"):
+        balance = modelling.build(file, None, report).balance
+        with report.stage("frequency response"):
             options = arc_length.Options(newton=settings.newton_options(file.scene))
             branch = two_ends.follow(arc_length, balance, low, high, options)
         if not branch.converged[0]:
             raise SolveFailed(f"the frequency response {branch.end}")
         found = []
         for fold in branch.folds:
-            with progress.stage(f"fold at {branch.frequency[fold]:.6g} Hz in time"):
+            with report.stage(f"fold at {branch.frequency[fold]:.6g} Hz in time"):
                 try:
-                    found.append(fold_in_time(balance, branch, fold, settings.OUTPUT, bracket=bracket))
+                    found.append(fold_in_time(balance, branch, fold, settings.OUTPUT, bracket=within))
                 except IntegrationFailed as failure:
                     omega = float(branch.omega[fold])
                     why = SolveEnd.INTEGRATION_FAILED.say(f" {failure}")
-                    found.append(FoldInTime(fold, omega, omega, float("nan"), bracket, why))
+                    found.append(FoldInTime(fold, omega, omega, float("nan"), within, why))
     return FoldsFound(branch, tuple(found))

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -25,13 +25,13 @@ from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
 from tribodyn.workflows.result import store
-from tribodyn.workflows.result.columns import write_columns
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.scene_file import SceneFile
-
-UNITS = {"load": "", "gap": "m", "stiffness": "", "friction": "", "wear": ""}  # what may change, and its unit
+from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
+from tribodyn.workflows.scene.units import to_si
+from tribodyn.workflows.studies.files import write_files
 
 LIMIT = 1e-6  # distance, relative, from an end of the response range that is none
 
@@ -66,37 +66,79 @@ class Track:
             "end": str(self.end),
         }
 
+    def lines(self) -> list[str]:
+        """For people."""
+        rows = zip(self.value, self.frequency, self.amplitude, strict=True)
+        said = [
+            f"{self.name} {f'{v:.6g} {self.unit}':14} {hertz:12.6g} Hz {height:12.6g} m" for v, hertz, height in rows
+        ]
+        return [*said, f"{self.what}: {self.end}"]
 
-def follow(
-    file: SceneFile,
-    against: str,
-    start: float,
-    stop: float,
-    fold: int | None,
-    points: int,
-    worn: Path | None,
-    progress: Progress,
+    def write(self, folder: Path) -> list[Path]:
+        """Write track.csv and track.png."""
+        columns = {"value": self.value, "frequency_hz": self.frequency, "amplitude_m": self.amplitude}
+        return write_files(folder, {"track": columns}, {"track": self.plot()})
+
+    def plot(self) -> Figure:
+        """Frequency and amplitude against what changes."""
+        unit, scale = length_unit(self.amplitude.max())
+        with axes_of(7.2, 5.6, rows=2) as (figure, (upper, lower)):
+            upper.plot(self.value, self.frequency, ".-", color=BLUE, ms=4)
+            title = f"{self.what.capitalize()} against {self.name}"
+            upper.set(ylabel=f"frequency of the {self.what} / Hz", title=title)
+            lower.plot(self.value, scale * self.amplitude, ".-", color=ORANGE, ms=4)
+            lower.set(xlabel=f"{self.name} / {self.unit}" if self.unit else self.name, ylabel=f"amplitude / {unit}")
+        return figure
+
+
+def track(
+    scene: Source,
+    against: Literal["load", "gap", "stiffness", "friction", "wear"],
+    start: float | str,
+    stop: float | str,
+    *,
+    fold: int | None = None,
+    points: int | None = None,
+    worn: AnyPath | None = None,
+    overrides: Overrides = (),
+    progress: Report = None,
 ) -> Track:
-    """The peak, or the fold of this number (from 1, in the order of falling frequency), from one value to another.
+    """Follow the resonance peak, or a fold of the response, while load, gap, stiffness, friction or wear changes.
 
-    against : a key of UNITS; points : values of the peak, or the most that a line of folds may have
-    worn : folder of a result whose last depth is one of "wear"
+    scene : name of a scene or a .toml file
+    against : what changes: a factor on the harmonic loads, an opening added to every gap, a factor on the contact
+        springs or on the friction coefficients, or the share of the depth of a worn result
+    start : value to begin at, such as 1 or, for the gap, 0um
+    stop : value to end at
+    fold : number of the fold to follow, 1 for that of the highest frequency; the peak by default
+    points : values of the peak (21), or the most that a line of folds may have (500)
+    worn : folder of the result whose last depth is a wear of one
     Raises  ValueError for what cannot be; SolveFailed where not even the first point is found
     """
-    if start == stop:
+    ends = [_end(option, value, against) for option, value in (("--from", start), ("--to", stop))]
+    if ends[0] == ends[1]:
         raise ValueError("--from and --to are the same: give two values to go from and to")
-    if points < 2:
-        raise ValueError(f"--points: a line needs at least 2, not {points}")
+    count = points if points is not None else (21 if fold is None else 500)
+    if count < 2:
+        raise ValueError(f"--points: a line needs at least 2, not {count}")
     if (against == "wear") != (worn is not None):
         raise ValueError('--worn: give the folder of a worn result with --against "wear", and only there')
+    file, report = read_scene(scene, overrides), reporter(progress)
     with limited(file.scene.solver.threads):
-        balance = modelling.build(file, None, progress).balance
-        path = _path(balance, against, _depth(worn, balance))
+        balance = modelling.build(file, None, report).balance
+        path = _path(balance, against, None if worn is None else _depth(worn, balance))
         if fold is None:
-            with progress.track("peaks") as advance:
-                return _peaks(file, path, start, stop, points, lambda done: advance(done / points, ""))
-        with progress.stage("fold"):
-            return _fold(file, path, start, stop, fold, points)
+            with report.track("peaks") as advance:
+                return _peaks(file, path, ends[0], ends[1], count, lambda done: advance(done / count, ""))
+        with report.stage("fold"):
+            return _fold(file, path, ends[0], ends[1], fold, count)
+
+
+def _end(option: str, value: float | str, against: str) -> float:
+    try:
+        return to_si(value, "m" if against == "gap" else "")
+    except ValueError as error:
+        raise ValueError(f"{option}: {error}") from None
 
 
 def _path(balance: HarmonicBalance, against: str, depth: np.ndarray | None) -> Parameter:
@@ -107,11 +149,9 @@ def _path(balance: HarmonicBalance, against: str, depth: np.ndarray | None) -> P
     return made
 
 
-def _depth(worn: Path | None, balance: HarmonicBalance) -> np.ndarray | None:
-    """(n_pair,) depth [m] at the end of a result, None without one."""
-    if worn is None:
-        return None
-    wear = store.load(worn / "result.h5").wear
+def _depth(worn: AnyPath, balance: HarmonicBalance) -> np.ndarray:
+    """(n_pair,) depth [m] at the end of a result."""
+    wear = store.load(worn).wear
     if wear is None or wear.depth.shape[1] != balance.contact.n_pair:
         raise ValueError(f"--worn: {worn} holds no worn contact of this scene's {balance.contact.n_pair} node pairs")
     return wear.depth[-1]
@@ -162,19 +202,3 @@ def _fold(file: SceneFile, path: Parameter, start: float, stop: float, number: i
     amplitude = line.amplitude(settings.OUTPUT)
     frequency = line.omega / (2 * np.pi)
     return Track("fold", path.name, path.unit, line.parameter, frequency, amplitude, line.cusps, line.end)
-
-
-def write(track: Track, path: Path) -> None:
-    """The line as comma-separated values."""
-    write_columns({"value": track.value, "frequency_hz": track.frequency, "amplitude_m": track.amplitude}, path)
-
-
-def picture(track: Track) -> Figure:
-    """Frequency and amplitude against what changes."""
-    unit, scale = length_unit(track.amplitude.max())
-    with axes_of(7.2, 5.6, rows=2) as (figure, (upper, lower)):
-        upper.plot(track.value, track.frequency, ".-", color=BLUE, ms=4)
-        upper.set(ylabel=f"frequency of the {track.what} / Hz", title=f"{track.what.capitalize()} against {track.name}")
-        lower.plot(track.value, scale * track.amplitude, ".-", color=ORANGE, ms=4)
-        lower.set(xlabel=f"{track.name} / {track.unit}" if track.unit else track.name, ylabel=f"amplitude / {unit}")
-    return figure

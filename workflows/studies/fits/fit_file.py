@@ -1,4 +1,4 @@
-"""A fit that a file asks for: which numbers of a scene are looked for, and what was measured (tribodyn identify).
+"""A fit that a file asks for: which numbers of a scene are looked for, and what was measured (tribodyn study identify).
 
 The file names keys of the scene with bounds, and measured frequencies, preload, energies, amplitudes, life or work with
 their values. A scene is built anew for every trial, as far as the trial changes it.
@@ -7,7 +7,8 @@ their values. A scene is built anew for every trial, as far as the trial changes
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -21,14 +22,16 @@ from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.workflows.run import joints, modelling, settings, wear_run
 from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.wear import At, Place
-from tribodyn.workflows.studies.fits import posterior
+from tribodyn.workflows.studies.fits import posterior as posteriors
 from tribodyn.workflows.studies.fits.identification import Identification, Measured, Parameter, fit
 from tribodyn.workflows.studies.fits.posterior import Posterior
 from tribodyn.workflows.studies.many.distributions import Distribution, Marginal
@@ -111,66 +114,98 @@ class Task(Table):
     predict: dict[str, Asked] = Field(default_factory=dict)
 
 
-def read(path: Path) -> Task:
-    """Read and check the file of a fit; raises SceneError with one sentence."""
+def read(task: AnyPath | Mapping[str, Any]) -> Task:
+    """Read and check the file of a fit, or its tables; raises SceneError with one sentence."""
+    if isinstance(task, Mapping):
+        return scene_file.checked(Task, dict(task), "fit")
+    path = Path(task)
     if not path.is_file():
         raise SceneError(f'there is no file of a fit "{path}"')
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise SceneError(f"{path.name} is not valid TOML: {error}") from None
-    return parse(data, path.name)
+    return scene_file.checked(Task, data, path.name)
 
 
-def parse(tables: Mapping[str, Any], name: str = "fit") -> Task:
-    """Check the tables of a fit; name : for the sentence of a SceneError."""
-    return scene_file.checked(Task, dict(tables), name)
+@dataclass(frozen=True)
+class Fit:
+    """The numbers of a scene that fit the measured ones best.
+
+    found : with their errors; changes : overrides "section.key=value" that put them into the scene
+    """
+
+    found: Identification
+    changes: tuple[str, ...]
+
+    def record(self) -> dict[str, Any]:
+        """For machines."""
+        return {**self.found.record(), "set": list(self.changes)}
+
+    def lines(self) -> list[str]:
+        """For people."""
+        return [self.found.report(), "", "to continue with what was found:", *(f'  --set "{c}"' for c in self.changes)]
 
 
-def run(
-    scene: str, overrides: tuple[str, ...], task: Task, tell: Callable[[str], None]
-) -> tuple[Identification, list[str]]:
-    """The fit, and the overrides "section.key=value" that put what it found into the scene.
+def identify(
+    scene: Source, task: AnyPath | Mapping[str, Any], *, overrides: Overrides = (), progress: Report = None
+) -> Fit:
+    """Fit named numbers of a scene to measured ones, within bounds, and say how well these determine them.
 
-    tell : called with a sentence at every trial
+    scene : name of a scene or a .toml file; nothing is written into it
+    task : file with the numbers that are looked for and those that were measured, as cases/rig/rig.fit.toml
     Raises  SceneError for a key that is no number of the scene, ValueError for bounds that cannot be, SolveFailed
     """
-    looked = _Looking(scene, overrides, task, tell)
-    own = {name: value_of(looked.file.part_scene, one.keys[0]) for name, one in task.parameters.items()}
+    return best(read_scene(scene, overrides), read(task), reporter(progress))
+
+
+def best(file: SceneFile, task: Task, progress: Progress) -> Fit:
+    """The fit of a scene that was read."""
+    looked = _Looking(file, task, progress)
+    own = {name: value_of(file.part_scene, one.keys[0]) for name, one in task.parameters.items()}
     before = {name: value for name, value in own.items() if value is not None}
     with threadpool_limits(1):
         known = before if len(before) == len(looked.parameters) else None
         found = fit(looked.parameters, looked.measured, lambda values: looked.trial(values, task.measured), known)
-    return found, looked.changes(found.named(), digits=6)
+    return Fit(found, tuple(looked.changes(found.named(), digits=6)))
 
 
-def sample(
-    scene: str, overrides: tuple[str, ...], task: Task, tell: Callable[[str], None], most: int = 100, seed: int = 0
+def posterior(
+    scene: Source,
+    task: AnyPath | Mapping[str, Any],
+    *,
+    trials: int = 100,
+    seed: int = 0,
+    overrides: Overrides = (),
+    progress: Report = None,
 ) -> Posterior:
-    """What the measured numbers leave of the parameters, and what follows from them for the numbers in `predict`.
+    """Sample what measured numbers, each with its error, leave of the numbers of a scene, and what follows from them.
 
-    tell : called with a sentence at every trial; most : trials
-    Raises  as `run`
+    scene : name of a scene or a .toml file; nothing is written into it
+    task : file with the numbers that are looked for and those that were measured, as for `identify`
+    trials : runs of the scene that it may take
+    seed : seed of the samples
+    Raises  SceneError, ValueError: what is asked for cannot be; SolveFailed: most trials fail
     """
-    looked = _Looking(scene, overrides, task, tell)
-    asked = {**task.measured, **task.predict}
-    units = {name: MEASURED_IN[one.of] for name, one in task.predict.items()}
-    priors = {name: looked.prior(name, one.prior) for name, one in task.parameters.items() if one.prior is not None}
+    wanted = read(task)
+    looked = _Looking(read_scene(scene, overrides), wanted, reporter(progress))
+    asked = {**wanted.measured, **wanted.predict}
+    units = {name: MEASURED_IN[one.of] for name, one in wanted.predict.items()}
+    priors = {name: looked.prior(name, one.prior) for name, one in wanted.parameters.items() if one.prior is not None}
     with threadpool_limits(1):
-        return posterior.sample(
-            looked.parameters, looked.measured, lambda values: looked.trial(values, asked), units, priors, most, seed
+        return posteriors.sample(
+            looked.parameters, looked.measured, lambda values: looked.trial(values, asked), units, priors, trials, seed
         )
 
 
 class _Looking:
     """A scene whose numbers are looked for."""
 
-    def __init__(self, scene: str, overrides: tuple[str, ...], task: Task, tell: Callable[[str], None]):
+    def __init__(self, file: SceneFile, task: Task, progress: Progress):
         both = set(task.measured) & set(task.predict)
         if both:
             raise SceneError(f"predict.{min(both)}: a measured number has this name, give another one")
-        self._scene, self._overrides, self._task, self._tell = scene, overrides, task, tell
-        self.file = scene_file.read(scene, overrides)
+        self.file, self._task, self._progress = file, task, progress
         self.parameters = [parameter(name, one, self.file.part_scene) for name, one in task.parameters.items()]
         self.measured = [
             Measured(name, _si(f"measured.{name}.value", known.value, (MEASURED_IN[known.of],))[0],
@@ -187,9 +222,11 @@ class _Looking:
     def trial(self, values: Mapping[str, float], asked: Mapping[str, Asked]) -> np.ndarray:
         """What the scene says with values."""
         self._count += 1
-        trial = scene_file.read(self._scene, (*self._overrides, *self.changes(values)))
+        trial = self.file.changed(*self.changes(values))
         found = predict(self._bench, trial, asked)
-        self._tell(f"trial {self._count}: " + ", ".join(f"{name} {value:.6g}" for name, value in values.items()))
+        self._progress.say(
+            f"trial {self._count}: " + ", ".join(f"{name} {value:.6g}" for name, value in values.items())
+        )
         return found
 
     @staticmethod

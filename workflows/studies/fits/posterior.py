@@ -9,18 +9,21 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from scipy.stats import qmc
 
+from tribodyn.workflows.pictures.style import BLUE, INK, RED, STYLE
 from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.fits.identification import Measured, Parameter
 from tribodyn.workflows.studies.many.distributions import Marginal
 from tribodyn.workflows.studies.many.surrogate import Level
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 WALKERS = 96
 STEPS = 500  # of every walker, a third of which is left out
@@ -92,7 +95,7 @@ class Posterior:
         return found
 
     def lines(self) -> list[str]:
-        """What a reader is told."""
+        """For people."""
         failed = f", {self.failed} of them without numbers" if self.failed else ""
         found = [f"posterior from {self.trials} trials{failed}", f"{'':26}{'median':>12}   90 % credible"]
         found += [
@@ -113,9 +116,11 @@ class Posterior:
 
     def plot(self) -> Figure:
         """Every pair of parameters and predicted numbers."""
-        from tribodyn.workflows.studies.fits import posterior_picture
+        return _picture(self)
 
-        return posterior_picture.picture(self)
+    def write(self, folder: Path) -> list[Path]:
+        """Write posterior.png."""
+        return write_files(folder, {}, {"posterior": self.plot()})
 
 
 def sample(
@@ -302,3 +307,39 @@ def _library() -> Any:
     except ImportError:
         raise ValueError('a posterior needs the package emcee: install it with pip install "tribodyn[lives]"') from None
     return emcee
+
+
+def _picture(found: Posterior) -> Figure:
+    """The parameters and the numbers that follow from them; red: medians and the ends of their central 90 %."""
+    shown_numbers = found.summaries()
+    columns = np.column_stack([found.samples, *found.predicted.values()])
+    n = len(shown_numbers)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(2.3 * n + 0.8, 2.1 * n + 0.5), layout="constrained")
+        panes = figure.subplots(n, n, squeeze=False, sharex="col")
+        for i in range(n):
+            for j in range(n):
+                pane = panes[i, j]
+                if j > i:
+                    pane.set_axis_off()
+                    continue
+                if i == j:
+                    pane.hist(columns[:, i], bins=40, color=BLUE, alpha=0.7)
+                    for end in (shown_numbers[i].low, shown_numbers[i].median, shown_numbers[i].high):
+                        pane.axvline(end, color=RED, lw=1)
+                    pane.set_yticks([])
+                    pane.set_title(shown_numbers[i].name, fontsize=9, color=INK)
+                else:
+                    shown = columns[:: max(len(columns) // 1000, 1)]
+                    pane.plot(shown[:, j], shown[:, i], ".", color=BLUE, ms=2, alpha=0.4)
+                    if j == 0:
+                        pane.set_ylabel(_label(shown_numbers[i]), fontsize=8)
+                pane.xaxis.set_major_locator(MaxNLocator(3))
+                pane.tick_params(labelsize=7)
+        for j, pane in enumerate(panes[-1]):
+            pane.set_xlabel(_label(shown_numbers[j]), fontsize=8)
+    return figure
+
+
+def _label(one: Summary) -> str:
+    return f"{one.name} / {one.unit}" if one.unit else one.name

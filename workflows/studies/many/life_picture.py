@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -10,7 +11,9 @@ from scipy import stats
 
 from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREY, INK, RED
-from tribodyn.workflows.studies.many.table import StudyTable
+
+if TYPE_CHECKING:
+    from tribodyn.workflows.studies.many.table import StudyTable
 
 FEWEST = 5  # values that a distribution is fitted to
 TICKS = (0.01, 0.05, 0.1, 0.2, 0.5, 0.8, 0.9, 0.99)

@@ -3,31 +3,32 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from scipy import stats
 
 from tribodyn.workflows.result.verdict import QUANTITIES
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.progress import Progress, Report, reporter
+from tribodyn.workflows.scene.fields import Number
 from tribodyn.workflows.scene.scene_file import SceneError
-from tribodyn.workflows.studies.many import quantiles
+from tribodyn.workflows.scene.source import AnyPath
+from tribodyn.workflows.studies.many import lives_picture, quantiles, study_file
 from tribodyn.workflows.studies.many import study as studies
 from tribodyn.workflows.studies.many.journal import Journal
 from tribodyn.workflows.studies.many.quantiles import RARE, Sample
 from tribodyn.workflows.studies.many.sensitivity import Influence, influences
 from tribodyn.workflows.studies.many.space import Space
+from tribodyn.workflows.studies.many.study import Runner
 from tribodyn.workflows.studies.many.study_file import LISTED, Study
 from tribodyn.workflows.studies.many.surrogate import Surrogate
 from tribodyn.workflows.studies.many.table import LIFE, StudyTable
 from tribodyn.workflows.studies.many.task import solve
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 BATCH = 8  # runs that are added at a time
 COLUMNS = {  # of the table -> quantity of a verdict
@@ -100,7 +101,7 @@ class Lives:
         }
 
     def lines(self) -> list[str]:
-        """What a reader is told."""
+        """For people."""
         runs = f"{self.runs} runs" + (f" ({self.open} of them survived, or ended before)" if self.open else "")
         runs += f" and {self.cheap_runs} cheap ones" if self.cheap_runs else ""
         known = "not known: " + self.model_error_of if self.model_error is None else self.model_error_of
@@ -119,60 +120,80 @@ class Lives:
         scatter = f"{100 * self.scatter:.3g} %" if self.logarithmic else f"{self.scatter:.3g}"
         found.append(f"scatter {scatter}; measured exactly, a key leaves of it (first and total Sobol index):")
         found += [f"  {i.key:32}{100 * i.left:6.1f} %   ({i.first:.3f}, {i.total:.3f})" for i in self.influences]
-        return found
+        return self.table.troubles() + found
+
+    @property
+    def files(self) -> list[Path]:
+        """What it left beside the study's tables."""
+        folder = self.table.folder
+        return [] if folder is None else [folder / "lives.json", folder / "lives.png"]
 
     def plot(self) -> Figure:
         """The distribution with its quantiles, and what it depends on."""
-        from tribodyn.workflows.studies.many import lives_picture as picture
-
-        return picture.picture(self)
+        return lives_picture.picture(self)
 
 
-def run(
-    study: Study,
-    folder: Path,
-    progress: Progress,
+def lives(
+    study: AnyPath | Mapping[str, Any],
+    folder: AnyPath | None = None,
+    *,
+    rare: Number | None = None,
     workers: int | None = None,
     scheduler: str = "",
     resume: bool = False,
-    rare: float | None = None,
+    progress: Report = None,
 ) -> Lives:
-    """Do the runs that the distribution of a number takes, and leave lives.json and lives.png with the study's tables.
+    """Life distribution: what life a share of the parts outlives (B10), how sure that is, and what to measure next.
 
-    rare : a share whose value is wanted as well, and that runs are added for, such as 1e-4
+    study : the .toml file of a study that draws from distributions, or its tables; its table [lives] has what is wanted
+    folder : folder of lives.json, lives.png and the study's tables; results/NAME by default
+    rare : share of the parts whose value is wanted as well, and that runs are added for, such as 1e-4
+    workers : processes; as many as there are cores by default
+    scheduler : address of a scheduler of dask.distributed, or "local" for one of its own
+    resume : take the runs that the folder holds already, and do the others
     Raises  SceneError, ValueError: what is asked for cannot be; SolveFailed: no run has the number, a lost scheduler
     """
+    asked = study_file.read(study)
+    runner = Runner(studies.place(asked, folder), reporter(progress), workers, scheduler, resume)
+    return _distribution(asked, runner, rare)
+
+
+def _distribution(study: Study, runner: Runner, rare: float | None) -> Lives:
+    """Runs until the first share is known as well as is wanted, and what they come to."""
     wanted = study.lives
     if study.settings.design in LISTED:
         raise SceneError(f'{study.name}: lives are drawn, give design = "sobol" and distributions instead of lists')
     if rare is not None and not 0 < rare < 1:
         raise ValueError(f"rare {rare}: give a share between 0 and 1")
     space = Space.of(study)
-    ends = folder, progress, workers, scheduler
     cheap = None
     if wanted.cheap:
         rough = _cheap(study)
-        progress.say(f"{rough.settings.runs} cheap runs")
-        cheap = studies.run(rough, folder / "cheap", progress, workers, scheduler, resume, drawn=False)
+        runner.progress.say(f"{rough.settings.runs} cheap runs")
+        cheap = studies.run(rough, runner.below("cheap"), drawn=False)
     shares = wanted.shares if rare is None else (rare, *wanted.shares)
     added: list[dict[str, Any]] = []
     while True:
-        table = studies.run(study, *ends, resume or bool(added), more=added, drawn=False)
+        again = replace(runner, resume=runner.resume or bool(added))
+        table = studies.run(study, again, more=added, drawn=False)
         found = _Fit.of(space, table, cheap, wanted.number, study.settings.runs or 0, shares[0])
         sample = Sample.of(space, found.surrogate, shares[0] < RARE)
         half = _half_width(found, sample, shares[0], wanted.confidence)
         done = len(table.columns["run"])
         if wanted.within is None or half <= wanted.within or done >= wanted.most:
             break
-        progress.say(f"after {done} runs P{100 * shares[0]:.6g} is known within {100 * half:.2g} %: runs are added")
+        runner.progress.say(
+            f"after {done} runs P{100 * shares[0]:.6g} is known within {100 * half:.2g} %: runs are added"
+        )
         points = quantiles.next_runs(sample, found.surrogate, shares[0], min(BATCH, wanted.most - done))
         added += [space.run_of(point) for point in points]
+    folder = runner.folder
     studies.draw(study, table, folder)
-    error, source = _model_error(study, space, table, folder, progress)
-    told = _told(study, table, cheap, space, found, sample, shares, error, source)
-    (folder / "lives.json").write_text(json.dumps(told.record(), indent=2) + "\n", encoding="utf-8")
-    told.plot().savefig(folder / "lives.png")
-    return told
+    error, source = _model_error(study, space, table, folder, runner.progress)
+    distribution = _result(study, table, cheap, space, found, sample, shares, error, source)
+    (folder / "lives.json").write_text(json.dumps(distribution.record(), indent=2) + "\n", encoding="utf-8")
+    distribution.plot().savefig(folder / "lives.png")
+    return distribution
 
 
 @dataclass(frozen=True)
@@ -291,7 +312,7 @@ def _model_error(
     return error, "verdict on the run at the medians"
 
 
-def _told(
+def _result(
     study: Study, table: StudyTable, cheap: StudyTable | None, space: Space, found: _Fit, sample: Sample,
     shares: Sequence[float], error: float | None, source: str,
 ) -> Lives:  # fmt: skip
@@ -299,14 +320,14 @@ def _told(
     if shares[0] < RARE:
         body = Sample.of(space, found.surrogate)
     back = np.exp if found.logarithmic else np.asarray
-    told = []
+    every = []
     for share in sorted(shares):
         of = sample if share < RARE else body
-        told.append(_quantile(found, of, share, wanted.confidence, error))
+        every.append(_quantile(found, of, share, wanted.confidence, error))
     middle = float(body.mean @ body.weight)
     scatter = float(np.sqrt((body.mean - middle) ** 2 @ body.weight))
     return Lives(
-        study.name, wanted.number, table, tuple(told), influences(space, found.surrogate.mean), wanted.confidence,
+        study.name, wanted.number, table, tuple(every), influences(space, found.surrogate.mean), wanted.confidence,
         found.runs, found.open, 0 if cheap is None else cheap.count("complete"), len(table.columns["run"]) - found.runs,
         found.surrogate.explained, scatter, found.logarithmic, error, source, back(body.mean), body.weight,
     )  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -10,7 +12,9 @@ from scipy import stats
 from tribodyn.workflows.pictures.figures import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREY, ORANGE, RED
 from tribodyn.workflows.studies.many.life_picture import LABELS
-from tribodyn.workflows.studies.many.lives import Lives
+
+if TYPE_CHECKING:
+    from tribodyn.workflows.studies.many.lives import Lives
 
 TICKS = (1e-5, 1e-4, 1e-3, 0.01, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99)
 

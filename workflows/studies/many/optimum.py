@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from tribodyn.workflows.result.verdict import QUANTITIES
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.scene_file import SceneError
+from tribodyn.workflows.scene.source import AnyPath
 from tribodyn.workflows.studies.many import study as studies
+from tribodyn.workflows.studies.many import study_file, trade_picture
 from tribodyn.workflows.studies.many.distributions import Marginal, si
 from tribodyn.workflows.studies.many.proposal import Known, chebyshev, ends, propose
 from tribodyn.workflows.studies.many.space import Space
+from tribodyn.workflows.studies.many.study import Runner
 from tribodyn.workflows.studies.many.study_file import LISTED, Aim, Limit, Study
 from tribodyn.workflows.studies.many.table import LIFE, RUN, SENTENCE, STATUS, StudyTable
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PROPOSED = "proposed.json"
 FINER = "finer"
@@ -70,7 +72,7 @@ class Optimum:
 
     def values(self, row: int) -> dict[str, float]:
         """Values of the aims in a row of the table; lower bounds count as values."""
-        return {aim.number: float(values_of(self.table, aim.number)[0][row]) for aim in self.aims}
+        return {aim.number: float(self.table.values_of(aim.number)[0][row]) for aim in self.aims}
 
     def keys(self, row: int) -> dict[str, Any]:
         """Values of the keys that vary in a row of the table, numbers in SI units."""
@@ -93,7 +95,7 @@ class Optimum:
         }
 
     def lines(self) -> list[str]:
-        """What a reader is told."""
+        """For people."""
         wanted = ", ".join(f"{aim.number} {aim.want}" for aim in self.aims)
         said = [f"{len(self.table.columns[RUN])} runs, {self.table.count('complete')} complete; wanted: {wanted}"]
         if len(self.aims) > 1:
@@ -101,7 +103,9 @@ class Optimum:
         for row in self.front:
             mark = "  <- nearest to the best of every aim" if row == self.best and len(self.front) > 1 else ""
             said.append(f"  {self._told(row)}{mark}")
-        return said + [f"run {one.run}, {one.role}, again: {_again(one)}" for one in self.checked]
+        return (
+            self.table.troubles() + said + [f"run {one.run}, {one.role}, again: {_again(one)}" for one in self.checked]
+        )
 
     def _told(self, row: int) -> str:
         keys = ", ".join(f"{key} {_short(value)}" for key, value in self.keys(row).items())
@@ -111,26 +115,43 @@ class Optimum:
         )
         return f"run {self.table.columns[RUN][row]}: {values}   with {keys}"
 
+    @property
+    def files(self) -> list[Path]:
+        """What it left beside the study's tables."""
+        folder = self.table.folder
+        return [] if folder is None else [folder / "optimum.json", folder / "optimum.png"]
+
     def plot(self) -> Figure:
         """The trade of the first two aims, or how the one aim got better, and where in their ranges the keys lie."""
-        from tribodyn.workflows.studies.many import trade_picture
-
         return trade_picture.picture(self)
 
 
-def run(
-    study: Study,
-    folder: Path,
-    progress: Progress,
+def optimise(
+    study: AnyPath | Mapping[str, Any],
+    folder: AnyPath | None = None,
+    *,
     workers: int | None = None,
     scheduler: str = "",
     resume: bool = False,
+    progress: Report = None,
 ) -> Optimum:
-    """Look for the best designs; leaves optimum.json and optimum.png with the study's tables.
+    """Look for the best designs: least amplitude and longest life, or other aims, over ranges of any keys.
 
-    resume : take the runs that the folder holds, and what was proposed
+    study : the .toml file of a study that draws from ranges, or its tables; its table [optimise] has what is wanted
+    folder : folder of optimum.json, optimum.png and the study's tables; results/NAME by default
+    workers : processes; as many as there are cores by default
+    scheduler : address of a scheduler of dask.distributed, or "local" for one of its own
+    resume : take the runs that the folder holds already, and what was proposed, and do the others
     Raises  SceneError, ValueError: what is asked for cannot be; SolveFailed: no run keeps the limits, a lost scheduler
     """
+    asked = study_file.read(study)
+    runner = Runner(studies.place(asked, folder), reporter(progress), workers, scheduler, resume)
+    return _search(asked, runner)
+
+
+def _search(study: Study, runner: Runner) -> Optimum:
+    """Runs where they promise most, until there are as many as are wanted, then the best ones again."""
+    folder, resume = runner.folder, runner.resume
     wanted, space = study.optimise, _space(study)
     proposed = folder / PROPOSED
     shares = (
@@ -142,8 +163,8 @@ def run(
     table = None
     while True:
         more = [space.run_of(point) for point in space.values(np.array(shares))] if shares else []
-        again = resume or table is not None
-        table = studies.run(study, folder, progress, workers, scheduler, again, more=more, drawn=False, inside=True)
+        again = replace(runner, resume=resume or table is not None)
+        table = studies.run(study, again, more=more, drawn=False, inside=True)
         known = _known(study, space, table)
         left = wanted.evaluations - len(known.share)
         if left <= 0:
@@ -154,15 +175,17 @@ def run(
             propose(known, lambda share: _coordinates(space, share), min(wanted.batch, left), study.settings.seed)
         )
         proposed.write_text(json.dumps([place.tolist() for place in shares]), encoding="utf-8")
-        progress.say(f"{len(known.front)} best trades of {len(known.share)} runs, {int(known.allowed.sum())} allowed")
+        runner.progress.say(
+            f"{len(known.front)} best trades of {len(known.share)} runs, {int(known.allowed.sum())} allowed"
+        )
     front = known.front
     if not len(front):
         raise SolveFailed(_why_none(study, table, known))
     low, high = ends(known)
     best = int(front[chebyshev(known.aims[front], np.ones(len(wanted.aims)), low, high).argmin()])
-    only = {aim.number: tuple(np.flatnonzero(values_of(table, aim.number)[1]).tolist()) for aim in wanted.aims}
+    only = {aim.number: tuple(np.flatnonzero(table.values_of(aim.number)[1]).tolist()) for aim in wanted.aims}
     found = Optimum(study.name, wanted.aims, table, tuple(int(row) for row in front), best, only, ())
-    found = replace(found, checked=_checked(study, found, known, folder, progress, workers, scheduler, resume))
+    found = replace(found, checked=_checked(study, found, known, runner))
     (folder / "optimum.json").write_text(json.dumps(found.record(), indent=2) + "\n", encoding="utf-8")
     found.plot().savefig(folder / "optimum.png")
     return found
@@ -197,30 +220,15 @@ def _known(study: Study, space: Space, table: StudyTable) -> Known:
     return Known(share, np.stack(aims, axis=1), np.array(excess).T.reshape(rows, len(excess)))
 
 
-def values_of(table: StudyTable, number: str) -> tuple[np.ndarray, np.ndarray]:
-    """A number of the runs (n_run,), nan where there is none, and where only a lower bound of it is known.
-
-    A contact that survives, because its wear fades out or it never slips, lives as long as the longest of all runs
-    """
-    if number in table.varied:
-        return np.asarray(table.columns[number], float), np.zeros(len(table.columns[RUN]), bool)
-    values, bounds = table.bounded(number)
-    least = np.isfinite(bounds)
-    if number == LIFE and "survives" in table.columns and np.isfinite(values).any():
-        survives = table.columns["survives"] == 1.0
-        values, least = np.where(survives, np.nanmax(values), values), least | survives
-    return values, least
-
-
 def _column(table: StudyTable, number: str) -> np.ndarray:
-    values = values_of(table, number)[0]
+    values = table.values_of(number)[0]
     good = np.isfinite(values)
     return np.log(values) if good.any() and (values[good] > 0).all() else values
 
 
 def _excess(table: StudyTable, limit: Limit) -> list[np.ndarray]:
     """By how much the ends of a limit are passed, over its size."""
-    values = values_of(table, limit.number)[0]
+    values = table.values_of(limit.number)[0]
     found = []
     for end, sign in ((limit.low, -1.0), (limit.high, 1.0)):
         if end is not None:
@@ -238,10 +246,7 @@ def _why_none(study: Study, table: StudyTable, known: Known) -> str:
     return f"no run keeps the limits of {limits}: the nearest passes one by {100 * least:.2g} % of it"
 
 
-def _checked(
-    study: Study, found: Optimum, known: Known, folder: Path, progress: Progress, workers: int | None, scheduler: str,
-    resume: bool,
-) -> tuple[Checked, ...]:  # fmt: skip
+def _checked(study: Study, found: Optimum, known: Known, runner: Runner) -> tuple[Checked, ...]:
     """The best runs with finer settings, or with their verdicts."""
     wanted = study.optimise
     roles: dict[int, str] = {}
@@ -258,22 +263,14 @@ def _checked(
         }
     )
     varied = {key: tuple(float(found.table.columns[key][row]) for row in rows) for key in keys}
-    progress.say(f"{len(rows)} of the best runs again, {'finer' if wanted.finer else 'with their verdicts'}")
-    table = studies.run(
-        replace(study, settings=settings, varied=varied),
-        folder / FINER,
-        progress,
-        workers,
-        scheduler,
-        resume,
-        drawn=False,
-        inside=True,
-    )
+    runner.progress.say(f"{len(rows)} of the best runs again, {'finer' if wanted.finer else 'with their verdicts'}")
+    again_study = replace(study, settings=settings, varied=varied)
+    table = studies.run(again_study, runner.below(FINER), drawn=False, inside=True)
     checked = []
     for i, row in enumerate(rows):
         again, errors = {}, {}
         for number in found.values(row):
-            value = values_of(table, number)[0][i] if _has(table, number) else np.nan
+            value = table.values_of(number)[0][i] if _has(table, number) else np.nan
             again[number] = float(value) if np.isfinite(value) else None
             if not wanted.finer:
                 errors[number] = _error(table, number, i)

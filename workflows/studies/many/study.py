@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +11,13 @@ import tomli_w
 
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.run.checkpoint import alone_in
-from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.progress import Progress, Report, reporter
 from tribodyn.workflows.run.reuse import early_of
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.scene.schema import PartScene
-from tribodyn.workflows.studies.many import cluster, design, life_picture, parallel_picture, pool, sensitivity_picture
+from tribodyn.workflows.scene.source import AnyPath
+from tribodyn.workflows.studies.many import cluster, design, life_picture, pictures, pool, sensitivity, study_file
 from tribodyn.workflows.studies.many.journal import Journal
 from tribodyn.workflows.studies.many.shared_models import shared
 from tribodyn.workflows.studies.many.space import Space
@@ -25,48 +26,93 @@ from tribodyn.workflows.studies.many.table import StudyTable, table, write
 from tribodyn.workflows.studies.many.task import Row, Task, solve
 
 
-def run(
-    study: Study,
-    folder: Path,
-    progress: Progress,
+@dataclass(frozen=True)
+class Runner:
+    """How and where the runs of a study are done.
+
+    folder : of rows, tables and pictures; workers : processes, as many as there are cores where None
+    scheduler : see cluster.finished, none where empty; resume : take the rows that `folder` holds of the same runs
+    retry : but those of failed runs
+    """
+
+    folder: Path
+    progress: Progress
+    workers: int | None = None
+    scheduler: str = ""
+    resume: bool = False
+    retry: bool = False
+
+    def __post_init__(self) -> None:
+        if self.workers is not None and self.workers < 1:
+            raise ValueError(f"workers {self.workers}: give at least 1")
+
+    def below(self, name: str) -> Runner:
+        """The same in a folder below."""
+        return replace(self, folder=self.folder / name)
+
+
+def grid(
+    study: AnyPath | Mapping[str, Any],
+    folder: AnyPath | None = None,
+    *,
     workers: int | None = None,
     scheduler: str = "",
     resume: bool = False,
     retry: bool = False,
-    more: Sequence[dict[str, Any]] = (),
-    drawn: bool = True,
-    inside: bool = False,
+    progress: Report = None,
+) -> StudyTable:
+    """Run a scene many times, over lists of values or drawn from distributions, and leave one table.
+
+    A scene may name Python files beside it: running somebody's study runs his code. A script needs
+    `if __name__ == "__main__":` around the call.
+
+    study : a .toml file with [study] and [vary], or its tables as a dict
+    folder : folder of tables and pictures; results/NAME by default
+    workers : processes; as many as there are cores by default
+    scheduler : address of a scheduler of dask.distributed, such as tcp://host:8786, or "local" for one of its own
+    resume : take the runs that the folder holds already, and do the others
+    retry : resume, and do failed runs again
+    Raises  SceneError, ValueError: the study asks for what cannot be; SolveFailed: the scheduler was lost
+    """
+    asked = study_file.read(study)
+    return run(asked, Runner(place(asked, folder), reporter(progress), workers, scheduler, resume or retry, retry))
+
+
+def place(study: Study, folder: AnyPath | None) -> Path:
+    """The folder that a study leaves its tables in."""
+    return Path("results") / study.name if folder is None else Path(folder)
+
+
+def run(
+    study: Study, runner: Runner, more: Sequence[dict[str, Any]] = (), drawn: bool = True, inside: bool = False
 ) -> StudyTable:
     """Do the runs of a study, and leave its tables and pictures in a folder.
 
-    workers : processes, as many as there are cores by default; scheduler : see cluster.finished, none by default
-    resume : take the rows that `folder` holds of the same runs; retry : but those of failed runs
     more : values of runs beyond those of the design; drawn : whether pictures are wanted
     inside : one worker is this process itself, where few runs are done at a time and starting another would cost more
     Raises  SceneError, ValueError: the study asks for what cannot be; SolveFailed: the scheduler was lost
     """
-    if workers is not None and workers < 1:
-        raise ValueError(f"workers {workers}: give at least 1")
+    folder, progress, scheduler, resume = runner.folder, runner.progress, runner.scheduler, runner.resume
     varied = [*design.runs(study), *more]
     tasks, refused = _tasks(study, varied)
     folder.mkdir(parents=True, exist_ok=True)
     with alone_in(folder):
         journal, rows = Journal(folder), dict(refused)
-        earlier, again = journal.rows() if resume or retry else {}, ("lost", "failed") if retry else ("lost",)
+        earlier, again = journal.rows() if resume else {}, ("lost", "failed") if runner.retry else ("lost",)
         for task in tasks:
             row = earlier.get(task.key)
             if row is not None and row.status not in again:
                 rows[task.number] = replace(row, run=task.number)
         known = [row for number, row in sorted(rows.items()) if number not in refused]
         # rows that this study does not ask for stay too: one that is larger may
-        previous = journal.begin((earlier | {row.key: row for row in known}).values(), resume or retry)
+        previous = journal.begin((earlier | {row.key: row for row in known}).values(), resume)
         if previous:
             progress.say(f"the rows that were here are now {previous}")
-        if resume or retry:
+        if resume:
             progress.say(f"{len(known)} of {len(varied)} runs are done already")
         # runs that share mesh and reduction come one after the other
         left = sorted((task for task in tasks if task.number not in rows), key=lambda task: task.early)
-        count = workers or pool.cores()
+        count = runner.workers or pool.cores()
         if left:
             where = f"the workers of {scheduler}" if scheduler else f"{min(count, len(left))} processes"
             progress.say(f"{len(left)} runs on {where}, one thread for each run")
@@ -79,7 +125,7 @@ def run(
                     bad = sum(one.status != "complete" for one in rows.values())
                     advance(done / len(left), f"{done} of {len(left)}{f', {bad} not complete' if bad else ''}")
         finally:
-            found = table(study.name, varied, rows) if rows else None
+            found = table(study.name, varied, rows, folder) if rows else None
             if found is not None:
                 write(found, folder)
         assert found is not None
@@ -92,16 +138,16 @@ def draw(study: Study, found: StudyTable, folder: Path) -> None:
     """Pictures of a study, as far as its runs make any."""
     if found.count("complete"):
         found.plot().savefig(folder / "study.png")
-        if parallel_picture.possible(found):
+        if pictures.parallel_possible(found):
             found.plot_parallel().savefig(folder / "parallel.png")
         if life_picture.possible(found):
             found.plot_distribution().savefig(folder / "life.png")
         try:
-            told = sensitivity_picture.indices(Space.of(study, lists=True), found)
+            indices = sensitivity.indices(Space.of(study, lists=True), found)
         except SceneError:  # a key that is no number
-            told = {}
-        if told:
-            sensitivity_picture.picture(found.name, told).savefig(folder / "sensitivity.png")
+            indices = {}
+        if indices:
+            pictures.sensitivities(found.name, indices).savefig(folder / "sensitivity.png")
 
 
 def _finished(tasks: Sequence[Task], workers: int, scheduler: str, inside: bool) -> Iterator[Row]:

@@ -13,6 +13,7 @@ from pydantic import Field, StrictBool, StrictInt, model_validator
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.scene_file import SceneError
+from tribodyn.workflows.scene.source import AnyPath
 from tribodyn.workflows.studies.many.distributions import Distribution, Given, Marginal, si
 
 LISTED = ("grid", "list")
@@ -59,14 +60,14 @@ Share = Annotated[Number, Field(gt=0, lt=1)]
 
 
 class Lives(Table):
-    """The table [lives]: what `tribodyn lives` asks of the runs."""
+    """The table [lives]: what `tribodyn study lives` asks of the runs."""
 
     number: str = "life_cycles"
     """Column of the study's table whose distribution is wanted."""
     shares: Annotated[tuple[Share, ...], Field(min_length=1)] = (0.1, 0.5, 0.9)
     """Shares of the parts that fall below the wanted values: 0.1 gives P10, which 90 % of the parts outlive."""
     confidence: Share = 0.9
-    """Chance that a true quantile lies between the ends that are told."""
+    """Chance that a true quantile lies between the ends that are given."""
     within: Annotated[Number, Field(gt=0)] | None = None
     """Runs are added near the first share until its ends are within this of it, such as "5 %"; none are by default."""
     most: Annotated[StrictInt, Field(ge=1)] = 200
@@ -118,7 +119,7 @@ AIMS = (Aim(number="peak_m_first", want="low"), Aim(number="life_cycles", want="
 
 
 class Optimise(Table):
-    """The table [optimise]: what `tribodyn optimise` asks of the runs."""
+    """The table [optimise]: what `tribodyn study optimise` asks of the runs."""
 
     aims: Annotated[tuple[Aim, ...], Field(min_length=1, max_length=3)] = AIMS
     """What is wanted; of several aims the best trades are looked for."""
@@ -166,8 +167,11 @@ class Study:
         return str(beside) if beside.suffix == ".toml" and beside.is_file() else self.settings.scene
 
 
-def read(path: Path) -> Study:
-    """Read and check the file of a study; raises SceneError, one sentence that names the file and the key."""
+def read(study: AnyPath | Mapping[str, Any]) -> Study:
+    """Read and check the file of a study, or its tables; raises SceneError that names the file and the key."""
+    if isinstance(study, Mapping):
+        return parse(study, "study", Path().resolve())
+    path = Path(study)
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
@@ -189,8 +193,8 @@ def parse(data: Mapping[str, Any], label: str, folder: Path) -> Study:
     varied = {key: _read(key, value, file.study.design, label) for key, value in leaves.items()}
     design, lengths = file.study.design, {key: len(v) for key, v in varied.items() if isinstance(v, tuple)}
     if design == "list" and len(set(lengths.values())) > 1:
-        told = ", ".join(f"{key} {count}" for key, count in lengths.items())
-        raise SceneError(f"{label}: lists side by side need one length, but have {told}")
+        have = ", ".join(f"{key} {count}" for key, count in lengths.items())
+        raise SceneError(f"{label}: lists side by side need one length, but have {have}")
     for at, correlation in enumerate(file.correlations):
         for key in correlation.keys:
             if not isinstance(varied.get(key), Marginal):

@@ -12,18 +12,19 @@ from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
+from matplotlib.figure import Figure
 from scipy import stats
 
+from tribodyn.workflows.studies.many import life_picture, pictures
 from tribodyn.workflows.studies.many.distributions import si
-from tribodyn.workflows.studies.many.task import Row
+from tribodyn.workflows.studies.many.task import ENDS, SINGLE, Row
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 RUN, STATUS, SENTENCE = "run", "status", "sentence"
 LIFE = "life_cycles"
-FEWEST = 5  # complete runs that a correlation is told of
+FEWEST = 5  # complete runs that a correlation needs
 
 
 @dataclass(frozen=True)
@@ -32,12 +33,13 @@ class StudyTable:
 
     columns : name -> (n_run,) of numbers in SI units, nan where there is none, or of texts; run, status and sentence,
         then the keys that vary, then what was computed
-    varied : names of the keys
+    varied : names of the keys; folder : of its files, None where there are none
     """
 
     name: str
     columns: Mapping[str, np.ndarray]
     varied: tuple[str, ...]
+    folder: Path | None = None
 
     @property
     def computed(self) -> tuple[str, ...]:
@@ -64,6 +66,20 @@ class StudyTable:
             values, bounds = np.where(open_, ended, values), np.where(open_, ended, bounds)
         return values, bounds
 
+    def values_of(self, number: str) -> tuple[np.ndarray, np.ndarray]:
+        """A number of the runs (n_run,), nan where there is none, and where only a lower bound of it is known.
+
+        A contact that survives, because its wear fades out or it never slips, lives as long as the longest of all runs
+        """
+        if number in self.varied:
+            return np.asarray(self.columns[number], float), np.zeros(len(self.columns[RUN]), bool)
+        values, bounds = self.bounded(number)
+        least = np.isfinite(bounds)
+        if number == LIFE and "survives" in self.columns and np.isfinite(values).any():
+            survives = self.columns["survives"] == 1.0
+            values, least = np.where(survives, np.nanmax(values), values), least | survives
+        return values, least
+
     def influence(self) -> dict[str, dict[str, float]]:
         """Spearman's rank correlation of computed numbers with the keys that vary, over the complete runs.
 
@@ -80,6 +96,33 @@ class StudyTable:
                     found.setdefault(number, {})[key] = float(stats.spearmanr(x[there], y[there]).statistic)
         return found
 
+    @property
+    def files(self) -> list[Path]:
+        """The table as files."""
+        return [] if self.folder is None else [self.folder / "study.csv", self.folder / "study.h5"]
+
+    def record(self) -> dict[str, Any]:
+        """Counts of the runs and their rank correlations, for machines."""
+        counts = {status: self.count(status) for status in ("complete", "failed", "refused", "lost")}
+        return {"study": self.name, "runs": counts, "influence": self.influence()}
+
+    def lines(self) -> list[str]:
+        """For people: how runs ended, and what the first and the lives depend on."""
+        counts = self.record()["runs"].items()
+        lines = ["runs: " + ", ".join(f"{count} {status}" for status, count in counts if count), *self.troubles()]
+        for number, by_key in self.influence().items():
+            if number.endswith("_first") or number in (LIFE, "depth_max_m"):
+                ranks = sorted(by_key.items(), key=lambda item: -abs(item[1]))
+                lines.append(f"{number:14} rank correlation with {', '.join(f'{k} {rank:+.2f}' for k, rank in ranks)}")
+        return lines
+
+    def troubles(self, most: int = 5) -> list[str]:
+        """The first runs that are not complete, with their sentences."""
+        columns = self.columns
+        bad = [i for i, status in enumerate(columns[STATUS]) if status != "complete"]
+        lines = [f"run {columns[RUN][i]} {columns[STATUS][i]}: {columns[SENTENCE][i]}" for i in bad[:most]]
+        return lines + ([f"... and {len(bad) - most} more, in the table"] if len(bad) > most else [])
+
     def to_pandas(self) -> pd.DataFrame:
         """The table as a DataFrame with the runs as its index."""
         import pandas
@@ -88,24 +131,20 @@ class StudyTable:
 
     def plot_distribution(self, number: str = "life_cycles") -> Figure:
         """A number of the runs on Weibull paper, see `many.life_picture`; raises ValueError where they are few."""
-        from tribodyn.workflows.studies.many import life_picture
-
         return life_picture.picture(self, number)
 
     def plot_parallel(self, number: str | None = None) -> Figure:
         """The runs as parallel coordinates, coloured by a number; raises ValueError where they are few."""
-        from tribodyn.workflows.studies.many import parallel_picture
-
-        return parallel_picture.picture(self, number)
+        return pictures.parallel(self, number)
 
     def plot(self) -> Figure:
-        """Response against each of the keys that vary, see `many.picture`."""
-        from tribodyn.workflows.studies.many import picture
-
-        return picture.picture(self)
+        """Response against each of the keys that vary, see `many.pictures`."""
+        return pictures.panes(self)
 
 
-def table(name: str, varied: Sequence[Mapping[str, Any]], rows: Mapping[int, Row]) -> StudyTable:
+def table(
+    name: str, varied: Sequence[Mapping[str, Any]], rows: Mapping[int, Row], folder: Path | None = None
+) -> StudyTable:
     """The table of the runs that are finished.
 
     varied : values of the keys, run by run; rows : by the number of the run, from 1
@@ -120,13 +159,11 @@ def table(name: str, varied: Sequence[Mapping[str, Any]], rows: Mapping[int, Row
     known = dict.fromkeys(name for n in numbers for name in rows[n].numbers)
     for column in _ordered(known):
         columns[column] = np.array([rows[n].numbers.get(column, np.nan) for n in numbers])
-    return StudyTable(name, columns, keys)
+    return StudyTable(name, columns, keys, folder)
 
 
 def _ordered(names: Mapping[str, None]) -> list[str]:
     """Names of numbers in an order that does not depend on which run came first."""
-    from tribodyn.workflows.studies.many.task import ENDS, SINGLE
-
     first = [f"{name}_{end}" for name in ENDS for end in ("first", "last")] + [*SINGLE, "peak_at_end"]
     return [name for name in first if name in names] + sorted(name for name in names if name not in first)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -10,9 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, RED, STYLE
-from tribodyn.workflows.studies.many.optimum import Optimum, values_of
-from tribodyn.workflows.studies.many.picture import SHOWN
+from tribodyn.workflows.studies.many.pictures import SHOWN
 from tribodyn.workflows.studies.many.table import RUN
+
+if TYPE_CHECKING:
+    from tribodyn.workflows.studies.many.optimum import Optimum
 
 WIDE = 10.0  # largest over least value, from which on an axis is logarithmic
 
@@ -30,7 +32,7 @@ def picture(found: Optimum) -> Figure:
 
 def _trade(found: Optimum, axes: Any) -> None:
     one, two = (aim.number for aim in found.aims[:2])
-    x, y = (values_of(found.table, name)[0] for name in (one, two))
+    x, y = (found.table.values_of(name)[0] for name in (one, two))
     runs = found.table.columns[RUN]
     dots = axes.scatter(x, y, 22, runs, cmap="Greys", edgecolors=GREY, vmin=0, zorder=2)
     axes.figure.colorbar(dots, ax=axes, label="run", pad=0.01, ticks=MaxNLocator(integer=True))
@@ -57,7 +59,7 @@ def _trade(found: Optimum, axes: Any) -> None:
 
 def _progress(found: Optimum, axes: Any) -> None:
     aim = found.aims[0]
-    values = values_of(found.table, aim.number)[0]
+    values = found.table.values_of(aim.number)[0]
     runs = found.table.columns[RUN]
     axes.plot(runs, values, "o", color=GREY, ms=4, label="runs")
     axes.plot(runs[found.best], values[found.best], "*", color=ORANGE, ms=17, label="best that keeps the limits")

@@ -16,10 +16,12 @@ from tribodyn.reduction.cyclic import travelling_wave
 from tribodyn.reduction.flow import Flow, aeroelastic, with_flow
 from tribodyn.workflows.pictures.plots import axes_of
 from tribodyn.workflows.pictures.style import BLUE, GREY, RED
-from tribodyn.workflows.result.columns import write_columns
 from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.settings import OUTPUT
+from tribodyn.workflows.scene.fields import Length
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
+from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.wheels import wheel as wheels
 
 
@@ -76,13 +78,48 @@ class Flutter:
                 ]
         return said
 
+    def write(self, folder: Path) -> list[Path]:
+        """Write flutter.csv, index, frequency and damping ratio of every wave, and flutter.png."""
+        columns = {
+            "index": list(self.eigenvalues),
+            "frequency_Hz": [value.imag / (2 * np.pi) for value in self.eigenvalues.values()],
+            "damping": list(self.damping.values()),
+        }
+        return write_files(folder, {"flutter": columns}, {"flutter": self.plot()})
 
-def study(file: SceneFile, start: float | None = None, stop: float | None = None, points: int = 40) -> Flutter:
-    """Eigenvalues of all waves, and the limit cycles of those that flutter between two amplitudes [m].
+    def plot(self) -> Figure:
+        """Damping ratio of every wave; those that flutter in red."""
+        index, damping = np.array(list(self.damping)), 100 * np.array(list(self.damping.values()))
+        with axes_of(7.0, 4.0) as (figure, axes):
+            axes.bar(index, damping, color=[RED if value < 0 else BLUE for value in damping])
+            axes.axhline(0.0, color=GREY, lw=0.8)
+            axes.set(xlabel="wave (positive with the rotation)", ylabel="damping ratio / %")
+            axes.set_title(f"{self.name}: waves of the stuck wheel in the flow")
+        return figure
 
-    start, stop : of the response; no limit cycles by default; points : of the backbone that is followed
+
+def flutter(
+    scene: Source,
+    start: Length | None = None,
+    stop: Length | None = None,
+    *,
+    points: int = 40,
+    overrides: Overrides = (),
+) -> Flutter:
+    """Tell which waves of a wheel flutter in the flow of the scene, and at which amplitude friction limits them.
+
+    scene : name of a scene with [wheel] and [flow], or a .toml file; its harmonic loads play no part
+    start : amplitude of the response from which limit cycles are looked for, such as 1um; none by default
+    stop : amplitude up to which they are looked for
+    points : points of the backbone between these amplitudes
     Raises  SceneError for a scene without [wheel] or [flow]; ValueError where one end alone is given
     """
+    file = read_scene(scene, overrides)
+    return of_scene(file, start, stop, points)
+
+
+def of_scene(file: SceneFile, start: float | None = None, stop: float | None = None, points: int = 40) -> Flutter:
+    """The flutter of the wheel of a scene that was read; arguments as for `flutter`."""
     scene = file.mesh_scene
     if scene.flow is None:
         raise SceneError(f"{file.name} has no [flow]: give its influence coefficients")
@@ -108,27 +145,3 @@ def study(file: SceneFile, start: float | None = None, stop: float | None = None
             except ValueError as error:
                 cycles[index] = str(error)
     return Flutter(file.name, eigenvalues, cycles)
-
-
-def write(found: Flutter, path: Path) -> None:
-    """Index, frequency and damping ratio of every wave as comma-separated values."""
-    values = found.eigenvalues
-    write_columns(
-        {
-            "index": np.array(list(values)),
-            "frequency_Hz": np.array([value.imag / (2 * np.pi) for value in values.values()]),
-            "damping": np.array(list(found.damping.values())),
-        },
-        path,
-    )
-
-
-def picture(found: Flutter) -> Figure:
-    """Damping ratio of every wave; those that flutter in red."""
-    index, damping = np.array(list(found.damping)), 100 * np.array(list(found.damping.values()))
-    with axes_of(7.0, 4.0) as (figure, axes):
-        axes.bar(index, damping, color=[RED if value < 0 else BLUE for value in damping])
-        axes.axhline(0.0, color=GREY, lw=0.8)
-        axes.set(xlabel="wave (positive with the rotation)", ylabel="damping ratio / %")
-        axes.set_title(f"{found.name}: waves of the stuck wheel in the flow")
-    return figure

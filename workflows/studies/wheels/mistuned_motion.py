@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,40 +12,59 @@ from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.workflows.pictures import film
 from tribodyn.workflows.pictures.render_wheel import MistunedWheelFilm, Wheel, WheelState
 from tribodyn.workflows.run.description import part_mesh
-from tribodyn.workflows.studies.wheels.mistuned_wear import MistunedWear
-from tribodyn.workflows.studies.wheels.patterns import OUTPUT, Blades, amplitude, asked_of, drawn
+from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.studies.wheels.patterns import OUTPUT, Blades, amplitude
 
 IMAGES = 32  # of a film
 
 
-def at_peak(blades: Blades, number: int) -> WheelState:
-    """The wheel of a pattern at its highest peak; raises SolveFailed."""
-    pattern = drawn(asked_of(blades.file), blades.wheel.n_sectors, number)
-    found, blade = blades.peak(pattern)
-    balance, state = blades.balance(pattern), found.state
+@dataclass(frozen=True)
+class PatternMotion:
+    """The wheel of a pattern of blades that differ, at its highest peak."""
+
+    blades: Blades
+    number: int
+    state: WheelState
+    formats: tuple[str, ...]
+
+    def record(self) -> dict[str, object]:
+        """For machines."""
+        return {"pattern": self.number, "amplitude_m": self.state.heights.tolist()}
+
+    def lines(self) -> list[str]:
+        """For people."""
+        return [self.state.label]
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write mistuned_wheel.png, and films; raises RenderingUnavailable."""
+        return write_wheel(self.blades, [self.state], folder, self.formats)
+
+
+def pattern_motion(
+    scene: Source, pattern: int, *, formats: Sequence[str] = (), overrides: Overrides = ()
+) -> PatternMotion:
+    """Draw the wheel of a pattern of blades that differ at its highest peak, all blades at one instant.
+
+    scene : name of a scene with [wheel] and [mistuning], or a .toml file
+    pattern : number of the pattern, from 1
+    formats : formats of a film, gif or mp4: made over one cycle, none by default
+    Raises  SceneError; SolveFailed
+    """
+    blades = Blades.of(read_scene(scene, overrides))
+    drawn = blades.pattern(pattern)
+    found, blade = blades.peak(drawn)
+    balance, state = blades.balance(drawn), found.state
     names = list(balance.compliance.output_names)
     rows = [names.index(f"{OUTPUT}@{n}") for n in range(blades.wheel.n_sectors)]
     heights = amplitude(found.response[rows])
     over = heights.max() / blades.alike.amplitude
-    label = f"pattern {number}, {state.omega / (2 * np.pi):.4g} Hz: blade {blade}, {over:.3f} of blades alike"
+    label = f"pattern {pattern}, {state.omega / (2 * np.pi):.4g} Hz: blade {blade}, {over:.3f} of blades alike"
     force = state.cycle.force.reshape(state.flat.shape)
-    return WheelState(label, _nodes(blades, balance, state.flat, force, state.omega), heights, np.zeros(len(heights)))
+    moved = nodes(blades, balance, state.flat, force, state.omega)
+    return PatternMotion(blades, pattern, WheelState(label, moved, heights, np.zeros(len(heights))), tuple(formats))
 
 
-def worn_states(blades: Blades, found: MistunedWear) -> list[WheelState]:
-    """A worn wheel at its first and at its last wear step."""
-    history = found.history
-    balance = blades.balance(drawn(asked_of(blades.file), blades.wheel.n_sectors, found.number))
-    states = []
-    for row in (0, -1):
-        omega = float(history.omega[row])
-        moved = _nodes(blades, balance, history.displacement[row], history.force[row], omega)
-        label = f"pattern {found.number}, {history.cycles[row]:.3g} cycles, {omega / (2 * np.pi):.4g} Hz"
-        states.append(WheelState(label, moved, found.heights[row], found.volume[row]))
-    return states
-
-
-def write(blades: Blades, states: Sequence[WheelState], folder: Path, formats: Sequence[str] = ()) -> list[Path]:
+def write_wheel(blades: Blades, states: Sequence[WheelState], folder: Path, formats: Sequence[str] = ()) -> list[Path]:
     """Write mistuned_wheel.png, and a film over one cycle in some formats; returns their paths.
 
     Raises  ValueError for a part that has no mesh of one kind; RenderingUnavailable
@@ -62,7 +82,7 @@ def write(blades: Blades, states: Sequence[WheelState], folder: Path, formats: S
     return [drawing, *films]
 
 
-def _nodes(
+def nodes(
     blades: Blades, balance: HarmonicBalance, displacement: np.ndarray, force: np.ndarray, omega: float
 ) -> np.ndarray:
     """Displacement (N, n_node, 3, n_coeff) of every blade [m]."""

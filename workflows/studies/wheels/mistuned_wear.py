@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,29 +15,35 @@ from tribodyn.hbm.threads import limited
 from tribodyn.hbm.wear.evolution import WearProblem
 from tribodyn.hbm.wear.history import WearHistory, WearRow
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
+from tribodyn.workflows.pictures.render_wheel import WheelState
 from tribodyn.workflows.pictures.style import WEAR_MAP
-from tribodyn.workflows.result.columns import write_columns
 from tribodyn.workflows.run import references, settings, wear_run
+from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.run.settings import OUTPUT
-from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
-from tribodyn.workflows.studies.wheels.patterns import Blades, asked_of, drawn
+from tribodyn.workflows.scene.scene_file import SceneError
+from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.studies.files import where_it_can_be, write_files
+from tribodyn.workflows.studies.wheels.mistuned_motion import nodes, write_wheel
+from tribodyn.workflows.studies.wheels.patterns import Blades, asked_of
 
 
 @dataclass(frozen=True)
 class MistunedWear:
     """A worn wheel.
 
-    number : of its pattern; history : of all pairs, sector by sector; blade : whose peak is tracked
+    blades : the wheel; number : of its pattern; history : of all pairs, sector by sector; blade : whose peak is tracked
     volume : (n_row, N) worn by then at the contacts of every sector [m3]; heights : (n_row, N) amplitudes [m]
-    preload : (n_row, N) mean normal force of the contacts of every sector [N]
+    preload : (n_row, N) mean normal force of the contacts of every sector [N]; formats : of films
     """
 
+    blades: Blades
     number: int
     blade: int
     history: WearHistory
     volume: np.ndarray
     heights: np.ndarray
     preload: np.ndarray
+    formats: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
         """For people."""
@@ -65,73 +71,90 @@ class MistunedWear:
             "amplitude_m": [self.heights[0].tolist(), self.heights[-1].tolist()],
         }
 
+    def write(self, folder: Path) -> list[Path]:
+        """Write mistuned_wear.csv, of every blade over the cycles, its picture, and pictures and films of the wheel."""
+        h = self.history
+        columns: dict[str, np.ndarray] = {"cycles": h.cycles, "peak_Hz": h.omega / (2 * np.pi)}
+        for name, values in (("amplitude_m", self.heights), ("volume_m3", self.volume), ("preload_N", self.preload)):
+            columns |= {f"{name}@{k}": column for k, column in enumerate(values.T)}
+        written = write_files(folder, {"mistuned_wear": columns}, {"mistuned_wear": self.plot()})
+        shown = [self.state(0), self.state(-1)]
+        return written + where_it_can_be(lambda: write_wheel(self.blades, shown, folder, self.formats))
 
-def study(
-    file: SceneFile,
-    number: int,
-    on_row: Callable[[WearRow], None] | None = None,
-    blades: Blades | None = None,
+    def state(self, row: int) -> WheelState:
+        """The wheel at a wear step."""
+        h, balance = self.history, self.blades.balance(self.blades.pattern(self.number))
+        omega = float(h.omega[row])
+        moved = nodes(self.blades, balance, h.displacement[row], h.force[row], omega)
+        label = f"pattern {self.number}, {h.cycles[row]:.3g} cycles, {omega / (2 * np.pi):.4g} Hz"
+        return WheelState(label, moved, self.heights[row], self.volume[row])
+
+    def plot(self) -> Figure:
+        """Amplitude, preload and worn volume of every blade as the wheel wears."""
+        with axes_of(10.0, 3.8, columns=3, share=False) as (figure, axes):
+            blades, cycles = np.arange(self.volume.shape[1]), self.history.cycles
+            unit, scale = length_unit(float(self.heights.max()))
+            shown = (
+                (scale * self.heights, f"amplitude / {unit}"),
+                (self.preload, "preload / N"),
+                (1e9 * self.volume, "worn volume / mm³"),
+            )
+            for ax, (values, label) in zip(axes, shown, strict=True):
+                mesh = ax.pcolormesh(blades, 1e-6 * cycles, values, cmap=WEAR_MAP, shading="nearest")
+                figure.colorbar(mesh, ax=ax)
+                ax.set(xlabel="blade", title=label)
+            axes[0].set_ylabel("million cycles")
+        return figure
+
+
+def pattern_wear(
+    scene: Source,
+    pattern: int,
+    *,
+    formats: Sequence[str] = (),
+    overrides: Overrides = (),
+    progress: Report = None,
 ) -> MistunedWear:
-    """Wear the wheel of a pattern by the scene's [wear]; a peak that it asks for is that of the blade that has the
-    highest one unworn.
+    """Wear the wheel of a pattern of blades that differ: every blade's contacts wear by their own work.
 
-    blades : of this file, where they are there already
-    Raises  SceneError where the scene lacks [wear] or [mistuning]; SolveFailed
+    By the [wear] of the scene; a peak that it asks for is that of the blade that has the highest one unworn.
+
+    scene : name of a scene with [wheel], [mistuning] and [wear], or a .toml file
+    pattern : number of the pattern, from 1
+    formats : formats of a film, gif or mp4: made of the worn wheel over one cycle; none by default
+    Raises  SceneError where the scene lacks a table; SolveFailed
     """
-    scene = file.mesh_scene
+    file, report = read_scene(scene, overrides), reporter(progress)
+    wanted = file.mesh_scene.wear
     asked_of(file)
-    if scene.wear is None:
+    if wanted is None:
         raise SceneError(f"{file.name} has no [wear]: there is nothing to wear the blades by")
-    with limited(scene.solver.threads):
-        blades = blades or Blades.of(file)
-        n = blades.wheel.n_sectors
-        pattern = drawn(asked_of(file), n, number)
-        balance = blades.balance(pattern)
-        _, blade = blades.peak(pattern)
-        one = wear_run.wear_problem(scene, file.folder, blades.wheel.wave, scene.wear.lost_below)
+
+    def on_row(row: WearRow) -> None:
+        report.say(f"{row.cycles:.4g} cycles, {1e6 * row.depth.max():.4g} um")
+
+    with limited(file.scene.solver.threads):
+        blades = Blades.of(file)
+        n, drawn = blades.wheel.n_sectors, blades.pattern(pattern)
+        balance = blades.balance(drawn)
+        _, blade = blades.peak(drawn)
+        one = wear_run.wear_problem(file.scene, file.folder, blades.wheel.wave, wanted.lost_below)
         output = f"{OUTPUT}@{blade}"
-        duties = [replace(duty, site=_of_output(duty.site, output)) for duty in settings.mission(scene)]
+        duties = [replace(duty, site=_of_output(duty.site, output)) for duty in settings.mission(file.scene)]
         area = np.tile(one.area, n)
-        approach = references.free_deflection(blades.wheel.wave)
-        limit = settings.step_limit(scene, approach, one.area)
+        limit = settings.step_limit(file.scene, references.free_deflection(blades.wheel.wave), one.area)
         problem = WearProblem(balance, tuple(duties), one.wear, area, one.lost_below, None, one.any_joint, n)
-        history = wear_run.evolve(problem, scene.wear, limit, scene.wear.max_steps, on_row)
+        history = wear_run.evolve(problem, wanted, limit, wanted.max_steps, on_row)
     names = list(balance.compliance.output_names)
     rows = [names.index(f"{OUTPUT}@{k}") for k in range(n)]
     per = (len(history.cycles), n, -1)
     volume = (history.depth * area).reshape(per).sum(axis=2)
     preload = history.normal_force.reshape(per).sum(axis=2)
-    return MistunedWear(number, blade, history, volume, amplitude(history.response[:, rows]), preload)
+    heights = amplitude(history.response[:, rows])
+    return MistunedWear(blades, pattern, blade, history, volume, heights, preload, tuple(formats))
 
 
 def _of_output(site: Site, output: str) -> Site:
     if isinstance(site, BesidePeak):
         return replace(site, peak=replace(site.peak, output=output))
     return replace(site, output=output)
-
-
-def write(found: MistunedWear, path: Path) -> None:
-    """Peak, amplitude, worn volume and preload of every blade over the cycles, as comma-separated values."""
-    h = found.history
-    columns: dict[str, np.ndarray] = {"cycles": h.cycles, "peak_Hz": h.omega / (2 * np.pi)}
-    for name, values in (("amplitude_m", found.heights), ("volume_m3", found.volume), ("preload_N", found.preload)):
-        columns |= {f"{name}@{k}": column for k, column in enumerate(values.T)}
-    write_columns(columns, path)
-
-
-def picture(found: MistunedWear) -> Figure:
-    """Amplitude, preload and worn volume of every blade as the wheel wears."""
-    with axes_of(10.0, 3.8, columns=3, share=False) as (figure, axes):
-        blades, cycles = np.arange(found.volume.shape[1]), found.history.cycles
-        unit, scale = length_unit(float(found.heights.max()))
-        shown = (
-            (scale * found.heights, f"amplitude / {unit}"),
-            (found.preload, "preload / N"),
-            (1e9 * found.volume, "worn volume / mm³"),
-        )
-        for ax, (values, label) in zip(axes, shown, strict=True):
-            mesh = ax.pcolormesh(blades, 1e-6 * cycles, values, cmap=WEAR_MAP, shading="nearest")
-            figure.colorbar(mesh, ax=ax)
-            ax.set(xlabel="blade", title=label)
-        axes[0].set_ylabel("million cycles")
-    return figure

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import matplotlib as mpl
 import numpy as np
@@ -18,9 +19,10 @@ from tribodyn.hbm.continuation.branch import Branch, amplitude
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures.plots import axes_of, length_unit
 from tribodyn.workflows.pictures.style import INK, WEAR_MAP
-from tribodyn.workflows.result.columns import write_columns
 from tribodyn.workflows.run.settings import OUTPUT
-from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.fields import Number, quantity
+from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.wheels import wheel as wheels
 
 TOLERANCE = 3e-3  # of the curves between their points
@@ -54,6 +56,34 @@ class Mistuned:
             "peak_alike_m": float(self.alike.amplitude(OUTPUT).max()),
         }
 
+    def lines(self) -> list[str]:
+        """For people."""
+        return [
+            "factors on the stiffness: " + ", ".join(f"{factor:.4f}" for factor in self.stiffness),
+            f"largest amplitude over that of sectors alike: {self.amplification:.3f}",
+        ]
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write mistuned.csv, the amplitude of every sector over frequency, and mistuned.png."""
+        heights = {f"sector_{n}_m": column for n, column in enumerate(self.heights.T)}
+        columns = {"frequency_Hz": self.branch.frequency, **heights}
+        return write_files(folder, {"mistuned": columns}, {"mistuned": self.plot()})
+
+    def plot(self) -> Figure:
+        """Amplitude of every sector over frequency, beside that of sectors alike."""
+        colours = mpl.colormaps[WEAR_MAP](np.linspace(0.0, 0.92, len(self.stiffness)))
+        with axes_of(7.6, 4.6) as (figure, axes):
+            unit, scale = length_unit(float(self.heights.max()))
+            for n, colour in enumerate(colours):
+                label = f"sector {n}: {100 * (self.stiffness[n] - 1):+.1f} %" if len(colours) <= 12 else None
+                axes.plot(self.branch.frequency, scale * self.heights[:, n], color=colour, lw=1.2, label=label)
+            alike = scale * self.alike.amplitude(OUTPUT)
+            axes.plot(self.alike.frequency, alike, "--", color=INK, label="sectors alike")
+            axes.set(yscale="log", xlabel="frequency / Hz", ylabel=f"amplitude / {unit}")
+            axes.set_title("Sectors whose stiffnesses deviate")
+            axes.legend(fontsize=8, ncols=2)
+        return figure
+
 
 def deviations(n_sectors: int, spread: float, seed: int) -> np.ndarray:
     """Factors (n_sectors,) on the stiffness, drawn from a normal distribution, then shifted and scaled.
@@ -76,45 +106,29 @@ def checked(factors: Sequence[float] | np.ndarray, n_sectors: int) -> np.ndarray
     return values
 
 
-def respond(
-    file: SceneFile,
-    stiffness: Sequence[float] | np.ndarray | None = None,
-    spread: float = 0.02,
+def mistuned(
+    scene: Source,
+    stiffness: Annotated[Sequence[float] | None, quantity("")] = None,
+    *,
+    spread: Number = 0.02,
     seed: int = 1,
-    tolerance: float = TOLERANCE,
+    overrides: Overrides = (),
 ) -> Mistuned:
-    """Response of the scene's wheel over its range of frequencies, beside that of sectors alike.
+    """Solve all sectors of a wheel at once, their stiffnesses a little apart, beside sectors alike.
 
-    stiffness : factor for each sector; drawn with `spread` and `seed` by default
+    scene : name of a scene with a [wheel], or a .toml file
+    stiffness : factor on the stiffness of every sector, such as "1.02, 0.99, 1, 0.98"; drawn by default
+    spread : standard deviation of the factors that are drawn, such as "2 %"
+    seed : seed of the draw; the same seed gives the same factors
     Raises  SceneError for a scene without [wheel], ValueError for factors that cannot be, SolveFailed
     """
+    file = read_scene(scene, overrides)
     with limited(file.scene.solver.threads):
         wheel = wheels.build(file)
         n = wheel.n_sectors
         factors = deviations(n, spread, seed) if stiffness is None else checked(stiffness, n)
         frequency = file.scene.response.frequency
-        branch = wheels.follow(wheel.whole([float(one) for one in factors]), frequency, tolerance)
-        alike = wheels.follow(wheel.wave(), frequency, tolerance)
+        branch = wheels.follow(wheel.whole([float(one) for one in factors]), frequency, TOLERANCE)
+        alike = wheels.follow(wheel.wave(), frequency, TOLERANCE)
     rows = [branch.output_names.index(f"{OUTPUT}@{i}") for i in range(n)]
     return Mistuned(factors, branch, amplitude(branch.response[:, rows]), alike)
-
-
-def write(found: Mistuned, path: Path) -> None:
-    """Amplitude of every sector over frequency as comma-separated values."""
-    heights = {f"sector_{n}_m": column for n, column in enumerate(found.heights.T)}
-    write_columns({"frequency_Hz": found.branch.frequency, **heights}, path)
-
-
-def picture(found: Mistuned) -> Figure:
-    """Amplitude of every sector over frequency, beside that of sectors alike."""
-    colours = mpl.colormaps[WEAR_MAP](np.linspace(0.0, 0.92, len(found.stiffness)))
-    with axes_of(7.6, 4.6) as (figure, axes):
-        unit, scale = length_unit(float(found.heights.max()))
-        for n, colour in enumerate(colours):
-            label = f"sector {n}: {100 * (found.stiffness[n] - 1):+.1f} %" if len(colours) <= 12 else None
-            axes.plot(found.branch.frequency, scale * found.heights[:, n], color=colour, lw=1.2, label=label)
-        axes.plot(found.alike.frequency, scale * found.alike.amplitude(OUTPUT), "--", color=INK, label="sectors alike")
-        axes.set(yscale="log", xlabel="frequency / Hz", ylabel=f"amplitude / {unit}")
-        axes.set_title("Sectors whose stiffnesses deviate")
-        axes.legend(fontsize=8, ncols=2)
-    return figure

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures import wheel_diagrams
-from tribodyn.workflows.pictures.figures import save
-from tribodyn.workflows.result.columns import write_columns
-from tribodyn.workflows.scene.scene_file import SceneFile
+from tribodyn.workflows.scene.fields import Frequency
+from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.wheels.wheel import build, campbell, critical_speeds
 
 
@@ -24,6 +24,7 @@ class WheelModes:
 
     families : "free" and "stuck" (n_diameter, family) [Hz]; slow, fast : range of speeds [Hz], None for none
     speeds : (n_speed,) of the Campbell diagram [Hz]; waves : "free" and "stuck" (n_speed, n_order, family) [Hz]
+    formats : of the pictures
     """
 
     name: str
@@ -34,6 +35,7 @@ class WheelModes:
     orders: tuple[int, ...]
     speeds: np.ndarray
     waves: dict[str, np.ndarray]
+    formats: tuple[str, ...] = ("png",)
 
     @property
     def critical(self) -> dict[int, list[float]]:
@@ -89,23 +91,50 @@ class WheelModes:
             )
         return said
 
+    def write(self, folder: Path) -> list[Path]:
+        """Write nodal_diameters.csv and the pictures."""
+        columns = {"nodal_diameter": np.arange(len(self.families["stuck"]))}
+        for state, values in self.families.items():
+            columns |= {f"{state}_{i + 1}_Hz": values[:, i] for i in range(values.shape[1])}
+        return write_files(folder, {"nodal_diameters": columns}, self.figures(), self.formats)
 
-def study(
-    file: SceneFile, slow: float | None, fast: float | None, orders: Sequence[int], families: int, count: int
+
+def modes(
+    scene: Source,
+    start: Frequency | None = None,
+    stop: Frequency | None = None,
+    *,
+    orders: Sequence[int] = (),
+    families: int = 4,
+    speeds: int = 7,
+    formats: Sequence[str] = ("png",),
+    overrides: Overrides = (),
 ) -> WheelModes:
-    """Modes of all nodal diameters of a scene's wheel, and those of some engine orders' waves up to a speed.
+    """Show the modes of a wheel: nodal diameters, and SAFE and Campbell diagrams of a range of speeds.
 
-    slow, fast : ends of the range of speeds [Hz], None for no diagram; count : speeds of the Campbell diagram
+    Contact free and stuck, at the scene's speed; the Campbell diagram has the modes at each speed.
+
+    scene : name of a scene with a [wheel], or a .toml file
+    start : lowest speed of the SAFE diagram, such as 3000rpm
+    stop : highest speed of the SAFE diagram, and of the Campbell diagram; no such diagrams by default
+    orders : engine orders of the Campbell diagram; that of the scene by default
+    families : modes of each nodal diameter
+    speeds : speeds of the Campbell diagram, from rest to the highest
+    formats : formats of the pictures, png, pdf or svg; can be repeated
     Raises  SceneError for a scene without a wheel; ValueError for what cannot be
     """
+    slow, fast = start, stop
+    if slow is not None and fast is None:
+        raise ValueError("--from: give --to, the highest speed, too")
     if families < 1:
         raise ValueError(f"--families {families}: ask for 1 at least")
     if fast is not None and (fast <= 0 or (slow is not None and not 0 < slow < fast)):
         raise ValueError("--from and --to: give speeds above 0, the lower one first")
-    if count < 2:
-        raise ValueError(f"--speeds {count}: a Campbell diagram needs 2 at least")
+    if speeds < 2:
+        raise ValueError(f"--speeds {speeds}: a Campbell diagram needs 2 at least")
     if 0 in orders:
         raise ValueError("--order: engine orders are 1 or more, or -1 or less for waves against the rotation")
+    file = read_scene(scene, overrides)
     with limited(file.scene.solver.threads):
         wheel = build(file)
         own = wheel.scene.wheel
@@ -113,19 +142,7 @@ def study(
         diameters = range(wheel.n_sectors // 2 + 1)
         found = {state: wheel.diagram(diameters, families, state == "stuck") for state in ("free", "stuck")}
         chosen = tuple(orders) or (own.engine_order or 1,)
-        speeds, waves = np.zeros(0), dict[str, np.ndarray]()
+        turning, waves = np.zeros(0), dict[str, np.ndarray]()
         if fast is not None:
-            speeds, waves = campbell(wheel, fast, count, chosen, 1)
-    return WheelModes(file.name, wheel.n_sectors, found, slow, fast, chosen, speeds, waves)
-
-
-def write(found: WheelModes, folder: Path, formats: Sequence[str] = ("png",)) -> list[Path]:
-    """Write nodal_diameters.csv and the pictures; returns their paths."""
-    folder.mkdir(parents=True, exist_ok=True)
-    columns = {"nodal_diameter": np.arange(len(found.families["stuck"]))}
-    for state, values in found.families.items():
-        columns |= {f"{state}_{i + 1}_Hz": values[:, i] for i in range(values.shape[1])}
-    table = folder / "nodal_diameters.csv"
-    write_columns(columns, table)
-    pictures = [path for name, figure in found.figures().items() for path in save(figure, folder / name, formats)]
-    return [table, *pictures]
+            turning, waves = campbell(wheel, fast, speeds, chosen, 1)
+    return WheelModes(file.name, wheel.n_sectors, found, slow, fast, chosen, turning, waves, tuple(formats))

@@ -39,13 +39,14 @@ from tribodyn.workflows.result.columns import write_columns
 from tribodyn.workflows.run import settings
 from tribodyn.workflows.run.checkpoint import alone_in
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.content import digests
 from tribodyn.workflows.scene.fields import unknown_key
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.sectors import Mistuning
+from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_scene
 from tribodyn.workflows.studies.many import pool
 from tribodyn.workflows.studies.many.journal import Journal
 from tribodyn.workflows.studies.many.task import Row, Status
@@ -107,6 +108,12 @@ class Blades:
             raise SceneError("mistuning.friction: no contact of this scene has friction: leave it out")
         ports = tuple(reduction.port_name(k) for k in range(shapes.shape[1]))
         return cls(file, wheel.part, reduced, MistunedWheel(wave, ports))
+
+    def pattern(self, number: int) -> Pattern:
+        """The pattern of this number, from 1; it depends on the seed of the scene and its number alone."""
+        if number < 1:
+            raise ValueError(f"--pattern {number}: patterns are counted from 1")
+        return drawn(asked_of(self.file), self.wheel.n_sectors, number)
 
     @cached_property
     def alike(self) -> OperatingPoint:
@@ -235,8 +242,7 @@ def solve(task: PatternTask) -> Row:
             blades = _ready[1]
             alike, _ = blades.alike, blades.beginning  # of all patterns
             start = time.process_time()
-            pattern = drawn(asked_of(blades.file), blades.wheel.n_sectors, task.number)
-            found, blade = blades.peak(pattern)
+            found, blade = blades.peak(blades.pattern(task.number))
         except (ValueError, RuntimeError, np.linalg.LinAlgError, MemoryError) as error:
             status: Status = "refused" if isinstance(error, SceneError) else "failed"
             return Row(task.number, task.key, status, " ".join(str(error).split()), {}, time.process_time() - start)
@@ -255,12 +261,13 @@ def solve(task: PatternTask) -> Row:
 class Patterns:
     """What the patterns of a scene came to.
 
-    rows : by number, of all that were asked for; n_sectors : of the wheel
+    rows : by number, of all that were asked for; n_sectors : of the wheel; folder : of table and picture
     """
 
     name: str
     n_sectors: int
     rows: tuple[Row, ...]
+    folder: Path
 
     @cached_property
     def complete(self) -> tuple[Row, ...]:
@@ -308,6 +315,29 @@ class Patterns:
             ]
         return lines
 
+    @property
+    def files(self) -> list[Path]:
+        """Table and picture."""
+        names = ("patterns.csv", "mistuning.png") if self.complete else ("patterns.csv",)
+        return [self.folder / name for name in names]
+
+    def plot(self) -> Figure:
+        """How often which amplification was met, with its percentiles and what no linear wheel passes."""
+        values, said = self.column("amplification"), self.record()
+        with axes_of(7.6, 4.2) as (figure, axes):
+            axes.hist(values, bins="auto" if len(values) > 20 else 10, color=BLUE, alpha=0.8)
+            for name, colour in (("p50", INK), ("p95", ORANGE), ("p99", RED)):
+                axes.axvline(said[name], color=colour, lw=1.5, label=f"{name.upper()} {said[name]:.3f}")
+            bound = whitehead(self.n_sectors)
+            shown = [bound] if bound < 1.5 * values.max() else []  # further out it would squeeze the distribution
+            axes.vlines(
+                shown, 0, 1, GREY, "--", transform=axes.get_xaxis_transform(), label=f"bound {bound:.3f}, Whitehead"
+            )
+            axes.set(xlabel="largest amplitude of any blade over that of blades alike", ylabel="patterns")
+            axes.set_title(f"{self.name}: {len(values)} patterns of {self.n_sectors} blades")
+            axes.legend(fontsize=9)
+        return figure
+
 
 def tasks_of(file: SceneFile, count: int) -> list[PatternTask]:
     """The patterns 1 to `count` of a scene."""
@@ -318,23 +348,30 @@ def tasks_of(file: SceneFile, count: int) -> list[PatternTask]:
     ]
 
 
-def run(
-    file: SceneFile,
-    folder: Path,
-    progress: Progress,
+def patterns(
+    scene: Source,
+    folder: AnyPath | None = None,
+    *,
     workers: int | None = None,
     resume: bool = False,
+    overrides: Overrides = (),
+    progress: Report = None,
 ) -> Patterns:
-    """Solve the patterns of a scene and leave their table in a folder.
+    """Draw patterns of blades that differ, and tell how far they amplify; contact acts on every blade of each.
 
-    workers : processes, as many as there are cores by default; resume : take the rows that the folder holds
+    scene : name of a scene with [wheel] and [mistuning], or a .toml file
+    folder : folder of the table and its picture, in which rows are as they come; results/NAME by default
+    workers : processes; as many as there are cores by default
+    resume : take the rows that the folder holds of the same patterns
     Raises  SceneError
     """
+    file, report = read_scene(scene, overrides), reporter(progress)
+    folder = Path("results") / file.name if folder is None else Path(folder)
     asked, wheel = asked_of(file), file.mesh_scene.wheel
     if wheel is None:
         raise SceneError(f"{file.name} has no [wheel]: this study is for a sector of one")
     if workers is not None and workers < 1:
-        raise ValueError(f"workers {workers}: give at least 1")
+        raise ValueError(f"--workers {workers}: give at least 1")
     folder.mkdir(parents=True, exist_ok=True)
     with alone_in(folder):
         tasks = tasks_of(file, asked.patterns)
@@ -344,18 +381,20 @@ def run(
         journal.begin(earlier.values(), resume)
         left = [task for task in tasks if task.number not in rows]
         if resume:
-            progress.say(f"{len(rows)} of {len(tasks)} patterns are done already")
+            report.say(f"{len(rows)} of {len(tasks)} patterns are done already")
         count = workers or pool.cores()
-        with progress.track(f"{len(left)} patterns") as advance:
+        with report.track(f"{len(left)} patterns") as advance:
             for done, row in enumerate(_finished(left, count), 1):
                 journal.add(row)
                 rows[row.run] = row
                 advance(done / len(left), f"{done} of {len(left)}")
-    found = Patterns(file.name, wheel.sectors, tuple(rows[task.number] for task in tasks))
+    found = Patterns(file.name, wheel.sectors, tuple(rows[task.number] for task in tasks), folder)
     names = ("amplification", "peak_m", "peak_hz", "blade", "solves")
     columns = {name: [row.numbers.get(name, np.nan) for row in found.rows] for name in names}
     every = {"pattern": [row.run for row in found.rows], "status": [row.status for row in found.rows], **columns}
     write_columns({**every, "seconds": [row.seconds for row in found.rows]}, folder / "patterns.csv")
+    if found.complete:
+        found.plot().savefig(folder / "mistuning.png")
     return found
 
 
@@ -372,21 +411,3 @@ def _key(content: str, number: int) -> str:
 def _but_count(overrides: tuple[str, ...]) -> list[str]:
     """Overrides but the number of patterns, on which no pattern depends."""
     return [one for one in overrides if one.partition("=")[0].strip() != "mistuning.patterns"]
-
-
-def picture(found: Patterns) -> Figure:
-    """How often which amplification was met, with its percentiles and what no linear wheel passes."""
-    values, said = found.column("amplification"), found.record()
-    with axes_of(7.6, 4.2) as (figure, axes):
-        axes.hist(values, bins="auto" if len(values) > 20 else 10, color=BLUE, alpha=0.8)
-        for name, colour in (("p50", INK), ("p95", ORANGE), ("p99", RED)):
-            axes.axvline(said[name], color=colour, lw=1.5, label=f"{name.upper()} {said[name]:.3f}")
-        bound = whitehead(found.n_sectors)
-        shown = [bound] if bound < 1.5 * values.max() else []  # further out it would squeeze the distribution
-        axes.vlines(
-            shown, 0, 1, GREY, "--", transform=axes.get_xaxis_transform(), label=f"bound {bound:.3f}, Whitehead"
-        )
-        axes.set(xlabel="largest amplitude of any blade over that of blades alike", ylabel="patterns")
-        axes.set_title(f"{found.name}: {len(values)} patterns of {found.n_sectors} blades")
-        axes.legend(fontsize=9)
-    return figure

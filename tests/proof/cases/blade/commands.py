@@ -33,8 +33,7 @@ def blade(
     """
     from tests.proof.cases.blade import study as blade_study
     from tests.proof.cases.blade.few_sectors import FEW_SECTORS
-    from tribodyn.workflows.scene import scene_file
-    from tribodyn.workflows.studies.wheels import mistuning
+    from tribodyn.workflows.studies.wheels.mistuning import mistuned
 
     highest = None if speed is None else quantity("--speed", speed, "Hz")
     make_room(out)
@@ -42,11 +41,8 @@ def blade(
     if work == "study":
         written = blade_study.run(scene, overrides, folder, highest, aside, blade_study.Extent())
     else:
-        found = mistuning.respond(scene_file.read(scene, (*FEW_SECTORS, *overrides)))
-        folder.mkdir(parents=True, exist_ok=True)
-        written = [folder / "mistuned.csv", folder / "mistuned.png"]
-        mistuning.write(found, written[0])
-        mistuning.picture(found).savefig(written[1])
+        found = mistuned(scene, overrides=(*FEW_SECTORS, *overrides))
+        written = found.write(folder)
         print(f"largest amplitude over that of blades alike: {found.amplification:.3f}")
     for path in written:
         print(path)

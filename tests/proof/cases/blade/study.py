@@ -25,8 +25,8 @@ from tribodyn.workflows.pictures.wheel_diagrams import campbell as plot_campbell
 from tribodyn.workflows.result.result import References
 from tribodyn.workflows.run.settings import OUTPUT
 from tribodyn.workflows.scene.scene_file import SceneError
+from tribodyn.workflows.scene.source import read_scene
 from tribodyn.workflows.studies.published import published_wear_steps
-from tribodyn.workflows.studies.scenes import read_scene
 from tribodyn.workflows.studies.wheels.wheel import Wheel, campbell, critical_speeds
 from tribodyn.workflows.studies.wheels.wheel import build as build_wheel
 

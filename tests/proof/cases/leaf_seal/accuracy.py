@@ -20,7 +20,7 @@ from tests.proof.cases.leaf_seal.figures import MICRO, draw_curve
 from tests.proof.cases.leaf_seal.response import LINER_NODE, LeafResponse, respond
 from tribodyn.hbm.stability.folds_in_time import Coexisting, FoldInTime, coexisting, fold_in_time
 from tribodyn.style import BLUE, GREEN, INK, ORANGE, RED, STYLE
-from tribodyn.workflows.studies.scenes import read_scene
+from tribodyn.workflows.scene.source import read_scene
 
 HARMONICS = (1, 3, 5, 9)
 HILL = 5  # harmonics of the solutions whose stability is compared with time integration

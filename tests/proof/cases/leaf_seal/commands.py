@@ -32,7 +32,7 @@ def leaf(
         Print JSON for machines.
     """
     from tests.proof.cases.leaf_seal import accuracy, fit, study
-    from tribodyn.workflows.studies.scenes import read_scene
+    from tribodyn.workflows.scene.source import read_scene
 
     make_room(out)
     folder = out or Path("results") / f"leaf_{work}"

@@ -14,7 +14,7 @@ from tribodyn.workflows.run.modelling import Model
 from tribodyn.workflows.run.reuse import Bench, reaction
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import PartScene
-from tribodyn.workflows.studies.scenes import read_scene
+from tribodyn.workflows.scene.source import read_scene
 
 PLATFORM, SHAKER = "platform", "shaker"  # names in the scene
 TIED = {

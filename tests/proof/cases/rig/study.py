@@ -9,7 +9,7 @@ from tests.proof.cases.rig import cases as rig_cases
 from tests.proof.cases.rig import figures as rig_figures
 from tests.proof.cases.rig import model as rig_model
 from tests.proof.cases.rig import table as rig_table
-from tribodyn.workflows.studies.scenes import read_scene
+from tribodyn.workflows.scene.source import read_scene
 
 
 def run(

@@ -1,0 +1,66 @@
+"""Studies: each is one function whose result has `record()`, `lines()` and, where there are files, `write(folder)`.
+
+A scene is a name, the path of a .toml file, its tables as a dict, or one that was read. The words `tribodyn curve`,
+`study` and `geometry` are made from these functions.
+"""
+
+from tribodyn.geometry.surface import HeightMap
+from tribodyn.workflows.studies.curves.backbones import SceneBackbone, backbone
+from tribodyn.workflows.studies.curves.decay import Decay, ring_down
+from tribodyn.workflows.studies.curves.folds import FoldsFound, folds
+from tribodyn.workflows.studies.curves.tracking import Track, track
+from tribodyn.workflows.studies.fits.fit_file import Fit, identify, posterior
+from tribodyn.workflows.studies.fits.posterior import Posterior
+from tribodyn.workflows.studies.forces import Forces, forces
+from tribodyn.workflows.studies.inspection import Inspection
+from tribodyn.workflows.studies.many.lives import Lives, lives
+from tribodyn.workflows.studies.many.optimum import Optimum, optimise
+from tribodyn.workflows.studies.many.study import grid
+from tribodyn.workflows.studies.many.table import StudyTable
+from tribodyn.workflows.studies.supports import Supports, supports
+from tribodyn.workflows.studies.surfaces import FaceAsperities, asperities
+from tribodyn.workflows.studies.trades import Converged, Traded, converge, trade
+from tribodyn.workflows.studies.variation import Variation, vary
+from tribodyn.workflows.studies.verification import Comparison
+from tribodyn.workflows.studies.worn_in_time import LifeInTime, wear_in_time
+from tribodyn.workflows.studies.worn_states import WornStates, verify_states
+
+__all__ = [
+    "Comparison",
+    "Converged",
+    "Decay",
+    "FaceAsperities",
+    "Fit",
+    "FoldsFound",
+    "Forces",
+    "HeightMap",
+    "Inspection",
+    "LifeInTime",
+    "Lives",
+    "Optimum",
+    "Posterior",
+    "SceneBackbone",
+    "StudyTable",
+    "Supports",
+    "Track",
+    "Traded",
+    "Variation",
+    "WornStates",
+    "asperities",
+    "backbone",
+    "converge",
+    "folds",
+    "forces",
+    "grid",
+    "identify",
+    "lives",
+    "optimise",
+    "posterior",
+    "ring_down",
+    "supports",
+    "track",
+    "trade",
+    "vary",
+    "verify_states",
+    "wear_in_time",
+]

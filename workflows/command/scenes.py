@@ -1,0 +1,264 @@
+"""The words of the command `tribodyn` on one scene or one result."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from tribodyn.workflows.command.word import QUIET, show_found, word
+from tribodyn.workflows.command.words import Flag, Json, Overrides, make_room, quantity
+from tribodyn.workflows.report import text
+from tribodyn.workflows.result import store
+from tribodyn.workflows.result.columns import named_lines
+from tribodyn.workflows.result.result import Result
+from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.progress import Progress, console_progress
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies import inspection, scenes, verification, worn_in_time, worn_states
+
+Formats = Annotated[tuple[str, ...], Parameter(name="--format", negative=(), consume_multiple=True)]
+Targets = Annotated[tuple[str, ...], Parameter(name="--to", negative=(), consume_multiple=True)]
+Films = Annotated[tuple[Literal["wear", "cycle"], ...], Parameter(name="--film", negative=(), consume_multiple=True)]
+
+inspect = word(inspection.inspect, "inspect", into="asked")
+
+
+def run(
+    scene: str,
+    *,
+    overrides: Overrides = (),
+    accuracy: str | None = None,
+    out: Path | None = None,
+    resume: Flag = False,
+    pictures: Annotated[bool, Parameter(negative="--no-pictures")] = True,
+    quiet: QUIET = False,
+    log: Path | None = None,
+) -> None:
+    """Run a scene and leave its result and pictures in a folder.
+
+    A scene may name Python files beside it: running somebody's scene runs his code.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene (see `tribodyn cases`) or a .toml file.
+    accuracy
+        Relative error wanted, such as "1 %", or of what is named, "1 % of energy": the scene is run with finer and
+        finer settings until the errors of its verdict are below that; exit code 3 where they do not get there. Without
+        depth or life in it nothing is worn. "1 % of life given harmonics" leaves a setting as the scene has it, and
+        its error out.
+    out
+        Folder of the result; results/NAME by default.
+    resume
+        Resume an unfinished result in the folder.
+    pictures
+        Draw curves, maps and renders when done.
+    quiet
+        Print nothing but what goes wrong.
+    log
+        File to which every line of progress is added, with its time.
+    """
+    make_room(out)
+    progress = console_progress(quiet, log)
+    file = scene_file.read(scene, overrides)
+    folder = out or Path("results") / file.name
+    path = folder / "result.h5"
+    try:
+        if accuracy is not None:
+            result, bound = scenes.run_to_accuracy(file, accuracy, folder, progress=progress, resume=resume)
+        else:
+            result, bound = scenes.run(file, folder, progress=progress, resume=resume), None
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(_kept(path, scene, file.overrides)) from None
+    except SolveFailed as failure:
+        raise SolveFailed(f"{failure}; what was computed before is kept in {path}") from None
+    if not quiet:
+        print(*named_lines(text.lines(result)), sep="\n")
+    progress.say(f"result: {path}")
+    if pictures:
+        _draw(result, folder / "pictures", report=progress.say)
+    if bound is not None and not bound.met:
+        raise RuntimeError(f"{bound.sentence}; the result is kept in {path}")
+
+
+def _kept(path: Path, scene: str, overrides: Sequence[str]) -> str:
+    if not path.exists():
+        return "stopped before anything was computed"
+    words = [scene, "--out", str(path.parent), *(word for text in overrides for word in ("--set", text))]
+    return f"stopped, {store.load(path).state}, kept in {path}: resume with tribodyn run {shlex.join(words)} --resume"
+
+
+def cases() -> None:
+    """List the scenes that come with the program."""
+    for name in scene_file.names():
+        print(f"{name:12} {scene_file.title(name)}")
+
+
+def plan(scene: str, *, overrides: Overrides = ()) -> None:
+    """Show what a scene will model, and what it will cost, before running it.
+
+    Parameters
+    ----------
+    scene
+        Name of a scene (see `tribodyn cases`) or a .toml file.
+    """
+    print(*named_lines(scenes.plan(scene, overrides).lines()), sep="\n")
+
+
+def show(result: Path, *, as_json: Json = False) -> None:
+    """Show what a result holds.
+
+    Parameters
+    ----------
+    result
+        Folder or file of a result.
+    as_json
+        Print JSON for machines.
+    """
+    loaded = store.load(result)
+    print(json.dumps(loaded.summary(), indent=2) if as_json else "\n".join(named_lines(text.lines(loaded))))
+
+
+def draw(
+    result: Path,
+    *,
+    film: Films = (),
+    formats: Formats = (),
+    dpi: int | None = None,
+    row: int | None = None,
+    images: int = 48,
+    out: Path | None = None,
+) -> None:
+    """Draw the pictures of a result again, or films of it.
+
+    Parameters
+    ----------
+    result
+        Folder or file of a result.
+    film
+        A film instead of pictures: of the contact over wear, or of the part and the status of its pairs over one cycle;
+        can be both.
+    formats
+        Of pictures png (default), pdf or svg, of films mp4 (default) or gif; can be repeated.
+    dpi
+        Dots per inch: of a picture 200, of a film of 12.8 by 7.2 inches 100 by default.
+    row
+        Wear row, or point of a response that does not wear, whose cycle is filmed; by default that whose contact works
+        most.
+    images
+        Images of a film, at the most.
+    out
+        Folder of pictures and films; pictures/ beside the result by default.
+    """
+    make_room(out)
+    if dpi is not None and not 20 <= dpi <= 2400:
+        raise ValueError(f"--dpi {dpi}: give 20 to 2400 dots per inch")
+    loaded, folder = store.load(result), out or store.result_file(result).parent / "pictures"
+    if not film:
+        _draw(loaded, folder, formats or ("png",), dpi or 200)
+    for over in film:
+        given = {"row": row, "formats": formats or ("mp4",), "images": images, "dpi": dpi or 100}
+        print(*scenes.animate(loaded, folder, over, **given), sep="\n")  # type: ignore[arg-type]
+
+
+def _draw(
+    result: Result,
+    folder: Path,
+    formats: Sequence[str] = ("png",),
+    dpi: int | None = None,
+    report: Callable[[str], None] = print,
+) -> None:
+    written, missing = scenes.draw(result, folder, formats, dpi)
+    for line in (*([missing] if missing else []), *map(str, written)):
+        report(line)
+
+
+def verify(
+    result: Path,
+    *,
+    at: str | None = None,
+    row: int | None = None,
+    states: int | None = None,
+    wear: Flag = False,
+    steps: int | None = None,
+    overrides: Overrides = (),
+    out: Path | None = None,
+    as_json: Json = False,
+) -> None:
+    """Check a result against direct time integration of the same model with the same contact law.
+
+    Parameters
+    ----------
+    result
+        Folder or file of a result.
+    at
+        Frequency such as 410Hz; the peak of the response, or the frequency of the row, by default.
+    row
+        Wear row whose depth the contact has; unworn by default.
+    states
+        So many worn states of a wear run, spread over its cycles, one line each.
+    wear
+        Wear the contact along the motion in time, at the frequencies of the run, and compare its life with the run's.
+    steps
+        Time steps per period; 256 or 32 for each harmonic by default.
+    out
+        Folder of tables and pictures; pictures/ beside the result by default.
+    as_json
+        Print JSON for machines.
+    """
+    make_room(out)
+    if sum((states is not None, wear, at is not None or row is not None)) > 1:
+        raise ValueError("expected one of --states, --wear, and --at with --row")
+    hertz = None if at is None else quantity("--at", at, "Hz")
+    folder = out or store.result_file(result).parent / "pictures"
+    loaded, progress = store.load(result), Progress() if as_json else console_progress()
+    if wear:
+        life = worn_in_time.wear_in_time(loaded, folder, steps=steps, overrides=overrides, progress=progress)
+        show_found(life, life.files, as_json)
+    elif states is not None:
+        along = worn_states.verify_states(loaded, states, steps=steps, overrides=overrides, progress=progress)
+        show_found(along, along.write(folder), as_json)
+    else:
+        found = verification.verify(loaded, hertz, row=row, steps=steps, overrides=overrides, progress=progress)
+        show_found(found, found.write(folder), as_json)
+
+
+def report(*result: Path, out: Path | None = None) -> None:
+    """Write one HTML file that shows results and opens anywhere, without a network.
+
+    Parameters
+    ----------
+    result
+        Folders or files of results; several are shown side by side, with differences from the first.
+    out
+        The .html file; report.html beside the first result by default.
+    """
+    if not result:
+        raise ValueError("report: give the folder or file of a result")
+    make_room(out, (".html",))
+    print(scenes.report(result, out or store.result_file(result[0]).parent / "report.html"))
+
+
+def export(result: Path, *, to: Targets, out: Path | None = None, mesh_ending: str = ".xdmf") -> None:
+    """Write a result in the formats of other programs.
+
+    Parameters
+    ----------
+    result
+        Folder or file of a result.
+    to
+        Formats, one or several: vtk (series for ParaView), csv, parquet, mat, uff (tables and curves), mesh (worn part
+        with its fields), npz, mtx, abaqus (reduced matrices).
+    out
+        Folder, in which each format gets a folder of its own; export/ beside the result by default.
+    mesh_ending
+        Format of the mesh by its ending, such as .vtu, .exo, .msh or .bdf.
+    """
+    make_room(out)
+    for written in scenes.export(result, to, out or store.result_file(result).parent / "export", mesh_ending):
+        print(written)

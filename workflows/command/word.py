@@ -1,0 +1,249 @@
+"""A word of the command line, made from a study: its options from the parameters, its help from the docstring.
+
+A study is a function with one result type, which has `record()` for machines, `lines()` for people and, where there are
+tables or pictures, `write(folder)`. A parameter that is marked with a quantity takes a text with a unit.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+import shlex
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from cyclopts import Parameter
+
+from tribodyn.workflows.command.words import Flag, Json, Overrides, make_room, quantity
+from tribodyn.workflows.result import store
+from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.progress import Progress, console_progress
+from tribodyn.workflows.scene import source
+from tribodyn.workflows.scene.fields import Quantity
+
+NAMES = {"start": "--from", "stop": "--to", "overrides": "--set"}
+SUPPLIED = ("progress", "folder", "overrides")  # parameters that are not given as options of their own names
+
+
+@dataclass(frozen=True)
+class Option:
+    """A parameter of a study as an option of its word.
+
+    placed : whether the study takes it by its place; unit : of a quantity, None for what is none
+    many : whether there are several values, by name where `by_name`
+    """
+
+    name: str
+    hint: Any
+    default: Any
+    placed: bool
+    unit: str | None = None
+    many: bool = False
+    by_name: bool = False
+
+    @classmethod
+    def of(cls, parameter: inspect.Parameter, hint: Any) -> Option:
+        """The option of a parameter with its type."""
+        unit = next((mark.unit for mark in _marks(hint) if isinstance(mark, Quantity)), None)
+        bare = _not_none(get_args(_not_none(hint))[0] if get_origin(_not_none(hint)) is Annotated else _not_none(hint))
+        origin, placed = get_origin(bare), parameter.kind is not inspect.Parameter.KEYWORD_ONLY
+        many = origin in (Sequence, Mapping)
+        return cls(parameter.name, bare, parameter.default, placed, unit, many, origin is Mapping)
+
+    @property
+    def positional(self) -> bool:
+        """Whether it is given by its place: a scene, a result or another file."""
+        return self.placed and self._kind is not None
+
+    @property
+    def _kind(self) -> Any:
+        if self.hint == source.Source:
+            return str
+        return Path if PathLike[str] in get_args(self.hint) else None
+
+    @property
+    def flag(self) -> str:
+        """Such as --points; several values are given one at a time, under the name of one."""
+        repeated = self.by_name or (self.many and self.unit is None)
+        name = self.name.removesuffix("s") if repeated else self.name
+        return NAMES.get(self.name, f"--{name.replace('_', '-')}")
+
+    def parameter(self, meaning: str) -> inspect.Parameter:
+        """The parameter of the word."""
+        required = self.default is inspect.Parameter.empty
+        if self.positional:
+            annotation: Any = Annotated[self._kind if required else self._kind | None, Parameter(help=meaning)]
+            place = inspect.Parameter.POSITIONAL_OR_KEYWORD
+            return inspect.Parameter(self.name, place, default=self.default, annotation=annotation)
+        kind, default = self._kind or self.hint, self.default
+        whole = self.many and get_args(self.hint)[:1] == (int,)
+        if self.by_name or (self.many and self.unit is None):
+            kind, default = tuple[int, ...] if whole else tuple[str, ...], default if required else default or ()
+        elif self.unit is not None or kind == float | str:
+            kind, default = str, f"{default:g} {self.unit}".strip() if isinstance(default, (int, float)) else default
+        if default is None:
+            kind = kind | None
+        plain = () if self.many or kind is bool else None
+        shown = Parameter(name=self.flag, help=meaning, negative=plain, consume_multiple=whole)
+        annotation = Annotated[kind, shown]
+        return inspect.Parameter(self.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+    def value(self, given: Any) -> Any:
+        """What the study takes."""
+        if given is None or self.unit is None:
+            return given
+        if self.by_name:
+            return dict(self._named(text) for text in given)
+        if self.many:
+            return tuple(quantity(self.flag, text.strip(), self.unit) for text in given.split(","))
+        return quantity(self.flag, given, self.unit)
+
+    def _named(self, text: str) -> tuple[str, float]:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise ValueError(f"{self.flag} {text}: give a name and its value, such as name=1")
+        return name.strip(), quantity(f"{self.flag} {name.strip()}", value.strip(), self.unit or "")
+
+
+def word(
+    study: Callable[..., Any], words: str, *, into: Literal["results", "beside", "pictures", "asked"] = "results"
+) -> Callable[..., None]:
+    """The function behind a word of the command line.
+
+    words : such as "curve track", to tell how to continue
+    into : where --out is not given, tables and pictures go to results/NAME, beside the result, into pictures/ beside
+        it, or nowhere
+    """
+    hints = get_type_hints(study, include_extras=True)
+    parameters = inspect.signature(study).parameters
+    options = [Option.of(p, hints[name]) for name, p in parameters.items() if name not in SUPPLIED]
+    said = meanings(study.__doc__ or "", list(parameters))
+    writes = "folder" in parameters or hasattr(hints["return"], "write")
+
+    def call(*placed: Any, **named: Any) -> None:
+        bound = signature.bind(*placed, **named)
+        bound.apply_defaults()
+        given = dict(bound.arguments)
+        out, as_json, overrides = given.pop("out", None), given.pop("as_json"), given.pop("overrides", None)
+        quiet = given.pop("quiet", False)
+        make_room(out)
+        first = next((given[one.name] for one in options if one.positional), None)
+        folder = out or _folder(first, into)
+        values = {one.name: one.value(given[one.name]) for one in options}
+        if overrides is not None:
+            values["overrides"] = overrides
+        if "progress" in parameters:
+            values["progress"] = Progress() if as_json or quiet else console_progress()
+        if "folder" in parameters:
+            values["folder"] = folder
+        try:
+            found = study(**values)
+        except KeyboardInterrupt:
+            if "resume" not in parameters:
+                raise
+            sets = [word for text in overrides or () for word in ("--set", text)]
+            again = shlex.join(["tribodyn", *words.split(), str(first), *sets, "--out", str(folder), "--resume"])
+            raise KeyboardInterrupt(f"stopped; what was finished is kept in {folder}: resume with {again}") from None
+        if hasattr(found, "write"):
+            files = [] if folder is None else found.write(folder)
+        else:
+            files = list(getattr(found, "files", ()))
+        show_found(found, files, as_json)
+
+    shown = [one.parameter(said.get(one.name, "")) for one in options]
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    if "overrides" in parameters:
+        shown.append(inspect.Parameter("overrides", keyword, default=(), annotation=Overrides))
+    if writes:
+        meaning = said.get("folder", _OUT[into])
+        out = Annotated[Path | None, Parameter(name="--out", help=meaning)]
+        shown.append(inspect.Parameter("out", keyword, default=None, annotation=out))
+    shown.append(inspect.Parameter("as_json", keyword, default=False, annotation=Json))
+    if "progress" in parameters:
+        shown.append(inspect.Parameter("quiet", keyword, default=False, annotation=QUIET))
+    call.__name__ = words.split()[-1].replace("-", "_")
+    call.__doc__ = summary(study.__doc__ or "", list(parameters))
+    call.__signature__ = signature = inspect.Signature(sorted(shown, key=lambda p: p.kind))  # type: ignore[attr-defined]
+    call.__annotations__ = {p.name: p.annotation for p in shown}
+    return call
+
+
+QUIET = Annotated[Flag, Parameter(help="Print no progress.")]
+_OUT = {
+    "results": "Folder of tables and pictures; results/NAME by default.",
+    "beside": "Folder of tables and pictures; that of the result by default.",
+    "pictures": "Folder of tables and pictures; pictures/ beside the result by default.",
+    "asked": "Folder of tables and pictures; none are written by default.",
+}
+
+
+def show_found(found: Any, files: Sequence[Path] = (), as_json: bool = False) -> None:
+    """Print what was found, as JSON or as lines, and the files that hold it.
+
+    Raises  SolveFailed where what was found says in `failure` that it is not what was asked for
+    """
+    if as_json:
+        record = found.record()
+        if isinstance(record, dict) and files:
+            record = {**record, "files": [str(path) for path in files]}
+        print(json.dumps(record, indent=2))
+    else:
+        print(*found.lines(), *files, sep="\n")
+    if failure := getattr(found, "failure", ""):
+        raise SolveFailed(failure)
+
+
+def meanings(doc: str, names: Sequence[str]) -> dict[str, str]:
+    """Meaning of each name in the lines "name, name : meaning; name : meaning" of a docstring."""
+    found: dict[str, str] = {}
+    for line in _whole_lines(doc):
+        for piece in re.split(r"; (?=\w+(?:, \w+)* : )", line):
+            said, colon, meaning = piece.partition(" : ")
+            listed = [name.strip() for name in said.split(",")]
+            if colon and set(names).issuperset(listed):
+                text = meaning.strip().rstrip(".")
+                found |= dict.fromkeys(listed, f"{text[:1].upper()}{text[1:]}.")
+    return found
+
+
+def summary(doc: str, names: Sequence[str]) -> str:
+    """A docstring without the meanings of parameters and what follows these."""
+    lines = []
+    for line in inspect.cleandoc(doc).splitlines():
+        head = line.partition(" : ")[0]
+        if line.startswith(("Raises  ", "Returns ", "Source  ")) or set(names).issuperset(head.split(", ")):
+            break
+        lines.append(line)
+    return "\n".join(lines).strip()
+
+
+def _whole_lines(doc: str) -> Iterator[str]:
+    """The lines of a docstring, each joined with those that continue it further in."""
+    return iter(re.sub(r"\n {4,}", " ", inspect.cleandoc(doc)).splitlines())
+
+
+def _folder(first: Any, into: str) -> Path | None:
+    if into == "asked":
+        return None
+    if into == "results":
+        return Path("results") / (Path(first).name.removesuffix(".toml") if first is not None else "study")
+    beside = store.result_file(first).parent
+    return beside / "pictures" if into == "pictures" else beside
+
+
+def _not_none(hint: Any) -> Any:
+    """A type without None."""
+    if get_origin(hint) in (Union, UnionType) and type(None) in get_args(hint):
+        return Union[tuple(one for one in get_args(hint) if one is not type(None))]  # noqa: UP007  # of one: itself
+    return hint
+
+
+def _marks(hint: Any) -> Iterator[Any]:
+    yield from getattr(hint, "__metadata__", ())
+    for inner in get_args(hint):
+        yield from _marks(inner)

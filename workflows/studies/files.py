@@ -1,0 +1,38 @@
+"""Tables and pictures of a study, written into a folder."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from tribodyn.workflows.pictures.figures import save
+from tribodyn.workflows.pictures.offscreen import RenderingUnavailable
+from tribodyn.workflows.result.columns import write_columns
+
+
+def write_files(
+    folder: Path,
+    tables: Mapping[str, Mapping[str, Any]],
+    pictures: Mapping[str, Figure],
+    formats: Sequence[str] = ("png",),
+) -> list[Path]:
+    """Write columns as NAME.csv and figures as NAME.png, or in other formats; returns the files."""
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for name, columns in tables.items():
+        write_columns(columns, folder / f"{name}.csv")
+        written.append(folder / f"{name}.csv")
+    return [*written, *(path for name, figure in pictures.items() for path in save(figure, folder / name, formats))]
+
+
+def where_it_can_be(draw: Callable[[], list[Path]]) -> list[Path]:
+    """Files of what is rendered; where this machine cannot, none, and a sentence on standard error."""
+    try:
+        return draw()
+    except RenderingUnavailable as reason:
+        print(reason, file=sys.stderr)
+        return []
