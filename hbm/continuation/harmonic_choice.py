@@ -25,8 +25,6 @@ from tribodyn.hbm.threads import single
 
 ROUGH = 1e-5  # error of the compliance at the highest harmonic that estimates at single states may have
 _WIDE: WeakKeyDictionary[ContactCompliance, ContactCompliance] = WeakKeyDictionary()
-CLIMB = (3, 5, 7, 9)  # highest harmonics that `climb` goes through: each start is near enough for Newton
-FURTHER = 6  # harmonics beyond the kept ones that it looks at, where more than CLIMB are kept
 
 
 @dataclass(frozen=True)
@@ -149,16 +147,6 @@ def choose(balance: HarmonicBalance, omega: Sequence[float], options: ChoiceOpti
         tuple(trial.x),
         outcome,
     )
-
-
-def climb(top: int) -> list[int]:
-    """Highest harmonics to solve with, one after the other, where `top` is kept, to see what more of them change."""
-    return [h for h in CLIMB if h > top + 1] or [top + FURTHER // 2, top + FURTHER]
-
-
-def highest_looked_at(top: int) -> int:
-    """The highest harmonic of a balance that `climb` stays within."""
-    return max(CLIMB[-1], top + FURTHER)
 
 
 def widened(balance: HarmonicBalance, highest: int, error: float | None = None) -> HarmonicBalance:

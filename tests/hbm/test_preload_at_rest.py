@@ -7,13 +7,11 @@ import pytest
 from scipy.optimize import root
 
 from tests.helpers.pressed_body import N_PAIR, wear_problem
-from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
-from tribodyn.hbm.wear.even_wear import depth_to_loss
 from tribodyn.hbm.wear.evolution import WearProblem
 from tribodyn.hbm.wear.history import WearHistory
 from tribodyn.hbm.wear.step_control import Tolerance
@@ -85,18 +83,3 @@ def test_a_contact_without_static_normal_force_has_no_preload_at_rest(problem: W
     unpressed = HarmonicBalance.of(one.model, one.contact.joints, HarmonicBasis((1,), 64), shaken, 1500.0)
     with pytest.raises(ValueError, match="component n and harmonic 0"):
         wear_problem(balance=unpressed, lost_below_at_rest=0.5)
-
-
-def test_the_depth_that_takes_the_preload_follows_its_slope(problem: WearProblem) -> None:
-    balance = problem.balance.with_load(0.0)
-    state = newton.solve_from_rest(balance, 1.0).state
-    rest = static_preload(problem, np.zeros(N_PAIR))
-    small = 1e-9
-    wanted = rest * small / (rest - static_preload(problem, np.full(N_PAIR, small)))
-    assert depth_to_loss(balance, state) == pytest.approx(wanted, rel=1e-5)
-    assert depth_to_loss(balance, state, balance.contact.joints[0].name) == depth_to_loss(balance, state)
-
-
-def test_nothing_is_lost_where_nothing_presses(problem: WearProblem) -> None:
-    balance = problem.balance.with_load(0.0).with_gap(np.full(N_PAIR, 1.0))
-    assert np.isnan(depth_to_loss(balance, newton.solve_from_rest(balance, 1.0).state))
