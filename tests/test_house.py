@@ -32,13 +32,13 @@ ORDER = (
     ("workflows.errors",),
     ("workflows.pictures",),
     ("workflows.report", "workflows.export"),
-    ("workflows.studies", "workflows.benchmarks"),
+    ("workflows.studies",),
     ("workflows.command",),
     ("workflows.cases",),
 )
 
 # the most that there may be; only ever lowered
-LIMITS = {"loops": 0, "imports upwards": 6, "commands": 14, "public names": 40, "constants": 786, "lines": 63_703}
+LIMITS = {"loops": 0, "imports upwards": 0, "commands": 14, "public names": 40, "constants": 250, "lines": 53_000}
 
 
 @cache
