@@ -13,11 +13,11 @@ from tests.proof import __main__ as cli
 from tests.proof.cases.blade import study as blade_study
 from tests.proof.cases.blade.few_sectors import FEW_SECTORS
 from tests.proof.cases.blade.study import Extent
-from tribodyn import build_wheel, critical_speeds
 from tribodyn.hbm import newton
 from tribodyn.hbm.linear import travelling_wave as waves
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies.wheels.wheel import build, critical_speeds
 
 SHORT = Extent(
     orders=(1, 20), loads=(0.02, 1.0), tolerance=0.02, steps=(0.6, 0.4), shown=0.4, frames=2, speeds=2
@@ -27,7 +27,7 @@ FEWER = (*FEW_SECTORS, "geometry.n_span=3", "harmonics.samples=32", "response.po
 
 @pytest.fixture(scope="module")
 def blade():
-    return build_wheel(scene_file.read("blade_thesis", COARSE))
+    return build(scene_file.read("blade_thesis", COARSE))
 
 
 def rows_of(path):
@@ -95,7 +95,7 @@ def test_references_carry_the_load_of_their_curve(blade):
 
 def test_blades_alike_are_a_travelling_wave():
     """The wheel that the mistuned example solves, with no deviation, is the sector: same parts, same answer."""
-    blade = build_wheel(scene_file.read("blade_thesis", FEWER))
+    blade = build(scene_file.read("blade_thesis", FEWER))
     one, wheel = blade.wave(), blade.whole()
     exact = newton.NewtonOptions(tolerance=1e-11)
     mine, theirs = (newton.solve_from_rest(balance, 2 * np.pi * 1000, exact) for balance in (one, wheel))
@@ -119,4 +119,4 @@ def test_mistuned_wheel(tmp_path, capsys):
 
 def test_a_part_alone_has_no_such_study():
     with pytest.raises(ValueError, match=r"beam has no \[wheel\]"):
-        build_wheel(scene_file.read("beam"))
+        build(scene_file.read("beam"))

@@ -14,6 +14,7 @@ import scipy.linalg as sla
 import tribodyn as td
 from tests.helpers.browser import chromium, clicked_zoomed_and_turned
 from tests.helpers.command import leave
+from tests.proof.problems import wear
 from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions, backbone
 from tribodyn.hbm.time import ring_down as time_ring_down
@@ -104,7 +105,7 @@ def test_locked_bolts_lose_force_with_what_is_worn():
 
 def test_the_lap_wears_where_it_slides():
     file = scene_file.read("brb_locked", [*COARSER, "wear.max_steps=2", "wear.at=168 Hz"])
-    history = td.wear(file, built("brb_locked").balance)
+    history = wear(file, built("brb_locked").balance)
     depth = history.depth[-1]
     assert history.cycles[-1] > 1e5
     assert depth.max() == pytest.approx(40e-9, rel=0.05)
