@@ -108,7 +108,7 @@ def test_list_names_every_scene(capsys: pytest.CaptureFixture[str]) -> None:
 def test_plan_says_what_will_be_modelled(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = leave(["plan", "beam_thesis"], capsys)
     assert code == 0
-    for words in ("169 node pairs", "524 DOFs", "1521 in each", "GB", "about 33 steps", "verdict", "whole run"):
+    for words in ("169 node pairs", "524 DOFs", "1521 in each", "GB", "about 33 steps", "finer model", "whole run"):
         assert words in out
 
 
@@ -146,7 +146,7 @@ def test_show_for_people(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
 def test_a_reader_that_has_seen_enough_ends_the_command_in_silence(tmp_path: Path) -> None:
     """As in `tribodyn cases | head -1`; here nobody reads at all."""
     store.save(tmp_path / "result.h5", result(9))
-    for words in (["show", str(tmp_path)], ["show", str(tmp_path), "--json"], ["list"]):
+    for words in (["show", str(tmp_path)], ["show", str(tmp_path), "--json"], ["cases"]):
         read_end, write_end = os.pipe()
         os.close(read_end)
         command = [sys.executable, "-m", "tribodyn", *words]

@@ -191,7 +191,7 @@ def test_a_linear_field_is_carried_to_a_millionth_of_the_patch() -> None:
 
 
 def test_grids_of_the_beam(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["converge", "beam", "--most", "9", "--json", "--out", str(tmp_path)]
+    words = ["study", "converge", "beam", "--most", "9", "--json", "--out", str(tmp_path)]
     words += set_of((*NO_WEAR[:2], "wear="))
     cli.app([*words, *set_of(("reduction.modes=4", "response.points=25"))], result_action="return_value")
     rows = [row for row in json.loads(capsys.readouterr().out) if row["ladder"] == "contact_grid"]
