@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.errors import choice, converge, ladders, trade, trade_table
+from tribodyn.workflows.errors import choice, ladders, trade, trade_table
 from tribodyn.workflows.errors.limit import limit_of
 from tribodyn.workflows.errors.trade_table import Trade, TradeRow
 from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies import convergence as converge
 
 SMALL = (
     "geometry.n_length=4",

@@ -8,12 +8,13 @@ from os import fspath
 from pathlib import Path
 from typing import Any
 
-from tribodyn.workflows.errors import choice, trade_picture, trade_table
-from tribodyn.workflows.errors import converge as grids
+from tribodyn.workflows.errors import choice, trade_table
 from tribodyn.workflows.errors import trade as measured
 from tribodyn.workflows.errors.trade_table import Trade
 from tribodyn.workflows.run.progress import Report, reporter
 from tribodyn.workflows.scene.source import AnyPath, Overrides, override_texts
+from tribodyn.workflows.studies import convergence as grids
+from tribodyn.workflows.studies import trade_figure
 from tribodyn.workflows.studies.files import write_files
 
 
@@ -65,7 +66,7 @@ def trade(
 
     texts, say = override_texts(overrides), reporter(progress).say
     found = measured.run(fspath(scene), settings, texts, say, most, keep, earlier)
-    trade_picture.picture(found).savefig(path.with_suffix(".png"))
+    trade_figure.picture(found).savefig(path.with_suffix(".png"))
     return Traded(found, place)
 
 
