@@ -10,8 +10,7 @@ import numpy as np
 from scipy.sparse import csr_matrix, vstack
 
 from tribodyn.fem.constraints import named
-from tribodyn.fem.interface import COMPONENTS, ContactInterface, checked_components, contact_frames
-from tribodyn.fem.loads import unit
+from tribodyn.fem.interface import COMPONENTS, ContactInterface, checked_components, contact_frames, unit
 from tribodyn.fem.matching import facing_partners, partners
 from tribodyn.fem.mortar import MORTAR, side
 from tribodyn.fem.mortar_contact import mortar_halves

@@ -17,8 +17,7 @@ from scipy.sparse import csr_matrix, vstack
 
 from tribodyn.fem.constraints import named
 from tribodyn.fem.contact import ContactFaces
-from tribodyn.fem.interface import ContactInterface
-from tribodyn.fem.loads import unit
+from tribodyn.fem.interface import ContactInterface, unit
 from tribodyn.fem.matching import partners
 from tribodyn.fem.part import Part
 from tribodyn.fem.system import SecondOrderSystem

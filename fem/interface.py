@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.fem.loads import unit
-
 COMPONENTS = ("t1", "t2", "n")
 
 
@@ -70,3 +68,14 @@ def contact_frames(normals: np.ndarray, t1: Sequence[float]) -> np.ndarray:
         raise ValueError(f"the contact direction t1 = {list(t1)} is along the contact normal; give one along the face")
     first = along / length
     return np.stack([first, np.cross(normals, first), normals], axis=1)
+
+
+def unit(direction: Sequence[float], what: str) -> np.ndarray:
+    """Unit vector (3,) along a direction.
+
+    Raises  ValueError, naming what, for a zero vector or a wrong length
+    """
+    vector = np.asarray(direction, dtype=float)
+    if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
+        raise ValueError(f"{what} must be three numbers that are not all zero, but is {list(np.ravel(direction))}")
+    return vector / np.linalg.norm(vector)

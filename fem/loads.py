@@ -11,6 +11,7 @@ import numpy as np
 from tribodyn.fem.assembly import Assembly
 from tribodyn.fem.constraints import named
 from tribodyn.fem.elements import coordinates
+from tribodyn.fem.interface import unit
 from tribodyn.fem.surface import face_integrals, facet_nodes, outside
 
 
@@ -135,14 +136,3 @@ class Sum:
         for load, factor in self.parts:
             force += factor * load.vector(mesh, node_sets, mass)
         return force
-
-
-def unit(direction: Sequence[float], what: str) -> np.ndarray:
-    """Unit vector (3,) along a direction.
-
-    Raises  ValueError, naming what, for a zero vector or a wrong length
-    """
-    vector = np.asarray(direction, dtype=float)
-    if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
-        raise ValueError(f"{what} must be three numbers that are not all zero, but is {list(np.ravel(direction))}")
-    return vector / np.linalg.norm(vector)

@@ -18,7 +18,7 @@ from tribodyn.fem.assembly import materials_of
 from tribodyn.fem.elasticity import of_elements, symmetric
 from tribodyn.fem.elements import batches, connectivity, scatter
 from tribodyn.fem.factor import SingularStiffness, factorise
-from tribodyn.fem.loads import unit
+from tribodyn.fem.interface import unit
 from tribodyn.fem.material import Material
 from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.part import Part

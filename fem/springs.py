@@ -12,7 +12,7 @@ from scipy.sparse import csr_matrix, diags_array
 from tribodyn.fem.assembly import Assembly
 from tribodyn.fem.constraints import named
 from tribodyn.fem.elements import coordinates
-from tribodyn.fem.loads import unit
+from tribodyn.fem.interface import unit
 from tribodyn.fem.matching import partners
 from tribodyn.fem.surface import surface
 

@@ -1,7 +1,8 @@
 """Reduced model -> response: harmonic balance with friction contact, continuation, wear.
 
 harmonics, excitation                 basis and loads
-balance, newton, krylov, anderson     the balance and how it is solved; reference: the dense algorithm
+balance, newton, krylov, anderson     the balance and how it is solved
+homotopy                              a number led to its goal in steps that Newton can follow
 rest                                  the preloaded state that friction begins from
 mistuning                             wheels whose blades differ
 outcome                               how a solve or a run ended

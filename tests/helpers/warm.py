@@ -142,9 +142,12 @@ def child(files: list[int], arguments: list[str], folder: str, environment: dict
             sys.path.insert(0, "")
             exec(compile(arguments[1], "<string>", "exec"), main.__dict__)
         else:
-            from tribodyn.__main__ import main as command
+            if arguments[:1] == ["prove"]:
+                from tests.proof.__main__ import main as command
+            else:
+                from tribodyn.__main__ import main as command
 
-            sys.argv = ["tribodyn", *arguments]
+            sys.argv = ["tribodyn", *arguments[arguments[:1] == ["prove"] :]]
             command()
     except SystemExit as stop:
         code = stop.code

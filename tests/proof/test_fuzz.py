@@ -90,16 +90,17 @@ def test_a_wrong_number_in_a_result_is_seen(tmp_path: Path, monkeypatch: pytest.
     result = scenes.run("beam", overrides=TINY)
     wear = result.wear
     assert wear is not None
-    told = {"depth": Statement(1.0, 0.1, "mesh", True, "all measured")}
+    told = {"depth": Statement(1.0, 0.1, "mesh and contact grid", "reported", "measured")}
 
     def end(**changes: object) -> str:
         store.save(tmp_path / "changed.h5", replace(result, **changes))
         return fuzz_result.wrong(tmp_path / "changed.h5")
 
     def verdict(**changes: object) -> str:
-        return end(verdict=Verdict({"depth": replace(told["depth"], **changes)}, (), 0.0).dumped())
+        return end(verdict=Verdict({"depth": replace(told["depth"], **changes)}, (), 2.0, 0.0).dumped())
 
-    assert end() == verdict() == verdict(error=None) == ""
+    assert end() == verdict() == ""
+    assert verdict(error=None) == "verdict: depth is stated without an error"
     assert end(wear=replace(wear, depth=np.full_like(wear.depth, np.inf))) == "not finite: wear.depth"
     assert end(facts=replace(result.facts, delta_max_m=float("nan"))) == "not finite: facts.delta_max_m"
     assert verdict(value=None) == "verdict: depth is stated without a value"
@@ -107,4 +108,3 @@ def test_a_wrong_number_in_a_result_is_seen(tmp_path: Path, monkeypatch: pytest.
     assert verdict(value=-1.0) == "verdict: depth is negative"
     assert verdict(error=float("inf")) == "verdict: depth has an error that is no number"
     assert verdict(error=0.6) == "verdict: depth is stated with an error above 50%"
-    assert verdict(stated=False, reason="") == "verdict: depth is not stated, for no reason"

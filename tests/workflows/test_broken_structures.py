@@ -39,7 +39,7 @@ BROKEN: dict[str, tuple[str, tuple[Change, ...], str, str]] = {  # name : scene,
     ),
     "bolt called as a load": (STACK, (("[bolts.m8]", "[bolts.shake]"),), "", "bolts.shake has the name of a load"),
     # places
-    "faces apart": (BLOCKS, (('"10 mm"]', '"60 mm"]'),), "", r"do not meet: .* apart .*; move a body, or give reach"),
+    "faces apart": (BLOCKS, (('"10 mm"]', '"60 mm"]'),), "", r"do not meet: .* apart.*; move a body, or give reach"),
     "bodies that overlap": (
         BLOCKS, (('"10 mm"]', '"4 mm"]'),), "",
         "bodies.lower overlaps bodies.upper: 50% .*move one",

@@ -117,7 +117,7 @@ def td_progress() -> measure.Progress:
 
 
 def test_depth_and_life_are_those_of_a_finer_wear_run() -> None:
-    overrides = (*TINY, "wear.rule=thesis", "wear.step=40 %")
+    overrides = (*TINY, "wear.at=700 Hz", "wear.tolerance=30 %")
     result = td.run("beam", overrides=overrides)
     combined = rows(result, Refinement.COMBINED)
     assert result.summary()["life_cycles"] == combined["life"].value
@@ -126,7 +126,8 @@ def test_depth_and_life_are_those_of_a_finer_wear_run() -> None:
     there = td.run(finer, overrides=["verdict.enabled=false"])
     assert there.summary()["life_cycles"] == pytest.approx(combined["life"].refined, rel=1e-6)
     statement = loaded(result.verdict).statements["life"]
-    assert statement.error == pytest.approx(DEFAULT.total(combined["life"].relative or 0.0, 2.0))
+    ratio = loaded(result.verdict).ratio
+    assert statement.error == pytest.approx(DEFAULT.total(combined["life"].relative or 0.0, ratio))
 
 
 def finding(**changes: object) -> Finding:
@@ -154,10 +155,9 @@ def test_what_time_integration_finds_decides_what_is_reported(
 
 
 def test_small_contacts_are_integrated_in_time() -> None:
-    overrides = (*TINY[:-1], "wear=", "loads.harmonic.shake.value=1 kN")
-    said = loaded(td.run("beam", overrides=overrides).verdict).statements
-    assert {said[name].status for name in OF_STATE} <= set(Status)
-    assert said["peak_frequency"].stated
+    """Two ways to solve one reduced model: what time integration contradicts is not reported."""
+    said = loaded(td.run("beam", overrides=(*TINY[:-1], "wear=")).verdict).statements
+    assert said["amplitude"].status in (Status.UNSTABLE, Status.CONTRADICTED, Status.NOT_PERIODIC)
 
 
 def test_an_end_of_the_range_is_no_peak() -> None:

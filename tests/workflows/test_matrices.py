@@ -47,7 +47,7 @@ def test_a_scene_of_matrices_runs_to_wear_and_pictures(folder: Path, capsys: pyt
     assert result.wear.worn.max(axis=1) == pytest.approx(1e-6, rel=1e-3)  # the step of the scene, whole cycles
     # worn volume is the coefficient times the friction work
     assert result.wear.worn.sum(0) @ np.full(2, 5e-6) == pytest.approx(2e-15 * result.wear.work.sum(), rel=1e-12)
-    for command in (["show", "--json"], ["render"], ["verify", "--at", "60 Hz", "--steps", "128", "--json"]):
+    for command in (["show", "--json"], ["draw"], ["verify", "--at", "60 Hz", "--steps", "128", "--json"]):
         code, out, err = leave([command[0], str(folder / "out"), *command[1:]], capsys)
         assert code == 0, err
     assert json.loads(out)["frequency_hz"] == pytest.approx(60)

@@ -191,7 +191,7 @@ def test_a_matrix_market_file_that_is_not_what_it_says_is_refused(tmp_path: Path
 
 def test_the_example_of_the_front_door_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     lines = (td.__doc__ or "").splitlines()
-    first = next(i for i, line in enumerate(lines) if "read_matrices" in line)
+    first = next(i for i, line in enumerate(lines) if "matrices.read" in line)
     last = next(i for i, line in enumerate(lines) if "curve.amplitude" in line)
     np.savez(tmp_path / "part.npz", M=MASS[:3, :3], K=STIFFNESS[:3, :3])
     monkeypatch.chdir(tmp_path)

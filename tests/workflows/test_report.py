@@ -55,7 +55,7 @@ def test_the_page_needs_nothing_else(written: Path) -> None:
     for words in (
         "Side by side",
         "+100.00%",
-        "error budget",
+        "measured changes",
         "SHA-256 of the scene",
         "tribodyn run beam",
         "contact lost",

@@ -50,7 +50,7 @@ def test_the_command_compares_and_draws(folder: Path, capsys: pytest.CaptureFixt
     response, energy = numbers["outputs"]["response"], numbers["energy"]
     assert response["balance_m"] == pytest.approx(response["time_m"] * (1 + response["difference"]))
     assert energy["balance_J"] == pytest.approx(energy["time_J"] * (1 + energy["difference"]))
-    assert Path(numbers["picture"]).is_file()
+    assert Path(numbers["files"][0]).is_file()
 
 
 def test_a_motion_that_hill_finds_unstable_is_said_to_be_and_time_leaves_it(
@@ -100,7 +100,7 @@ def test_more_harmonics_come_closer(folder: Path) -> None:
 def test_a_worn_row_is_compared_where_it_was_solved(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     result = store.load(folder / "result.h5")
     assert result.wear is not None
-    comparison = verification.compare(result, None, 1, [], 128, Progress())
+    comparison = verification.verify(result, row=1, steps=128)
     assert comparison.found.omega == result.wear.omega[1]
     assert comparison.solution.steps == 0  # it starts at the solution of the row
     assert comparison.record()["preload"]["balance_N"] == pytest.approx(result.wear.preload[1], rel=1e-6)
@@ -125,7 +125,7 @@ def test_worn_states_are_compared_along_a_run(folder: Path, capsys: pytest.Captu
         assert state["energy_of_run_J"] == pytest.approx(wear.energy[row].sum())
         assert compared["energy"]["balance_J"] == pytest.approx(state["energy_of_run_J"], rel=1e-6)
         assert compared["frequency_hz"] == pytest.approx(wear.frequency[row])
-    assert Path(found["picture"]).is_file()
+    assert Path(found["files"][0]).is_file()
     code, out, _ = leave(given, capsys)
     assert code == 0
     assert out.strip().splitlines()[-4].split()[:2] == ["row", "cycles"]  # head, two states, picture
@@ -143,12 +143,13 @@ def test_a_wear_run_is_worn_again_along_its_motion_in_time(
     assert code == 0, err
     found = json.loads(out)
     assert found["end"] == "stopped after the volume that the run wore"
-    rows = list(csv.DictReader(Path(found["table"]).read_text(encoding="utf-8").splitlines()))
+    (table,) = (Path(one) for one in found["files"] if one.endswith(".csv"))
+    rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
     assert [float(row["cycles"]) for row in rows] == [row["cycles"] for row in found["rows"]]
     assert found["rows"][0]["frequency_hz"] == pytest.approx(wear.frequency[0])
     worn = found["rows"][-1]["depth_m"]
     assert 0 < worn < 1.5 * wear.depth[-1].max()
-    assert Path(found["picture"]).is_file()
+    assert Path(found["files"][0]).is_file()
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, console_progress
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies import inspection, scenes, verification, worn_in_time, worn_states
+from tribodyn.workflows.studies import inspection, scenes
 
 Formats = Annotated[tuple[str, ...], Parameter(name="--format", negative=(), consume_multiple=True)]
 Targets = Annotated[tuple[str, ...], Parameter(name="--to", negative=(), consume_multiple=True)]
@@ -218,12 +218,18 @@ def verify(
     folder = out or store.result_file(result).parent / "pictures"
     loaded, progress = store.load(result), Progress() if as_json else console_progress()
     if wear:
+        from tribodyn.workflows.studies import worn_in_time
+
         life = worn_in_time.wear_in_time(loaded, folder, steps=steps, overrides=overrides, progress=progress)
         show_found(life, life.files, as_json)
     elif states is not None:
+        from tribodyn.workflows.studies import worn_states
+
         along = worn_states.verify_states(loaded, states, steps=steps, overrides=overrides, progress=progress)
         show_found(along, along.write(folder), as_json)
     else:
+        from tribodyn.workflows.studies import verification
+
         found = verification.verify(loaded, hertz, row=row, steps=steps, overrides=overrides, progress=progress)
         show_found(found, found.write(folder), as_json)
 

@@ -72,7 +72,6 @@ def measure(
         _step_by_step(file, finer, ratio, table, say)
     _estimates(file, table, result)
     if result.wear_steps and file.scene.wear is not None:
-        say("wear on the finer model")
         _worn(file, finer, why, table, result, options)
     return table
 

@@ -115,9 +115,7 @@ def load(path: Path) -> Trade:
     try:
         said = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
-        raise ValueError(
-            f'there is no trade table "{path}": make one with tribodyn study trade SCENE'
-        ) from None
+        raise ValueError(f'there is no trade table "{path}": make one with tribodyn study trade SCENE') from None
     if not isinstance(said, dict) or said.get("format") != FORMAT:
         raise ValueError(f'"{path}" is no trade table of this version: make it again with tribodyn study trade SCENE')
     rows = [

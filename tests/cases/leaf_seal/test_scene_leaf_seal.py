@@ -21,6 +21,7 @@ from tribodyn.hbm.linear.recovery import coordinates
 from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.stepper import Options
+from tribodyn.workflows.errors.verdict import with_verdict
 from tribodyn.workflows.result.verdict import loaded
 from tribodyn.workflows.run import modelling, pipeline, planning
 from tribodyn.workflows.run.progress import Progress
@@ -355,9 +356,9 @@ def test_the_verdict_knows_what_a_fold_is_off_by(tmp_path):
     """The highest point is a fold, which one harmonic puts 8 % too low and a quarter too high, as in time."""
     overrides = (
         "geometry.n_column=7", "geometry.pin_column=2", 'response.frequency=["120 Hz", "180 Hz"]',
-        "response.stability=false", "verdict.enabled=false", "verdict.in_time=false",
+        "response.stability=false", "verdict.in_time=false",
     )  # fmt: skip
-    result = pipeline.run(scene_file.read("leaf_seal_thesis", overrides), tmp_path, Progress())
-    found = {part.quantity: part.error for part in loaded(result.verdict).contributions if part.source == "harmonics"}
+    result = pipeline.run(scene_file.read("leaf_seal_thesis", overrides), tmp_path, Progress(), judge=with_verdict)
+    found = {row.quantity: row.relative for row in loaded(result.verdict).changes if row.refinement == "harmonics"}
     assert found["peak_frequency"] == pytest.approx(0.08, abs=0.015)
     assert found["amplitude"] == pytest.approx(0.24, abs=0.04)
