@@ -20,6 +20,7 @@ from tribodyn.fem.contact import ContactFaces
 from tribodyn.fem.interface import ContactInterface, unit
 from tribodyn.fem.matching import partners
 from tribodyn.fem.part import Part
+from tribodyn.fem.prestress import Prestress
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.geometry.placing import rotation
 
@@ -37,6 +38,7 @@ class Sector:
     seam_right, seam_left : (k, 3) coordinates of matched nodes where sectors are joined, x, y, z; k = 0 for none
     turn : (3, 3) rotation by one pitch, from a sector to the one on its left
     n_sectors : sectors of the wheel; joints : joint -> its pairs
+    prestress : of the full sector of a wheel that turns
     """
 
     system: SecondOrderSystem
@@ -47,6 +49,7 @@ class Sector:
     turn: np.ndarray
     n_sectors: int
     joints: Mapping[str, slice] = field(default_factory=dict)
+    prestress: Prestress | None = None
 
     def phase(self, index: int) -> complex:
         """exp(-i 2 pi j / N), real to the last bit where it is."""

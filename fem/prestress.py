@@ -1,20 +1,21 @@
 """Stiffness of a stressed and spinning part: stress stiffening and spin softening about a static equilibrium.
 
-Statics give the stress once; the vibration about it is linear. The static displacement is not added to the geometry.
+Stress and static displacement are iterated until they fit each other; the vibration about them is linear. The static
+displacement is not added to the geometry, so that rotations have to be small.
 In the turning frame a velocity v meets the Coriolis force -2 speed axis x v.
 Source  Cook, Malkus, Plesha and Witt, Concepts and Applications of Finite Element Analysis, 2002, chapter 18
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.sparse import block_diag, csr_matrix, identity, kron
 
-from tribodyn.fem.assembly import materials_of
+from tribodyn.fem.assembly import materials_of, pieces
 from tribodyn.fem.elasticity import of_elements, symmetric
 from tribodyn.fem.elements import batches, connectivity, scatter
 from tribodyn.fem.factor import SingularStiffness, factorise
@@ -24,33 +25,77 @@ from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.part import Part
 from tribodyn.geometry.placing import cross
 
+LOWER = "lower the load or the speed"
 UNSTABLE = (
     "under its static load or speed the part is unstable at rest: its stress and spin softening outweigh its "
-    "stiffness; lower the load or the speed"
+    f"stiffness; {LOWER}"
 )
+NO_EQUILIBRIUM = f"under its static load or speed the part comes to no equilibrium with its own stress; {LOWER}"
+PASSES = 40  # of displacement and stress
+CONVERGED = 1e-8  # relative change of the displacement in a pass
+LARGE_ROTATION = 0.05  # of an element [rad]: its sine is off by 0.04 %, its geometry by 5 %
+
+
+@dataclass(frozen=True)
+class Prestress:
+    """A static equilibrium and the stiffness about it.
+
+    q : (n_free,) displacement [m]; stiffness : (n_free, n_free) under the stress of q [N/m]
+    residual : relative change of q by its own stress once more; rotation : largest of any element [rad]
+    """
+
+    q: np.ndarray
+    stiffness: csr_matrix
+    residual: float
+    rotation: float
 
 
 def prestressed(
     part: Part,
     material: Material | Mapping[str, Material],
-    force: np.ndarray,
+    at_rest: Callable[[csr_matrix], np.ndarray],
+    start: np.ndarray,
     softening: Any = 0,
-    tie: csr_matrix | None = None,
-) -> Part:
-    """The part vibrating about its static equilibrium under a force.
+    temperature: np.ndarray | None = None,
+) -> Prestress:
+    """The equilibrium whose stress stiffens the part that rests in it: the fixed point of q = at_rest(K(q)).
 
-    material : the one it was built with; force : (n_free,) static force [N], such as speed^2 times a centrifugal load
-    softening : `spin_softening` at that speed over the free DOFs [N/m], 0 where it does not spin
-    tie : (n_free, m) what q = tie z the equilibrium is looked for in, such as fem.cyclic.seam_map of index 0
-    Returns the part with stiffness K + softening + geometric stiffness of the stress under the force
-    Raises  ValueError where the part can move rigidly, StaticDivergence where it is beyond buckling or divergence
+    material : the one it was built with; at_rest : displacement (n_free,) [m] at rest of a part of this stiffness
+    start : (n_free,) displacement [m] whose stress is the first one; softening : `spin_softening` over the free DOFs
+        [N/m], 0 where it does not spin; temperature : as for `geometric_stiffness`
+    Raises  StaticDivergence where no equilibrium is found or an element turns by more than LARGE_ROTATION; and what
+        at_rest raises. Whether the equilibrium is stable is for `check_stability`
     """
-    K = part.system.stiffness + softening
-    T = identity(K.shape[0], format="csr") if tie is None else tie
-    u = part.field(T @ factorise(csr_matrix(T.T @ K @ T), definite=False).solve(T.T @ force))
-    stressed = csr_matrix(K + part.restricted(geometric_stiffness(part.mesh, material, u)))
-    check_stability(csr_matrix(T.T @ stressed @ T))
-    return replace(part, system=replace(part.system, stiffness=stressed))
+    soft, q = part.system.stiffness + softening, start
+    for _ in range(PASSES):
+        stress = geometric_stiffness(part.mesh, material, part.field(q), temperature)
+        stiffness = csr_matrix(soft + part.restricted(stress))
+        before, q = q, at_rest(stiffness)
+        residual = float(np.linalg.norm(q - before) / max(np.linalg.norm(q), np.finfo(float).tiny))
+        if residual <= CONVERGED:
+            break
+    else:
+        raise StaticDivergence(f"{NO_EQUILIBRIUM} (the displacement still changes by {residual:.1e})")
+    rotation = largest_rotation(part.mesh, part.field(q))
+    if rotation > LARGE_ROTATION:
+        raise StaticDivergence(
+            f"its static deflection of {1e3 * np.abs(q).max():.3g} mm turns elements by {np.degrees(rotation):.2g} "
+            f"degrees, and small rotations are assumed, up to {np.degrees(LARGE_ROTATION):.2g}; {LOWER}"
+        )
+    return Prestress(q, stiffness, residual, rotation)
+
+
+def largest_rotation(mesh: Any, u: np.ndarray) -> float:
+    """Largest rotation [rad] of any element under the displacement u (n_node, 3) [m]: of its mean gradient."""
+    largest = 0.0
+    for piece in pieces(mesh):
+        nodes, own = connectivity(piece.mesh), u[piece.node : piece.node + piece.mesh.doflocs.shape[1]]
+        for elements, _, gradient, weight in batches(piece.mesh):
+            slope = gradient @ own[nodes[elements]][:, None]  # d u_j / d x_i
+            mean = np.einsum("eq,eqij->eij", weight, slope) / weight.sum(axis=1)[:, None, None]
+            turn = 0.5 * (mean - mean.swapaxes(1, 2))
+            largest = max(largest, float(np.linalg.norm(turn, axis=(1, 2)).max() / np.sqrt(2)))
+    return largest
 
 
 def check_stability(stiffness: csr_matrix) -> None:

@@ -57,9 +57,14 @@ def reduce_sector(
         left=left,
         seam_right=np.searchsorted(masters, sector.seam_right),
         seam_left=np.searchsorted(masters, sector.seam_left),
+        prestress=None,
     )
     assert model.basis is not None
-    return ReducedSector(small, model.basis, replace(model.info, joints=dict(sector.joints)))
+    info = replace(model.info, joints=dict(sector.joints))
+    if sector.prestress is not None:
+        rest = sector.prestress
+        info = replace(info, prestress_residual=rest.residual, prestress_rotation=rest.rotation)
+    return ReducedSector(small, model.basis, info)
 
 
 def nodal_diameters(

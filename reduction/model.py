@@ -29,6 +29,7 @@ class ModelInfo:
     free_frequency_error, stuck_frequency_error : (n,) their estimated relative errors by truncation
     n_interface_modes, interface_omitted_frequency : modes of the boundary, and the first one left out [Hz]
     n_sectors, engine_order : of a wheel
+    prestress_residual, prestress_rotation : of a wheel that turns, see fem.prestress.Prestress
     joints : joint -> its pairs; reaction : what prescribed coordinates need, see `prescribed.prescribe`
     """
 
@@ -47,6 +48,8 @@ class ModelInfo:
     interface_omitted_frequency: float | None = None
     n_sectors: int | None = None
     engine_order: int | None = None
+    prestress_residual: float | None = None
+    prestress_rotation: float | None = None
     joints: Mapping[str, slice] = field(default_factory=dict)
     reaction: StaticReaction | None = None
 

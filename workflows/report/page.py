@@ -179,7 +179,8 @@ def _inspection(result: Result) -> str:
         "retained_modes": "retained modes",
         "first_omitted_hz": "first omitted mode / Hz", "free_hz": "free modes / Hz", "contact_pairs": "contact pairs",
         "unknowns": "unknowns of the balance", "harmonics": "harmonics", "compliance_error": "error of the compliance",
-        "factorisation": "factorisation", "sectors": "sectors", "engine_order": "engine order",
+        "factorisation": "factorisation", "prestress_residual": "residual of the prestress",
+        "prestress_rotation": "largest static rotation / rad", "sectors": "sectors", "engine_order": "engine order",
     }  # fmt: skip
     rows, table = [], result.facts.table()
     for key, label in names.items():

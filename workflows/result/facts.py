@@ -41,6 +41,8 @@ class Facts:
     compliance_error : relative, of the dynamic compliance of the contact
     elements, nodes, scaled_jacobian : of the mesh, the last is the smallest one, 1 is best
     retained_modes, first_omitted_hz, factorisation : of a reduction by Craig and Bampton
+    prestress_residual : of a wheel that turns, relative change of its static displacement by its own stress once more
+    prestress_rotation : largest of any element in that displacement [rad]
     interface_modes : characteristic constraint modes that stand for the masters
     delta_max_m : depth at which the static loads can close the contact no longer; wear_split : share of body 1
     around : the wheel of a part that is a sector
@@ -63,6 +65,8 @@ class Facts:
     retained_modes: int | None = None
     first_omitted_hz: float | None = None
     factorisation: str | None = None
+    prestress_residual: float | None = None
+    prestress_rotation: float | None = None
     interface_modes: int | None = None
     delta_max_m: float | None = None
     wear_split: float | None = None

@@ -48,6 +48,8 @@ def described(
         harmonics=tuple(balance.basis.harmonics),
         free_hz=np.zeros(0) if reduced.info.free_frequency is None else reduced.info.free_frequency,
         compliance_error=balance.compliance.error,
+        prestress_residual=reduced.info.prestress_residual,
+        prestress_rotation=reduced.info.prestress_rotation,
         interface_modes=reduced.info.n_interface_modes,
     )
     if part is not None:

@@ -18,7 +18,7 @@ from tribodyn.fem.factor import SingularStiffness, factorise
 from tribodyn.fem.matching import Mismatch
 from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.part import Part
-from tribodyn.fem.prestress import UNSTABLE, check_stability, coriolis, geometric_stiffness, spin_softening
+from tribodyn.fem.prestress import UNSTABLE, check_stability, coriolis, prestressed, spin_softening
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.sliding import solve_along_friction
@@ -92,53 +92,45 @@ def reduced(scene: MeshScene, full: Sector) -> ReducedSector:
 def spun(scene: MeshScene, part: Part, cut: Sector) -> Sector:
     """The sector `cut` from a part, vibrating about its equilibrium at the scene's speed.
 
-    The stress is that of the static loads with the contact as it settles: closed, slipped or open, pair by pair
+    The stress is that of the static loads with the contact as it settles under it: closed, slipped or open, pair by
+    pair
     Raises  ValueError where the contact does not settle or a body can move rigidly, StaticDivergence where the sector
-        is unstable at rest with its contacts stuck
+        has no equilibrium, turns far in it, or is unstable in it with its contacts stuck
     """
     wheel = scene.wheel
     assert wheel is not None
     speed = 2 * np.pi * wheel.speed
     material = part_reduction.material(scene, part.mesh)
     mass, _ = assemble(part.mesh, material)
-    soft = csr_matrix(cut.system.stiffness + part.restricted(spin_softening(mass, wheel.axis, speed)))
+    softening = part.restricted(spin_softening(mass, wheel.axis, speed))
     turning = csr_matrix(part.restricted(coriolis(mass, wheel.axis, speed))) if wheel.coriolis else None
-    heat = temperature(scene, part)
 
-    def stiffened(q: np.ndarray) -> Sector:
-        stress = part.restricted(geometric_stiffness(part.mesh, material, part.field(q), heat))
-        return replace(cut, system=replace(cut.system, stiffness=csr_matrix(soft + stress), gyroscopic=turning))
+    def stiffened(stiffness: csr_matrix) -> Sector:
+        return replace(cut, system=replace(cut.system, stiffness=stiffness, gyroscopic=turning))
 
-    softened = replace(cut, system=replace(cut.system, stiffness=soft))
-    first = stiffened(stuck_at_rest(scene, softened))
-    found = stiffened(at_rest(scene, first))
-    check_stability(stuck_index_0(scene, found)[0])
-    return found
+    start = stuck_at_rest(scene, stiffened(csr_matrix(cut.system.stiffness + softening)))
+    found = prestressed(
+        part, material, lambda k: at_rest(scene, stiffened(k)), start, softening, temperature(scene, part)
+    )
+    spinning = replace(stiffened(found.stiffness), prestress=found)
+    check_stability(stuck_index_0(scene, spinning))
+    return spinning
 
 
-def stuck_index_0(scene: MeshScene, sector: Sector) -> tuple[csr_matrix, csr_matrix, np.ndarray]:
-    """Stiffness (m, m) [N/m] of sectors that move alike with their contacts stuck, contact map (n_c, m), and contact
-    springs (n_pair, n_component) [N/m].
-    """
+def stuck_index_0(scene: MeshScene, sector: Sector) -> csr_matrix:
+    """Stiffness (m, m) [N/m] of sectors that move alike with their contacts stuck."""
     system, B = at_index(sector, 0)
     model = ReducedModel(sector.system, sector.interface, info=ModelInfo(joints=sector.joints))
-    springs = joints.contact_stiffness(scene, model)
-    return stuck_stiffness(system.stiffness, B, springs), csr_matrix(B), springs
+    return stuck_stiffness(system.stiffness, B, joints.contact_stiffness(scene, model))
 
 
 def stuck_at_rest(scene: MeshScene, sector: Sector) -> np.ndarray:
-    """Displacement (n_free,) [m] under the static loads with all contacts stuck: where a body would slide away that
-    only its stress holds upright, this is where the stress is first taken from.
+    """Displacement (n_free,) [m] under the static loads with all contacts stuck where they stand, whatever their gap:
+    where a body would slide away that only its stress holds upright, this is where the stress is first taken from.
     """
-    stiffness, B, springs = stuck_index_0(scene, sector)
-    T = seam_map(sector, 0)
-    gap = np.zeros(springs.shape)
-    if "n" in sector.interface.components:
-        gap[:, sector.interface.components.index("n")] = sector.interface.gap
-    force = B.T @ (springs * gap).ravel()
-    for name, value in static_loads(scene).items():
-        force = force + value * (T.T @ sector.system.loads[name])
-    return np.asarray(T @ factorise(stiffness, definite=False).solve(force))
+    stiffness, T = stuck_index_0(scene, sector), seam_map(sector, 0)
+    force = sum((v * sector.system.loads[name] for name, v in static_loads(scene).items()), np.zeros(T.shape[0]))
+    return np.asarray(T @ factorise(stiffness, definite=False).solve(T.T @ force))
 
 
 def at_rest(scene: MeshScene, sector: Sector, tolerance: float = 1e-10, samples: int = 16) -> np.ndarray:
