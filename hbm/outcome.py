@@ -60,6 +60,7 @@ class BranchEnd(End):
     """Why a curve of solutions ended."""
 
     REACHED = "reached"
+    JUMPED = "jumped on the way and reached"
     ENDED = "ended at"
     TURNED_BACK = "turned back to"
     CLOSED = "closed curve"

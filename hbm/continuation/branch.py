@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -49,6 +49,11 @@ class Branch:
         return self.end.kind
 
     @property
+    def arrived(self) -> bool:
+        """Whether the branch came to the value it was to stop at, with jumps or without."""
+        return self.ended in (BranchEnd.REACHED, BranchEnd.JUMPED)
+
+    @property
     def converged(self) -> np.ndarray:
         """(n_point,) whether the point is a solution."""
         return np.array([outcome.kind is SolveEnd.CONVERGED for outcome in self.outcome])
@@ -61,6 +66,27 @@ class Branch:
     def amplitude(self, output: str) -> np.ndarray:
         """(n_point,) vibration amplitude of an output, see `amplitude` [m]."""
         return amplitude(self.response[:, self.output_names.index(output)])
+
+    def peak(self, output: str) -> int | None:
+        """The highest point of an output, None where that is an end of the branch: an end is no resonance."""
+        height = np.where(self.converged, self.amplitude(output), -1.0)
+        best = int(np.argmax(height))
+        return None if best in (0, len(height) - 1) else best
+
+    def inserted(self, at: int, point: BranchPoint) -> Branch:
+        """The branch with one more point before point `at`."""
+        rows: dict[str, Any] = {
+            "omega": point.omega,
+            "response": point.response,
+            "energy": point.energy,
+            "newton_steps": point.steps,
+        }
+        rows |= {"contact": point.x.reshape(self.contact.shape[1:])}
+        if len(self.parameter):
+            rows["parameter"] = point.value
+        grown: dict[str, Any] = {name: np.insert(getattr(self, name), at, row, axis=0) for name, row in rows.items()}
+        outcome = (*self.outcome[:at], point.outcome, *self.outcome[at:])
+        return replace(self, **grown, outcome=outcome, folds=tuple(i + (i >= at) for i in self.folds))
 
 
 def amplitude(coefficients: np.ndarray) -> np.ndarray:

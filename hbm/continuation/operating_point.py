@@ -12,7 +12,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tribodyn.hbm import newton
-from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.balance import HarmonicBalance, Linearisation, State
+from tribodyn.hbm.continuation.bordered import Direction
 from tribodyn.hbm.continuation.branch import Branch, amplitude
 from tribodyn.hbm.continuation.methods import adaptive, arc_length
 from tribodyn.hbm.newton import NewtonOptions, Solution
@@ -54,11 +55,13 @@ class Correction:
     """How far a solved cycle is from where it is to be taken.
 
     distance : to the right frequency [rad/s]; dx : d x / d omega (n_pair, n_component, n_coeff) [m s]; solves : spent
+    accuracy : that the frequency is wanted with [rad/s]
     """
 
     distance: float
     dx: np.ndarray
     solves: int
+    accuracy: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -93,11 +96,6 @@ class AtFrequency:
         """The distance of a state to the fixed frequency."""
         return Correction(self.omega - state.omega, np.zeros_like(state.x), 0)
 
-    @property
-    def accuracy(self) -> float:
-        """Relative accuracy that the frequency is wanted with."""
-        return 0.0
-
 
 @dataclass(frozen=True)
 class AtPeak:
@@ -105,7 +103,7 @@ class AtPeak:
 
     start, stop : range that the first search scans [rad/s], from `start` on; n_scan : its steps where nothing bends are
         up to five times as long as of so many points
-    tolerance : relative, on the frequency of the peak
+    tolerance : of the frequency of the peak, in half widths of the resonance: its height misses by half the square
     highest : amplitude that no linear response inside the range passes, with the contact free or stuck, at load factor
         1 [m]: a tracked peak as high stays the highest, and none is looked for
     scanned : highest harmonic of the scans for peaks: a contact that lifts drives higher modes by harmonics of the
@@ -117,7 +115,8 @@ class AtPeak:
     coarsest : longest step of the first search, share of its range
     overtakes : amplitude over that of the tracked peak, from which on another resonance dominates: what fewer harmonics
         miss of a peak is less, and a peak that emerges passes this at once
-    near : relative distance to the peak within which a point beside failed solves is taken for it
+    near : half widths from the peak within which a point beside failed solves is taken for it
+    stride : first step from a neighbouring peak, in half widths of the resonance
     reach : half widths between the points beside a maximum of a scan, by which its peak may lie outside them
     tried : maxima of a scan that are refined in turn, the highest first
     Those from `scanned_above` on: see docs/accuracy/ablations.md
@@ -127,7 +126,7 @@ class AtPeak:
     start: float
     stop: float
     n_scan: int = 60
-    tolerance: float = 1e-5
+    tolerance: float = 1e-3
     highest: float = np.inf
     scanned: int = 7
     scanned_above: int = 3
@@ -135,7 +134,8 @@ class AtPeak:
     scan_misses: float = 0.15
     coarsest: float = 0.05
     overtakes: float = 1.2
-    near: float = 1e-3
+    near: float = 0.1
+    stride: float = 0.02
     reach: float = 2.0
     tried: int = 3
     newton: NewtonOptions = field(default_factory=NewtonOptions)
@@ -234,10 +234,14 @@ class AtPeak:
     def _contains(self, omega: float) -> bool:
         return min(self.start, self.stop) <= omega <= max(self.start, self.stop)
 
+    def within(self, balance: HarmonicBalance, omega: float, x: np.ndarray, low: float, high: float) -> OperatingPoint:
+        """Refine a maximum of a curve between two frequencies [rad/s] beside it."""
+        return self._refine(balance, omega, x, 0.25 * (high - low), (low, high))
+
     @single
     def next(self, balance: HarmonicBalance, omega: float, x: np.ndarray) -> OperatingPoint:
         """Refine from a neighbouring peak."""
-        return self._refine(balance, omega, x, 2e-4 * omega)
+        return self._refine(balance, omega, x, None)
 
     @single
     def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> tuple[OperatingPoint | None, int]:
@@ -290,13 +294,8 @@ class AtPeak:
     @single
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
         """The distance of a state to the peak, by its slope and as though one mode responded."""
-        here = _Slope.of(balance, Solution(state, CONVERGED, 0, 0, ()), self.output)
-        return Correction(here.distance, here.dx, 0)
-
-    @property
-    def accuracy(self) -> float:
-        """Relative accuracy that the frequency is wanted with."""
-        return self.tolerance
+        here = Slope.of(balance, Solution(state, CONVERGED, 0, 0, ()), self.output)
+        return Correction(here.distance, here.dx, 0, self.tolerance * here.width)
 
     def _maxima(self, branch: Branch) -> np.ndarray:
         """Points of a branch that are higher than both their neighbours, the highest first."""
@@ -321,23 +320,24 @@ class AtPeak:
         balance: HarmonicBalance,
         omega: float,
         x: np.ndarray,
-        stride: float,
+        stride: float | None,
         within: tuple[float, float] = (0.0, np.inf),
     ) -> OperatingPoint:
-        def solve(w: float, guess: np.ndarray) -> _Slope:
+        def solve(w: float, guess: np.ndarray) -> Slope:
             solution = newton.solve(balance, w, guess, self.newton)
-            return _Slope.of(balance, solution, self.output)
+            return Slope.of(balance, solution, self.output)
 
         here = solve(omega, x)
         solves = 1
         if not here.solution.converged:
             return OperatingPoint.of(balance, here.solution, self.output, solves)
-        resolution = self.tolerance * omega
+        resolution = self.tolerance * here.width
+        stride = self.stride * here.width if stride is None else stride
         uphill = other = None  # the latest points on either side of the zero, once it is bracketed
         climbed: bool | None = None  # whether the last point inside the bracket replaced `uphill`
-        before: _Slope | None = None
+        before: Slope | None = None
         best = here
-        while solves < 60:
+        while solves < 60 and best.miss > self.tolerance:
             side = float(np.sign(here.slope))
             if uphill is not None and other is not None:
                 if abs(uphill.omega - other.omega) <= resolution:  # as about a kink, where no slope vanishes
@@ -372,8 +372,8 @@ class AtPeak:
                     uphill, other = replace(uphill, weight=kept * uphill.weight), there
                 climbed = climbs
             before, here = here, there
-            if abs(there.slope) <= abs(best.slope):
-                best = there
+            if there.miss <= best.miss:
+                best, resolution = there, self.tolerance * there.width
         if uphill is None and best.slope > 0 and best.omega >= (1 - 1e-9) * balance.omega_max:
             hertz = balance.omega_max / (2 * np.pi)
             raise NoPeak(
@@ -382,9 +382,7 @@ class AtPeak:
             )
         found = best.solution
         between = np.inf if uphill is None or other is None else abs(uphill.omega - other.omega)
-        if (
-            min(abs(best.distance), between) > self.near * best.omega
-        ):  # sampled forces have kinks, where the slope jumps
+        if min(best.miss, between / best.width) > self.near:  # sampled forces have kinks, where the slope jumps
             hertz, rises = best.omega / (2 * np.pi), "rises" if best.slope > 0 else "falls"
             lost = SolveEnd.SITE_NOT_FOUND.say(
                 f" {solves} solves: the curve ends at {hertz:.5g} Hz, where it still {rises}"
@@ -408,39 +406,56 @@ def _range(branch: Branch) -> str:
     return f"{low:.5g} and {high:.5g} Hz"
 
 
-def _zero(a: _Slope, b: _Slope) -> float:
-    """Where the straight line through two slopes vanishes [rad/s]."""
-    fa, fb = a.weight * a.slope, b.weight * b.slope
+def _zero(a: Slope, b: Slope) -> float:
+    """Where the straight line through two distances vanishes [rad/s]; of one mode they lie on a line, slopes do not."""
+    fa, fb = a.weight * a.distance, b.weight * b.distance
     return (a.omega * fb - b.omega * fa) / (fb - fa) if fa != fb else 0.5 * (a.omega + b.omega)
 
 
 @dataclass(frozen=True)
-class _Slope:
-    """A solved point with d A^2 / d omega and d x / d omega.
+class Slope:
+    """A solved point with d A^2 / d omega and d x / d omega, or along another tangent of its curve.
 
     distance : to the peak [rad/s], were the response that of one mode, y = R / (p - omega)
+    width : half width of the resonance at its peak, abs(p - omega) elsewhere [rad/s]
     """
 
     solution: Solution
     omega: float
     slope: float
     distance: float
+    width: float
     dx: np.ndarray
     weight: float = 1.0
 
+    @property
+    def miss(self) -> float:
+        """Distance to the peak in widths: the cosine between the response and its derivative, 0 at the peak."""
+        return abs(self.distance) / self.width
+
     @classmethod
-    def of(cls, balance: HarmonicBalance, solution: Solution, output: str) -> _Slope:
-        state = solution.state
-        slope_r, slope_y = balance.frequency_slope(state)
-        linear = balance.linearise(state)
-        dx = linear.solve_refined(-slope_r, 1e-8)
-        dy = slope_y + balance.at(state.omega).outputs(linear.departure_slope(dx))
+    def of(cls, balance: HarmonicBalance, solution: Solution, output: str) -> Slope:
+        """The slope over the frequency."""
+        slope_r, _ = balance.frequency_slope(solution.state)
+        linear = balance.linearise(solution.state)
+        way = Direction(linear.solve_refined(-slope_r, 1e-8), 1.0)
+        return cls.along(balance, linear, solution, output, way)
+
+    @classmethod
+    def along(
+        cls, balance: HarmonicBalance, linear: Linearisation, solution: Solution, output: str, way: Direction
+    ) -> Slope:
+        """The slope along a tangent of the curve, `way`; distance and width in lengths of that."""
+        state, dx = solution.state, way.x
+        _, slope_y = balance.frequency_slope(state)
+        dy = way.p * slope_y + balance.at(state.omega).outputs(linear.departure_slope(dx))
         row = balance.compliance.output_names.index(output)
         y = balance.outputs(state)[row]
         dynamic = balance.basis.order > 0
         along, steepness = y[dynamic] @ dy[row][dynamic], dy[row][dynamic] @ dy[row][dynamic]
         distance = along / steepness if steepness > 0 else 0.0
-        return cls(solution, state.omega, float(2 * along), float(distance), dx.reshape(state.x.shape))
+        width = np.sqrt(y[dynamic] @ y[dynamic] / steepness) if steepness > 0 else state.omega
+        return cls(solution, state.omega, float(2 * along), float(distance), float(width), dx.reshape(state.x.shape))
 
     def predict(self, omega: float) -> np.ndarray:
         return self.solution.state.x + (omega - self.omega) * self.dx

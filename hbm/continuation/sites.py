@@ -62,12 +62,8 @@ class BesidePeak:
         solution, solves = self._walk(balance, state.omega, state.omega / self.ratio, state.x)
         at_peak = self.peak.next(balance, state.omega / self.ratio, solution.state.x)
         distance = self.ratio * at_peak.state.omega - state.omega
-        return Correction(distance, np.zeros_like(state.x), solves + at_peak.solves)
-
-    @property
-    def accuracy(self) -> float:
-        """Relative accuracy that the frequency is wanted with."""
-        return self.peak.tolerance
+        accuracy = self.ratio * self.peak.correct(balance, at_peak.state).accuracy
+        return Correction(distance, np.zeros_like(state.x), solves + at_peak.solves, accuracy)
 
     def _beside(self, balance: HarmonicBalance, peak: OperatingPoint) -> OperatingPoint:
         omega = peak.state.omega

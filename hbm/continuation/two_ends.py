@@ -261,7 +261,8 @@ class _Meeting:
             builder.append(first.points[i], i in first.folds)
         for i in reversed(range(self._cut[1])):
             builder.append(second.points[i], i in second.folds)
-        return builder.finish(BranchEnd.REACHED.say(f" {self._path.say(stop)}{first.notes}"))
+        end = BranchEnd.JUMPED if first.notes else BranchEnd.REACHED
+        return builder.finish(end.say(f" {self._path.say(stop)}{first.notes}"))
 
     def alone(self, stop: float) -> Outcome[BranchEnd]:
         """How the way from the start ended, and what the other one found that it has not."""

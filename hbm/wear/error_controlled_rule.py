@@ -377,7 +377,6 @@ def _stage(
     duties = problem.mission
     unworn = [problem.in_duty(duty) for duty in duties]
     gain = _gain(problem, near)
-    accuracy = np.array([duty.site.accuracy for duty in duties])
     x, depth = np.concatenate(guess, axis=1), near.depth + stretch * near.rate
     solves = rounds = retreats = 0
     known: tuple[np.ndarray, np.ndarray] | None = None  # frequencies and x that the search went on from
@@ -407,7 +406,7 @@ def _stage(
         after = np.array([s.next(w, c.distance) for s, w, c in zip(searches, omega, corrections, strict=True)])
         turned = _gain(problem, found)
         settled = np.all(np.abs(turned - gain) * found.work * stretch <= RULES.gain_accuracy * np.abs(depth).max())
-        if settled and np.all(np.abs(after - omega) <= accuracy * omega):
+        if settled and np.all(np.abs(after - omega) <= [c.accuracy for c in corrections]):
             return found
         if rounds > RULES.max_corrections:
             lost = SolveEnd.SITE_NOT_FOUND.say(f" {RULES.max_corrections} solves")

@@ -29,12 +29,21 @@ class Duty:
     """A part of the mission: `share` of all cycles run at `site`, with the harmonic loads times `load`.
 
     balance : its own unworn problem over the same contact, as at another speed of rotation; None for the common one
+    start : frequency [rad/s] and x (n_pair, n_component, n_coeff) [m] beside its unworn cycle; looked for where None
     """
 
     site: Site
     share: float = 1.0
     load: float = 1.0
     balance: HarmonicBalance | None = None
+    start: tuple[float, np.ndarray] | None = None
+
+    def first(self, balance: HarmonicBalance) -> OperatingPoint:
+        """The cycle without a neighbouring state."""
+        if self.start is None:
+            return self.site.first(balance)
+        point = self.site.next(balance, *self.start)
+        return point if point.solution.converged else self.site.first(balance)
 
 
 @dataclass(frozen=True)
@@ -149,7 +158,7 @@ def assess(problem: WearProblem, depth: np.ndarray, cycles: float, before: WearS
     for i, duty in enumerate(problem.mission):
         balance = problem.in_duty(duty, depth)
         if before is None:
-            points.append(duty.site.first(balance))
+            points.append(duty.first(balance))
         else:
             points.append(_neighbour(problem, duty, balance, before.points[i], before.depth, depth))
     return worn_state(problem, depth, cycles, points, sum(point.solves for point in points))

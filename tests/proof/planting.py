@@ -215,7 +215,7 @@ def plant(fault: Fault, tree: Path) -> None:
     if not _recoded(module, fresh) + _reset(module, fresh):
         raise ValueError(f"{fault.file}: nothing of the loaded module changes with {fault.new}")
     for kept in gc.get_objects():
-        if isinstance(kept, functools._lru_cache_wrapper):
+        if type(kept) is functools._lru_cache_wrapper:  # isinstance asks the referent of a proxy, which may be gone
             kept.cache_clear()
 
 

@@ -94,9 +94,8 @@ def highest_of(branch: Branch, balance: HarmonicBalance) -> OperatingPoint:
 
 
 def _highest(branch: Branch) -> int:
-    height = np.where(branch.converged, branch.amplitude(branch.output_names[0]), -1.0)
-    best = int(np.argmax(height))
-    if best in (0, len(height) - 1):
+    best = branch.peak(branch.output_names[0])
+    if best is None:
         raise NoPeak("the response is highest at an end of response.frequency, which is no peak: widen the range")
     return best
 

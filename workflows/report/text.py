@@ -55,6 +55,8 @@ def _response(found: dict[str, Any]) -> Lines:
         shown.append(("amplitude", _course(found, "peak_m", 1e3, "mm")))
     if found["peak_at_end"]:
         shown.append(("", "no peak: the response is highest at an end of response.frequency, widen it"))
+    if found["jumped"]:
+        shown.append(("", 'warning: the sweep jumped: behind the fold its peak may be higher; see method "arc_length"'))
     if found["peak_is_stable"] is False and not found["wear_steps"]:
         hertz, height = found["stable_peak_hz"], found["stable_peak_m"]
         below = (

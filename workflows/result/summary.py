@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.wear.events import events
 from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload, cycles_to_share
 from tribodyn.workflows.result import verdict
@@ -30,6 +31,7 @@ def summary(result: Result) -> dict[str, Any]:
     wear_steps, hbm_solves : steps taken and balance solves spent on wear
     peak_hz, peak_m, preload_N : [first, last] of the wear run, or the peak of the response curve without one
     peak_at_end : whether that peak is no peak, but an end of the response curve
+    jumped : whether the response is a sweep that jumped at a fold, so that the curve may have a higher peak
     peak_is_stable : whether that peak of the curve is stable, None where this was not asked for
     stable_peak_hz, stable_peak_m : the highest point of the curve that is
     seconds : of computing, interrupted runs included
@@ -152,7 +154,7 @@ def _peak(result: Result) -> dict[str, Any]:
         amplitude = frf.amplitude(frf.output_names[0])
         best = int(np.argmax(np.where(frf.converged, amplitude, -1.0)))
         hertz, height = float(frf.frequency[best]), float(amplitude[best])
-        at_end = best in (0, len(amplitude) - 1)
+        at_end = frf.peak(frf.output_names[0]) is None
         return {"peak_hz": [hertz, hertz], "peak_m": [height, height], "preload_N": None, "peak_at_end": at_end}
     return dict.fromkeys(("peak_hz", "peak_m", "preload_N", "peak_at_end"))
 
@@ -178,6 +180,7 @@ def _curve(result: Result) -> dict[str, Any]:
         "harmonics": list(result.harmonics),
         "harmonics_error": result.facts.harmonics_error,
         "response_end": None if frf is None else str(frf.end),
+        "jumped": None if frf is None else frf.ended is BranchEnd.JUMPED,
         "folds_hz": [] if frf is None else [float(frf.frequency[i]) for i in frf.folds],
         "unstable_points": None,
         "bifurcations": None,

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation import harmonic_choice, residual_shear, two_ends
+from tribodyn.hbm.continuation import harmonic_choice, peaks, residual_shear, two_ends
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
+from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.newton import NewtonOptions
+from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.stability import exponents
 from tribodyn.workflows.result.result import CurveStability, Result, ShearBounds, WornResponses
 from tribodyn.workflows.run import settings
@@ -20,16 +23,28 @@ from tribodyn.workflows.scene.schema import Scene
 
 
 def follow_response(
-    scene: Scene, balance: HarmonicBalance, advance: Callable[[float, str], None], highest: float = np.inf
+    scene: Scene,
+    balance: HarmonicBalance,
+    advance: Callable[[float, str], None],
+    highest: float = np.inf,
+    folds: bool = True,
 ) -> Branch:
-    """The response curve of the unworn contact by the scene's continuation method, from both ends on two threads.
+    """The response curve of the unworn contact by the scene's continuation method, its highest peaks solved.
 
     highest : frequency [rad/s] at which it ends, if that of the scene's range is higher
+    folds : whether a curve on which a sweep jumps is followed round its folds, where its highest peak may be; not where
+        the scene itself asks for the sweep, by `method = "natural"`
     """
     method, options = continuation.load(scene.response.method_name), settings.response_options(scene)
     low, high = settings.response_range(scene)
     high = max(low, min(high, highest))
-    return two_ends.follow(method, balance, low, high, options, lambda done, wanted: advance(done / wanted, ""))
+    branch = two_ends.follow(method, balance, low, high, options, lambda done, wanted: advance(done / wanted, ""))
+    as_swept = scene.response.method == "natural" and "method" in scene.response.model_fields_set
+    if folds and branch.ended is BranchEnd.JUMPED and not as_swept:
+        whole = arc_length.follow(balance, low, high, arc_length.Options(newton=settings.newton_options(scene)))
+        if whole.arrived:
+            branch = replace(whole, end=whole.end.kind.say(f"{whole.end.detail} by arc length: a sweep jumps"))
+    return peaks.with_peaks(balance, branch, settings.peak_of(scene))
 
 
 def choose_harmonics(

@@ -85,7 +85,7 @@ def run(
             with progress.track("responses of the worn contact") as advance:
 
                 def again(worn: HarmonicBalance) -> Branch:
-                    return curve.follow_response(scene, worn, lambda done, text: None)
+                    return curve.follow_response(scene, worn, lambda done, text: None, folds=False)
 
                 count = scene.wear.responses
                 curves = curve.worn_responses(result, model.balance, count, again, advance)

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.wear import error_controlled_rule, thesis_rule
 from tribodyn.hbm.wear.evolution import Duty, WearProblem
@@ -48,6 +50,10 @@ def wear_down(
         advance(done, f"step {len(rows)}, {state}, preload {row.preload:.4g} N, depth {deepest:.3g} mm")
 
     problem = wear_problem(scene, file.folder, model.balance, wear.lost_below, wear.end_at == "at_rest")
+    if result.response is not None:
+        problem = replace(
+            problem, mission=tuple(_from_response(d, result.response, model.balance) for d in problem.mission)
+        )
     limit = settings.step_limit(scene, patch.free_deflection, patch.area)
     worn = evolve(problem, wear, limit, wear.max_steps, on_row, result.wear)
     result = with_shown(scene, replace(result, wear=worn), model.balance.with_load(problem.mission[0].load), model.part)
@@ -55,6 +61,15 @@ def wear_down(
         keep(replace(result, stage=Stage.FAILED))
         raise SolveFailed(f"wear step {len(worn.cycles)}: {worn.end}")
     return result
+
+
+def _from_response(duty: Duty, branch: Branch, balance: HarmonicBalance) -> Duty:
+    """A duty at the peak of the response, which is known already."""
+    peak = branch.peak(settings.OUTPUT)
+    if peak is None or duty.load != 1 or duty.balance is not None or not isinstance(duty.site, AtPeak):
+        return duty
+    x = branch.contact[peak].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
+    return replace(duty, start=(float(branch.omega[peak]), x))
 
 
 def worn_out(file: SceneFile, model: Model, left: float = LIFE_SHARE) -> WearHistory:

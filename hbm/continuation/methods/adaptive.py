@@ -166,7 +166,8 @@ class _Sweep:
         if trouble:
             return BranchEnd.ENDED.say(f" {self._path.say(builder.value[-1])}: {trouble}")
         if builder.value[-1] == self._stop:
-            return BranchEnd.REACHED.say(f" {self._path.say(self._stop)}{self.notes}")
+            end = BranchEnd.JUMPED if self._jumps else BranchEnd.REACHED
+            return end.say(f" {self._path.say(self._stop)}{self.notes}")
         return None
 
     def _outputs(self, value: float, solution: Solution) -> np.ndarray:

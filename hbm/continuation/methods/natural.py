@@ -34,12 +34,17 @@ class Rules:
     max_fold_points : by arc length on the way round folds, after which the sweep looks from rest
     trial_shortest, trial_slowest : where Newton's method gives up early, as a shorter step is left to try: shortest
         share of its step, and residual over that of two steps before
+    abrupt : miss of the extrapolation, in steps of x, from which on a step is solved backwards: over a jump it does
+        not lead back
+    same : distance, in steps of x, within which it has led back
     """
 
     least_spacing: float = 0.5
     max_fold_points: int = 200
     trial_shortest: float = 0.03
     trial_slowest: float = 0.8
+    abrupt: float = 0.5
+    same: float = 1e-2
 
 
 @dataclass(frozen=True)
@@ -98,28 +103,33 @@ class _Sweep:
         self.builder.add(start, self._solution)
         self.parts: list[Segment] | None = None
         self.done = 0
+        self._jumps: list[float] = []
 
     @property
     def notes(self) -> str:
         """At which folds the response jumped; empty where it did not."""
-        folds = ", ".join(self._path.say(self.builder.value[i]) for i in self.builder.folds)
-        return f"; the response jumped at folds: {folds} (arc_length goes round them)" if folds else ""
+        places = sorted({*self._jumps, *(self.builder.value[i] for i in self.builder.folds)})
+        return f"; the response jumped at {', '.join(map(self._path.say, places))}" if places else ""
 
     def advance(self) -> Outcome[BranchEnd] | None:
         """The next value; why the branch ends, or None."""
         path, builder, options = self._path, self.builder, self._options
         solution = self._solution
         if solution.converged:
-            value = self._wanted[self.done]
+            value, known = self._wanted[self.done], len(builder.value)
             solution = _step(path, builder, value, options, options.refinements)
             if not solution.converged:
                 solution = _by_arc_length(path, builder, solution, value, self._stop, options)
+            else:
+                steps = range(known, len(builder.value))
+                self._jumps += [builder.value[i] for i in steps if not _leads_back(path, builder, i, options)]
             self._solution = solution
             self.done += 1
         if not solution.converged:
             return BranchEnd.ENDED.say(f" {path.say(builder.value[-1])}: {solution.outcome}")
         if self.done == len(self._wanted):
-            return BranchEnd.REACHED.say(f" {path.say(self._stop)}{self.notes}")
+            end = BranchEnd.JUMPED if self.notes else BranchEnd.REACHED
+            return end.say(f" {path.say(self._stop)}{self.notes}")
         return None
 
 
@@ -135,6 +145,20 @@ def _step(path: Parameter, builder: BranchBuilder, value: float, options: Option
         return _step(path, builder, value, options, halvings - 1)
     builder.add(value, solution)
     return solution
+
+
+def _leads_back(path: Parameter, builder: BranchBuilder, i: int, options: Options) -> bool:
+    """Whether a step to point i, where it is far from the extrapolation, comes back to the point before."""
+    before, here = builder.x[i - 1], builder.x[i]
+    first = max(builder.folds[-1] + 1 if builder.folds else 0, i - EXTRAPOLATION_DEGREE - 1)
+    step = np.linalg.norm(here - before)
+    if i - first < 2:
+        return True
+    miss = here - extrapolate(np.array(builder.value[first:i]), builder.x[first:i], builder.value[i])
+    if np.linalg.norm(miss) <= options.rules.abrupt * step:
+        return True
+    back = newton.solve(*path.place(builder.value[i - 1]), here, options.newton)
+    return back.converged and bool(np.linalg.norm(back.state.x - before) <= options.rules.same * step)
 
 
 def _by_arc_length(

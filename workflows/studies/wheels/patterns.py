@@ -28,7 +28,6 @@ from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.linear.travelling_wave import at_sector
 from tribodyn.hbm.mistuning import MistunedWheel, spread
 from tribodyn.hbm.newton import NewtonOptions
-from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.threads import limited
 from tribodyn.reduction import mistuning as reduction
 from tribodyn.reduction.cyclic import ReducedSector
@@ -163,7 +162,7 @@ class Blades:
             guess=self.beginning,
         )
         branch = adaptive.follow(balance, low, high, scan)
-        if branch.ended is not BranchEnd.REACHED:
+        if not branch.arrived:
             raise SolveFailed(f"the frequency response {branch.end}")
         heights = amplitude(branch.response[:, [branch.output_names.index(name) for name in names]])
         if heights.argmax() // len(names) in (0, len(heights) - 1):

@@ -19,7 +19,6 @@ from tribodyn.hbm.continuation import two_ends
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import adaptive
 from tribodyn.hbm.linear.travelling_wave import on_wheel
-from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.reduction.cyclic import ReducedSector, nodal_diameters, travelling_wave, wheel_model
 from tribodyn.workflows.run import joints, modelling
 from tribodyn.workflows.run import sector as sectors
@@ -113,7 +112,7 @@ def follow(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: 
     low, high = (2 * np.pi * hertz for hertz in frequency)
     options = adaptive.Options(tolerance=tolerance, max_points=MAX_POINTS)
     branch = two_ends.follow(adaptive, balance, low, high, options)
-    if branch.ended is not BranchEnd.REACHED:
+    if not branch.arrived:
         raise SolveFailed(f"the frequency response {branch.end}")
     return branch
 

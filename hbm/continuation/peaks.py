@@ -1,0 +1,191 @@
+"""The peaks of a response curve, solved and made points of it: what is read from its highest point is the peak.
+
+Between two neighbours where the frequency rises or falls throughout, the peak is refined along the frequency; where the
+curve turns back beside it, along its arc length.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation import bordered, parameter
+from tribodyn.hbm.continuation.bordered import BorderFailed, Direction, Metric
+from tribodyn.hbm.continuation.branch import Branch, BranchPoint
+from tribodyn.hbm.continuation.curve import CurvePoint, Segment
+from tribodyn.hbm.continuation.highest_peak import Sample, vertex
+from tribodyn.hbm.continuation.operating_point import AtPeak, OperatingPoint, Slope
+from tribodyn.hbm.newton import Solution
+from tribodyn.hbm.outcome import CONVERGED
+from tribodyn.hbm.threads import single
+
+
+@dataclass(frozen=True)
+class PeakRules:
+    """How peaks of a curve are refined.
+
+    tried : maxima of a curve, the highest foreseen first
+    trials : solves along the arc, after which the maximum is left as it is
+    shortest : arc length between two points, of what they were apart at first, beside a kink where no slope vanishes
+    tangent : relative accuracy of tangents
+    """
+
+    tried: int = 3
+    trials: int = 40
+    shortest: float = 1e-6
+    tangent: float = 1e-8
+
+
+RULES = PeakRules()
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """A peak that a curve may have: its height as foreseen, the point beside it and the frequencies around it."""
+
+    height: float
+    point: int
+    low: float
+    high: float
+    turns: bool = False
+
+
+@single
+def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch:
+    """The curve with its highest peaks among its points, in their order.
+
+    branch : over the frequency; site : of which output, and how exactly
+    A maximum that no solve makes higher stays the point that it is
+    """
+    found: list[tuple[int, BranchPoint]] = []
+    heights = branch.amplitude(site.output)
+    for candidate in _candidates(balance, branch, site)[: RULES.tried]:
+        i = candidate.point
+        if candidate.turns:
+            point = along_arc(balance, branch, i, site)
+        else:
+            x, omega = _shaped(balance, branch, i), float(branch.omega[i])
+            point = site.within(balance, omega, x, candidate.low, candidate.high)
+        if point is None or not point.solution.converged or not point.amplitude > heights[i]:
+            continue
+        state = point.state
+        if not candidate.turns and not candidate.low < state.omega < candidate.high:
+            continue
+        at = i + 1 if _lies_behind(branch, i, state.omega, state.flat) else i
+        energy = float(balance.energy(state).sum())
+        solved = BranchPoint(state.omega, state.x, state.omega, point.response, energy, CONVERGED, point.solves)
+        found.append((at, solved))
+    for at, solved in sorted(found, key=lambda item: -item[0]):
+        branch = branch.inserted(at, solved)
+    return branch
+
+
+def _candidates(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> list[_Candidate]:
+    """Points as high as both neighbours, and steps that a resonance may hide in; the highest foreseen first."""
+    omega, height = branch.omega, np.where(branch.converged, branch.amplitude(site.output), -1.0)
+    inner = (height[1:-1] > 0) & (height[1:-1] >= height[:-2]) & (height[1:-1] >= height[2:])
+    tops = np.flatnonzero(inner & (height[:-2] >= 0) & (height[2:] >= 0)) + 1
+    none, found = np.empty(0), []
+    for i in map(int, tops):
+        foreseen = vertex([Sample(omega[k], none, height[k]) for k in (i - 1, i, i + 1)])[1]
+        low, high = sorted((float(omega[i - 1]), float(omega[i + 1])))
+        turns = bool((omega[i] - omega[i - 1]) * (omega[i + 1] - omega[i]) <= 0)
+        found.append(_Candidate(foreseen, i, low, high, turns))
+    for i in map(int, np.flatnonzero((height[:-1] > 0) & (height[1:] > 0))):
+        if i not in tops and i + 1 not in tops:
+            foreseen = _hidden(balance, branch, i, site)
+            if foreseen > 0:
+                low, high = sorted((float(omega[i]), float(omega[i + 1])))
+                found.append(_Candidate(foreseen, i if height[i] > height[i + 1] else i + 1, low, high))
+    return sorted(found, key=lambda candidate: -candidate.height)
+
+
+def _hidden(balance: HarmonicBalance, branch: Branch, i: int, site: AtPeak) -> float:
+    """Height of a resonance between points i and i + 1, both of which lie on its flanks; 0 where there is none.
+
+    Two responses y = R / (p - omega) give p. A response that passes zero looks the same, but falls towards it.
+    """
+    y = branch.response[i : i + 2, branch.output_names.index(site.output)]
+    y = y[:, y.shape[1] % 2 :]
+    strongest = 2 * int(np.argmax(np.sum(y[:, ::2] ** 2 + y[:, 1::2] ** 2, axis=0)))
+    a, b = y[:, strongest] - 1j * y[:, strongest + 1]
+    w = branch.omega[i : i + 2]
+    pole = (a * w[0] - b * w[1]) / (a - b) if a != b else complex(np.inf)
+    low, high = sorted(w)
+    if not low < pole.real < high:
+        return 0.0
+    for k, way in ((i, 1.0), (i + 1, -1.0)):
+        state = balance.evaluate(float(branch.omega[k]), _shaped(balance, branch, k))
+        slope = Slope.of(balance, Solution(state, CONVERGED, 0, 0, ()), site.output).slope
+        if slope * way * (w[1] - w[0]) <= 0:
+            return 0.0
+    return float(abs(a) * abs(pole - w[0]) / max(abs(pole.imag), 1e-12 * abs(pole)))
+
+
+def _shaped(balance: HarmonicBalance, branch: Branch, i: int) -> np.ndarray:
+    return branch.contact[i].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
+
+
+def _lies_behind(branch: Branch, i: int, omega: float, flat: np.ndarray) -> bool:
+    """Whether a point beside point i comes after it on the way of the branch."""
+    there = flat - branch.contact[i]
+    before, after = branch.contact[i - 1] - branch.contact[i], branch.contact[i + 1] - branch.contact[i]
+    beside = branch.omega[i - 1 : i + 2]
+    if (beside[1] - beside[0]) * (beside[2] - beside[1]) > 0:
+        return bool((omega - beside[1]) * (beside[2] - beside[1]) > 0)
+    return bool(np.vdot(there, after) / np.linalg.norm(after) > np.vdot(there, before) / np.linalg.norm(before))
+
+
+def along_arc(balance: HarmonicBalance, branch: Branch, i: int, site: AtPeak) -> OperatingPoint | None:
+    """The peak beside point i of a curve that turns back there; None where a solve fails."""
+    path = parameter.of(balance)
+    span = float(np.ptp(branch.omega[i - 1 : i + 2]))
+    size = float(np.linalg.norm(np.ptp(branch.contact[i - 1 : i + 2], axis=0)))
+    if not (span > 0 and size > 0):
+        return None
+    metric = Metric(size, span)
+    places = [Direction(branch.contact[k], float(branch.omega[k])) for k in (i - 1, i, i + 1)]
+
+    def solved(guess: Direction, border: Direction) -> tuple[CurvePoint, Slope] | None:
+        solution, value = bordered.correct(path, guess, border, metric, site.newton)
+        if not solution.converged:
+            return None
+        tangent = bordered.tangent(path, value, solution.state, border, metric, site.newton, RULES.tangent)
+        point = CurvePoint.of(value, solution, tangent)
+        return point, Slope.along(balance, balance.linearise(solution.state), solution, site.output, tangent)
+
+    def of(point: CurvePoint) -> OperatingPoint:
+        assert point.solution is not None
+        return OperatingPoint.of(balance, point.solution, site.output, spent)
+
+    spent = 0
+    try:
+        here = solved(places[1], metric.unit(places[2] - places[0]))
+        spent += 1
+        if here is None:
+            return None
+        rises = here[1].slope > 0
+        other = solved(places[2] if rises else places[0], here[0].tangent)
+        spent += 1
+        if other is None or other[1].slope * here[1].slope > 0:
+            return None
+        ends = [here, other] if rises else [other, here]  # the amplitude rises at the first, falls at the second
+        weight, best = [1.0, 1.0], min(ends, key=lambda end: end[1].miss)
+        first = metric.norm(ends[1][0].place - ends[0][0].place)
+        while best[1].miss > site.tolerance and spent < RULES.trials:
+            segment = Segment(ends[0][0], ends[1][0], metric)
+            if segment.length <= RULES.shortest * first:
+                break
+            up, down = weight[0] * ends[0][1].slope, -weight[1] * ends[1][1].slope
+            there = solved(segment.at(float(np.clip(up / (up + down), 0.02, 0.98))), segment.along)
+            spent += 1
+            if there is None:
+                return None
+            k = 0 if there[1].slope > 0 else 1
+            ends[k], weight[k], weight[1 - k] = there, 1.0, 0.5 * weight[1 - k]  # Illinois
+            best = min(best, there, key=lambda end: end[1].miss)
+        return max((of(end[0]) for end in [*ends, best]), key=lambda point: point.amplitude)
+    except BorderFailed:
+        return None

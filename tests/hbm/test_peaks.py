@@ -1,0 +1,97 @@
+"""Peaks of response curves against closed forms, from sharp resonances to folded ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq, minimize_scalar
+
+from tests.helpers.continuation_models import Duffing, Lifting
+from tests.helpers.verification_models import interface, modal_damping
+from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact.joint import Joint
+from tribodyn.hbm.contact.law import ContactParameters
+from tribodyn.hbm.continuation.methods import adaptive, arc_length, natural
+from tribodyn.hbm.continuation.operating_point import AtPeak
+from tribodyn.hbm.continuation.peaks import with_peaks
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonics import HarmonicBasis
+from tribodyn.hbm.outcome import BranchEnd
+from tribodyn.reduction.model import ReducedModel
+
+RANGE = 1.0, 4.0
+
+
+class StuckOscillator:
+    """Two masses, the first on a contact that always sticks; `peak` : height and frequency by direct solution."""
+
+    def __init__(self, ratio: float):
+        mass, stiffness = np.eye(2), np.array([[3.0, -1.0], [-1.0, 4.0]])
+        stuck = stiffness + np.diag([2.0, 0.0])
+        damping, load, seen = modal_damping(mass, stuck, ratio), np.array([1.0, 0.3]), np.array([0.2, 1.0])
+        system = SecondOrderSystem(mass, stiffness, damping, {"force": load}, {"mass": seen})
+        law = ContactParameters.of(("t1",), [[2.0]], friction=1e12, normal_load=3.0)
+        self.balance = HarmonicBalance.of(
+            ReducedModel(system, interface(np.eye(2)[:1], ("t1",))),
+            Joint("contact", "jenkins_constant", law),
+            HarmonicBasis((0, 1), 64, "located"),
+            Excitation.of({}, {1: {"force": 0.5}}),
+            20.0,
+        )
+
+        def height(omega: float) -> float:
+            dynamic = stuck - omega**2 * mass + 1j * omega * damping
+            return float(abs(seen @ np.linalg.solve(dynamic, 0.5 * load)))
+
+        tops = []
+        for mode in np.sqrt(np.linalg.eigvalsh(stuck)):
+            best = minimize_scalar(
+                lambda e, mode=mode: -height(mode * (1 + e * ratio)), bounds=(-5, 5), method="bounded",
+                options={"xatol": 1e-9},
+            )  # fmt: skip
+            tops.append((-best.fun, mode * (1 + best.x * ratio)))
+        self.peak = max(tops)
+
+
+@pytest.mark.parametrize("ratio", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8])
+def test_a_linear_resonance_has_its_height_at_any_damping(ratio: float) -> None:
+    problem = StuckOscillator(ratio)
+    found = AtPeak("mass", *RANGE).first(problem.balance)
+    assert found.solution.converged
+    assert found.amplitude == pytest.approx(problem.peak[0], rel=1e-4)
+    assert found.state.omega == pytest.approx(problem.peak[1], rel=0.05 * ratio + 1e-9)
+
+
+@pytest.mark.parametrize("ratio", [5e-3, 1e-5])
+@pytest.mark.parametrize("points", [10, 30, 300])
+def test_the_peak_of_a_sweep_does_not_depend_on_its_points(ratio: float, points: int) -> None:
+    problem = StuckOscillator(ratio)
+    branch = natural.follow(problem.balance, *RANGE, natural.Options(n_points=points))
+    solved = with_peaks(problem.balance, branch, AtPeak("mass", *RANGE))
+    assert np.all(np.diff(solved.omega) > 0)
+    assert solved.amplitude("mass").max() == pytest.approx(problem.peak[0], rel=1e-5)
+    assert solved.peak("mass") == int(solved.amplitude("mass").argmax())
+
+
+@pytest.mark.parametrize("way", [(0.3, 4.5), (4.5, 0.3)])
+@pytest.mark.parametrize("steps", [arc_length.Options(), arc_length.Options(step=0.3, max_step=0.6, angle=0.6)])
+@pytest.mark.parametrize(("zeta", "force"), [(0.02, 0.1), (0.005, 0.1), (0.05, 0.05)])
+def test_the_peak_of_a_folded_curve_has_its_closed_form(zeta, force, steps, way) -> None:
+    """At the highest amplitude A of one harmonic omega^2 = k - 2 zeta^2, k = 1 + 3/4 g A^2."""
+    duffing = Duffing(zeta, force)
+    highest = brentq(lambda a: 4 * zeta**2 * (1 + 0.75 * a * a - zeta**2) - (force / a) ** 2, 1e-3, 1e3)
+    branch = arc_length.follow(duffing.balance(), *way, steps)
+    solved = with_peaks(duffing.balance(), branch, AtPeak("mass", *way))
+    assert solved.amplitude("mass").max() == pytest.approx(highest, rel=2e-6)
+    before, after = branch.omega[list(branch.folds)], solved.omega[list(solved.folds)]
+    np.testing.assert_array_equal(before, after)
+
+
+@pytest.mark.parametrize("method", [natural, adaptive])
+@pytest.mark.parametrize("way", [(0.3, 3.0), (3.0, 0.3)])
+def test_a_sweep_over_a_fold_ends_as_one_that_jumped(method, way) -> None:
+    """Hardening and softening: the sweep misses a part of the curve either way, and the branch says so."""
+    for balance in (Lifting().balance(), Duffing().balance()):
+        assert method.follow(balance, *way).ended is BranchEnd.JUMPED
+    assert method.follow(Duffing(0.05, 0.02).balance(), *way).ended is BranchEnd.REACHED
