@@ -104,6 +104,7 @@ class AtPeak:
     start, stop : range that the first search scans [rad/s], from `start` on; n_scan : its steps where nothing bends are
         up to five times as long as of so many points
     tolerance : of the frequency of the peak, in half widths of the resonance: its height misses by half the square
+    widest : half width over the frequency, above which resonances are found as those of this width
     highest : amplitude that no linear response inside the range passes, with the contact free or stuck, at load factor
         1 [m]: a tracked peak as high stays the highest, and none is looked for
     scanned : highest harmonic of the scans for peaks: a contact that lifts drives higher modes by harmonics of the
@@ -127,6 +128,7 @@ class AtPeak:
     stop: float
     n_scan: int = 60
     tolerance: float = 1e-3
+    widest: float = 0.01
     highest: float = np.inf
     scanned: int = 7
     scanned_above: int = 3
@@ -295,7 +297,11 @@ class AtPeak:
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
         """The distance of a state to the peak, by its slope and as though one mode responded."""
         here = Slope.of(balance, Solution(state, CONVERGED, 0, 0, ()), self.output)
-        return Correction(here.distance, here.dx, 0, self.tolerance * here.width)
+        return Correction(here.distance, here.dx, 0, self._resolution(here))
+
+    def _resolution(self, here: Slope) -> float:
+        """How exactly the frequency of a peak beside a point is wanted [rad/s]."""
+        return self.tolerance * min(here.width, self.widest * here.omega)
 
     def _maxima(self, branch: Branch) -> np.ndarray:
         """Points of a branch that are higher than both their neighbours, the highest first."""
@@ -331,13 +337,13 @@ class AtPeak:
         solves = 1
         if not here.solution.converged:
             return OperatingPoint.of(balance, here.solution, self.output, solves)
-        resolution = self.tolerance * here.width
+        resolution = self._resolution(here)
         stride = self.stride * here.width if stride is None else stride
         uphill = other = None  # the latest points on either side of the zero, once it is bracketed
         climbed: bool | None = None  # whether the last point inside the bracket replaced `uphill`
         before: Slope | None = None
         best = here
-        while solves < 60 and best.miss > self.tolerance:
+        while solves < 60 and abs(best.distance) > resolution:
             side = float(np.sign(here.slope))
             if uphill is not None and other is not None:
                 if abs(uphill.omega - other.omega) <= resolution:  # as about a kink, where no slope vanishes
@@ -373,7 +379,7 @@ class AtPeak:
                 climbed = climbs
             before, here = here, there
             if there.miss <= best.miss:
-                best, resolution = there, self.tolerance * there.width
+                best, resolution = there, self._resolution(there)
         if uphill is None and best.slope > 0 and best.omega >= (1 - 1e-9) * balance.omega_max:
             hertz = balance.omega_max / (2 * np.pi)
             raise NoPeak(

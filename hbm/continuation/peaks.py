@@ -130,11 +130,12 @@ def _shaped(balance: HarmonicBalance, branch: Branch, i: int) -> np.ndarray:
 
 def _lies_behind(branch: Branch, i: int, omega: float, flat: np.ndarray) -> bool:
     """Whether a point beside point i comes after it on the way of the branch."""
+    beside = branch.omega[max(i - 1, 0) : i + 2]
+    steps = np.diff(beside)
+    if steps[0] * steps[-1] > 0:
+        return bool((omega - branch.omega[i]) * steps[0] > 0)
     there = flat - branch.contact[i]
     before, after = branch.contact[i - 1] - branch.contact[i], branch.contact[i + 1] - branch.contact[i]
-    beside = branch.omega[i - 1 : i + 2]
-    if (beside[1] - beside[0]) * (beside[2] - beside[1]) > 0:
-        return bool((omega - beside[1]) * (beside[2] - beside[1]) > 0)
     return bool(np.vdot(there, after) / np.linalg.norm(after) > np.vdot(there, before) / np.linalg.norm(before))
 
 

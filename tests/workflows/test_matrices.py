@@ -90,7 +90,9 @@ def test_the_scene_is_the_same_as_the_documented_python(folder: Path, monkeypatc
     assert result.response is not None
     assert result.wear is not None
     ours, theirs = names["response"], result.response
-    assert theirs.amplitude("response") == pytest.approx(ours.amplitude("tip"), rel=1e-6)
+    common = np.isin(theirs.omega, ours.omega)  # the scene's curve has its solved peaks, too
+    assert theirs.amplitude("response")[common] == pytest.approx(ours.amplitude("tip"), rel=1e-6)
+    assert theirs.amplitude("response").max() >= ours.amplitude("tip").max()
     assert result.wear.cycles == pytest.approx(names["history"].cycles, rel=1e-5)
     assert result.wear.depth == pytest.approx(names["history"].depth, rel=1e-5)
 

@@ -191,8 +191,8 @@ def test_force_times_slip_is_the_friction_work_over_the_coefficient_of_friction(
     assert exposure.normal_force_times_slip[0] == pytest.approx(4 * 100.0 * (3e-4 - 0.4 * 100.0 / k), rel=1e-4)
 
 
-def test_a_peak_is_looked_for_where_the_line_through_two_slopes_vanishes() -> None:
-    rises, falls = (SimpleNamespace(omega=w, weight=0.5, slope=s) for w, s in ((1.0, 2.0), (5.0, -6.0)))
+def test_a_peak_is_looked_for_where_the_line_through_two_distances_vanishes() -> None:
+    rises, falls = (SimpleNamespace(omega=w, weight=0.5, distance=d) for w, d in ((1.0, 2.0), (5.0, -6.0)))
     assert operating_point._zero(rises, falls) == pytest.approx(2.0)
 
 

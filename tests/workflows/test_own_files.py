@@ -152,8 +152,8 @@ def test_a_scene_runs_with_all_its_own_files(scene: Path) -> None:
     highest, with_more = (np.abs(r.response.response[:, 0, 1:]).max() for r in (result, more))
     assert abs(with_more - highest) > 1e-3 * highest
     low, high = scene_file.read(str(scene)).scene.response.frequency
-    spacing = np.median(np.diff(result.response.omega)) / (2 * np.pi)
-    assert spacing == pytest.approx((high - low) / round((high - low) / 120.0))
+    points = np.linspace(low, high, 1 + round((high - low) / 120.0))  # solved peaks stand between them
+    assert np.abs(result.response.omega / (2 * np.pi) - points[:, None]).min(axis=1).max() < 1e-6
     assert [parameter.name for parameter in ladders.study_of(scene_file.read(str(scene))).parameters] == ["my_grid"]
 
 

@@ -33,13 +33,13 @@ def follow_response(
 
     highest : frequency [rad/s] at which it ends, if that of the scene's range is higher
     folds : whether a curve on which a sweep jumps is followed round its folds, where its highest peak may be; not where
-        the scene itself asks for the sweep, by `method = "natural"`
+        the scene itself names a method that sweeps, such as `method = "natural"`
     """
     method, options = continuation.load(scene.response.method_name), settings.response_options(scene)
     low, high = settings.response_range(scene)
     high = max(low, min(high, highest))
     branch = two_ends.follow(method, balance, low, high, options, lambda done, wanted: advance(done / wanted, ""))
-    as_swept = scene.response.method == "natural" and "method" in scene.response.model_fields_set
+    as_swept = "method" in scene.response.model_fields_set and scene.response.method_name != "adaptive"
     if folds and branch.ended is BranchEnd.JUMPED and not as_swept:
         whole = arc_length.follow(balance, low, high, arc_length.Options(newton=settings.newton_options(scene)))
         if whole.arrived:
