@@ -16,7 +16,7 @@ from tribodyn.hbm.continuation.bordered import BorderFailed, Direction, Metric
 from tribodyn.hbm.continuation.branch import Branch, BranchPoint
 from tribodyn.hbm.continuation.curve import CurvePoint, Segment
 from tribodyn.hbm.continuation.highest_peak import Sample, vertex
-from tribodyn.hbm.continuation.operating_point import AtPeak, OperatingPoint, Slope
+from tribodyn.hbm.continuation.operating_point import AtPeak, NoPeak, OperatingPoint, Slope
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
@@ -67,7 +67,10 @@ def with_peaks(balance: HarmonicBalance, branch: Branch, site: AtPeak) -> Branch
             point = along_arc(balance, branch, i, site)
         else:
             x, omega = _shaped(balance, branch, i), float(branch.omega[i])
-            point = site.within(balance, omega, x, candidate.low, candidate.high)
+            try:
+                point = site.within(balance, omega, x, candidate.low, candidate.high)
+            except NoPeak:  # it still rises at the highest frequency that is modelled
+                continue
         if point is None or not point.solution.converged or not point.amplitude > heights[i]:
             continue
         state = point.state

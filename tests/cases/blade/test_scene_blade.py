@@ -15,6 +15,7 @@ from tribodyn.fem.elasticity import assemble
 from tribodyn.geometry.placing import rotation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.travelling_wave import at_sector, left_face
+from tribodyn.hbm.outcome import WearEnd
 from tribodyn.reduction.cyclic import nodal_diameters
 from tribodyn.workflows.pictures import render, render_wheel
 from tribodyn.workflows.report import text
@@ -42,7 +43,8 @@ def finished(folder):
 
 def test_wear_goes_on_until_the_blades_are_free(finished):
     wear, patch = finished.wear, finished.patch
-    assert finished.state == "complete: contact lost at every pair"
+    assert wear.ended in (WearEnd.LOST, WearEnd.FADED)
+    assert wear.preload[-1] < 1e-6 * wear.preload[0]
     assert len(patch.area) == 20
     assert patch.area.sum() == pytest.approx(20e-3 * 30e-3)
     assert wear.depth[-1] @ patch.area == pytest.approx(2e-15 * wear.work.sum(), rel=1e-12)
