@@ -3,7 +3,7 @@
 The solver makes many small products; BLAS threads that wait for each other make them many times slower, and two pay
 nowhere that was measured. So each entry of the solver is `single`: BLAS has one thread in it, however it is called.
 `limited` asks for more: BLAS has them outside of the solver, and what the solver can share among processes is shared,
-see `continuation.two_ends`.
+see `processes.shared`.
 """
 
 from __future__ import annotations

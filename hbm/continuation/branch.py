@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import BranchEnd, Outcome, SolveEnd
-
-if TYPE_CHECKING:
-    from tribodyn.hbm.continuation.curve import Segment
 
 
 @dataclass(frozen=True)
@@ -168,24 +165,3 @@ class BranchBuilder:
             parameter_name=self._parameter.name,
             parameter=np.array(self.value),
         )
-
-
-class Walk(Protocol):
-    """A continuation under way, from its first point on.
-
-    builder : the branch so far
-    parts : the curve up to the points that the last step added, a segment for each; None where the method is a sweep,
-        which has no tangents and may jump
-    """
-
-    builder: BranchBuilder
-    parts: list[Segment] | None
-
-    @property
-    def notes(self) -> str:
-        """What the sentence of the end is to say of the way so far, such as where it jumped."""
-        ...
-
-    def advance(self) -> Outcome[BranchEnd] | None:
-        """One step more; why the branch ends, or None."""
-        ...

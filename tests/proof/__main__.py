@@ -26,7 +26,6 @@ def bench(
     fe: Annotated[tuple[str, ...], Parameter(name="--fe", negative=(), consume_multiple=False)] = (),
     way: Annotated[tuple[str, ...], Parameter(name="--way", negative=(), consume_multiple=False)] = (),
     contact: Annotated[tuple[str, ...], Parameter(name="--contact", negative=(), consume_multiple=False)] = (),
-    two_cores: Flag = False,
     out: Path = Path("scaling.png"),
     as_json: Json = False,
 ) -> None:
@@ -47,8 +46,6 @@ def bench(
     contact
         Set-up, memory and seconds of one response at 0+3 on "500", "3k", "12k" or "48k" contact DOFs instead, with
         residual flexibility and, up to 3k, beside the dense compliance; can be repeated.
-    two_cores
-        Seconds of one response on one core and on two instead, followed from both ends, on 507 and 1587 contact DOFs.
     out
         File of the plot of --scaling.
     as_json
@@ -65,12 +62,6 @@ def bench(
 
         sizes = large_contact.run(contact, aside)
         print(json.dumps(large_contact.as_records(sizes), indent=2) if as_json else large_contact.as_text(sizes))
-        return
-    if two_cores:
-        from tests.proof import two_cores as both
-
-        cores = both.run(aside)
-        print(json.dumps(both.as_records(cores), indent=2) if as_json else both.as_text(cores))
         return
     if scaling:
         make_room(out, PICTURE)

@@ -9,7 +9,6 @@ import numpy as np
 from tribodyn.fem.part import Part
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.continuation import two_ends
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.time import verify as hbm_verify
@@ -58,7 +57,7 @@ def follow_arc_length(file: SceneFile, balance: HarmonicBalance) -> Branch:
     """The response over the scene's range by arc length, round its folds."""
     low, high = settings.response_range(file.scene)
     options = arc_length.Options(newton=settings.newton_options(file.scene))
-    return two_ends.follow(arc_length, balance, low, high, options)
+    return arc_length.follow(balance, low, high, options)
 
 
 def follow_adaptive(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: float) -> Branch:

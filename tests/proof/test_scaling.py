@@ -5,15 +5,13 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from tests.helpers.command import leave
-from tests.proof import large_contact, large_fe, scaling, two_cores
+from tests.proof import large_contact, large_fe, scaling
 from tests.proof.__main__ import main
-from tribodyn.hbm import threads
 
 
 def test_small_sizes_converge_and_memory_is_their_own(
@@ -88,43 +86,3 @@ def test_both_ways_of_a_large_contact_are_measured_and_agree() -> None:
     assert "residual_flexibility: powers of the contact DOFs: set-up 1.00" in text
     with pytest.raises(ValueError, match='no size "5k": there are 500, 3k, 12k, 48k'):
         large_contact.run(["5k"], lambda said: None)
-
-
-def test_a_response_is_measured_on_one_core_and_on_two(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(two_cores, "CASES", {3: ("0+1",)})
-    monkeypatch.setattr(two_cores, "POINTS", 30)
-    monkeypatch.setattr(two_cores, "COMPARED", 1)
-    monkeypatch.setattr(threads.os, "sched_getaffinity", lambda process: {0, 1}, raising=False)
-    code, out, err = leave(["bench", "--two-cores", "--json"], capsys, main)
-    assert code == 0, err
-    row, back = json.loads(out)
-    assert row["upwards"]
-    assert not back["upwards"]
-    assert row["contact_dofs"] == 27
-    assert row["reached"]
-    assert row["points"][0] >= 30
-    assert row["difference"] < 1e-8
-    assert row["processor"][2] > 0  # the other process has worked
-    assert 0 < row["own_bytes"] < 1e9
-    assert row["ratio"] == pytest.approx(row["one"] / row["two"])
-    assert "least of 3 repeats" in two_cores.as_text([two_cores.CoresCost(27, "0+1", *row_fields(row))])
-    monkeypatch.setattr(threads.os, "sched_getaffinity", lambda process: {0}, raising=False)
-    assert "two cores are needed" in leave(["bench", "--two-cores"], capsys, main)[2]
-
-
-def row_fields(row: dict[str, Any]) -> tuple[Any, ...]:
-    names = (
-        "upwards",
-        "points",
-        "newton_steps",
-        "one",
-        "two",
-        "processor",
-        "from_rest",
-        "difference",
-        "own_bytes",
-        "reached",
-    )
-    return tuple(row[name] for name in names)

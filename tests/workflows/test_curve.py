@@ -10,9 +10,6 @@ import pytest
 
 from tests.helpers.command import leave
 from tests.helpers.matrix_scene import matrix_folder
-from tribodyn.hbm import threads
-from tribodyn.hbm.continuation import two_ends
-from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.harmonic_choice import estimate, widened
 from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.stability.exponents import mark
@@ -87,26 +84,6 @@ def test_stability_and_bounds_are_marked_kept_and_drawn(folder: Path, capsys: py
     assert "changes the amplitude by up to" in out
     assert leave(["draw", str(folder)], capsys)[0] == 0
     assert (folder / "pictures" / "frf.png").is_file()
-
-
-def test_two_threads_follow_it_from_both_ends(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(threads.os, "sched_getaffinity", lambda process: {0, 1}, raising=False)
-    joined, shares = two_ends._Meeting.joined, []
-
-    def watched(self: two_ends._Meeting, stop: float) -> Branch | None:
-        shares.append(self._cut)
-        return joined(self, stop)
-
-    monkeypatch.setattr(two_ends._Meeting, "joined", watched)
-    one, two = run(folder).response, run(folder, "solver.threads=2").response
-    assert one is not None
-    assert two is not None
-    (cut,) = shares
-    assert min(cut) > 2
-    assert str(two.end) == str(one.end)
-    at = np.isin(one.omega, two.omega), np.isin(two.omega, one.omega)
-    assert at[0].sum() >= 20
-    np.testing.assert_allclose(two.response[at[1]], one.response[at[0]], atol=1e-6 * np.abs(one.response).max())
 
 
 @pytest.mark.parametrize("method", ["arc_length", "adaptive"])

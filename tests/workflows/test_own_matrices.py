@@ -158,7 +158,6 @@ def test_rows_that_pick_dofs_are_the_contact_of_those_dofs() -> None:
         (lambda m: own.reduce(m, (), loads=LOADS, outputs={"tip": 3}), "at least one contact"),
         (lambda m: structure(0.01, np.eye(4)), "hold a damping matrix"),
         (lambda m: balance(structure()).response(1, 2, nonsense=3), "nonsense"),
-        (lambda m: balance(structure()).response(1, 2, threads=0), "threads: expected 1 or more, got 0"),
         (lambda m: balance(structure()).response(1, 2, method="magic"), "no continuation 'magic'"),
         (lambda m: balance(structure()).peak(1, 2, "toe"), "no output 'toe': there are tip, bow"),
         (

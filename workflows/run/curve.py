@@ -9,7 +9,7 @@ import numpy as np
 
 from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation import harmonic_choice, peaks, residual_shear, two_ends
+from tribodyn.hbm.continuation import harmonic_choice, peaks, residual_shear
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.continuation.methods import arc_length
@@ -38,10 +38,12 @@ def follow_response(
     method, options = continuation.load(scene.response.method_name), settings.response_options(scene)
     low, high = settings.response_range(scene)
     high = max(low, min(high, highest))
-    branch = two_ends.follow(method, balance, low, high, options, lambda done, wanted: advance(done / wanted, ""))
+    branch = method.follow(balance, low, high, options, lambda done, wanted: advance(done / wanted, ""))
     as_swept = "method" in scene.response.model_fields_set and scene.response.method_name != "adaptive"
     if folds and branch.ended is BranchEnd.JUMPED and not as_swept:
-        whole = arc_length.follow(balance, low, high, arc_length.Options(newton=settings.newton_options(scene)))
+        rules = arc_length.Rules(max_gaps=0)  # a curve with gaps does not lead from fold to fold
+        round_folds = arc_length.Options(rules=rules, newton=settings.newton_options(scene))
+        whole = arc_length.follow(balance, low, high, round_folds)
         if whole.arrived:
             branch = replace(whole, end=whole.end.kind.say(f"{whole.end.detail} by arc length: a sweep jumps"))
     return peaks.with_peaks(balance, branch, settings.peak_of(scene))

@@ -18,7 +18,6 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.joint import Joint, joint_transitions
 from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation import nonlinear_modes as modes
-from tribodyn.hbm.continuation import two_ends
 from tribodyn.hbm.continuation.branch import Branch, amplitude
 from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
 from tribodyn.hbm.excitation import Excitation
@@ -26,7 +25,6 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import Outcome, SolveEnd
 from tribodyn.hbm.stability import exponents as floquet
-from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time import time_integration as time
 from tribodyn.hbm.time import verify
 from tribodyn.hbm.time.stepper import Options
@@ -221,25 +219,21 @@ class Balance:
         stop: float,
         points: int | None = None,
         method: str = "natural",
-        threads: int = 1,
         **options: Any,
     ) -> Branch:
         """The response from one frequency to another [Hz] by a continuation method.
 
         points : for the methods that take them; options : of the method, see its `Options`
-        threads : from 2 on it is followed from both ends at once, see `hbm.continuation.two_ends`
-        Raises  ValueError for methods and options that do not exist, and for less than one thread
+        Raises  ValueError for methods and options that do not exist
         """
-        if threads < 1:
-            raise ValueError(f"threads: expected 1 or more, got {threads}")
         module = continuation.load(method)
         chosen = {**({} if points is None else {"n_points": points}), **options, "newton": self.newton}
         try:
             made = module.Options(**chosen)
         except TypeError as problem:
             raise ValueError(f"continuation {method}: {problem}") from None
-        with limited(threads):
-            return two_ends.follow(module, self.problem, HZ * start, HZ * stop, made)
+        branch: Branch = module.follow(self.problem, HZ * start, HZ * stop, made)
+        return branch
 
     def stability(self, branch: Branch) -> floquet.BranchStability:
         """Stability of every point of a response of this balance, and its bifurcations, by Hill's method."""

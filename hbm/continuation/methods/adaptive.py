@@ -18,7 +18,6 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import parameter
 from tribodyn.hbm.continuation.branch import Branch, BranchBuilder
-from tribodyn.hbm.continuation.curve import Segment
 from tribodyn.hbm.continuation.methods.arc_length import solve_along_load
 from tribodyn.hbm.continuation.methods.natural import EXTRAPOLATION_DEGREE, extrapolate
 from tribodyn.hbm.continuation.parameter import Parameter
@@ -93,7 +92,7 @@ def follow(
     Returns a Branch; `end` says where it ends and why, and where the response jumped to another branch on the way
     """
     options = options or Options()
-    sweep = begin(parameter.of(problem), start, stop, options)
+    sweep = _begin(parameter.of(problem), start, stop, options)
     while (end := sweep.advance()) is None:
         if on_point is not None:
             _tell(on_point, sweep.builder, start, stop, options)
@@ -102,7 +101,7 @@ def follow(
     return sweep.builder.finish(end)
 
 
-def begin(path: Parameter, start: float, stop: float, options: Options) -> _Sweep:
+def _begin(path: Parameter, start: float, stop: float, options: Options) -> _Sweep:
     """The first point, from which to follow."""
     first = None
     if options.guess is not None:
@@ -141,7 +140,6 @@ class _Sweep:
         self._path, self._options, self._stop = path, options, stop
         self.builder = BranchBuilder(path)
         self.builder.add(start, first)
-        self.parts: list[Segment] | None = None
         self._span = stop - start
         self._step, self._shortest, self._crawled = options.step, options.min_step, 0
         self._ahead: list[tuple[float, Solution]] = []  # the nearest last

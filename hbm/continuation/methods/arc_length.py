@@ -113,7 +113,7 @@ def follow(
     Raises  ValueError where start and stop are the same or out of the bounds
     """
     options = options or Options()
-    walk = begin(parameter.of(problem), start, stop, options)
+    walk = _begin(parameter.of(problem), start, stop, options)
     while (end := walk.advance()) is None:
         if on_point is not None:
             done = len(walk.builder.value)
@@ -122,7 +122,7 @@ def follow(
     return walk.builder.finish(end)
 
 
-def begin(path: Parameter, start: float, stop: float, options: Options) -> _Walk:
+def _begin(path: Parameter, start: float, stop: float, options: Options) -> _Walk:
     """The first point, from which to follow; raises ValueError as `follow` does."""
     if start == stop:
         raise ValueError(f"start and stop are the same, {path.say(start)}: there is no curve to follow")
@@ -184,7 +184,6 @@ class _Walk:
         self._start, self._reach = start, abs(stop - start)
         self.builder = BranchBuilder(path)
         self.builder.add(start, first)
-        self.parts: list[Segment] | None = []
         if first.converged:
             self._stepper = Stepper(path, options, first, start, stop)
         self._first: CurvePoint | None = None
@@ -202,7 +201,6 @@ class _Walk:
 
     def advance(self) -> Outcome[BranchEnd] | None:
         """One step more; why the branch ends, or None."""
-        self.parts = []
         end = self._step_on()
         return None if end is None else end.kind.say(end.detail + self.notes)
 
@@ -222,7 +220,6 @@ class _Walk:
                 return None
             return BranchEnd.ENDED.say(f" {here}: {self._stepper.trouble}")
         self._first = self._first or parts[0].start.bare()
-        self.parts = passed = []
         for part in parts:
             bound = next((b for b in self._bounds if part.crosses(b)), None)
             if bound is not None:
@@ -231,7 +228,6 @@ class _Walk:
                 builder.mark_fold()
             assert part.end.solution is not None
             builder.add(part.end.value, part.end.solution, fold=part.end.fold)
-            passed.append(part.bare())
         self._rows.append(len(builder.value))
         return self._came_back(parts)
 
@@ -311,7 +307,6 @@ class _Walk:
 
     def _rewind(self, index: int) -> None:
         """Back to the start of an earlier segment."""
-        self.parts = []
         self._stepper.rewind(index)
         self.builder.truncate(self._rows[index])
         del self._rows[index + 1 :]

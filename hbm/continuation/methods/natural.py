@@ -16,7 +16,6 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation import parameter
 from tribodyn.hbm.continuation.branch import Branch, BranchBuilder
-from tribodyn.hbm.continuation.curve import Segment
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.continuation.parameter import Parameter
 from tribodyn.hbm.newton import NewtonOptions, Solution
@@ -78,17 +77,12 @@ def follow(
         of the branch that are folds are marked
     """
     options = options or Options()
-    sweep, end = begin(parameter.of(problem), start, stop, options), None
+    sweep, end = _Sweep(parameter.of(problem), start, stop, options), None
     while end is None:
         end = sweep.advance()
         if on_point is not None and sweep.done:
             on_point(sweep.done + 1, options.n_points)
     return sweep.builder.finish(end)
-
-
-def begin(path: Parameter, start: float, stop: float, options: Options) -> _Sweep:
-    """The first point, from which to follow."""
-    return _Sweep(path, start, stop, options)
 
 
 class _Sweep:
@@ -101,7 +95,6 @@ class _Sweep:
         self._wanted = (rising if start <= stop else rising[::-1])[1:]  # the same values either way
         self.builder = BranchBuilder(path)
         self.builder.add(start, self._solution)
-        self.parts: list[Segment] | None = None
         self.done = 0
         self._jumps: list[float] = []
 

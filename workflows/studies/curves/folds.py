@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm.continuation import two_ends
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.outcome import SolveEnd
@@ -73,7 +72,7 @@ def folds(scene: Source, within: Number = 0.02, *, overrides: Overrides = (), pr
         balance = modelling.build(file, None, report).balance
         with report.stage("frequency response"):
             options = arc_length.Options(newton=settings.newton_options(file.scene))
-            branch = two_ends.follow(arc_length, balance, low, high, options)
+            branch = arc_length.follow(balance, low, high, options)
         if not branch.converged[0]:
             raise SolveFailed(f"the frequency response {branch.end}")
         found = []

@@ -15,7 +15,6 @@ from tribodyn.fem.cyclic import Sector
 from tribodyn.fem.modes import StaticDivergence
 from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation import two_ends
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import adaptive
 from tribodyn.hbm.linear.travelling_wave import on_wheel
@@ -111,7 +110,7 @@ def follow(balance: HarmonicBalance, frequency: tuple[float, float], tolerance: 
     """
     low, high = (2 * np.pi * hertz for hertz in frequency)
     options = adaptive.Options(tolerance=tolerance, max_points=MAX_POINTS)
-    branch = two_ends.follow(adaptive, balance, low, high, options)
+    branch = adaptive.follow(balance, low, high, options)
     if not branch.arrived:
         raise SolveFailed(f"the frequency response {branch.end}")
     return branch
