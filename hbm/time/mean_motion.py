@@ -107,6 +107,26 @@ class Follower:
         self._motion = self._at(balance, state.omega).start_from(state)
         self._regular = True
 
+    def kept(self) -> np.ndarray:
+        """What moves, as one vector whose length depends on the model alone."""
+        stepper, motion = self._stepper, self._motion
+        assert stepper is not None
+        assert motion is not None
+        z = np.pad(motion.z, (0, 2 * len(stepper.modes[0]) - len(motion.z)))
+        parts = (motion.x, motion.f, motion.memory, motion.bits, motion.hold)
+        return np.concatenate([[stepper.omega, self._regular], z, *(np.ravel(part) for part in parts)])
+
+    def take_up(self, balance: HarmonicBalance, kept: np.ndarray) -> None:
+        """Go on with what `kept` has given, of a balance that differs in its gaps alone."""
+        self._regular = bool(kept[1])
+        stepper = self._stepper = TimeStepper(balance, float(kept[0]), Options(self.options.steps, accelerate=False))
+        pairs, memory = balance.contact.stiffness.shape, balance.memory.shape
+        hold = 0 if stepper.hold is None else len(stepper.hold.dofs)
+        sizes = [2, 2 * len(stepper.modes[0]), *2 * (pairs[0] * pairs[1],), memory[0] * memory[1], pairs[0], hold]
+        _, z, x, f, s, bits, p = np.split(kept, np.cumsum(sizes)[:-1])
+        n = 2 * stepper.n_dynamic
+        self._motion = Moving(z[:n], x.reshape(pairs), f.reshape(pairs), s.reshape(memory), bits.astype(np.int64), p)
+
     def mean(self, balance: HarmonicBalance, omega: float, see: Callable[[PeriodicMotion], np.ndarray]) -> MeanMotion:
         """Follow the motion to a place, until it is periodic or has settled.
 

@@ -197,13 +197,17 @@ class TimeStepper:
         x_free += self._of_hold[2] @ hold
         contact = self.contact._replace(A=self.static)
         closed = np.zeros(self.n_pair, bool)
-        _, rounds, _ = time_step.solve_contact(
-            self.law, contact, x_free, x.copy(), closed, s, x, f, float(np.abs(x).max()), np.zeros_like(self.static)
+        scale, inverse = float(np.abs(x).max()), np.zeros_like(self.static)
+        rounds, _ = time_step.solve_contact(
+            self.law, contact, x_free, x.copy(), closed, s, x, f, scale, inverse, self._space(s)
         )
         if rounds < 0:
             raise IntegrationFailed("the contact has no equilibrium to start from")
         s, bits = time_step.memory_after(self.law, x[None], self.contact, s)
         return Moving(z.copy(), x, f, s, bits, np.array(hold))
+
+    def _space(self, memory: np.ndarray) -> time_step.Space:
+        return time_step.Space.of(self.n_pair, self.c, memory.shape[1])
 
     def period(self, start: Moving, with_slopes: bool = False) -> tuple[Moving, Record, int, float]:
         """March one period from t = 0.
@@ -225,7 +229,7 @@ class TimeStepper:
                 rest=linear.rest + rest @ start.hold,
                 output_rest=linear.output_rest + output_rest @ start.hold,
             )
-        failed, spent, speed = time_step.march(self.law, self.contact, linear, end, record)
+        failed, spent, speed = time_step.march(self.law, self.contact, linear, end, record, self._space(end.memory))
         if failed >= 0:
             raise IntegrationFailed(
                 f"the contact iteration did not converge in step {failed} of {n}: take more steps per period"

@@ -21,6 +21,8 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
+from llvmlite import ir
+from numba.extending import intrinsic
 
 from tribodyn.hbm.contact.law import SEPARATES
 
@@ -75,6 +77,25 @@ class Moving(NamedTuple):
     hold: np.ndarray
 
 
+class Space(NamedTuple):
+    """Work space of a step: `room` of one pair, three for its equations, y = A f, status bits, and the x and f tried."""
+
+    work: tuple[np.ndarray, ...]
+    M: np.ndarray
+    r: np.ndarray
+    b: np.ndarray
+    y: np.ndarray
+    bits: np.ndarray
+    x: np.ndarray
+    f: np.ndarray
+
+    @classmethod
+    def of(cls, n_pair: int, c: int, n_state: int) -> Space:
+        """For so many pairs, components and states of the memory."""
+        small = np.zeros((c, c)), np.zeros(c), np.zeros(c), np.zeros(n_pair * c)
+        return cls(room(c, n_state), *small, np.zeros(n_pair, np.int64), *np.zeros((2, n_pair, c)))
+
+
 class Record(NamedTuple):
     """One period, at the ends of its steps.
 
@@ -88,6 +109,21 @@ class Record(NamedTuple):
     y: np.ndarray
     bits: np.ndarray
     slopes: np.ndarray
+
+
+@intrinsic
+def bare(_context, array):  # type: ignore[no-untyped-def]
+    """An array without its count of references: counting takes most of the time of a law that is called pair by pair.
+
+    The caller keeps the array alive
+    """
+
+    def code(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        made = context.make_array(signature.args[0])(context, builder, value=arguments[0])
+        made.meminfo = ir.Constant(made.meminfo.type, None)
+        return made._getvalue()
+
+    return array(array), code
 
 
 @numba.njit(cache=True)
@@ -243,7 +279,7 @@ def solve_pair(step, x0, was_open, x, s, p, gap, normal, own, b, near, work, M, 
 
 @numba.njit(cache=True)
 def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, near, backward, work, M, r, b):
-    """One round of Gauss-Seidel over all pairs; y = A f and everything else moves on in place.
+    """One round of Gauss-Seidel over all pairs; y = A f and everything else moves on in place but x of open pairs.
 
     Returns the largest displacement of a pair, negative where one failed
     """
@@ -253,6 +289,9 @@ def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, near, backward,
     for turn in range(n_pair):
         i = n_pair - 1 - turn if backward else turn
         o = i * c
+        opened = bits[i] == SEPARATES
+        if opened and x_free[o + normal] - y[o + normal] < contact.gap[i]:
+            continue  # exerts no force
         own = A[o : o + c, o : o + c].T
         off = 0.0
         for a in range(c):
@@ -260,15 +299,10 @@ def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, near, backward,
             off = max(off, abs(b[a] - x[i, a]))
             for q in range(c):
                 b[a] += own[a, q] * f[i, q]
-        if off <= 0.1 * near and bits[i] != 0:
-            continue
-        if bits[i] == SEPARATES and b[normal] < contact.gap[i]:  # and exerts no force
-            for a in range(c):
-                moved = max(moved, abs(x[i, a] - b[a]))
-                x[i, a] = b[a]
-            continue
-        if bits[i] == SEPARATES:
+        if opened:
             put(b, x[i])
+        elif off <= 0.1 * near and bits[i] != 0:
+            continue
         bits[i] = solve_pair(
             step, x0[i], was_open[i], x[i], s[i], contact.p[i], contact.gap[i], normal, own, b, 0.1 * near, work, M, r
         )
@@ -286,23 +320,23 @@ def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, near, backward,
 
 
 @numba.njit(cache=True)
-def solve_contact(step, contact, x_free, x0, was_open, s, x, f, scale, inverse):
+def solve_contact(step, contact, x_free, x0, was_open, s, x, f, scale, inverse, space):
     """Solve x + A f(x) = x_free for all pairs from the guesses x, f, which are overwritten; s is the memory before.
 
     inverse : (n_contact, n_contact) of the derivative in the last step that needed Newton's method, zeros before the
         first; such steps come in a row, and one inverse serves many of them
-    Returns status bits (n_pair,), rounds spent (negative: failed) and the scale of x
+    Returns rounds spent (negative: failed) and the scale of x
     """
     n_pair, c = x.shape
-    n_state = s.shape[1]
-    work, M, r, b = room(c, n_state), np.zeros((c, c)), np.zeros(c), np.zeros(c)
-    bits = np.zeros(n_pair, np.int64)
+    work, M, r, b, y, bits, _, _ = space
+    for i in range(n_pair):
+        bits[i] = SEPARATES if contact.normal >= 0 and was_open[i] and not f[i].any() else 0
     if inverse[0, 0] != 0.0:
         rounds, scale = chord(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inverse)
         if rounds > 0:
-            return bits, rounds, scale
+            return rounds, scale
         return newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inverse)
-    y = times(contact.A, f)
+    put(times(contact.A, f), y)
     before = np.inf
     slow = 0
     for it in range(SWEEPS):
@@ -310,7 +344,10 @@ def solve_contact(step, contact, x_free, x0, was_open, s, x, f, scale, inverse):
         moved = sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, near, it % 2 == 1, work, M, r, b)
         scale = max(scale, np.abs(x).max())
         if 0.0 <= moved <= TOLERANCE * scale:
-            return bits, it + 1, scale
+            for i in range(n_pair):
+                if bits[i] == SEPARATES:
+                    put(x_free[i * c : i * c + c] - y[i * c : i * c + c], x[i])
+            return it + 1, scale
         slow += moved > SLOW * before
         if moved < 0.0 or slow > 5:
             break
@@ -392,7 +429,7 @@ def newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inve
         error = np.abs(r).max()
         if error <= TOLERANCE * scale:
             put(np.linalg.inv(full), inverse)
-            return bits, SWEEPS + it + 1, scale
+            return SWEEPS + it + 1, scale
         if error >= best and length > SHORTEST:  # a kink lies on the way: go less far
             length *= 0.5
         else:
@@ -404,19 +441,25 @@ def newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inve
                 add(np.dot(np.ascontiguousarray(A[o : o + c].T), np.ascontiguousarray(J[i])), full, 0, o)
             direction = np.linalg.solve(full, r)
         put(x_best - length * direction.reshape(x.shape), x)
-    return bits, -1, scale
+    return -1, scale
 
 
 @numba.njit(cache=True)
-def march(step, contact, linear, moving, record):
+def march(step, contact, linear, moving, record, space):
     """March one period; `moving` moves on in place, the record is filled.
 
     Returns the step that failed or -1, the rounds of the contact solver spent, and the largest |h v|
     """
-    z, x, f, memory, bits, _ = moving
+    z, x, f, memory, bits = bare(moving.z), bare(moving.x), bare(moving.f), bare(moving.memory), bare(moving.bits)
+    contact = Contact(bare(contact.p), bare(contact.gap), contact.normal, bare(contact.A))
+    w = space.work
+    work = (bare(w[0]), bare(w[1]), bare(w[2]), bare(w[3]), bare(w[4]), bare(w[5]), bare(w[6]), bare(w[7]))
+    space = Space(
+        work, bare(space.M), bare(space.r), bare(space.b), bare(space.y), bare(space.bits), bare(space.x), bare(space.f)
+    )
+    x_new, f_new = space.x, space.f
     n_pair, c = x.shape
-    m, n_state = linear.Q.shape[1], memory.shape[1]
-    work = room(c, n_state)
+    m = linear.Q.shape[1]
     spent, scale = 0, np.abs(x).max()
     chained = record.slopes.shape[0] > 0
     inverse = np.zeros((x.size, x.size))
@@ -429,10 +472,10 @@ def march(step, contact, linear, moving, record):
         half_pull = 0.5 * np.dot(f.ravel(), linear.U)
         z_free = np.dot(linear.E, z) + linear.impulse[j] - np.dot(linear.Q, half_pull)
         x_free = np.dot(linear.U, z_free[:m]) + linear.rest[j]
-        f_new = np.where(f == 0.0, 0.0, 2.0 * f - f_before)
-        x_new = (x_free - times(contact.A, f_new)).reshape(n_pair, c)
+        put(np.where(f == 0.0, 0.0, 2.0 * f - f_before), f_new)
+        put(x_free - times(contact.A, f_new), x_new)
         was_open = bits == SEPARATES
-        _, rounds, scale = solve_contact(step, contact, x_free, x, was_open, memory, x_new, f_new, scale, inverse)
+        rounds, scale = solve_contact(step, contact, x_free, x, was_open, memory, x_new, f_new, scale, inverse, space)
         spent += abs(rounds)
         if rounds < 0:
             return j, spent, speed

@@ -19,6 +19,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.continuation.operating_point import NoPeak, OperatingPoint
 from tribodyn.hbm.outcome import Outcome, SolveEnd, WearEnd
 from tribodyn.hbm.threads import single
+from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.hbm.wear import fewer_harmonics
 from tribodyn.hbm.wear.evolution import (
     LARGEST_SHIFT,
@@ -34,6 +35,7 @@ from tribodyn.hbm.wear.evolution import (
 )
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, WearRow, history, rows_to_resume
 from tribodyn.hbm.wear.implicit_stage import WearingBalance
+from tribodyn.hbm.wear.machine_motion import MachineMotion
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
 from tribodyn.hbm.wear.step_control import STEP_RATIO_LIMITS, Tolerance, growth, local_error
 
@@ -67,6 +69,10 @@ class StepRules:
     first_moved: float = 1e-3
     further_moved: float = 4.0
     gain_accuracy: float = 1e-9  # of the depth, for laws whose depth per work is not constant
+    # first depth in time, and the shortest: the scatter of the rates is no error that shorter steps lower; both over
+    # the tolerance on depth
+    first_in_time: float = 0.3
+    shortest_in_time: float = 0.05
 
 
 RULES = StepRules()
@@ -83,19 +89,26 @@ def evolve(
     max_steps: int = 10000,
     on_row: Callable[[WearRow], None] | None = None,
     resume: WearHistory | None = None,
+    follows: bool = False,
 ) -> WearHistory:
     """Wear the contact until it is lost, with steps chosen by a local error estimate on depth and on life.
 
+    follows : whether a motion that a machine leaves is followed in time, see hbm.wear.machine_motion
     on_row, resume, return : as for the thesis's rule; `step_error` of a row is its estimate over the tolerance. The
     last touch of a vibrating contact does not end in finite time: `least_preload_share` ends the run where
     `lost_below` does not.
     Raises  ValueError where the wear law wears pairs that do no friction work
     """
     problem = replace(problem, lost_below=max(problem.lost_below, RULES.least_preload_share))
+    machine = MachineMotion(problem) if follows else None
     rows = rows_to_resume(resume)
     if rows:  # the state after the last step was not kept: take the step again, to the same bits
         again = rows.pop()
-        state = _step(problem, tolerance, replace(state_of(problem, again), solves=0), rows).after
+        state = replace(state_of(problem, again), solves=0)
+        if machine is not None:
+            machine.take_up(again)
+            state = machine.of(state)
+        state = _taken(problem, machine, tolerance, state, rows).after
         rows.append(again)
     else:
         state = assess(problem, np.zeros_like(problem.area), 0.0, None)
@@ -103,6 +116,8 @@ def evolve(
     end = WearEnd.STEPS_DONE.say(f" {max_steps} wear steps")
     while len(rows) < max_steps and state is not None:
         state = at_rest.of(state)
+        if machine is not None:
+            state = machine.of(state)
         first = (first_preload(problem, rows, state), first_at_rest(rows, state))
         reason = reason_to_stop(problem, state, *first, rows, tolerance.share * tolerance.scale)
         if reason:
@@ -110,7 +125,7 @@ def evolve(
             rows.append(row_of(problem, state, 0.0, nothing, nothing, 0.0, np.zeros(1 + len(state.points))))
             end = reason
         else:
-            taken = _step(problem, tolerance, state, rows)
+            taken = _taken(problem, machine, tolerance, state, rows)
             rows.append(taken.row)
             state, end = taken.after, taken.failure or end
         if on_row is not None:
@@ -152,6 +167,55 @@ class _Lost:
 
     failure: Outcome[WearEnd] | None
     solves: int
+
+
+def _taken(
+    problem: WearProblem,
+    machine: MachineMotion | None,
+    tolerance: Tolerance,
+    state: WearState,
+    rows: Sequence[WearRow],
+) -> _Taken:
+    """A step along the motion that a state has."""
+    if machine is None or state.means is None:
+        return _step(problem, tolerance, state, rows)
+    try:
+        return _step_in_time(problem, machine, tolerance, state, rows)
+    except IntegrationFailed as failure:
+        nothing = np.zeros_like(problem.area)
+        row = row_of(problem, state, 0.0, nothing, nothing, 0.0, np.zeros(1 + len(state.points)))
+        return _Taken(row, None, WearEnd.SOLVE_FAILED.say(f" in time: {failure}"))
+
+
+def _step_in_time(
+    problem: WearProblem, machine: MachineMotion, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow]
+) -> _Taken:
+    """A step along the machine's motion; where another peak overtakes, it ends there."""
+    unit = tolerance.share * tolerance.scale / float(state.rate.max())
+    stride = float(rows[-1].plan[0]) if rows and rows[-1].plan[0] > 0 else RULES.first_in_time * unit
+    solves, means = state.solves, state.means
+    assert means is not None
+    periods = means.periods
+    while True:
+        there = assess(problem, machine.ahead(state, stride), state.cycles + stride, state)
+        there, worn, deviation = machine.step(state, there, stride)
+        solves += there.solves
+        periods += there.means.periods if there.means else 0
+        error = local_error(tolerance, problem.area, deviation, worn, stride, state.cycles + stride)
+        if error <= 1.0 or stride <= RULES.shortest_in_time * unit:
+            break
+        stride = max(stride * growth(error), RULES.shortest_in_time * unit)
+    plan = np.array([stride * growth(error), *np.full(len(state.points), RULES.unknown_slope)])
+    after = assess(problem, state.depth + worn, state.cycles + stride, state)
+    solves += after.solves
+    if not after.failure and _is_due(problem, state, there, rows):
+        found, spent = _overtaken(problem, after)
+        solves += spent
+        if found is not None:
+            after, plan = worn_state(problem, after.depth, after.cycles, found, 0), np.zeros(1 + len(state.points))
+    work = stride * 0.5 * (state.work + there.work)
+    row = row_of(problem, replace(state, solves=solves), stride, worn, work, error, plan)
+    return _Taken(replace(row, periods=periods), replace(after, solves=0))
 
 
 def _step(whole: WearProblem, tolerance: Tolerance, state: WearState, rows: Sequence[WearRow]) -> _Taken:
@@ -216,7 +280,7 @@ def _step_of(
             worn = second.depth - state.depth
             error = local_error(tolerance, problem.area, deviation, worn, stride, second.cycles)
         if error <= 1.0:
-            preload = problem.preload(second.points[0].state)
+            preload = problem.preload_of(second)
             if preload >= RULES.event_window[0] * target:
                 found = None
                 if jumped or _is_due(problem, state, second, rows):
@@ -233,7 +297,7 @@ def _step_of(
                 stride = 0.5 * (highest_until + jumped[0])
                 continue
             longest = stride
-            stride *= _share_to(target, problem.preload(state.points[0].state), preload)
+            stride *= _share_to(target, problem.preload_of(state), preload)
         elif jumped is not None:
             break
         else:
@@ -256,7 +320,7 @@ def _step_of(
 def _is_due(problem: WearProblem, state: WearState, second: WearState, rows: Sequence[WearRow]) -> bool:
     """Whether higher peaks are looked for after a step from a state: each time the preload has fallen by some share."""
     first = first_preload(problem, rows, state)
-    shares = np.array([problem.preload(s.points[0].state) for s in (state, second)]) / (first or 1.0)
+    shares = np.array([problem.preload_of(s) for s in (state, second)]) / (first or 1.0)
     if np.any(shares <= 0):
         return True
     before, after = np.floor(np.log(shares) / np.log(RULES.looked_at))
@@ -330,7 +394,7 @@ def _explicit_step(
 
 def _event(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) -> float:
     """The next preload at which a row is wanted [N]: where life is stated to end, and where the run is to end."""
-    first, now = first_preload(problem, rows, state), problem.preload(state.points[0].state)
+    first, now = first_preload(problem, rows, state), problem.preload_of(state)
     shares = [share for share in (LIFE_SHARE, problem.lost_below) if share > 0]
     return max((share * first for share in shares if share * first < now), default=0.0)
 

@@ -104,6 +104,12 @@ class WearProblem:
         """Indices of the pairs of the joints that wear."""
         return np.sort(np.concatenate([self.balance.contact.joint(name).rows for name in self.wearing]))
 
+    def preload_of(self, state: WearState) -> float:
+        """Mean normal force of the joints that wear in the first duty of a state [N]."""
+        if state.means is not None:
+            return float(state.means.normal_force[self.pairs].sum())
+        return self.preload(state.points[0].state)
+
     def preload(self, state: State) -> float:
         """Static normal force of the joints that wear [N]."""
         if len(self.wearing) == len(self.balance.contact.joints):
@@ -119,12 +125,33 @@ class WearProblem:
 
 
 @dataclass(frozen=True)
+class Means:
+    """Means over the periods of a motion in time, of the first duty but for what says how well they are known.
+
+    energy : (n_pair,) friction work per period [J]; normal_force : (n_pair,) [N]; amplitude : of the first output [m]
+    spread : standard deviation of the work of a period, over its mean; error : standard error of that mean, relative
+    settled : whether the means came to rest; periods : marched
+    moving : what moved before, to begin from again; empty where the motion began in the balance
+    """
+
+    energy: np.ndarray
+    normal_force: np.ndarray
+    amplitude: float
+    spread: float
+    error: float
+    settled: bool
+    periods: int
+    moving: np.ndarray
+
+
+@dataclass(frozen=True)
 class WearState:
     """A worn contact with its solved duties.
 
     depth : (n_pair,) [m]; cycles : passed before; points : one per duty; pairs : of the joints that wear
     rate : (n_pair,) wear depth per cycle [m], work : (n_pair,) friction work per cycle [J]; averages over the mission
     preload_at_rest : [N], nan where it was not asked for; failure_at_rest : why it was not found
+    means : of the motion in time where a machine leaves that of the balance, see hbm.wear.machine_motion
     """
 
     depth: np.ndarray
@@ -136,6 +163,7 @@ class WearState:
     pairs: np.ndarray
     preload_at_rest: float = float("nan")
     failure_at_rest: Outcome[WearEnd] | None = None
+    means: Means | None = None
 
     @property
     def failure(self) -> Outcome[WearEnd] | None:
@@ -149,6 +177,8 @@ class WearState:
     @property
     def separated(self) -> bool:
         """Whether no pair that can wear touches at any moment of any duty."""
+        if self.means is not None:
+            return not self.rate.any() and not self.means.normal_force[self.pairs].any()
         return all(bool(np.all(point.state.cycle.status[self.pairs] == SEPARATES)) for point in self.points)
 
 
@@ -241,7 +271,7 @@ def reason_to_stop(
         return WearEnd.LOST_AT_REST.say(f" {share:.3g} of its first value")
     if state.separated:
         return WearEnd.LOST.say()
-    preload = problem.preload(state.points[0].state)
+    preload = problem.preload_of(state)
     if preload < problem.lost_below * first_preload:
         return WearEnd.PRELOAD_LOST.say(f" {problem.lost_below:.3g} of its first value")
     lost = lost_joint(problem, state, rows) if problem.any_joint else None
@@ -263,7 +293,7 @@ def lost_joint(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) 
     if not rows or "n" not in problem.balance.contact.components or not problem.balance.basis.has_static:
         return None
     contact, now = problem.balance.contact, state.points[0].state.cycle.force
-    normal = now[:, contact.components.index("n"), 0]
+    normal = now[:, contact.components.index("n"), 0] if state.means is None else state.means.normal_force
     size = contact.n_pair // problem.copies
     for name in problem.wearing:
         pairs = contact.joint(name).rows
@@ -288,8 +318,13 @@ def row_of(
     """The history row of a state, with what its step wears [m] and dissipates [J]."""
     balance = problem.in_duty(problem.mission[0], state.depth)
     taken = (cycles_in_step, worn, work, state.solves, step_error, plan, state.preload_at_rest)
-    preload = problem.preload(state.points[0].state)
-    return WearRow.of(balance, state.points, state.depth, state.cycles, preload, *taken)
+    preload = problem.preload_of(state)
+    row = WearRow.of(balance, state.points, state.depth, state.cycles, preload, *taken)
+    means = state.means
+    if means is None:
+        return row
+    of_motion = {name: getattr(means, name) for name in ("energy", "normal_force", "amplitude", "spread", "moving")}
+    return replace(row, **of_motion, mean_error=means.error, periods=means.periods, settled=means.settled)
 
 
 def state_of(problem: WearProblem, row: WearRow) -> WearState:
@@ -306,7 +341,7 @@ def state_of(problem: WearProblem, row: WearRow) -> WearState:
 
 def first_preload(problem: WearProblem, rows: Sequence[WearRow], state: WearState) -> float:
     """Preload of the unworn contact [N]."""
-    return rows[0].preload if rows else problem.preload(state.points[0].state)
+    return rows[0].preload if rows else problem.preload_of(state)
 
 
 def first_at_rest(rows: Sequence[WearRow], state: WearState) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 
 LIFE_SHARE = 1e-3  # of the first preload, where the life that is stated ends
+OF_MOTION = ("spread", "mean_error", "settled", "periods", "moving")  # of a row whose motion was marched in time
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,11 @@ class WearRow:
     duty_omega: np.ndarray
     duty_displacement: np.ndarray
     preload_at_rest: float = float("nan")
+    spread: float = 0.0
+    mean_error: float = 0.0
+    settled: bool = True
+    periods: int = 0
+    moving: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def displacement(self) -> np.ndarray:
@@ -122,6 +128,13 @@ class WearHistory:
     end : why the run ended; its text is a sentence
     preload_at_rest : (n_row,) static normal force of the whole contact without the harmonic loads [N]; nan where the
         end of the run does not depend on it
+    periods : (n_row,) marched in time, where a machine leaves the motion of the balance: energy, normal_force, preload
+        and amplitude then are means over its own, while omega, displacement, force and response stay the balance's;
+        zero elsewhere. None in a run that is nowhere marched, as the four below
+    spread : (n_row,) standard deviation of the work of a period, over its mean; mean_error : (n_row,) standard error of
+        that mean, relative; settled : (n_row,) whether the means came to rest
+    moving : (n_row, n) what moved before the row's periods, see hbm.time.mean_motion.Follower; zeros where they began
+        in the balance
     """
 
     cycles: np.ndarray
@@ -144,6 +157,23 @@ class WearHistory:
     duty_displacement: np.ndarray
     end: Outcome[WearEnd]
     preload_at_rest: np.ndarray | None = None
+    spread: np.ndarray | None = None
+    mean_error: np.ndarray | None = None
+    settled: np.ndarray | None = None
+    periods: np.ndarray | None = None
+    moving: np.ndarray | None = None
+
+    @property
+    def in_time(self) -> np.ndarray:
+        """(n_row,) whether the row's motion is one in time that a machine makes, and not that of the balance."""
+        return np.zeros(len(self.cycles), bool) if self.periods is None else self.periods > 0
+
+    @property
+    def scatter(self) -> float:
+        """Standard error of the cycles passed by the scatter of the motions in time, relative."""
+        if self.mean_error is None:
+            return 0.0
+        return float(np.linalg.norm(self.cycles_in_step * self.mean_error)) / float(self.cycles_in_step.sum() or 1.0)
 
     @property
     def frequency(self) -> np.ndarray:
@@ -194,7 +224,12 @@ def rows_to_resume(interrupted: WearHistory | None) -> list[WearRow]:
 
 def history(rows: list[WearRow], end: Outcome[WearEnd]) -> WearHistory:
     """Rows put together."""
-    columns = {f.name: np.array([getattr(r, f.name) for r in rows]) for f in fields(WearRow)}
+    marched = any(row.periods for row in rows)
+    names = [f.name for f in fields(WearRow) if marched or f.name not in OF_MOTION]
+    if marched:
+        width = max(len(row.moving) for row in rows)
+        rows = [replace(row, moving=np.pad(row.moving, (0, width - len(row.moving)))) for row in rows]
+    columns = {name: np.array([getattr(row, name) for row in rows]) for name in names}
     if np.isnan(columns["preload_at_rest"]).all():
         del columns["preload_at_rest"]
     return WearHistory(**columns, end=end)

@@ -41,5 +41,5 @@ class PreloadAtRest:
         if self._before.failure:
             failure = self._before.failure.kind.say(f" at rest{self._before.failure.detail}")
             return replace(state, failure_at_rest=failure, preload_at_rest=float(np.nan), solves=solves)
-        preload = problem.preload(self._before.points[0].state)
+        preload = problem.preload_of(self._before)
         return replace(state, preload_at_rest=preload, solves=solves)

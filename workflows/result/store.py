@@ -118,6 +118,11 @@ SCHEMA: dict[str, tuple[type, dict[str, tuple[tuple[str, ...], str]]]] = {
             "duty_omega": (("row", "duty"), "rad/s"),
             "duty_displacement": (("row", "duty", "contact", "coefficient"), "m"),
             "preload_at_rest": (("row",), "N"),
+            "spread": (("row",), ""),
+            "mean_error": (("row",), ""),
+            "settled": (("row",), ""),
+            "periods": (("row",), ""),
+            "moving": (("row", "moving"), ""),
         },
     ),
     "worn": (

@@ -1,0 +1,233 @@
+"""The motion that a machine makes at a worn contact, where it leaves that of the balance, and wear steps along it.
+
+A periodic motion that a push grows on is left, for another one or for one that never repeats itself. Hill's method
+says, at little cost, where that may be; there the motion is marched through time from that of the wear state before,
+until its means have settled (hbm.time.mean_motion). The place stays that of the balance, such as its peak.
+Pressure reacts to local depth at once, so that dw/dZ = r(w) is stiff. A Rosenbrock step of second order takes an
+approximate derivative of r: the rate of a pair in proportion to its normal force, and that by the static stiffness of
+the pairs that touch. Its order does not depend on how good the derivative is.
+Source  ROS2: Verwer, Spee, Blom and Hundsdorfer 1999, SIAM J. Sci. Comput. 20(4), gamma = 1 - 1/sqrt(2)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.stability import exponents
+from tribodyn.hbm.time import wave_in_time
+from tribodyn.hbm.time.mean_motion import Follower, MeanMotion, MeanOptions
+from tribodyn.hbm.time.time_integration import PeriodicMotion
+from tribodyn.hbm.wear import law as wear_law
+from tribodyn.hbm.wear.evolution import Means, WearProblem, WearState
+from tribodyn.hbm.wear.history import WearRow
+
+GAMMA = 1 - 1 / np.sqrt(2)
+
+
+@dataclass(frozen=True)
+class MotionRules:
+    """What a motion in time is followed with.
+
+    steps : per period at least; per_harmonic : for each harmonic of the balance
+    accuracy : standard error of a mean, relative; those of many wear steps average out in a life
+    most_components : of the contact
+    """
+
+    steps: int = 128
+    per_harmonic: int = 16
+    accuracy: float = 1e-2
+    most_components: int = 600
+
+
+RULES = MotionRules()
+
+
+@dataclass(frozen=True)
+class MotionExposure(wear_law.Exposure):
+    """One period of a motion in time as a wear law sees it; `state` is the part of it in the balance's harmonics."""
+
+    motion: PeriodicMotion | None = None
+
+    @cached_property
+    def energy(self) -> np.ndarray:
+        """(n_pair,) friction work over the period [J]."""
+        assert self.motion is not None
+        return np.maximum(self.motion.energy[self.joint.rows], 0.0)
+
+    @property
+    def status(self) -> np.ndarray:
+        """(n_pair,) bits of what happened in the period."""
+        assert self.motion is not None
+        return self.motion.status[self.joint.rows]
+
+    @cached_property
+    def history(self) -> tuple[np.ndarray, np.ndarray]:
+        """Displacement [m] and contact force [N], both (n_pair, n_component, n_step)."""
+        assert self.motion is not None
+        at = np.ix_(self.joint.rows, self.balance.contact.columns(self.joint))
+        return self.motion.x[at], self.motion.force[at]
+
+
+class MachineMotion:
+    """The motions of all duties, each followed while the contact wears and the balance's own motion is left."""
+
+    def __init__(self, problem: WearProblem):
+        self._problem = problem
+        steps = max(RULES.steps, RULES.per_harmonic * problem.balance.basis.harmonics[-1])
+        self._options = MeanOptions(steps, accuracy=RULES.accuracy)
+        self._followers: list[Follower] = []
+        fits = problem.balance.contact.stiffness.size <= RULES.most_components
+        self._serves = fits and not wave_in_time.is_wave(problem.balance)
+        self._moving = np.zeros(0)
+
+    @cached_property
+    def _stiffness(self) -> np.ndarray:
+        return static_stiffness(self._problem.balance)
+
+    def take_up(self, row: WearRow) -> None:
+        """What moved when the row of an interrupted run was come to."""
+        if not row.moving.any():
+            return
+        balances = [self._problem.in_duty(duty, row.depth) for duty in self._problem.mission]
+        self._followers = [Follower(self._options) for _ in balances]
+        for follower, balance, part in zip(self._followers, balances, np.split(row.moving, len(balances)), strict=True):
+            follower.take_up(balance, part)
+
+    def of(self, state: WearState) -> WearState:
+        """A state of the balance with the rates of the machine's motion; as it is where that is the balance's own.
+
+        Raises  IntegrationFailed
+        """
+        if not self._serves or state.failure or not self._is_left(state):
+            self._followers, self._moving = [], np.zeros(0)
+            return state
+        self._moving = np.concatenate([f.kept() for f in self._followers]) if self._followers else np.zeros(0)
+        if not self._followers and not self._begins(state):
+            return state
+        return self._along(state, [point.state.omega for point in state.points])
+
+    def step(self, state: WearState, there: WearState, stride: float) -> tuple[WearState, np.ndarray, np.ndarray]:
+        """A step from a state, with the balance at the depth that `ahead` foresees.
+
+        Returns the state there with its rates, the depth that wears (n_pair,) and its deviation from a step of first
+        order [m]
+        """
+        near = state if there.failure else there
+        there = self._along(there, [point.state.omega for point in near.points])
+        matrix, k1 = self._ahead(state, stride)
+        k2 = np.linalg.solve(matrix, there.rate - 2 * k1)
+        return there, np.maximum(stride * (1.5 * k1 + 0.5 * k2), 0.0), 0.5 * stride * (k1 + k2)
+
+    def ahead(self, state: WearState, stride: float) -> np.ndarray:
+        """Depth (n_pair,) [m] at which a step from a state takes its second rate."""
+        return state.depth + stride * np.maximum(self._ahead(state, stride)[1], 0.0)
+
+    def _ahead(self, state: WearState, stride: float) -> tuple[np.ndarray, np.ndarray]:
+        matrix = np.eye(len(state.depth)) + GAMMA * stride * self._fall(state)
+        return matrix, np.linalg.solve(matrix, state.rate)
+
+    def _is_left(self, state: WearState) -> bool:
+        """Whether Hill's method finds a perturbation of one of the duties that grows."""
+        balances = (self._problem.in_duty(duty, state.depth) for duty in self._problem.mission)
+        try:
+            return any(not exponents.stability(b, p.state).stable for b, p in zip(balances, state.points, strict=True))
+        except ValueError:  # a model without exponents
+            self._serves = False
+            return False
+
+    def _begins(self, state: WearState) -> bool:
+        """March the motion of every duty from the balance; False where there is no equation of motion in time."""
+        self._followers = [Follower(self._options) for _ in state.points]
+        try:
+            for follower, duty, point in zip(self._followers, self._problem.mission, state.points, strict=True):
+                follower.start(self._problem.in_duty(duty, state.depth), point.state)
+        except ValueError:
+            self._followers, self._serves = [], False
+        return self._serves
+
+    def _along(self, state: WearState, omegas: Sequence[float]) -> WearState:
+        problem, depth, cycles = self._problem, state.depth, state.cycles
+        found: list[MeanMotion] = []
+        for follower, duty, omega in zip(self._followers, problem.mission, omegas, strict=True):
+            balance = problem.in_duty(duty, depth)
+
+            def wears(motion: PeriodicMotion, balance: HarmonicBalance = balance) -> np.ndarray:
+                return _depth_rate(problem, balance, motion, depth, cycles)
+
+            found.append(follower.mean(balance, omega, wears))
+        shares = [duty.share for duty in problem.mission]
+        rate, work = (
+            np.sum([s * part for s, part in zip(shares, parts, strict=True)], axis=0)
+            for parts in ([m.seen for m in found], [m.energy for m in found])
+        )
+        works = np.array([s * float(m.energy.sum()) for s, m in zip(shares, found, strict=True)])
+        weight = works / works.sum() if works.sum() > 0 else works
+        first = found[0]
+        means = Means(
+            energy=first.energy,
+            normal_force=first.normal_force,
+            amplitude=float(first.amplitude[0]),
+            spread=float(weight @ [m.spread for m in found]),
+            error=float(np.linalg.norm(weight * [m.error for m in found])),
+            settled=all(m.settled for m in found),
+            periods=sum(m.periods for m in found),
+            moving=self._moving,
+        )
+        return replace(state, rate=rate, work=work, means=means)
+
+    def _fall(self, here: WearState) -> np.ndarray:
+        """(n_pair, n_pair) - d rate / d depth, about."""
+        assert here.means is not None
+        force = here.means.normal_force
+        touches = force > 0
+        fall = np.zeros((len(force), len(force)))
+        if not touches.any():
+            return fall
+        stiffness = self._stiffness[np.ix_(touches, touches)]
+        if not touches.all():
+            coupled = self._stiffness[np.ix_(touches, ~touches)]
+            rest = self._stiffness[np.ix_(~touches, ~touches)]
+            stiffness = stiffness - coupled @ np.linalg.lstsq(rest, coupled.T, rcond=None)[0]
+        fall[np.ix_(touches, touches)] = (here.rate[touches] / force[touches])[:, None] * stiffness
+        return fall
+
+
+def _depth_rate(
+    problem: WearProblem, balance: HarmonicBalance, motion: PeriodicMotion, depth: np.ndarray, cycles: float
+) -> np.ndarray:
+    """(n_pair,) wear depth of one period [m], by the laws of the joints."""
+    x = motion.coefficients(motion.x, balance.basis)
+    state = balance.evaluate(motion.omega, x, jacobian=False)
+    rate = np.zeros_like(depth)
+    for name, wear in problem.wearing.items():
+        pairs = balance.contact.joint(name).rows
+        of_joint = (problem.area[pairs], problem.numbers(name), depth[pairs])
+        exposure = MotionExposure(balance, state, *of_joint, cycles, name, motion)
+        rate[pairs] = wear_law.depth_rate(wear.law, exposure)
+    return rate
+
+
+def static_stiffness(balance: HarmonicBalance) -> np.ndarray:
+    """(n_pair, n_pair) static normal forces that fall when gaps open, with every pair closed and stuck [N/m].
+
+    Zero where the contact has no normal component or the balance no harmonic 0
+    """
+    contact, basis = balance.contact, balance.basis
+    found = np.zeros((contact.n_pair, contact.n_pair))
+    if "n" not in contact.components or not basis.has_static:
+        return found
+    width = len(contact.components)
+    rows = contact.components.index("n") + width * np.arange(contact.n_pair)
+    k = balance.reference_stiffness
+    point = balance.at(balance.omega_max)
+    for i, row in enumerate(rows):
+        pull = np.zeros((len(k), basis.n_coeff))
+        pull[row, 0] = k[row]
+        found[:, i] = -k[rows] * point.apply(pull)[rows, 0]
+        found[i, i] += k[row]
+    return found
