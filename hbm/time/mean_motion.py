@@ -30,6 +30,8 @@ class MeanRules:
     periodic: float = 1e-5  # drift over a period, relative, of a motion that counts as periodic
     # standard errors by which the means of two blocks may differ and still be those of one motion
     same_scatter: float = 2.0
+    fewest_blocks: int = 4  # whose means give a standard error
+    contact: float = 1e-7  # accuracy of the contact's equations in a step
 
 
 RULES = MeanRules()
@@ -119,7 +121,7 @@ class Follower:
     def take_up(self, balance: HarmonicBalance, kept: np.ndarray) -> None:
         """Go on with what `kept` has given, of a balance that differs in its gaps alone."""
         self._regular = bool(kept[1])
-        stepper = self._stepper = TimeStepper(balance, float(kept[0]), Options(self.options.steps, accelerate=False))
+        stepper = self._stepper = TimeStepper(balance, float(kept[0]), self._march_options())
         pairs, memory = balance.contact.stiffness.shape, balance.memory.shape
         hold = 0 if stepper.hold is None else len(stepper.hold.dofs)
         sizes = [2, 2 * len(stepper.modes[0]), *2 * (pairs[0] * pairs[1],), memory[0] * memory[1], pairs[0], hold]
@@ -131,7 +133,6 @@ class Follower:
         """Follow the motion to a place, until it is periodic or has settled.
 
         see : what to average besides, of one period
-        Source  means of blocks: Flyvbjerg and Petersen 1989
         Raises  IntegrationFailed
         """
         stepper = self._at(balance, omega)
@@ -229,13 +230,16 @@ class Follower:
         chance = RULES.same_scatter * off.std(axis=0) / np.sqrt(len(off))
         return bool((np.abs(off.mean(axis=0)) <= self.options.accuracy * abs(stepper.hold.height) + chance).all())
 
+    def _march_options(self) -> Options:
+        return Options(self.options.steps, accelerate=False, contact=RULES.contact)
+
     def _at(self, balance: HarmonicBalance, omega: float) -> TimeStepper:
         """The stepper at a place; what moves is taken along."""
         before = self._stepper
         if before is not None and before.omega == omega:
             self._stepper = before.worn(balance)
             return self._stepper
-        options = Options(self.options.steps, accelerate=False)
+        options = self._march_options()
         stepper = TimeStepper(balance, omega, options, None if before is None else before.modes)
         if before is not None and self._motion is not None:
             self._motion = _carried(self._motion, before, stepper)
@@ -257,9 +261,17 @@ def _apart(motion: PeriodicMotion) -> float:
 
 
 def _standard_error(work: np.ndarray) -> float:
-    """Of the mean, relative."""
-    whole = float(work.mean())
-    return float(work.std()) / np.sqrt(len(work)) / whole if whole > 0 else 0.0
+    """Of the mean, relative: the largest by means of ever longer blocks, since periods that follow are not independent.
+
+    Source  Flyvbjerg and Petersen 1989
+    """
+    whole, found = float(work.mean()), 0.0
+    if not whole > 0:
+        return found
+    while len(work) >= RULES.fewest_blocks:
+        found = max(found, float(work.std(ddof=1)) / np.sqrt(len(work)) / whole)
+        work = work[len(work) % 2 :].reshape(-1, 2).mean(axis=1)
+    return found
 
 
 def _carried(motion: Moving, before: TimeStepper, after: TimeStepper) -> Moving:

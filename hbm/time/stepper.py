@@ -33,6 +33,7 @@ class Options:
     accelerate : mix the states of past periods (Anderson) instead of waiting for the transient to decay; finds
         unstable periodic motions, too, from which a plain march would leave. A slider that never slips in the periodic
         motion then stands where the load path of the balance left it, else where the transient did
+    contact : accuracy of the contact's equations, see `time_step.Contact`
     """
 
     steps: int = 1024
@@ -40,6 +41,7 @@ class Options:
     max_periods: int = 2000
     patience: int = 80
     accelerate: bool = True
+    contact: float = 1e-12
 
     def __post_init__(self) -> None:
         if self.steps < 8:
@@ -128,7 +130,8 @@ class TimeStepper:
         joint = self.balance.contact.merged("time integration")
         components = joint.parameters.components
         normal = components.index("n") if "n" in components else -1
-        self.contact = time_step.Contact(joint.parameters.packed(), joint.parameters.gap, normal, compliance)
+        packed, gap = joint.parameters.packed(), joint.parameters.gap
+        self.contact = time_step.Contact(packed, gap, normal, compliance, self.options.contact)
         self.law = compiled_law.pointer(joint.module.step)
 
     def worn(self, balance: HarmonicBalance) -> TimeStepper:

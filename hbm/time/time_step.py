@@ -21,16 +21,17 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from llvmlite import ir
-from numba.extending import intrinsic
 
 from tribodyn.hbm.contact.law import SEPARATES
 
-TOLERANCE = 1e-12  # of the contact residual, relative to the largest contact displacement
 SWEEPS, SLOW = 60, 0.5  # at most of Gauss-Seidel; factor per sweep from which on it is slow
 LOCAL, DAMPED = 40, 20  # iterations of one pair; from which on its steps are halved
 NEWTON = 60
 SHORTEST = 0.1  # share of a Newton step that is tried before a worse point is taken all the same
+
+
+# of functions that are called pair by pair and make no array: numba's count of references would take half of the time
+PLAIN = {"cache": True, "_nrt": False, "error_model": "numpy"}
 
 
 class Contact(NamedTuple):
@@ -39,12 +40,14 @@ class Contact(NamedTuple):
     p : (n_pair, ...) packed parameters; gap : (n_pair,) [m]; normal : position of the component n, -1 without one
     A : (n_pair * c, n_pair * c) compliance of a step, row i the displacement of all under a unit force i; symmetric
         but for Coriolis forces
+    accuracy : of the contact's equations, relative to the largest contact displacement
     """
 
     p: np.ndarray
     gap: np.ndarray
     normal: int
     A: np.ndarray
+    accuracy: float
 
 
 class Linear(NamedTuple):
@@ -78,7 +81,9 @@ class Moving(NamedTuple):
 
 
 class Space(NamedTuple):
-    """Work space of a step: `room` of one pair, three for its equations, y = A f, status bits, and the x and f tried."""
+    """Work space of a step: `room` of one pair, three for its equations, y = A f, then of all pairs status bits, slopes
+    df/dx, and the x and f tried.
+    """
 
     work: tuple[np.ndarray, ...]
     M: np.ndarray
@@ -86,6 +91,7 @@ class Space(NamedTuple):
     b: np.ndarray
     y: np.ndarray
     bits: np.ndarray
+    J: np.ndarray
     x: np.ndarray
     f: np.ndarray
 
@@ -93,7 +99,8 @@ class Space(NamedTuple):
     def of(cls, n_pair: int, c: int, n_state: int) -> Space:
         """For so many pairs, components and states of the memory."""
         small = np.zeros((c, c)), np.zeros(c), np.zeros(c), np.zeros(n_pair * c)
-        return cls(room(c, n_state), *small, np.zeros(n_pair, np.int64), *np.zeros((2, n_pair, c)))
+        status, slopes = np.zeros(n_pair, np.int64), np.zeros((n_pair, c, c))
+        return cls(room(c, n_state), *small, status, slopes, *np.zeros((2, n_pair, c)))
 
 
 class Record(NamedTuple):
@@ -111,27 +118,19 @@ class Record(NamedTuple):
     slopes: np.ndarray
 
 
-@intrinsic
-def bare(_context, array):  # type: ignore[no-untyped-def]
-    """An array without its count of references: counting takes most of the time of a law that is called pair by pair.
-
-    The caller keeps the array alive
-    """
-
-    def code(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        made = context.make_array(signature.args[0])(context, builder, value=arguments[0])
-        made.meminfo = ir.Constant(made.meminfo.type, None)
-        return made._getvalue()
-
-    return array(array), code
-
-
 @numba.njit(cache=True)
 def put(values, to):
     """Copy a contiguous array; to assign one array to a slice of another takes numba seconds to compile."""
     a, b = values.ravel(), to.ravel()
     for i in range(b.size):
         b[i] = a[i]
+
+
+@numba.njit(**PLAIN)
+def put_vector(values, to):
+    """Copy a short vector: of one, `put` takes most of its time to shape it."""
+    for i in range(to.size):
+        to[i] = values[i]
 
 
 @numba.njit(cache=True)
@@ -144,7 +143,7 @@ def room(c, n_state):
     )  # fmt: skip
 
 
-@numba.njit(cache=True)
+@numba.njit(**PLAIN)
 def advance(step, x0, was_open, x1, s, p, gap, normal, work, chained):
     """The law of one pair along the straight line from x0 to x1 with memory s before, into `work`.
 
@@ -190,7 +189,7 @@ def advance(step, x0, was_open, x1, s, p, gap, normal, work, chained):
     return bits
 
 
-@numba.njit(cache=True)
+@numba.njit(**PLAIN)
 def clear(J, dfs, dsx, dss):
     """Set all slopes of a law to zero."""
     for M in (J, dfs, dsx, dss):
@@ -199,7 +198,7 @@ def clear(J, dfs, dsx, dss):
                 M[a, b] = 0.0
 
 
-@numba.njit(cache=True)
+@numba.njit(**PLAIN)
 def slopes_of(touched, work, D):
     """Derivative D of (f, memory) with respect to (x1, memory before, x0), of what `advance` left in `work`."""
     _, _, J, dfs, dsx, dss, _, before = work
@@ -211,11 +210,11 @@ def slopes_of(touched, work, D):
         add(dfs, D, 0, c)
         add(dss, D, c, c)
         return
-    add(np.dot(dfs, np.ascontiguousarray(before[:, c:])), D, 0, c)
-    add(np.dot(dss, before), D, c, 0)
+    add_product(dfs, before[:, c:], D, 0, c)
+    add_product(dss, before, D, c, 0)
 
 
-@numba.njit(cache=True)
+@numba.njit(**PLAIN)
 def add(M, D, row, column):
     """Add the matrix M to a larger one, from a row and a column of that on."""
     for a in range(M.shape[0]):
@@ -223,7 +222,16 @@ def add(M, D, row, column):
             D[row + a, column + b] += M[a, b]
 
 
-@numba.njit(cache=True)
+@numba.njit(**PLAIN)
+def add_product(A, B, D, row, column):
+    """Add A B to a larger matrix, from a row and a column of that on."""
+    for a in range(A.shape[0]):
+        for b in range(B.shape[1]):
+            for k in range(A.shape[1]):
+                D[row + a, column + b] += A[a, k] * B[k, b]
+
+
+@numba.njit(**PLAIN)
 def solve_small(M, r):
     """M^-1 r in place of r for a matrix of up to three rows, which is overwritten; without pivots: I + A J."""
     n = r.size
@@ -250,12 +258,16 @@ def solve_small(M, r):
             r[i] /= M[i, i]
 
 
-@numba.njit(cache=True)
-def solve_pair(step, x0, was_open, x, s, p, gap, normal, own, b, near, work, M, r):
-    """Newton on x + own f(x) = b for one pair from the guess x, which is overwritten; returns bits, 0: failed."""
+@numba.njit(**PLAIN)
+def solve_pair(step, x0, was_open, x, s, p, gap, normal, own, b, near, bits, work, M, r):
+    """Newton on x + own f(x) = b for one pair from the guess x, which is overwritten; returns bits, 0: failed.
+
+    bits : of the guess, whose force and slope are in `work` then; 0 where they are not known
+    """
     f, J = work[0], work[2]
     c = x.size
-    bits = advance(step, x0, was_open, x, s, p, gap, normal, work, False)
+    if bits == 0:
+        bits = advance(step, x0, was_open, x, s, p, gap, normal, work, False)
     for it in range(LOCAL):
         size = 0.0
         for a in range(c):
@@ -277,8 +289,8 @@ def solve_pair(step, x0, was_open, x, s, p, gap, normal, own, b, near, work, M, 
     return 0
 
 
-@numba.njit(cache=True)
-def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, near, backward, work, M, r, b):
+@numba.njit(**PLAIN)
+def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, J, near, backward, work, M, r, b):
     """One round of Gauss-Seidel over all pairs; y = A f and everything else moves on in place but x of open pairs.
 
     Returns the largest displacement of a pair, negative where one failed
@@ -293,6 +305,7 @@ def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, near, backward,
         if opened and x_free[o + normal] - y[o + normal] < contact.gap[i]:
             continue  # exerts no force
         own = A[o : o + c, o : o + c].T
+        known = 0 if opened else bits[i]
         off = 0.0
         for a in range(c):
             b[a] = x_free[o + a] - y[o + a]
@@ -300,14 +313,21 @@ def sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, near, backward,
             for q in range(c):
                 b[a] += own[a, q] * f[i, q]
         if opened:
-            put(b, x[i])
-        elif off <= 0.1 * near and bits[i] != 0:
+            put_vector(b, x[i])
+        elif off <= 0.1 * near and known != 0:
             continue
-        bits[i] = solve_pair(
-            step, x0[i], was_open[i], x[i], s[i], contact.p[i], contact.gap[i], normal, own, b, 0.1 * near, work, M, r
-        )
+        if known != 0:
+            for a in range(c):
+                work[0][a] = f[i, a]
+                for q in range(c):
+                    work[2][a, q] = J[i, a, q]
+        at = contact.p[i], contact.gap[i], normal
+        bits[i] = solve_pair(step, x0[i], was_open[i], x[i], s[i], *at, own, b, 0.1 * near, known, work, M, r)
         if bits[i] == 0:
             return -1.0
+        for a in range(c):
+            for q in range(c):
+                J[i, a, q] = work[2][a, q]
         moved = max(moved, off)
         for a in range(c):
             change = work[0][a] - f[i, a]
@@ -328,9 +348,9 @@ def solve_contact(step, contact, x_free, x0, was_open, s, x, f, scale, inverse, 
     Returns rounds spent (negative: failed) and the scale of x
     """
     n_pair, c = x.shape
-    work, M, r, b, y, bits, _, _ = space
+    work, M, r, b, y, bits, J, _, _ = space
     for i in range(n_pair):
-        bits[i] = SEPARATES if contact.normal >= 0 and was_open[i] and not f[i].any() else 0
+        bits[i] = SEPARATES if contact.normal >= 0 and was_open[i] and f[i, contact.normal] == 0.0 else 0
     if inverse[0, 0] != 0.0:
         rounds, scale = chord(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inverse)
         if rounds > 0:
@@ -340,13 +360,14 @@ def solve_contact(step, contact, x_free, x0, was_open, s, x, f, scale, inverse, 
     before = np.inf
     slow = 0
     for it in range(SWEEPS):
-        near = TOLERANCE * scale
-        moved = sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, near, it % 2 == 1, work, M, r, b)
+        near = contact.accuracy * scale
+        moved = sweep(step, contact, x_free, x0, was_open, s, x, f, y, bits, J, near, it % 2 == 1, work, M, r, b)
         scale = max(scale, np.abs(x).max())
-        if 0.0 <= moved <= TOLERANCE * scale:
+        if 0.0 <= moved <= contact.accuracy * scale:
             for i in range(n_pair):
                 if bits[i] == SEPARATES:
-                    put(x_free[i * c : i * c + c] - y[i * c : i * c + c], x[i])
+                    for a in range(c):
+                        x[i, a] = x_free[i * c + a] - y[i * c + a]
             return it + 1, scale
         slow += moved > SLOW * before
         if moved < 0.0 or slow > 5:
@@ -376,7 +397,7 @@ def residual(step, contact, x_free, x0, was_open, s, x, f, work, bits, J):
         bits[i] = abs(
             advance(step, x0[i], was_open[i], x[i], s[i], contact.p[i], contact.gap[i], contact.normal, work, False)
         )
-        put(work[0], f[i])
+        put_vector(work[0], f[i])
         put(work[2], J[i])
     return x.ravel() - x_free + times(contact.A, f)
 
@@ -392,7 +413,7 @@ def chord(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inver
         r = residual(step, contact, x_free, x0, was_open, s, x, f, work, bits, J)
         scale = max(scale, np.abs(x).max())
         error = np.abs(r).max()
-        if error <= TOLERANCE * scale:
+        if error <= contact.accuracy * scale:
             return it + 1, scale
         slow += error > SLOW * before
         if slow > 2:
@@ -427,7 +448,7 @@ def newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inve
         r = residual(step, contact, x_free, x0, was_open, s, x, f, work, bits, J)
         scale = max(scale, np.abs(x).max())
         error = np.abs(r).max()
-        if error <= TOLERANCE * scale:
+        if error <= contact.accuracy * scale:
             put(np.linalg.inv(full), inverse)
             return SWEEPS + it + 1, scale
         if error >= best and length > SHORTEST:  # a kink lies on the way: go less far
@@ -444,21 +465,28 @@ def newton(step, contact, x_free, x0, was_open, s, x, f, scale, work, bits, inve
     return -1, scale
 
 
+@numba.njit(**PLAIN)
+def pass_on(step, contact, x, was_open, x_new, memory, bits, work, slopes):
+    """Memory and bits of all pairs over a step that is solved; slopes : (n, ...) the first is filled, if any."""
+    chained = slopes.shape[0] > 0
+    for i in range(x.shape[0]):
+        at = contact.p[i], contact.gap[i], contact.normal
+        now = advance(step, x[i], was_open[i], x_new[i], memory[i], *at, work, chained)
+        put_vector(work[1], memory[i])
+        if chained:
+            slopes_of(now < 0, work, slopes[0, i])
+        bits[i] = abs(now)
+
+
 @numba.njit(cache=True)
 def march(step, contact, linear, moving, record, space):
     """March one period; `moving` moves on in place, the record is filled.
 
     Returns the step that failed or -1, the rounds of the contact solver spent, and the largest |h v|
     """
-    z, x, f, memory, bits = bare(moving.z), bare(moving.x), bare(moving.f), bare(moving.memory), bare(moving.bits)
-    contact = Contact(bare(contact.p), bare(contact.gap), contact.normal, bare(contact.A))
-    w = space.work
-    work = (bare(w[0]), bare(w[1]), bare(w[2]), bare(w[3]), bare(w[4]), bare(w[5]), bare(w[6]), bare(w[7]))
-    space = Space(
-        work, bare(space.M), bare(space.r), bare(space.b), bare(space.y), bare(space.bits), bare(space.x), bare(space.f)
-    )
+    z, x, f, memory, bits, _ = moving
+    work = space.work
     x_new, f_new = space.x, space.f
-    n_pair, c = x.shape
     m = linear.Q.shape[1]
     spent, scale = 0, np.abs(x).max()
     chained = record.slopes.shape[0] > 0
@@ -479,23 +507,8 @@ def march(step, contact, linear, moving, record, space):
         spent += abs(rounds)
         if rounds < 0:
             return j, spent, speed
-        for i in range(n_pair):
-            now = advance(
-                step,
-                x[i],
-                was_open[i],
-                x_new[i],
-                memory[i],
-                contact.p[i],
-                contact.gap[i],
-                contact.normal,
-                work,
-                chained,
-            )
-            put(work[1], memory[i])
-            if chained:
-                slopes_of(now < 0, work, record.slopes[j, i])
-            bits[i] = abs(now)
+        pass_on(step, contact, x, was_open, x_new, memory, bits, work, record.slopes[j if chained else 0 :])
+        for i in range(x.shape[0]):
             record.bits[i] |= bits[i]
         put(f, f_before)
         put(x_new, x)
@@ -525,7 +538,7 @@ def along(step, before, xs, contact, memory, bits, forces):
                     step, x0, was_open, xs[j, i], memory[i], contact.p[i], contact.gap[i], contact.normal, work, False
                 )
             )
-            put(work[1], memory[i])
+            put_vector(work[1], memory[i])
             if forces.shape[0] > 0:
                 put(work[0], forces[j, i])
 

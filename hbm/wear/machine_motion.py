@@ -34,13 +34,14 @@ class MotionRules:
     """What a motion in time is followed with.
 
     steps : per period at least; per_harmonic : for each harmonic of the balance
-    accuracy : standard error of a mean, relative; those of many wear steps average out in a life
+    accuracy : standard error of a mean, relative, and difference from the balance's work up to which a periodic motion
+        is that of the balance; the errors of many wear steps average out in a life
     most_components : of the contact
     """
 
     steps: int = 128
     per_harmonic: int = 16
-    accuracy: float = 1e-2
+    accuracy: float = 2e-2
     most_components: int = 600
 
 
@@ -103,13 +104,19 @@ class MachineMotion:
 
         Raises  IntegrationFailed
         """
-        if not self._serves or state.failure or not self._is_left(state):
+        if not self._serves or state.failure:
             self._followers, self._moving = [], np.zeros(0)
             return state
         self._moving = np.concatenate([f.kept() for f in self._followers]) if self._followers else np.zeros(0)
-        if not self._followers and not self._begins(state):
+        if not self._followers and not (self._is_left(state) and self._begins(state)):
             return state
-        return self._along(state, [point.state.omega for point in state.points])
+        found = self._along(state, [point.state.omega for point in state.points])
+        assert found.means is not None
+        apart = abs(float(found.work.sum() - state.work.sum()))
+        if found.means.spread == 0 and apart <= RULES.accuracy * float(state.work.sum()):
+            self._followers, self._moving = [], np.zeros(0)
+            return state  # the motion has come back to that of the balance
+        return found
 
     def step(self, state: WearState, there: WearState, stride: float) -> tuple[WearState, np.ndarray, np.ndarray]:
         """A step from a state, with the balance at the depth that `ahead` foresees.
