@@ -47,7 +47,7 @@ class Contact(NamedTuple):
     gap: np.ndarray
     normal: int
     A: np.ndarray
-    accuracy: float
+    accuracy: float = 1e-12
 
 
 class Linear(NamedTuple):

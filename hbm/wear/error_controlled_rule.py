@@ -102,13 +102,14 @@ def evolve(
     problem = replace(problem, lost_below=max(problem.lost_below, RULES.least_preload_share))
     machine = MachineMotion(problem) if follows else None
     rows = rows_to_resume(resume)
+    state: WearState | None
     if rows:  # the state after the last step was not kept: take the step again, to the same bits
         again = rows.pop()
-        state = replace(state_of(problem, again), solves=0)
+        before = replace(state_of(problem, again), solves=0)
         if machine is not None:
             machine.take_up(again)
-            state = machine.of(state)
-        state = _taken(problem, machine, tolerance, state, rows).after
+            before = machine.of(before)
+        state = _taken(problem, machine, tolerance, before, rows).after
         rows.append(again)
     else:
         state = assess(problem, np.zeros_like(problem.area), 0.0, None)

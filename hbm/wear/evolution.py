@@ -150,7 +150,8 @@ class WearState:
 
     depth : (n_pair,) [m]; cycles : passed before; points : one per duty; pairs : of the joints that wear
     rate : (n_pair,) wear depth per cycle [m], work : (n_pair,) friction work per cycle [J]; averages over the mission
-    preload_at_rest : [N], nan where it was not asked for; failure_at_rest : why it was not found
+    preload_at_rest : [N], nan where it was not asked for
+    lost : why there is no preload at rest, or no motion in time
     means : of the motion in time where a machine leaves that of the balance, see hbm.wear.machine_motion
     """
 
@@ -162,7 +163,7 @@ class WearState:
     solves: int
     pairs: np.ndarray
     preload_at_rest: float = float("nan")
-    failure_at_rest: Outcome[WearEnd] | None = None
+    lost: Outcome[WearEnd] | None = None
     means: Means | None = None
 
     @property
@@ -172,7 +173,7 @@ class WearState:
             if not point.solution.converged:
                 hertz = point.state.omega / (2 * np.pi)
                 return WearEnd.SOLVE_FAILED.say(f" at {hertz:.6g} Hz: {point.solution.outcome}")
-        return self.failure_at_rest
+        return self.lost
 
     @property
     def separated(self) -> bool:

@@ -42,11 +42,11 @@ def settled(whole: WearProblem, state: WearState) -> tuple[WearProblem, WearStat
             if far or not found.solution.converged:
                 return problem, replace(state, solves=solves)
             points.append(found)
-        at_rest = (state.preload_at_rest, state.failure_at_rest)
+        at_rest = (state.preload_at_rest, state.lost)
         found_with_more = worn_state(more, state.depth, state.cycles, points, solves)
         if not found_with_more.rate.max() > 0:  # another motion, which slips nowhere: no step follows from it
             return problem, replace(state, solves=solves)
-        state = replace(found_with_more, preload_at_rest=at_rest[0], failure_at_rest=at_rest[1])
+        state = replace(found_with_more, preload_at_rest=at_rest[0], lost=at_rest[1])
         problem = more
     return problem, state
 
@@ -102,7 +102,7 @@ def carried(problem: WearProblem, state: WearState) -> WearState:
         there = replace(point.solution, state=balance.evaluate(point.state.omega, x))
         points.append(OperatingPoint.of(balance, there, duty.site.output, point.solves))
     made = worn_state(problem, state.depth, state.cycles, points, state.solves)
-    return replace(made, preload_at_rest=state.preload_at_rest, failure_at_rest=state.failure_at_rest)
+    return replace(made, preload_at_rest=state.preload_at_rest, lost=state.lost)
 
 
 def _top(problem: WearProblem, state: WearState) -> int:

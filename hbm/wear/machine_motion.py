@@ -18,9 +18,11 @@ from functools import cached_property
 import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.time import wave_in_time
 from tribodyn.hbm.time.mean_motion import Follower, MeanMotion, MeanOptions
+from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.evolution import Means, WearProblem, WearState
@@ -41,7 +43,7 @@ class MotionRules:
 
     steps: int = 128
     per_harmonic: int = 16
-    accuracy: float = 2e-2
+    accuracy: float = 5e-2
     most_components: int = 600
 
 
@@ -100,17 +102,17 @@ class MachineMotion:
             follower.take_up(balance, part)
 
     def of(self, state: WearState) -> WearState:
-        """A state of the balance with the rates of the machine's motion; as it is where that is the balance's own.
-
-        Raises  IntegrationFailed
-        """
+        """A state of the balance with the rates of the machine's motion; as it is where that is the balance's own."""
         if not self._serves or state.failure:
             self._followers, self._moving = [], np.zeros(0)
             return state
         self._moving = np.concatenate([f.kept() for f in self._followers]) if self._followers else np.zeros(0)
         if not self._followers and not (self._is_left(state) and self._begins(state)):
             return state
-        found = self._along(state, [point.state.omega for point in state.points])
+        try:
+            found = self._along(state, [point.state.omega for point in state.points])
+        except IntegrationFailed as failure:
+            return replace(state, lost=WearEnd.SOLVE_FAILED.say(f" in time: {failure}"))
         assert found.means is not None
         apart = abs(float(found.work.sum() - state.work.sum()))
         if found.means.spread == 0 and apart <= RULES.accuracy * float(state.work.sum()):

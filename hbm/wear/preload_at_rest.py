@@ -40,6 +40,6 @@ class PreloadAtRest:
         solves = state.solves + self._before.solves
         if self._before.failure:
             failure = self._before.failure.kind.say(f" at rest{self._before.failure.detail}")
-            return replace(state, failure_at_rest=failure, preload_at_rest=float(np.nan), solves=solves)
+            return replace(state, lost=failure, preload_at_rest=float(np.nan), solves=solves)
         preload = problem.preload_of(self._before)
         return replace(state, preload_at_rest=preload, solves=solves)

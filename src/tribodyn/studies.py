@@ -22,7 +22,7 @@ from tribodyn.workflows.studies.surfaces import FaceAsperities, asperities
 from tribodyn.workflows.studies.trades import Converged, Traded, converge, trade
 from tribodyn.workflows.studies.variation import Variation, vary
 from tribodyn.workflows.studies.verification import Comparison
-from tribodyn.workflows.studies.worn_in_time import LifeInTime, wear_in_time
+
 from tribodyn.workflows.studies.worn_states import WornStates, verify_states
 
 __all__ = [
@@ -35,7 +35,6 @@ __all__ = [
     "Forces",
     "HeightMap",
     "Inspection",
-    "LifeInTime",
     "Lives",
     "Optimum",
     "Posterior",
@@ -62,5 +61,4 @@ __all__ = [
     "trade",
     "vary",
     "verify_states",
-    "wear_in_time",
 ]

@@ -184,7 +184,6 @@ def verify(
     at: str | None = None,
     row: int | None = None,
     states: int | None = None,
-    wear: Flag = False,
     steps: int | None = None,
     overrides: Overrides = (),
     out: Path | None = None,
@@ -202,8 +201,6 @@ def verify(
         Wear row whose depth the contact has; unworn by default.
     states
         So many worn states of a wear run, spread over its cycles, one line each.
-    wear
-        Wear the contact along the motion in time, at the frequencies of the run, and compare its life with the run's.
     steps
         Time steps per period; 256 or 32 for each harmonic by default.
     out
@@ -212,17 +209,12 @@ def verify(
         Print JSON for machines.
     """
     make_room(out)
-    if sum((states is not None, wear, at is not None or row is not None)) > 1:
-        raise ValueError("expected one of --states, --wear, and --at with --row")
+    if states is not None and (at is not None or row is not None):
+        raise ValueError("expected one of --states, and --at with --row")
     hertz = None if at is None else quantity("--at", at, "Hz")
     folder = out or store.result_file(result).parent / "pictures"
     loaded, progress = store.load(result), Progress() if as_json else console_progress()
-    if wear:
-        from tribodyn.workflows.studies import worn_in_time
-
-        life = worn_in_time.wear_in_time(loaded, folder, steps=steps, overrides=overrides, progress=progress)
-        show_found(life, life.files, as_json)
-    elif states is not None:
+    if states is not None:
         from tribodyn.workflows.studies import worn_states
 
         along = worn_states.verify_states(loaded, states, steps=steps, overrides=overrides, progress=progress)

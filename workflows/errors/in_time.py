@@ -75,6 +75,8 @@ def check(
         return []
     found = []
     for row in (None, *states.later_rows(result)):
+        if row is not None and result.wear is not None and result.wear.in_time[row]:
+            continue
         try:
             found.append(_integrated(first if row is None else states.worn_state(file, balance, result, row)))
         except (ValueError, RuntimeError):  # a model without an equation in time, a row that is not solved again

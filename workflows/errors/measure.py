@@ -193,6 +193,9 @@ def _estimates(file: SceneFile, table: Table, result: Result) -> None:
         found = step_error(result.wear, wear.tolerance if wear.rule == "error_controlled" else None)
         for name, one in (("depth", found.depth), ("life", found.cycles)):
             table.rows.append(Change(Refinement.WEAR_STEPS, name, None, None, float(one), "estimate of the wear rule"))
+            if result.wear.in_time.any():
+                how = "standard error of means in time"
+                table.rows.append(Change(Refinement.MOTION, name, None, None, result.wear.scatter, how))
 
 
 def _worn(file: SceneFile, finer: SceneFile | None, why: str, table: Table, result: Result, options: Options) -> None:
@@ -208,7 +211,8 @@ def _worn(file: SceneFile, finer: SceneFile | None, why: str, table: Table, resu
         table.refuse(Refinement.COMBINED, "no life has ended", OF_WEAR)
         return
     top = top_of(own, options)
-    work = float(wear.solves.sum()) * ratio**2 * own.balance.contact.stiffness.size * (2 * top + 1)
+    periods = 0 if wear.periods is None else wear.periods.sum()  # one costs about as much as a solve
+    work = float(wear.solves.sum() + periods) * ratio**2 * own.balance.contact.stiffness.size * (2 * top + 1)
     if work > options.max_wear:
         table.refuse(
             Refinement.COMBINED,

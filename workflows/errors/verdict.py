@@ -60,7 +60,7 @@ def _statement(
     own = [row for row in table.rows if row.quantity == name]
     error, why = error_of(own, table.ratio, options)
     dominated = dominating(own)
-    concerned = findings if name in OF_WEAR else findings[:1]
+    concerned = _beside(findings, result) if name in OF_WEAR else findings[:1]
     for finding in () if name == "peak_frequency" else concerned:
         status, reason = finding.judged(name, error)
         if status is not None:
@@ -72,13 +72,21 @@ def _statement(
     return Statement(value, error, dominated, Status.REPORTED, "measured on this scene")
 
 
+def _beside(findings: Sequence[Finding], result: Result) -> list[Finding]:
+    """Findings at states that a run wore along the balance; what it followed in time needs none."""
+    assert result.wear is not None
+    followed = result.wear.cycles[result.wear.in_time]
+    return [finding for finding in findings if finding.cycles not in followed]
+
+
 def error_of(rows: Sequence[Change], ratio: float | None, options: Options = DEFAULT) -> tuple[float | None, str]:
     """Total error of a quantity from its rows, and why it is not known where it is not."""
+    chance = max((row.relative or 0.0 for row in rows if row.refinement == Refinement.MOTION), default=0.0)
     for row in rows:
         if row.refinement == Refinement.COMBINED:
             if row.relative is None:
                 return None, row.how
-            return options.total(row.relative, ratio), ""
+            return options.total(max(row.relative, chance), ratio), ""
     return None, "no refinement was measured"
 
 

@@ -23,6 +23,7 @@ class Refinement(StrEnum):
     HARMONICS = "harmonics"
     SAMPLES = "samples"
     WEAR_STEPS = "wear steps"
+    MOTION = "statistics of the motion"
     COMBINED = "combined"
 
 
