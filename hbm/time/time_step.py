@@ -17,12 +17,17 @@ by pair: Jean and Moreau 1999 (non-smooth contact dynamics); the condensation to
 
 from __future__ import annotations
 
+import warnings
 from typing import NamedTuple
 
 import numba
 import numpy as np
+from numba.core.errors import NumbaExperimentalFeatureWarning
 
 from tribodyn.hbm.contact.law import SEPARATES
+
+# a contact law is passed as a function
+warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning, module=__name__)
 
 SWEEPS, SLOW = 60, 0.5  # at most of Gauss-Seidel; factor per sweep from which on it is slow
 LOCAL, DAMPED = 40, 20  # iterations of one pair; from which on its steps are halved

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 
@@ -22,7 +22,6 @@ from tribodyn.hbm.threads import single
 from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.hbm.wear import fewer_harmonics
 from tribodyn.hbm.wear.evolution import (
-    LARGEST_SHIFT,
     WearProblem,
     WearState,
     assess,
@@ -33,14 +32,13 @@ from tribodyn.hbm.wear.evolution import (
     state_of,
     worn_state,
 )
-from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, WearRow, history, rows_to_resume
+from tribodyn.hbm.wear.history import LARGEST_SHIFT, LIFE_SHARE, WearHistory, WearRow, history, rows_to_resume
 from tribodyn.hbm.wear.implicit_stage import WearingBalance
 from tribodyn.hbm.wear.machine_motion import MachineMotion
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
 from tribodyn.hbm.wear.step_control import STEP_RATIO_LIMITS, Tolerance, growth, local_error
 
 GAMMA = 1 - 1 / np.sqrt(2)
-TURN = 2 * np.pi
 
 
 @dataclass(frozen=True)
@@ -89,18 +87,19 @@ def evolve(
     max_steps: int = 10000,
     on_row: Callable[[WearRow], None] | None = None,
     resume: WearHistory | None = None,
-    follows: bool = False,
+    motion: Literal["balance", "machine", "time"] = "balance",
 ) -> WearHistory:
     """Wear the contact until it is lost, with steps chosen by a local error estimate on depth and on life.
 
-    follows : whether a motion that a machine leaves is followed in time, see hbm.wear.machine_motion
+    motion : along which it wears: the balance's; that of a machine, followed in time where it leaves the balance's, see
+        hbm.wear.machine_motion; or in time everywhere
     on_row, resume, return : as for the thesis's rule; `step_error` of a row is its estimate over the tolerance. The
     last touch of a vibrating contact does not end in finite time: `least_preload_share` ends the run where
     `lost_below` does not.
     Raises  ValueError where the wear law wears pairs that do no friction work
     """
     problem = replace(problem, lost_below=max(problem.lost_below, RULES.least_preload_share))
-    machine = MachineMotion(problem) if follows else None
+    machine = None if motion == "balance" else MachineMotion(problem, always=motion == "time")
     rows = rows_to_resume(resume)
     state: WearState | None
     if rows:  # the state after the last step was not kept: take the step again, to the same bits
@@ -133,24 +132,23 @@ def evolve(
             on_row(rows[-1])
         if reason:
             break
-    return history(
-        rows, end.kind.say(end.detail + _jumps(rows) + fewer_harmonics.reported(problem.balance.basis, rows))
-    )
+    worn = history(rows, end)
+    told = end.detail + _told(worn) + fewer_harmonics.reported(problem.balance.basis, rows)
+    return replace(worn, end=end.kind.say(told))
 
 
-def jumps(rows: Sequence[WearRow]) -> list[int]:
-    """Rows after which wear went on at another peak: what follows a jump or an explicit step has no plan."""
-    pairs = enumerate(pairwise(rows))
-    return [i for i, (a, b) in pairs if a.plan.size and not a.plan.any() and abs(b.omega / a.omega - 1) > LARGEST_SHIFT]
-
-
-def _jumps(rows: Sequence[WearRow]) -> str:
-    """What to say of frequencies that moved on to another peak between rows; empty where none did."""
-    return "".join(
-        f"; the response jumped from {rows[i].omega / TURN:.5g} to {rows[i + 1].omega / TURN:.5g} Hz "
-        f"at {rows[i + 1].cycles:.3g} cycles"
-        for i in jumps(rows)
-    )
+def _told(worn: WearHistory) -> str:
+    """What to say of frequencies that moved on to another peak, and of motions that left the balance or came back."""
+    said = [
+        f"; the response jumped from {worn.frequency[i]:.5g} to {worn.frequency[i + 1]:.5g} Hz "
+        f"at {worn.cycles[i + 1]:.3g} cycles"
+        for i in worn.jumps
+    ]
+    in_time = worn.in_time.astype(int)
+    for i in np.flatnonzero(np.diff(in_time, prepend=0)):
+        motion = "the machine's motion leaves that of the balance" if in_time[i] else "it is that of the balance again"
+        said.append(f"; {motion} at {worn.cycles[i]:.3g} cycles")
+    return "".join(said)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,6 @@ from tribodyn.hbm.wear.history import WearRow
 from tribodyn.hbm.wear.law import JointWear
 
 FADED_SHARE = 1e-3  # share of the first friction work per cycle below which wear may have faded out
-LARGEST_SHIFT = 0.1  # of a frequency in one step: a peak that moves further is another one
 ENDLESS = 1e12  # cycles: thirty years at 1 kHz, longer than any machine runs
 
 

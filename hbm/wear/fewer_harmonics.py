@@ -14,8 +14,8 @@ import numpy as np
 
 from tribodyn.hbm.continuation.operating_point import AtPeak, OperatingPoint
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.hbm.wear.evolution import LARGEST_SHIFT, WearProblem, WearState, worn_state
-from tribodyn.hbm.wear.history import WearRow
+from tribodyn.hbm.wear.evolution import WearProblem, WearState, worn_state
+from tribodyn.hbm.wear.history import LARGEST_SHIFT, WearRow
 
 LEAST_HARMONIC = 3  # up to which harmonics are kept where no solution with more follows
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from tribodyn.hbm.continuation.operating_point import OperatingPoint
 
 
+LARGEST_SHIFT = 0.1  # of a frequency in one step: a peak that moves further is another one
 LIFE_SHARE = 1e-3  # of the first preload, where the life that is stated ends
 OF_MOTION = ("spread", "mean_error", "settled", "periods", "moving")  # of a row whose motion was marched in time
 
@@ -167,6 +168,11 @@ class WearHistory:
     def in_time(self) -> np.ndarray:
         """(n_row,) whether the row's motion is one in time that a machine makes, and not that of the balance."""
         return np.zeros(len(self.cycles), bool) if self.periods is None else self.periods > 0
+
+    @property
+    def jumps(self) -> np.ndarray:
+        """Rows after which wear went on at another peak."""
+        return np.flatnonzero(np.abs(self.omega[1:] / self.omega[:-1] - 1) > LARGEST_SHIFT)
 
     @property
     def scatter(self) -> float:

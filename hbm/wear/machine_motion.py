@@ -77,15 +77,23 @@ class MotionExposure(wear_law.Exposure):
 
 
 class MachineMotion:
-    """The motions of all duties, each followed while the contact wears and the balance's own motion is left."""
+    """The motions of all duties, each followed while the contact wears and the balance's own motion is left.
 
-    def __init__(self, problem: WearProblem):
-        self._problem = problem
+    always : whether they are followed where the balance's own is kept, too
+    Raises  ValueError where they are to be followed always and cannot be
+    """
+
+    def __init__(self, problem: WearProblem, always: bool = False):
+        self._problem, self._always = problem, always
         steps = max(RULES.steps, RULES.per_harmonic * problem.balance.basis.harmonics[-1])
         self._options = MeanOptions(steps, accuracy=RULES.accuracy)
         self._followers: list[Follower] = []
         fits = problem.balance.contact.stiffness.size <= RULES.most_components
         self._serves = fits and not wave_in_time.is_wave(problem.balance)
+        if always and not self._serves:
+            raise ValueError(
+                f"a wheel's wave and a contact of more than {RULES.most_components} components are not worn in time"
+            )
         self._moving = np.zeros(0)
 
     @cached_property
@@ -107,7 +115,7 @@ class MachineMotion:
             self._followers, self._moving = [], np.zeros(0)
             return state
         self._moving = np.concatenate([f.kept() for f in self._followers]) if self._followers else np.zeros(0)
-        if not self._followers and not (self._is_left(state) and self._begins(state)):
+        if not self._followers and not ((self._always or self._is_left(state)) and self._begins(state)):
             return state
         try:
             found = self._along(state, [point.state.omega for point in state.points])
@@ -115,7 +123,7 @@ class MachineMotion:
             return replace(state, lost=WearEnd.SOLVE_FAILED.say(f" in time: {failure}"))
         assert found.means is not None
         apart = abs(float(found.work.sum() - state.work.sum()))
-        if found.means.spread == 0 and apart <= RULES.accuracy * float(state.work.sum()):
+        if not self._always and found.means.spread == 0 and apart <= RULES.accuracy * float(state.work.sum()):
             self._followers, self._moving = [], np.zeros(0)
             return state  # the motion has come back to that of the balance
         return found

@@ -22,7 +22,6 @@ from tribodyn.workflows.studies.surfaces import FaceAsperities, asperities
 from tribodyn.workflows.studies.trades import Converged, Traded, converge, trade
 from tribodyn.workflows.studies.variation import Variation, vary
 from tribodyn.workflows.studies.verification import Comparison
-
 from tribodyn.workflows.studies.worn_states import WornStates, verify_states
 
 __all__ = [

@@ -10,6 +10,7 @@ import pytest
 from tests.helpers.pressed_body import N_PAIR, balance_of, pressed_body, wear_problem
 from tests.helpers.three_pairs import FLIPS_AT, three_pairs
 from tribodyn.hbm import newton
+from tribodyn.hbm.continuation.operating_point import AtFrequency
 from tribodyn.hbm.outcome import WearEnd
 from tribodyn.hbm.stability import floquet
 from tribodyn.hbm.stability.stays import HILL, MULTIPLIERS, stays
@@ -17,12 +18,12 @@ from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.mean_motion import Follower, MeanOptions
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.verify import verify
-from tribodyn.hbm.wear import error_controlled_rule, in_time
+from tribodyn.hbm.wear import error_controlled_rule
 from tribodyn.hbm.wear import law as wear_law
-from tribodyn.hbm.wear.evolution import WearProblem
-from tribodyn.hbm.wear.history import WearHistory, cycles_to_preload
-from tribodyn.hbm.wear.in_time import FixedPlaces, MotionExposure, PlacesOfRun
+from tribodyn.hbm.wear.evolution import Duty, WearProblem
+from tribodyn.hbm.wear.history import WearHistory, WearRow, cycles_to_preload, history
 from tribodyn.hbm.wear.law import JointWear
+from tribodyn.hbm.wear.machine_motion import MachineMotion, MotionExposure
 from tribodyn.hbm.wear.step_control import Tolerance
 
 LEFT = 0.5  # share of the preload
@@ -39,15 +40,43 @@ def run(problem: WearProblem) -> WearHistory:
 
 
 def test_life_in_time_is_that_of_many_harmonics(problem: WearProblem, run: WearHistory) -> None:
-    rows: list[in_time.TimeRow] = []
-    found = in_time.evolve(problem, FixedPlaces(problem), Tolerance(0.05, 2e-4), MeanOptions(128), on_row=rows.append)
+    found = error_controlled_rule.evolve(problem, Tolerance(0.05, 2e-4), motion="time")
     assert found.end.kind is WearEnd.PRELOAD_LOST
-    assert len(rows) == len(found.cycles)
-    assert found.settled.all()
-    assert found.life(LEFT) == pytest.approx(cycles_to_preload(run, LEFT), rel=5e-3)
+    assert found.in_time[:-1].all()
+    assert found.scatter == 0.0
+    assert cycles_to_preload(found, LEFT) == pytest.approx(cycles_to_preload(run, LEFT), rel=5e-3)
     assert found.energy[0].sum() == pytest.approx(run.energy[0].sum(), rel=5e-3)
-    depth = [np.interp(found.life(LEFT), h.cycles, h.depth.max(axis=1)) for h in (found, run)]
-    assert depth[0] == pytest.approx(depth[1], rel=0.05)  # between rows both are straight lines
+
+
+def test_a_motion_that_is_the_balances_is_not_followed(
+    problem: WearProblem, run: WearHistory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever Hill's method says of it."""
+    monkeypatch.setattr(MachineMotion, "_is_left", lambda self, state: True)
+    found = error_controlled_rule.evolve(problem, Tolerance(0.02, 2e-4), max_steps=3, motion="machine")
+    assert not found.in_time.any()
+    np.testing.assert_array_equal(found.depth, run.depth[:3])
+
+
+def test_a_motion_that_a_machine_leaves_is_worn_in_time_and_resumes_bit_for_bit() -> None:
+    flips = three_pairs(friction=0.05, static=30.0, shaker=60.0, top=7)
+    site = AtFrequency(flips.compliance.output_names[0], FLIPS_AT)
+    given = {"balance": flips, "mission": (Duty(site),), "area": np.full(flips.contact.n_pair, 1e-4)}
+    problem = wear_problem(**given, lost_below=0.5)
+    rows: list[WearRow] = []
+    whole = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 6, rows.append, motion="machine")
+    assert whole.in_time.all()
+    assert "leaves that of the balance" in str(whole.end)
+    follower = Follower(MeanOptions(128))
+    follower.start(flips, newton.solve(flips, FLIPS_AT, whole.displacement[0].reshape(3, 3, -1)).state)
+    alone = follower.mean(flips, FLIPS_AT, lambda motion: motion.energy)
+    assert whole.energy[0].sum() == pytest.approx(alone.energy.sum(), rel=0.01)
+    along_balance = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 1).energy[0].sum()
+    assert abs(whole.energy[0].sum() / along_balance - 1) > 0.04
+    begun = history(rows[:4], WearEnd.UNFINISHED.say())
+    resumed = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 6, resume=begun, motion="machine")
+    for name in ("cycles", "depth", "energy", "moving", "spread"):
+        np.testing.assert_array_equal(getattr(resumed, name), getattr(whole, name))
 
 
 def test_a_law_by_slip_path_sees_a_motion_as_it_sees_a_balance(problem: WearProblem) -> None:
@@ -60,22 +89,6 @@ def test_a_law_by_slip_path_sees_a_motion_as_it_sees_a_balance(problem: WearProb
         seen = exposure(balance, state, problem.area, archard.numbers, np.zeros(N_PAIR), 0.0, "contact", *own)
         rates.append(wear_law.depth_rate("archard", seen))
     np.testing.assert_allclose(*rates, rtol=0.02)
-
-
-def test_places_of_a_run_have_its_jumps_and_its_end(problem: WearProblem, run: WearHistory) -> None:
-    n = len(run.cycles)
-    duty_omega = run.duty_omega.copy()
-    duty_omega[n // 2 :] *= 0.7
-    part = replace(run, duty_omega=duty_omega, end=WearEnd.STEPS_DONE.say())
-    places, removed = PlacesOfRun(problem, part), run.depth @ problem.area
-    assert list(places.ends) == [removed[n // 2], removed[-1]]
-    assert places.omegas(0, removed[-1])[0] == duty_omega[0, 0]  # within the leg also beyond its end
-    assert places.omegas(1, removed[-1])[0] == duty_omega[-1, 0]
-    assert places.start(1, run.depth[-1])[0].omega == duty_omega[n // 2, 0]
-    whole = replace(problem, lost_below=0.0)
-    found = in_time.evolve(whole, PlacesOfRun(whole, part), Tolerance(0.5, 2e-4), MeanOptions(64))
-    assert (found.omega == np.where(found.depth @ problem.area < 0.999 * places.ends[0], *duty_omega[[0, -1], 0])).all()
-    assert found.end.kind is WearEnd.STEPS_DONE
 
 
 def test_a_periodic_motion_is_followed_and_one_that_a_push_drives_away_is_left() -> None:

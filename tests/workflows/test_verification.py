@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from tests.helpers.command import leave
@@ -14,7 +12,7 @@ from tribodyn.workflows.result import store
 from tribodyn.workflows.run import pipeline
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene.scene_file import read
-from tribodyn.workflows.studies import verification, worn_in_time
+from tribodyn.workflows.studies import verification
 
 SMALL = [
     "verdict.enabled=false",
@@ -80,7 +78,7 @@ def test_more_harmonics_come_closer(folder: Path) -> None:
     found = []
     for highest in (3, 9, 15):
         override = [f"harmonics.kept={list(range(highest + 1))}"]
-        comparison = verification.compare(result, 2 * np.pi * 700, None, override, 512, Progress())
+        comparison = verification.verify(result, 700.0, overrides=override, steps=512, progress=Progress())
         found.append(comparison.found)
     assert all(one.motion.periodic for one in found)
     for values in zip(*((one.waveform["response"], abs(one.energy), one.largest) for one in found), strict=True):
@@ -94,7 +92,7 @@ def test_more_harmonics_come_closer(folder: Path) -> None:
     assert alone.energy == pytest.approx(5.15, rel=0.05)
     assert 0.1 < alone.energy_spread < 0.6
     assert alone.drift > 0.1
-    assert any(name == "left alone" for name, _ in comparison.lines())
+    assert any(line[0] == "left alone" for line in comparison.lines())
 
 
 def test_a_worn_row_is_compared_where_it_was_solved(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -132,33 +130,11 @@ def test_worn_states_are_compared_along_a_run(folder: Path, capsys: pytest.Captu
     assert f"{found['states'][1]['comparison']['energy']['difference']:.2%}" in out
 
 
-def test_a_wear_run_is_worn_again_along_its_motion_in_time(
-    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(worn_in_time, "TOLERANCE", 2.0)  # few steps
-    wear = store.load(folder / "result.h5").wear
-    assert wear is not None
-    given = ["verify", str(folder), "--wear", "--steps", "64"]
-    code, out, err = leave([*given, "--json"], capsys)
-    assert code == 0, err
-    found = json.loads(out)
-    assert found["end"] == "stopped after the volume that the run wore"
-    (table,) = (Path(one) for one in found["files"] if one.endswith(".csv"))
-    rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
-    assert [float(row["cycles"]) for row in rows] == [row["cycles"] for row in found["rows"]]
-    assert found["rows"][0]["frequency_hz"] == pytest.approx(wear.frequency[0])
-    worn = found["rows"][-1]["depth_m"]
-    assert 0 < worn < 1.5 * wear.depth[-1].max()
-    assert Path(found["files"][0]).is_file()
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (["--states", "0"], "--states must be at least 1"),
         (["--states", "3", "--row", "1"], "expected one of --states"),
-        (["--wear", "--states", "3"], "expected one of --states"),
-        (["--wear", "--steps", "3"], "at least 8"),
         (["--at", "410"], "--at: expected"),
         (["--at=-3 Hz"], "outside what the scene models"),
         (["--at", "5 kHz"], "change response.frequency"),

@@ -149,9 +149,9 @@ def amplitude_against_cycles(result: Result) -> Figure:
     with axes_of(7.2, 5.6, rows=2) as (figure, (upper, lower)):
         scale_cycles = cycle_axis(lower, wear)
         unit, scale = length_unit(wear.amplitude.max())
-        upper.plot(scale_cycles * wear.cycles, scale * wear.amplitude, ".-", color=BLUE, ms=4)
+        _course(upper, scale_cycles, wear, scale * wear.amplitude, BLUE)
         upper.set(ylabel=f"amplitude / {unit}", title=titled(result, "response under wear"))
-        lower.plot(scale_cycles * wear.cycles, wear.omega / (2 * np.pi), ".-", color=ORANGE, ms=4)
+        _course(lower, scale_cycles, wear, wear.frequency, ORANGE)
         lower.set(ylabel="frequency / Hz")
     return figure
 
@@ -162,7 +162,7 @@ def preload_against_cycles(result: Result) -> Figure:
     with axes_of() as (figure, axes):
         scale_cycles = cycle_axis(axes, wear)
         unit, scale = ("kN", 1e-3) if wear.preload.max() >= 1e3 else ("N", 1.0)
-        axes.plot(scale_cycles * wear.cycles, scale * wear.preload, ".-", color=BLUE, ms=4)
+        _course(axes, scale_cycles, wear, scale * wear.preload, BLUE)
         axes.set(ylabel=f"preload / {unit}", title=titled(result, "preload of the contact"))
         axes.set_ylim(bottom=0)
     return figure
@@ -204,7 +204,7 @@ def energy_against_cycles(result: Result) -> Figure:
     assert patch is not None
     with axes_of(7.2, 5.6, rows=2, share=False) as (figure, (upper, lower)):
         scale_cycles = cycle_axis(upper, wear)
-        upper.plot(scale_cycles * wear.cycles, wear.energy.sum(1), ".-", color=BLUE, ms=4)
+        _course(upper, scale_cycles, wear, wear.energy.sum(1), BLUE)
         upper.set(ylabel="energy per cycle / J", title=titled(result, "dissipated energy"))
         spent = np.concatenate([[0.0], np.cumsum(wear.work.sum(1))[:-1]])
         lower.plot(spent * 1e-6, 1e9 * wear.depth @ patch.area, ".-", color=ORANGE, ms=4)
@@ -289,6 +289,18 @@ def hysteresis(result: Result, pairs: Sequence[int] | None = None) -> Figure:
         what = "hysteresis loops by pair" if has_friction(result) else "normal force over approach by pair"
         heading(figure, result, what)
     return figure
+
+
+def _course(axes: Any, scale: float, wear: WearHistory, values: np.ndarray, color: str) -> None:
+    """Values against cycles, with a gap where the response jumped; hollow where they are means of a motion in time."""
+    after = wear.jumps + 1
+    x, y = (np.insert(column, after, np.nan) for column in (scale * wear.cycles, values))
+    axes.plot(x, y, "-", color=color, zorder=2)
+    axes.plot(scale * wear.cycles, values, "o", color=color, ms=3)
+    if wear.in_time.any():
+        of_time = scale * wear.cycles[wear.in_time], values[wear.in_time]
+        axes.plot(*of_time, "o", color=color, mfc="white", ms=3, label="mean of the motion in time")
+        axes.legend(loc="best", fontsize=9)
 
 
 def _wear(result: Result) -> WearHistory:

@@ -130,4 +130,4 @@ def evolve(
     if wear.rule == "thesis":
         return thesis_rule.evolve(problem, limit, max_steps, on_row, resume)
     tolerance = Tolerance(wear.tolerance, limit)
-    return error_controlled_rule.evolve(problem, tolerance, max_steps, on_row, resume, wear.motion == "machine")
+    return error_controlled_rule.evolve(problem, tolerance, max_steps, on_row, resume, wear.motion)

@@ -144,9 +144,9 @@ class Wear(LawTable):
     """How the steps are chosen: "thesis" takes `step`, "error_controlled" takes `tolerance`."""
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = 0.01
     """Error that one wear step of the error-controlled rule may make, relative."""
-    motion: Literal["machine", "balance"] = "balance"
+    motion: Literal["balance", "machine", "time"] = "balance"
     """Along which motion the error-controlled rule wears: "balance" takes the periodic one of the balance, "machine"
-    follows in time what a machine does where it leaves that one."""
+    follows in time what a machine does where it leaves that one, "time" takes the motion in time everywhere."""
     lost_below: Annotated[Number, Field(ge=0, lt=1)] = 0.0
     """Share of the first preload at which the run ends; 0 waits until the last touch ends."""
     lost_of: Literal["all", "any"] = "all"
