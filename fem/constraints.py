@@ -82,11 +82,15 @@ def free_dofs(n_dof: int, clamps: Iterable[Clamp], node_sets: Mapping[str, np.nd
 
 @dataclass(frozen=True)
 class Following:
-    """DOFs (k,) that follow others: u[dofs] = map @ u with map (k, n_dof); what : which constraint, for errors."""
+    """DOFs (k,) that follow others: u[dofs] = map @ u with map (k, n_dof); what : which constraint, for errors.
+
+    equation : of one DOF, in whose place another of the equation may follow where this one is held or follows already
+    """
 
     dofs: np.ndarray
     map: csr_matrix
     what: str
+    equation: bool = False
 
 
 class Constraint(Protocol):
@@ -104,6 +108,7 @@ def restriction(n_dof: int, free: np.ndarray, constraints: Sequence[Following]) 
     owner = np.full(n_dof, -1)
     held = np.ones(n_dof, dtype=bool)
     held[free] = False
+    constraints = _pivoted(constraints, held)
     rows, dofs = [], []
     for number, one in enumerate(constraints):
         taken = one.dofs[owner[one.dofs] >= 0]
@@ -135,6 +140,42 @@ def restriction(n_dof: int, free: np.ndarray, constraints: Sequence[Following]) 
     follow = csr_matrix(follow[:, left])
     follow.eliminate_zeros()
     return left, follow
+
+
+def _pivoted(constraints: Sequence[Following], held: np.ndarray) -> list[Following]:
+    """The constraints, equations last and each for a DOF that neither is held nor follows already, by elimination."""
+    found = [one for one in constraints if not one.equation]
+    if len(found) == len(constraints):
+        return found
+    row_of = {int(dof): (one.map, k) for one in found for k, dof in enumerate(one.dofs)}
+    for one in (one for one in constraints if one.equation):
+        first = int(one.dofs[0])
+        left = {first: -1.0}
+        row: dict[int, float] = {}
+        waiting = [*left.items(), *_entries(one.map, 0)]
+        while waiting:
+            dof, factor = waiting.pop()
+            if dof in row_of:
+                waiting += [(other, factor * value) for other, value in _entries(*row_of[dof])]
+            elif not held[dof]:
+                row[dof] = row.get(dof, 0.0) + factor
+        largest = max(map(abs, row.values()), default=0.0)
+        row = {dof: value for dof, value in row.items() if abs(value) > 1e-12 * largest}
+        if not row:
+            continue  # the others say it already
+        pivot = first if first in row else max(row, key=lambda dof: abs(row[dof]))
+        rest = {dof: -value / row[pivot] for dof, value in row.items() if dof != pivot}
+        at = ([0] * len(rest), list(rest))
+        solved = Following(np.array([pivot]), csr_matrix((list(rest.values()), at), one.map.shape), one.what, True)
+        row_of[pivot] = (solved.map, 0)
+        found.append(solved)
+    return found
+
+
+def _entries(matrix: csr_matrix, row: int) -> list[tuple[int, float]]:
+    """Column and value of the entries of one row."""
+    own = slice(*matrix.indptr[row : row + 2].tolist())
+    return list(zip(matrix.indices[own].tolist(), matrix.data[own].tolist(), strict=True))
 
 
 def partition(n_dof: int, chosen: np.ndarray, what: str) -> tuple[np.ndarray, np.ndarray]:

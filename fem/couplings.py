@@ -79,7 +79,7 @@ class Tie:
 
 @dataclass(frozen=True)
 class Equation:
-    """A linear equation between displacements of single nodes, sum of factor * u = 0; the first one follows the others.
+    """A linear equation between displacements of single nodes, sum of factor * u = 0; the first one that can follows.
 
     what : name for errors; terms : (group of one node, axis 0..2, factor)
     """
@@ -94,7 +94,7 @@ class Equation:
         dofs = [3 * int(named(node_sets, group)[0]) + axis for group, axis, _ in self.terms]
         factors = [-factor / self.terms[0][2] for _, _, factor in self.terms[1:]]
         row = coo_matrix((factors, ([0] * len(factors), dofs[1:])), shape=(1, 3 * mesh.doflocs.shape[1]))
-        return Following(np.array(dofs[:1]), csr_matrix(row), self.what)
+        return Following(np.array(dofs[:1]), csr_matrix(row), self.what, equation=True)
 
 
 def _summed(blocks: list[tuple[np.ndarray, np.ndarray, np.ndarray]], n: int) -> csr_matrix:

@@ -39,13 +39,13 @@ def _assemble(
     mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial], order: int
 ) -> tuple[csr_matrix, csr_matrix]:
     nodes = connectivity(mesh)
-    kinds, kind = of_elements(mesh, material)
+    kinds, _ = of_elements(mesh, material)
     isotropic = all(isinstance(one, Material) for one in kinds)
     rho = densities(mesh, material)
     if isotropic:
         lam, mu, _ = per_element(mesh, material)
     else:
-        tensors = np.array([one.tensor for one in kinds])
+        C = at_elements(mesh, material, "tensor")
     n_element, n_a = nodes.shape
     mass = np.empty((n_element, n_a, n_a, 1, 1))
     stiffness = np.empty((n_element, n_a, n_a, 3, 3))
@@ -54,7 +54,7 @@ def _assemble(
         if isotropic:
             blocks = stiffness_blocks(gradient, weight, lam[elements], mu[elements])
         else:
-            blocks = tensor_blocks(gradient, weight, tensors[kind[elements]])
+            blocks = tensor_blocks(gradient, weight, C[elements])
         stiffness[elements] = symmetric(blocks)
     n_node = mesh.doflocs.shape[1]
     return kron(scatter(nodes, n_node, mass), identity(3), format="csr"), scatter(nodes, n_node, stiffness)
@@ -124,6 +124,20 @@ def densities(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]) -> n
     """Density of each element of one mesh (n_element,) [kg/m3]; raises ValueError as `of_elements` does."""
     kinds, kind = of_elements(mesh, material)
     return np.array([one.rho for one in kinds])[kind]
+
+
+def at_elements(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial], what: str) -> np.ndarray:
+    """A tensor (n_element, 3, ...) of the material at the centre of each element of one mesh.
+
+    what : "tensor" [Pa] or "expansion_tensor" [1/K]
+    """
+    kinds, kind = of_elements(mesh, material)
+    centres = mesh.p[:, mesh.t].mean(axis=1).T
+    found = [getattr(one, what)(centres[kind == i]) for i, one in enumerate(kinds)]
+    whole = np.empty((len(kind), *found[0].shape[1:]))
+    for i, values in enumerate(found):
+        whole[kind == i] = values
+    return whole
 
 
 def per_element(

@@ -1,4 +1,4 @@
-"""Linear elastic materials: isotropic, and orthotropic along axes of their own."""
+"""Linear elastic materials: isotropic, and orthotropic or anisotropic along axes of their own."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+from tribodyn.geometry.sources.directions import Directions, orthogonal
 
 VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
@@ -37,27 +39,68 @@ class Material:
             self.E / (2 * (1 + self.nu)),
         )
 
-    @property
-    def tensor(self) -> np.ndarray:
-        """Elasticity tensor (3, 3, 3, 3) [Pa]."""
+    def tensor(self, points: np.ndarray) -> np.ndarray:
+        """Elasticity tensors (n, 3, 3, 3, 3) [Pa] at points (n, 3), all alike."""
         lam, mu = self.lame
         eye = np.eye(3)
         shear = np.einsum("ik,jl->ijkl", eye, eye) + np.einsum("il,jk->ijkl", eye, eye)
-        return lam * np.einsum("ij,kl->ijkl", eye, eye) + mu * shear
+        return np.broadcast_to(lam * np.einsum("ij,kl->ijkl", eye, eye) + mu * shear, (len(points), 3, 3, 3, 3))
+
+    def expansion_tensor(self, points: np.ndarray) -> np.ndarray:
+        """Thermal strain per kelvin (n, 3, 3) [1/K] at points (n, 3), all alike."""
+        return np.broadcast_to(self.expansion * np.eye(3), (len(points), 3, 3))
+
+
+class _Turned:
+    """What materials with axes of their own have in common; each gives its `stiffness` along them.
+
+    axes : (2, 3) directions of the first and second material axis, made orthogonal, or directions from place to place
+    """
+
+    axes: Sequence[Sequence[float]] | Directions
+    expansion: Sequence[float]
 
     @property
-    def expansion_tensor(self) -> np.ndarray:
-        """Thermal strain per kelvin (3, 3) [1/K]."""
-        return self.expansion * np.eye(3)
+    def stiffness(self) -> np.ndarray:
+        """(6, 6) [Pa] along its axes, stresses 11, 22, 33, 23, 13, 12 of strains 11, 22, 33, 2*23, 2*13, 2*12."""
+        raise NotImplementedError
+
+    @property
+    def _own(self) -> np.ndarray:
+        """Elasticity tensor (3, 3, 3, 3) [Pa] along its axes."""
+        D, own = self.stiffness, np.empty((3, 3, 3, 3))
+        for a, (i, j) in enumerate(VOIGT):
+            for b, (k, l) in enumerate(VOIGT):
+                own[i, j, k, l] = own[j, i, k, l] = own[i, j, l, k] = own[j, i, l, k] = D[a, b]
+        return own
+
+    def rotation(self, points: np.ndarray) -> np.ndarray:
+        """(n, 3, 3) rows are the material axes at points (n, 3); one (1, 3, 3) where they are the same everywhere."""
+        if not hasattr(self.axes, "at"):
+            return orthogonal(*np.asarray(self.axes, dtype=float))[None]
+        return self.axes.at(points)
+
+    def tensor(self, points: np.ndarray) -> np.ndarray:
+        """Elasticity tensors (n, 3, 3, 3, 3) [Pa] along x, y, z at points (n, 3)."""
+        R = self.rotation(points)
+        C = np.einsum("nai,nbj,nck,ndl,abcd->nijkl", R, R, R, R, self._own, optimize=True)
+        return np.broadcast_to(C, (len(points), 3, 3, 3, 3))
+
+    def expansion_tensor(self, points: np.ndarray) -> np.ndarray:
+        """Thermal strain per kelvin (n, 3, 3) [1/K] along x, y, z at points (n, 3)."""
+        R = self.rotation(points)
+        strain = R.transpose(0, 2, 1) @ np.diag(np.asarray(self.expansion, dtype=float)) @ R
+        return np.broadcast_to(strain, (len(points), 3, 3))
 
 
 @dataclass(frozen=True)
-class Orthotropic:
+class Orthotropic(_Turned):
     """A material with three planes of symmetry, such as a single crystal or a laminate.
 
     young : E1, E2, E3 [Pa]; poisson : nu12, nu13, nu23, the strain along the second axis when pulled along the first;
     shear : G12, G13, G23 [Pa]; rho : [kg/m3]
-    axes : (2, 3) directions of the first and second material axis, made orthogonal; the third follows by the right hand
+    axes : (2, 3) directions of the first and second material axis, made orthogonal; the third follows by the right
+        hand; or directions from place to place
     expansion : along the three axes [1/K]
     Source  Lekhnitskii, Theory of Elasticity of an Anisotropic Body, 1981, chapter 1
     """
@@ -66,7 +109,7 @@ class Orthotropic:
     poisson: Sequence[float]
     shear: Sequence[float]
     rho: float
-    axes: Sequence[Sequence[float]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    axes: Sequence[Sequence[float]] | Directions = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     expansion: Sequence[float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
@@ -77,9 +120,10 @@ class Orthotropic:
                 f"material: Poisson's ratios {list(self.poisson)} do not fit Young's moduli {list(self.young)}: "
                 "the material would gain energy when strained; nu12 is the strain along 2 when pulled along 1"
             )
-        first, second = (np.asarray(axis, dtype=float) for axis in self.axes)
-        if not np.linalg.norm(np.cross(first, second)) > 1e-3 * np.linalg.norm(first) * np.linalg.norm(second):
-            raise ValueError("material: the two axes must be directions that are not parallel")
+        if not hasattr(self.axes, "at"):
+            first, second = (np.asarray(axis, dtype=float) for axis in self.axes)
+            if not np.linalg.norm(np.cross(first, second)) > 1e-3 * np.linalg.norm(first) * np.linalg.norm(second):
+                raise ValueError("material: the two axes must be directions that are not parallel")
 
     @property
     def compliance(self) -> np.ndarray:
@@ -92,30 +136,31 @@ class Orthotropic:
         return S
 
     @property
-    def rotation(self) -> np.ndarray:
-        """(3, 3) rows are the material axes."""
-        first, second = (np.asarray(axis, dtype=float) for axis in self.axes)
-        first = first / np.linalg.norm(first)
-        second = second - (second @ first) * first
-        second /= np.linalg.norm(second)
-        return np.stack([first, second, np.cross(first, second)])
+    def stiffness(self) -> np.ndarray:
+        """(6, 6) [Pa] along its axes, in the order of `compliance`."""
+        return np.linalg.inv(self.compliance)
+
+
+@dataclass(frozen=True)
+class Anisotropic(_Turned):
+    """A material without planes of symmetry.
+
+    D : (6, 6) its `stiffness` [Pa]; rho : [kg/m3]; axes, expansion : as of an orthotropic one
+    """
+
+    D: np.ndarray
+    rho: float
+    axes: Sequence[Sequence[float]] | Directions = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    expansion: Sequence[float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not (self.rho > 0 and np.linalg.eigvalsh(self.D)[0] > 0):
+            raise ValueError("material: density must be positive, and the 21 elastic constants positive definite")
 
     @property
-    def tensor(self) -> np.ndarray:
-        """Elasticity tensor (3, 3, 3, 3) [Pa] along x, y, z."""
-        D = np.linalg.inv(self.compliance)
-        own = np.empty((3, 3, 3, 3))
-        for a, (i, j) in enumerate(VOIGT):
-            for b, (k, l) in enumerate(VOIGT):
-                own[i, j, k, l] = own[j, i, k, l] = own[i, j, l, k] = own[j, i, l, k] = D[a, b]
-        R = self.rotation
-        return np.einsum("ai,bj,ck,dl,abcd->ijkl", R, R, R, R, own, optimize=True)
-
-    @property
-    def expansion_tensor(self) -> np.ndarray:
-        """Thermal strain per kelvin (3, 3) [1/K] along x, y, z."""
-        R = self.rotation
-        return R.T @ np.diag(np.asarray(self.expansion, dtype=float)) @ R
+    def stiffness(self) -> np.ndarray:
+        """(6, 6) [Pa] along its axes."""
+        return np.asarray(self.D, dtype=float)
 
 
-AnyMaterial = Material | Orthotropic
+AnyMaterial = Material | Orthotropic | Anisotropic

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.sparse import block_diag, csr_matrix, identity, kron
 
 from tribodyn.fem.assembly import materials_of, pieces
-from tribodyn.fem.elasticity import of_elements, symmetric
+from tribodyn.fem.elasticity import at_elements, symmetric
 from tribodyn.fem.elements import batches, connectivity, scatter
 from tribodyn.fem.factor import SingularStiffness, factorise
 from tribodyn.fem.interface import unit
@@ -126,15 +126,13 @@ def geometric_stiffness(mesh: Any, material: Any, u: np.ndarray, temperature: np
 def _geometric_stiffness(mesh: Any, material: Any, u: np.ndarray, temperature: np.ndarray | None) -> csr_matrix:
     """The same of one mesh, without the factor of three components: (n_node, n_node)."""
     nodes = connectivity(mesh)
-    kinds, kind = of_elements(mesh, material)
-    C = np.array([one.tensor for one in kinds])
-    expansion = np.array([one.expansion_tensor for one in kinds])
+    C, expansion = (at_elements(mesh, material, what) for what in ("tensor", "expansion_tensor"))
     blocks = np.empty((*nodes.shape, nodes.shape[1], 1, 1))
     for elements, N, gradient, weight in batches(mesh):
         strain = gradient @ u[nodes[elements]][:, None]  # d u_j / d x_i; the tensor takes its symmetric part
         if temperature is not None:
-            strain = strain - (temperature[nodes[elements]] @ N.T)[..., None, None] * expansion[kind[elements], None]
-        stress = np.einsum("eijkl,eqkl->eqij", C[kind[elements]], strain, optimize=True)
+            strain = strain - (temperature[nodes[elements]] @ N.T)[..., None, None] * expansion[elements, None]
+        stress = np.einsum("eijkl,eqkl->eqij", C[elements], strain, optimize=True)
         weighted = weight[..., None, None] * (stress @ gradient)
         blocks[elements] = symmetric(np.einsum("eqia,eqib->eab", gradient, weighted, optimize=True)[..., None, None])
     return scatter(nodes, mesh.doflocs.shape[1], blocks)

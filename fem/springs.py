@@ -65,6 +65,25 @@ class Spring:
         return csr_matrix(along(nodes) - along(others[place])), share
 
 
+@dataclass(frozen=True)
+class ElongationSpring:
+    """A stiffness against one elongation, a sum of displacements of single nodes.
+
+    terms : (group of one node, axis 0..2, factor); stiffness : [N/m]
+    """
+
+    terms: Sequence[tuple[str, int, float]]
+    stiffness: float
+
+    def matrix(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> csr_matrix:
+        """Stiffness (3 n_node, 3 n_node) [N/m]; raises ValueError where a node is unknown."""
+        dofs = [3 * int(named(node_sets, group)[0]) + axis for group, axis, _ in self.terms]
+        row = csr_matrix(
+            ([factor for *_, factor in self.terms], ([0] * len(dofs), dofs)), (1, 3 * mesh.doflocs.shape[1])
+        )
+        return csr_matrix(self.stiffness * (row.T @ row))
+
+
 def shares(mesh: Any, node_sets: Mapping[str, np.ndarray], name: str) -> tuple[np.ndarray, np.ndarray]:
     """Nodes of a set and the part of a stiffness that each one takes."""
     faces = mesh.boundaries or {}

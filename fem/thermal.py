@@ -16,7 +16,7 @@ import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from tribodyn.fem.assembly import Assembly, materials_of
-from tribodyn.fem.elasticity import of_elements
+from tribodyn.fem.elasticity import at_elements
 from tribodyn.fem.elements import batches, connectivity
 
 
@@ -46,12 +46,12 @@ class Heating:
         for name, (piece, material) in zip(names, materials_of(mesh, self.material), strict=True):
             if self.bodies and name not in self.bodies:
                 continue
-            kinds, kind = of_elements(piece.mesh, material)
-            held_back = np.array([np.einsum("ijkl,kl->ij", one.tensor, one.expansion_tensor) for one in kinds])
+            C, expansion = (at_elements(piece.mesh, material, what) for what in ("tensor", "expansion_tensor"))
+            held_back = np.einsum("eijkl,ekl->eij", C, expansion)
             nodes = connectivity(piece.mesh) + piece.node
             for elements, N, gradient, weight in batches(piece.mesh):
                 at = values[nodes[elements]] @ N.T
-                stress = held_back[kind[elements]]
+                stress = held_back[elements]
                 own = np.einsum("eq,eij,eqja->eai", weight * at, stress, gradient, optimize=True)
                 np.add.at(force, nodes[elements], own)
         if not force.any():

@@ -10,13 +10,16 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from tribodyn.geometry.placing import rotation
 from tribodyn.geometry.sources.cells import VOLUMES
+from tribodyn.geometry.sources.directions import System, orthogonal
 from tribodyn.geometry.sources.keywords import Card, cards
 from tribodyn.geometry.sources.raw import NOTHING, Cells, RawMesh
 
@@ -42,6 +45,7 @@ FACES: dict[int, tuple[tuple[int, ...], ...]] = {
     6: ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
     8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
 }
+CARRIED = ("MASS", "SPRING", "SFM3D")  # elements that are no solids: read by their cards, or mere surfaces
 GENERATORS = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY")
 
 Node = tuple[str, int]  # instance, label
@@ -61,8 +65,12 @@ class Scope:
     elsets: dict[str, list[str]] = field(default_factory=dict)
     surfaces: dict[str, tuple[str, list[tuple[str, str]]]] = field(default_factory=dict)
     names: dict[str, str] = field(default_factory=dict)
-    sections: list[tuple[str, str]] = field(default_factory=list)
+    sections: list[Card] = field(default_factory=list)
     masses: list[tuple[str, float]] = field(default_factory=list)
+    springs: list[Card] = field(default_factory=list)
+    orientations: dict[str, Card] = field(default_factory=dict)
+    distributions: dict[str, Card] = field(default_factory=dict)
+    system: System | None = None
 
     def name(self, text: str) -> str:
         """The key of a name, which is remembered as it was first written."""
@@ -136,7 +144,9 @@ def load(path: Path) -> Assembly:
             scope = _instance(card, parts, assembly)
         elif card.name in ("END PART", "END INSTANCE", "ASSEMBLY", "END ASSEMBLY"):
             scope = assembly.top
-        elif not _mesh_card(card, scope):
+        elif card.name in MESH_CARDS:
+            MESH_CARDS[card.name](card, scope)
+        else:
             assembly.cards.append(card)
     if flat and not assembly.instances:
         return assembly
@@ -153,16 +163,11 @@ def _instance(card: Card, parts: dict[str, Scope], assembly: Assembly) -> Scope:
     if any(name.upper() == other.upper() for other in assembly.instances):
         raise ValueError(f"{card.where} has the name '{name}' of another instance: give each its own")
     source = parts[part.upper()]
-    scope = Scope(
-        dict(source.nodes),
-        dict(source.elements),
-        {key: list(items) for key, items in source.nsets.items()},
-        {key: list(items) for key, items in source.elsets.items()},
-        dict(source.surfaces),
-        dict(source.names),
-        list(source.sections),
-        list(source.masses),
-    )
+    own: dict[str, Any] = {
+        key: {k: list(items) for k, items in getattr(source, key).items()} for key in ("nsets", "elsets")
+    }
+    own |= {one.name: copy(getattr(source, one.name)) for one in fields(source) if one.name not in own}
+    scope = Scope(**{**own, "system": None})
     turn, shift = np.eye(3), np.zeros(3)
     if card.data:
         shift = np.array(card.floats(card.data[0], 3))
@@ -176,40 +181,46 @@ def _instance(card: Card, parts: dict[str, Scope], assembly: Assembly) -> Scope:
     return scope
 
 
-def _mesh_card(card: Card, scope: Scope) -> bool:
-    """Put a card on nodes, elements, sets or surfaces into its scope; False where it is another card."""
-    if card.name in GENERATORS:
-        raise ValueError(f"{card.where} generates a mesh: write the deck with its nodes and elements listed")
-    if card.name == "NODE":
-        _nodes(card, scope)
-    elif card.name == "ELEMENT":
-        _elements(card, scope)
-    elif card.name in ("NSET", "ELSET"):
-        _set(card, scope)
-    elif card.name == "SURFACE":
-        kind = card.option("TYPE").upper() or "ELEMENT"
-        items = [(line[0], line[1].upper() if len(line) > 1 else "") for line in card.data]
-        scope.surfaces[scope.name(card.option("NAME"))] = (kind, items)
-    elif card.name == "SOLID SECTION":
-        scope.sections.append((card.option("ELSET"), card.option("MATERIAL")))
-    elif card.name == "MASS":
-        scope.masses.append((card.option("ELSET"), card.number(card.data[0][0]) if card.data else 0.0))
-    else:
-        return False
-    return True
+def _surface(card: Card, scope: Scope) -> None:
+    kind = card.option("TYPE").upper() or "ELEMENT"
+    items = [(line[0], line[1].upper() if len(line) > 1 else "") for line in card.data]
+    scope.surfaces[scope.name(card.option("NAME"))] = (kind, items)
+
+
+def _mass(card: Card, scope: Scope) -> None:
+    scope.masses.append((card.option("ELSET"), card.number(card.data[0][0]) if card.data else 0.0))
+
+
+def _system(card: Card, scope: Scope) -> None:
+    """Where the nodes that follow are placed: a translation, or three points."""
+    if not card.data:
+        scope.system = None
+        return
+    origin, along = (np.array(card.floats(card.data[0][k : k + 3], 3)) for k in (0, 3))
+    axes = np.eye(3)
+    if len(card.data[0]) > 3:
+        across = np.array(card.floats(card.data[1], 3)) if len(card.data) > 1 else origin + [0.0, 0.0, 1.0]
+        x, second, third = orthogonal(along - origin, across - origin)
+        axes = np.stack([x, second, third] if len(card.data) > 1 else [x, -third, second])
+    scope.system = System("rectangular", origin, axes)
 
 
 def _nodes(card: Card, scope: Scope) -> None:
-    if card.option("SYSTEM").upper() not in ("", "R"):
-        raise ValueError(f"{card.where} gives nodes in another system than the rectangular one: write x, y, z")
-    labels = []
-    for line in card.data:
-        label = card.whole(line[0])
-        x, y, z = card.floats(line[1:], 3)
-        scope.nodes[label] = (x, y, z)
-        labels.append(str(label))
+    letter = card.option("SYSTEM").upper() or "R"
+    kinds = {"R": "rectangular", "C": "cylindrical", "S": "spherical"}
+    if letter not in kinds:
+        raise ValueError(f"{card.where} has the system '{letter}': it is one of R, C, S")
+    labels = [card.whole(line[0]) for line in card.data]
+    if not labels:
+        raise ValueError(f"{card.where} has no nodes: write them in the deck, or take an *INCLUDE")
+    places = np.array([card.floats(line[1:], 3) for line in card.data])
+    if letter != "R":
+        places = System(kinds[letter], np.zeros(3), np.eye(3)).places(places)
+    if scope.system is not None:
+        places = scope.system.places(places)
+    scope.nodes |= {label: (x, y, z) for label, (x, y, z) in zip(labels, places.tolist(), strict=True)}
     if card.option("NSET"):
-        scope.nsets.setdefault(scope.name(card.option("NSET")), []).extend(labels)
+        scope.nsets.setdefault(scope.name(card.option("NSET")), []).extend(map(str, labels))
 
 
 def _elements(card: Card, scope: Scope) -> None:
@@ -248,6 +259,26 @@ def _set(card: Card, scope: Scope) -> None:
             target += [f"{prefix}{label}" for label in range(first, last + 1, step[0] if step else 1)]
         else:
             target += [prefix + text for text in line if text]
+
+
+def _generator(card: Card, scope: Scope) -> None:
+    raise ValueError(f"{card.where} generates a mesh: write the deck with its nodes and elements listed")
+
+
+MESH_CARDS: dict[str, Callable[[Card, Scope], None]] = {
+    "NODE": _nodes,
+    "ELEMENT": _elements,
+    "NSET": _set,
+    "ELSET": _set,
+    "SURFACE": _surface,
+    "MASS": _mass,
+    "SYSTEM": _system,
+    "SOLID SECTION": lambda card, scope: scope.sections.append(card),
+    "SPRING": lambda card, scope: scope.springs.append(card),
+    "ORIENTATION": lambda card, scope: scope.orientations.update({card.option("NAME").upper(): card}),
+    "DISTRIBUTION": lambda card, scope: scope.distributions.update({card.option("NAME").upper(): card}),
+    **dict.fromkeys(GENERATORS, _generator),
+}
 
 
 def raw_of(assembly: Assembly) -> tuple[RawMesh, dict[Node, int]]:
@@ -290,9 +321,9 @@ def raw_of(assembly: Assembly) -> tuple[RawMesh, dict[Node, int]]:
         blocks.append(Cells(kind, table, np.array([key[1] for key, _ in elements])))
     if not blocks:
         return NOTHING, row
-    unused = [
-        f"{count} elements of type {kind}, which are no solids" for kind, count in other.items() if kind != "MASS"
-    ]
+    refused = {
+        kind: f"{count} elements of type {kind}" for kind, count in other.items() if not kind.startswith(CARRIED)
+    }
     sets = _Sets(assembly, row, number, blocks)
     sets.collect(scopes)
     labels = np.array([label for _, label in row], dtype=int)
@@ -306,7 +337,8 @@ def raw_of(assembly: Assembly) -> tuple[RawMesh, dict[Node, int]]:
         sets.nodes,
         bodies=tuple(name for name in assembly.instances if name in sets.volumes),
         skins=frozenset(sets.nodes),
-        unused=[*unused, *sets.unused],
+        unused=sets.unused,
+        refused=refused,
     )
     return raw, row
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,9 +10,11 @@ import numpy as np
 
 from tribodyn.geometry.sources import abaqus, deck
 from tribodyn.geometry.sources.abaqus import Assembly, Node
+from tribodyn.geometry.sources.card_table import CardTable, Met
 from tribodyn.geometry.sources.cells import VOLUMES
+from tribodyn.geometry.sources.directions import Directions, Listed, System, orthogonal, turned
 from tribodyn.geometry.sources.keywords import Card
-from tribodyn.geometry.sources.raw import RawMesh, listed
+from tribodyn.geometry.sources.raw import RawMesh
 
 # named supports -> axes that they hold
 NAMED_SUPPORTS = {
@@ -26,12 +27,30 @@ NAMED_SUPPORTS = {
     "YASYMM": (0, 2, 4),
     "ZASYMM": (0, 1, 5),
 }
-# that order results or steer the solver of the other program, and have no effect on the structure
-SILENT = {
-    "HEADING", "PREPRINT", "RESTART", "OUTPUT", "NODE OUTPUT", "ELEMENT OUTPUT", "CONTACT OUTPUT", "ENERGY OUTPUT",
-    "NODE PRINT", "NODE FILE", "EL PRINT", "EL FILE", "CONTACT PRINT", "CONTACT FILE", "END STEP", "MONITOR", "PRINT",
-    "ENERGY PRINT", "SECTION PRINT", "FILE FORMAT",
-}  # fmt: skip
+# read first, as the points that they name are known by these names then
+NAMING = {"COUPLING", "KINEMATIC", "DISTRIBUTING", "KINEMATIC COUPLING", "DISTRIBUTING COUPLING", "RIGID BODY"}
+TABLE = CardTable(
+    read="""NODE, ELEMENT, NSET, ELSET, SURFACE, SOLID SECTION, PART, END PART, INSTANCE, END INSTANCE, ASSEMBLY,
+        END ASSEMBLY, INCLUDE, SYSTEM, ORIENTATION, DISTRIBUTION, MATERIAL, ELASTIC, DENSITY, EXPANSION, MASS, SPRING,
+        TIE, EQUATION, COUPLING, KINEMATIC, DISTRIBUTING, KINEMATIC COUPLING, DISTRIBUTING COUPLING, RIGID BODY, CLOAD,
+        BOUNDARY, DSLOAD, DLOAD, INITIAL CONDITIONS, STEP, CONTACT PAIR""",
+    silent="""HEADING, PREPRINT, RESTART, OUTPUT, NODE OUTPUT, ELEMENT OUTPUT, CONTACT OUTPUT, ENERGY OUTPUT,
+        NODE PRINT, NODE FILE, EL PRINT, EL FILE, CONTACT PRINT, CONTACT FILE, END STEP, MONITOR, PRINT, ENERGY PRINT,
+        SECTION PRINT, FILE FORMAT""",
+    harmless={
+        "the step is the scene's": """STATIC, FREQUENCY, DYNAMIC, BUCKLE, VISCO, STEADY STATE DYNAMICS, MODAL DYNAMIC,
+            RANDOM RESPONSE, RESPONSE SPECTRUM, COMPLEX FREQUENCY, HEAT TRANSFER, SUBSTRUCTURE GENERATE,
+            SUBSTRUCTURE MATRIX OUTPUT, SUBSTRUCTURE LOAD CASE, RETAINED NODAL DOFS, SELECT EIGENMODES, AMPLITUDE,
+            MATRIX GENERATE, MATRIX OUTPUT, CONTROLS, SOLUTION TECHNIQUE, TIME POINTS, SECTION CONTROLS,
+            HOURGLASS STIFFNESS, DISTRIBUTION TABLE, PHYSICAL CONSTANTS, USER OUTPUT, FILTER, NORMAL""",
+        "damping is the scene's": "DAMPING, MODAL DAMPING, GLOBAL DAMPING, DAMPING CONTROLS",
+        "bodies are elastic": "PLASTIC, CREEP, CYCLIC HARDENING, RATE DEPENDENT, CONDUCTIVITY, SPECIFIC HEAT",
+        "contact is the scene's": """SURFACE INTERACTION, SURFACE BEHAVIOR, FRICTION, CONTACT, CONTACT INCLUSIONS,
+            CONTACT EXCLUSIONS, CONTACT PROPERTY ASSIGNMENT, CONTACT CONTROLS, CONTACT CONTROLS ASSIGNMENT,
+            CONTACT FORMULATION, CONTACT INITIALIZATION ASSIGNMENT, CONTACT INITIALIZATION DATA, CONTACT DAMPING,
+            CHANGE FRICTION, CLEARANCE, GAP CONDUCTANCE, SURFACE PROPERTY ASSIGNMENT""",
+    },
+)
 
 
 def read(path: Path) -> RawMesh:
@@ -41,7 +60,7 @@ def read(path: Path) -> RawMesh:
     if not raw.cells:
         return raw
     reader = _Cards(assembly, raw, row)
-    for card in assembly.cards:
+    for card in sorted(assembly.cards, key=lambda card: card.name not in NAMING):  # the order is kept beyond that
         reader.take(card)
     return reader.finished()
 
@@ -64,7 +83,8 @@ class _Cards:
     faces: dict[str, list[np.ndarray]] = field(default_factory=dict)
     references: dict[int, str] = field(default_factory=dict)
     unused: list[str] = field(default_factory=list)
-    ignored: Counter[str] = field(default_factory=Counter)
+    springs: list[deck.Spring] = field(default_factory=list)
+    met: Met = field(default_factory=lambda: Met(TABLE, "*"))
     steps: int = 0
     material: str = ""
     coupling: Card | None = None
@@ -75,14 +95,20 @@ class _Cards:
         for block in self.raw.cells:
             self.solid[block.nodes] = True
         self.keys = list(self.row)
+        for name, rows in self.raw.nodes.items():  # a point has one name, whichever of its sets a card takes
+            if len(rows) == 1 and not self.solid[rows[0]]:
+                self.references.setdefault(int(rows[0]), name)
 
     def take(self, card: Card) -> None:
-        """Use a card, or count it among those that are not used."""
-        use = getattr(self, "_" + card.name.lower().replace(" ", "_"), None)
-        if use is not None:
-            use(card)
-        elif card.name not in SILENT:
-            self.ignored[card.name] += 1
+        """Use a card, or count it among those that are not used or refused."""
+        if card.name in TABLE.reads:
+            getattr(self, "_" + card.name.lower().replace(" ", "_"))(card)
+        else:
+            self.met.other(card.name)
+
+    def _refused(self, card: Card, what: str = "") -> None:
+        """Refuse a card, or one form of it."""
+        self.met.refuse(f"*{card.name}{what and ', '}{what}")
 
     # materials
 
@@ -95,20 +121,22 @@ class _Cards:
     def _elastic(self, card: Card) -> None:
         kind = card.option("TYPE").upper() or "ISO"
         values = [card.number(text) for line in card.data for text in line]
+        per_row = 2
         if kind.startswith("ISO") and len(values) >= 2:
             self._give(card, young=values[0], poisson=values[1])
-            rows = len(card.data)
+            per_row = 1
         elif kind.startswith("ENGINEERING") and len(values) >= 9:
             self._give(card, engineering=tuple(values[:9]))
-            rows = len(card.data) // 2
         elif kind.startswith("ORTHO") and len(values) >= 9 and _regular(values):
             self._give(card, engineering=engineering_constants(values[:9]))
-            rows = len(card.data) // 2
+        elif kind.startswith("ANISO") and len(values) >= 21:
+            self._give(card, stiffness=anisotropic(values[:21]))
+            per_row = 3
         else:
-            self.unused.append(f"{card.where} of type {kind}")
+            self._refused(card, kind)
             return
-        if rows > 1:
-            self.unused.append(f"{rows - 1} rows at other temperatures of {card.where}")
+        if len(card.data) > per_row:
+            self._refused(card, "at several temperatures")
 
     def _density(self, card: Card) -> None:
         if card.data:
@@ -118,7 +146,7 @@ class _Cards:
         if card.option("TYPE").upper() in ("", "ISO") and card.data:
             self._give(card, expansion=card.number(card.data[0][0]))
         else:
-            self.unused.append(card.where)
+            self._refused(card, card.option("TYPE").upper())
 
     def _give(self, card: Card, **values: object) -> None:
         if self.material not in self.materials:
@@ -143,7 +171,7 @@ class _Cards:
 
     def _equation(self, card: Card) -> None:
         if "REMOVE" in card.options:
-            self.ignored[card.name + ", REMOVE"] += 1
+            self._refused(card, "REMOVE")
             return
         lines = iter(card.data)
         for line in lines:
@@ -189,6 +217,24 @@ class _Cards:
             )
         )
 
+    def _distributing_coupling(self, card: Card) -> None:
+        nodes = [self._node(row) for line in card.data for row in self._rows(line[0], card)]
+        if len({line[1] for line in card.data if len(line) > 1} - {""}) > 1:
+            self._refused(card, "unequal weights")
+            return
+        name = f"coupling{len(self.couplings) + 1}"
+        self.nodes[name] = np.unique(np.concatenate([self.nodes[node] for node in nodes]))
+        point = self._reference(card.option("REFNODE") or self._element_node(card), card)
+        self.couplings.append(deck.Coupling(name, "distributing", point, name))
+
+    def _element_node(self, card: Card) -> str:
+        """The node of the element, such as DCOUP3D, to which CalculiX gives a distributing coupling."""
+        for where, label in self.assembly.elements(card.option("ELSET")):
+            kind, nodes = self.assembly.scope(where).elements[label]
+            self.met.refused.pop(kind, None)
+            return f"{where}.{nodes[0]}" if where else str(nodes[0])
+        return ""
+
     def _kinematic_coupling(self, card: Card) -> None:
         point = self._reference(card.option("REFNODE"), card)
         for line in card.data:
@@ -198,8 +244,8 @@ class _Cards:
 
     def _rigid_body(self, card: Card) -> None:
         face = card.option("NSET", "TIENSET", "PINNSET")
-        if not face:
-            self.unused.append(card.where)
+        if not face or card.option("ELSET"):
+            self._refused(card, "ELSET")
             return
         point = self._reference(card.option("REFNODE"), card)
         name = f"rigid{len(self.couplings) + 1}"
@@ -215,7 +261,7 @@ class _Cards:
             if 0 <= axis <= 5:
                 self.forces.append(deck.Force(self._place(line[0], card), axis, card.number(line[2])))
             else:
-                self.unused.append(f"direction {line[1]} of {card.where}")
+                self._refused(card, f"direction {line[1]}")
 
     def _boundary(self, card: Card) -> None:
         single: dict[tuple[tuple[int, ...], float], list[int]] = {}
@@ -242,13 +288,13 @@ class _Cards:
             if len(line) > 2 and line[1].upper() == "P":
                 self.pressures.append(deck.FacePressure(self._place(line[0], card, face=True), card.number(line[2])))
             else:
-                self.unused.append(f"load {','.join(line)} of {card.where}")
+                self._refused(card, line[1].upper() if len(line) > 1 else "")
 
     def _dload(self, card: Card) -> None:
         for line in card.data:
             face = line[1].upper() if len(line) > 2 else ""
             if not (face[:1] == "P" and face[1:].isdigit()):
-                self.unused.append(f"load {','.join(line)} of {card.where}")
+                self._refused(card, face or "without a kind")
                 continue
             name = f"pressed {len(self.pressures) + 1}"
             corners = self._faces_of(line[0], int(face[1:]), card)
@@ -261,7 +307,13 @@ class _Cards:
 
     def _contact_pair(self, card: Card) -> None:
         for line in card.data:
-            self.unused.append(f"contact pair {' on '.join(line)}: give it as [contacts.NAME] in the scene")
+            self.unused.append(f"contact pair {' on '.join(line)}, which the scene gives as [contacts.NAME]")
+
+    def _initial_conditions(self, card: Card) -> None:
+        if card.option("TYPE").upper() == "TEMPERATURE":
+            self.met.ignored["*INITIAL CONDITIONS, TEMPERATURE"] += 1
+        else:
+            self._refused(card, card.option("TYPE").upper())
 
     # places
 
@@ -334,7 +386,7 @@ class _Cards:
             if len(inside) and face <= len(faces):
                 found.append(block.nodes[inside][:, list(faces[face - 1])])
         if not found:
-            self.unused.append(f"load on '{text}' of {card.where}, which names no solid element")
+            self._refused(card, f"on '{text}', which is no solid element")
         return found
 
     # the end
@@ -351,14 +403,14 @@ class _Cards:
                 points.setdefault(name, self.raw.points[rows[0]])
         nodes = {name: rows for name, rows in named.items() if name not in points}
         unused = list(self.unused)
-        if self.ignored:
-            unused.append(f"cards {listed({f'*{name}': count for name, count in self.ignored.items()})}")
+        unused += self.met.unused()
         notes = [f"the loads and supports of {self.steps} steps are taken together"] if self.steps > 1 else []
         made = deck.Deck(
             tuple(self._with_groups()),
             tuple(self.ties),
             tuple(self.couplings),
             tuple(self.equations),
+            tuple(self._springs()),
             tuple(self.forces),
             tuple(self.pressures),
             tuple(self.supports),
@@ -371,13 +423,18 @@ class _Cards:
             points_of_reference=points,
             deck=made,
             unused=[*self.raw.unused, *unused],
+            refused={**self.raw.refused, **self.met.refused},
             notes=[*self.raw.notes, *notes],
         )
 
     def _with_groups(self) -> Iterator[deck.DeckMaterial]:
-        groups: dict[str, list[str]] = {}
+        groups: dict[str, dict[str, Directions | None]] = {}
         for instance, scope in {**self.assembly.instances, "": self.assembly.top}.items():
-            for elset, material in scope.sections:
+            for card in scope.sections:
+                elset, material = card.option("ELSET"), card.option("MATERIAL")
+                if "COMPOSITE" in card.options:
+                    self._refused(card, "COMPOSITE")
+                    continue
                 if material.upper() not in self.materials:
                     raise ValueError(
                         f"*SOLID SECTION of '{elset}' names the material '{material}', which the deck has not: "
@@ -386,9 +443,86 @@ class _Cards:
                 wanted = f"{instance}.{elset}" if instance else elset
                 name = next((name for name in self.raw.volumes if name.upper() == wanted.upper()), None)
                 if name:
-                    groups.setdefault(material.upper(), []).append(name)
+                    groups.setdefault(material.upper(), {})[name] = self._directions(card, scope, instance)
         for key, one in self.materials.items():
-            yield replace(one, groups=tuple(groups.get(key, ())))
+            mine = groups.get(key, {})
+            yield replace(one, groups=tuple(mine), directions={name: axes for name, axes in mine.items() if axes})
+
+    def _directions(self, section: Card, scope: abaqus.Scope, instance: str) -> Directions | None:
+        """Axes of the material of a section, None for x, y, z."""
+        name = section.option("ORIENTATION")
+        if not name:
+            return None
+        scope = scope if name.upper() in scope.orientations else self.assembly.top
+        card = scope.orientations.get(name.upper())
+        if card is None:
+            raise ValueError(f"{section.where} names the orientation '{name}', which the deck has not: add it")
+        if card.option("DEFINITION").upper() not in ("", "COORDINATES") or not card.data:
+            self._refused(card, card.option("DEFINITION").upper())
+            return None
+        turn, shift = self.assembly.moves.get(instance, (np.eye(3), np.zeros(3)))
+        own = np.eye(3)
+        if len(card.data) > 1 and card.data[1][0]:
+            axis, angle = card.floats(card.data[1], 2)
+            if axis not in (1.0, 2.0, 3.0):
+                raise ValueError(f"{card.where} turns about axis {axis:g}: give 1, 2 or 3")
+            own = turned(int(axis) - 1, angle)
+        table = scope.distributions.get(card.data[0][0].upper())
+        if table is not None:
+            return self._listed(table, instance, turn, own)
+        points = np.array(card.floats(card.data[0], 9)).reshape(3, 3)
+        kind = card.option("SYSTEM").upper() or "RECTANGULAR"
+        if kind in ("RECTANGULAR", "Z RECTANGULAR"):
+            rows = orthogonal(points[0] - points[2], points[1] - points[2])
+            if kind[0] == "Z":  # the first is z, the second x
+                rows = np.roll(rows, -1, axis=0)
+            system = System("rectangular", np.zeros(3), rows, own)
+        elif kind in ("CYLINDRICAL", "SPHERICAL"):
+            pole = points[1] - points[0]
+            aside = np.eye(3)[np.abs(pole).argmin()]
+            system = replace(System.of_points(kind.lower(), points[0], points[1], points[0] + aside), turn=own)
+        else:
+            self._refused(card, kind)
+            return None
+        return system.moved(turn, shift)
+
+    def _listed(self, card: Card, instance: str, turn: np.ndarray, own: np.ndarray) -> Listed:
+        """Axes element by element; those that no line names have those of the first line."""
+        centres = np.vstack([self.raw.points[block.nodes].mean(axis=1) for block in self.raw.cells])
+        number = {int(label): i for i, label in enumerate(np.concatenate([b.labels for b in self.raw.cells]))}
+        axes: list[np.ndarray] = []
+        which = np.zeros(len(centres), dtype=int)
+        for line in card.data:
+            points = np.array(card.floats(line[1:], 6)).reshape(2, 3)
+            if line[0]:
+                try:
+                    named = [label for _, label in self.assembly.elements(line[0], instance)]
+                except KeyError:
+                    raise ValueError(f"{card.where} names the elements '{line[0]}', which the deck has not") from None
+                which[[number[label] for label in named if label in number]] = len(axes)
+            axes.append(own @ orthogonal(*points) @ turn.T)
+        return Listed(centres, np.array(axes)[which])
+
+    def _springs(self) -> Iterator[deck.Spring]:
+        for instance, scope in {**self.assembly.instances, "": self.assembly.top}.items():
+            for card in scope.springs:
+                if len(card.data) < 2 or {"NONLINEAR", "ORIENTATION"} & set(card.options):
+                    self._refused(card, ", ".join({"NONLINEAR", "ORIENTATION"} & set(card.options)) or "no stiffness")
+                    continue
+                axes = [card.whole(text) - 1 for text in card.data[0] if text]
+                for where, label in self.assembly.elements(card.option("ELSET"), instance):
+                    kind, nodes = self.assembly.scope(where).elements[label]
+                    rows = [self.row[where, node] for node in nodes]
+                    if kind == "SPRINGA":
+                        along = np.subtract(*self.raw.points[rows[::-1]])
+                        factors = along / np.linalg.norm(along)
+                        terms = [
+                            (r, k, s * f) for r, s in zip(rows, (-1, 1), strict=True) for k, f in enumerate(factors)
+                        ]
+                    else:
+                        terms = [(r, axis, s) for r, axis, s in zip(rows, axes, (1.0, -1.0), strict=False)]
+                    kept = tuple((self._node(r), axis, float(factor)) for r, axis, factor in terms if factor)
+                    yield deck.Spring(kept, card.number(card.data[1][0]))
 
     def _masses(self) -> Iterator[deck.PointMass]:
         for instance, scope in {**self.assembly.instances, "": self.assembly.top}.items():
@@ -411,6 +545,15 @@ def engineering_constants(D: list[float]) -> tuple[float, ...]:
     S = np.linalg.inv(_normal_block(D))
     E = 1 / np.diag(S)
     return (*E.tolist(), float(-S[0, 1] * E[0]), float(-S[0, 2] * E[0]), float(-S[1, 2] * E[1]), *D[6:9])
+
+
+def anisotropic(D: list[float]) -> tuple[tuple[float, ...], ...]:
+    """The stiffness in our order of 21 values: columns of its upper triangle, stresses 11, 22, 33, 12, 13, 23."""
+    full = np.zeros((6, 6))
+    full.T[np.tril_indices(6)] = D
+    full = np.triu(full) + np.triu(full, 1).T
+    order = [0, 1, 2, 5, 4, 3]
+    return tuple(map(tuple, full[np.ix_(order, order)].tolist()))
 
 
 def _normal_block(D: list[float]) -> np.ndarray:

@@ -7,14 +7,18 @@ mm, t and s, as decks do.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from tribodyn.geometry.sources.directions import Directions
 
 
 @dataclass(frozen=True)
 class DeckMaterial:
     """young, poisson : isotropic, [Pa] and [-], or None; density [kg/m3], expansion [1/K] : None where not given;
     engineering : (E1, E2, E3, nu12, nu13, nu23, G12, G13, G23) of an orthotropic one, or None;
-    groups : volume groups made of it
+    stiffness : (6, 6) of an anisotropic one, stresses 11, 22, 33, 23, 13, 12, or None;
+    groups : volume groups made of it; directions : of these, those whose axes are not x, y, z -> its axes
     """
 
     name: str
@@ -23,7 +27,9 @@ class DeckMaterial:
     density: float | None = None
     expansion: float | None = None
     engineering: tuple[float, ...] | None = None
+    stiffness: tuple[tuple[float, ...], ...] | None = None
     groups: tuple[str, ...] = ()
+    directions: Mapping[str, Directions] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -55,6 +61,17 @@ class Equation:
     """sum of coefficient * displacement = 0; each term is (group of one node, axis 0..5, coefficient)."""
 
     terms: tuple[tuple[str, int, float], ...]
+
+
+@dataclass(frozen=True)
+class Spring:
+    """A stiffness [N/m] against the elongation sum of factor * displacement; terms as of an equation.
+
+    Rotations are counted with a length of 1 m; a spring of rotations alone has [N m]
+    """
+
+    terms: tuple[tuple[str, int, float], ...]
+    stiffness: float
 
 
 @dataclass(frozen=True)
@@ -99,6 +116,7 @@ class Deck:
     ties: tuple[Tie, ...] = ()
     couplings: tuple[Coupling, ...] = ()
     equations: tuple[Equation, ...] = ()
+    springs: tuple[Spring, ...] = ()
     forces: tuple[Force, ...] = ()
     pressures: tuple[FacePressure, ...] = ()
     supports: tuple[Support, ...] = ()
@@ -116,6 +134,9 @@ def in_si(deck: Deck, metre: float, newton: float) -> Deck:
         stress = newton / area
         return values and (*(stress * v for v in values[:3]), *values[3:6], *(stress * v for v in values[6:]))
 
+    def lengths(terms: tuple[tuple[str, int, float], ...]) -> tuple[tuple[str, int, float], ...]:
+        return tuple((group, axis, factor * (1.0 if axis < 3 else metre)) for group, axis, factor in terms)
+
     return replace(
         deck,
         materials=tuple(
@@ -124,10 +145,16 @@ def in_si(deck: Deck, metre: float, newton: float) -> Deck:
                 young=scaled(one.young, newton / area),
                 density=scaled(one.density, mass / metre**3),
                 engineering=moduli(one.engineering),
+                stiffness=one.stiffness and tuple(tuple(newton / area * v for v in row) for row in one.stiffness),
+                directions={group: own.scaled(metre) for group, own in one.directions.items()},
             )
             for one in deck.materials
         ),
         ties=tuple(replace(one, tolerance=scaled(one.tolerance, metre)) for one in deck.ties),
+        equations=tuple(replace(one, terms=lengths(one.terms)) for one in deck.equations),
+        springs=tuple(
+            replace(one, terms=lengths(one.terms), stiffness=one.stiffness * newton / metre) for one in deck.springs
+        ),
         forces=tuple(replace(one, value=one.value * newton * (1.0 if one.axis < 3 else metre)) for one in deck.forces),
         pressures=tuple(replace(one, value=one.value * newton / area) for one in deck.pressures),
         supports=tuple(replace(one, value=one.value * (metre if one.axis < 3 else 1.0)) for one in deck.supports),

@@ -29,7 +29,8 @@ class RawMesh:
     nodes : group -> rows of `points`; bodies : those of `volumes` that the file calls bodies
     skins : those of `nodes` that may stand for a face
     points_of_reference : name -> (3,) points that belong to no element
-    unused : one clause for each thing that was met and has no use here; notes : what a user should know
+    unused : one clause for each thing that was met and changes nothing here; notes : what a user should know
+    refused : name of a card or element -> clause, which would change stiffness, mass, support or load
     """
 
     points: np.ndarray
@@ -44,6 +45,7 @@ class RawMesh:
     deck: Deck = field(default_factory=Deck)
     unused: Sequence[str] = ()
     notes: Sequence[str] = ()
+    refused: Mapping[str, str] = field(default_factory=dict)
 
 
 NOTHING = RawMesh(np.empty((0, 3)), np.empty(0, dtype=int), ())

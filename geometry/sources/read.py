@@ -43,6 +43,7 @@ class Source:
     points : name -> (3,) reference points that belong to no element [m]
     notes : sentences on what was done to it, such as elements raised to second order
     unused : clauses that name what was found and is not used
+    refused : name -> clause of what is not carried over and would change stiffness, mass, support or load
     counts : group of nodes -> body -> how many of its nodes the file lists there, before edge nodes were added
     """
 
@@ -52,6 +53,7 @@ class Source:
     notes: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
     counts: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    refused: Mapping[str, str] = field(default_factory=dict)
 
 
 def read(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> Source:
@@ -69,7 +71,7 @@ def read(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> S
         for group, rows in raw.nodes.items()
     }
     unused = (*raw.unused, *lost(raw, built))
-    return Source(built, raw.deck, raw.points_of_reference, done(raw, built), unused, counts)
+    return Source(built, raw.deck, raw.points_of_reference, done(raw, built), unused, counts, raw.refused)
 
 
 def read_raw(path: str | Path, unit: str = "m", sizes: cad.Sizes | None = None) -> RawMesh:

@@ -43,7 +43,7 @@ def test_sets_and_surfaces_are_where_the_deck_puts_them(lap):
 def test_what_the_deck_says_beside_its_mesh(lap):
     said = lap.deck
     assert said.materials == (
-        deck.DeckMaterial("Steel", 210e9, 0.3, pytest.approx(7850.0), 1.2e-5, None, ("Block-1.All", "Block-2.All")),
+        deck.DeckMaterial("Steel", 210e9, 0.3, pytest.approx(7850.0), 1.2e-5, groups=("Block-1.All", "Block-2.All")),
     )
     assert said.ties == (deck.Tie("glue", "Lower", "Upper", 0.5e-3),)
     assert said.couplings == (deck.Coupling("carried", "distributing", "RP", "End"),)
@@ -100,7 +100,7 @@ BROKEN = {
     "half a load": ("RP, 2, -100.", "RP, 2", "needs node, direction and value"),
     "unknown set in a support": ("Foot, ENCASTRE", "Fuss, ENCASTRE", "names 'Fuss'"),
     "generated mesh": ("*Nset, nset=Left", "*Ngen\n1, 9, 2\n*Nset, nset=Left", "generates a mesh"),
-    "cylindrical nodes": ("*Node\n      1,           0.", "*Node, system=C\n      1,           0.", "another system"),
+    "unknown system": ("*Node\n      1,           0.", "*Node, system=Q\n      1,           0.", "one of R, C, S"),
     "missing include": (
         "*Part, name=Block",
         "*Include, input=gone.inp\n*Part, name=Block",

@@ -21,7 +21,7 @@ def said(capsys, *words):
 
 
 def test_a_deck_for_machines(capsys):
-    code, out, _ = said(capsys, LAP, "--unit", "mm", "--modes", "14", "--json")
+    code, out, _ = said(capsys, LAP, "--unit", "mm", "--modes", "14", "--free", "--json")
     assert not code
     found = json.loads(out)
     assert found["mass_kg"] == pytest.approx(2 * 2e-6 * 7850)

@@ -14,7 +14,7 @@ from tribodyn.fem.constraints import Clamp, Constraint, named
 from tribodyn.fem.couplings import DistributedCoupling, Link, RigidCoupling, Tie
 from tribodyn.fem.loads import Load
 from tribodyn.fem.material import AnyMaterial, Material, Orthotropic
-from tribodyn.fem.springs import Mass
+from tribodyn.fem.springs import ElongationSpring, Mass
 from tribodyn.fem.surface import surface
 from tribodyn.geometry import mesh as mesh_reader
 from tribodyn.geometry import parts, placing, refine
@@ -194,6 +194,11 @@ def masses(scene: StructureScene, folder: Path) -> list[Mass]:
     """Lumped masses."""
     own = [Mass(table.at, table.mass, table.inertia) for table in scene.masses.values()]
     return own + [mass for deck in of_decks(scene, folder).values() for mass in deck.masses]
+
+
+def deck_springs(scene: StructureScene, folder: Path) -> list[ElongationSpring]:
+    """The springs that decks bring."""
+    return [spring for deck in of_decks(scene, folder).values() for spring in deck.springs]
 
 
 def deck_loads(scene: StructureScene, folder: Path) -> dict[str, Load]:

@@ -7,19 +7,20 @@ point that nothing moves, is named among what is not used.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tribodyn.fem.assembly import Body
+from tribodyn.fem.assembly import Assembly, Body
 from tribodyn.fem.constraints import AXES, Clamp, Constraint
 from tribodyn.fem.couplings import DistributedCoupling, Equation, RigidCoupling, Tie
 from tribodyn.fem.loads import Load, Moment, NodalForce, Pressure, Sum
-from tribodyn.fem.material import AnyMaterial, Material, Orthotropic
-from tribodyn.fem.springs import Mass
+from tribodyn.fem.material import Anisotropic, AnyMaterial, Material, Orthotropic
+from tribodyn.fem.part import Part, build
+from tribodyn.fem.springs import ElongationSpring, Mass
 from tribodyn.geometry import refine
 from tribodyn.geometry.sources import deck, picking, read
 from tribodyn.workflows.scene.structure import EVERYTHING
@@ -38,6 +39,7 @@ class CarriedDeck:
     points: dict[str, np.ndarray] = field(default_factory=dict)
     clamps: list[Clamp] = field(default_factory=list)
     constraints: list[Constraint] = field(default_factory=list)
+    springs: list[ElongationSpring] = field(default_factory=list)
     masses: list[Mass] = field(default_factory=list)
     load: Sum = field(default_factory=lambda: Sum(()))
     notes: list[str] = field(default_factory=list)
@@ -78,6 +80,7 @@ class _Carrying:
         self.materials = materials
         self.faces: dict[str, list[str]] = {}  # group of the deck -> its names in the assembly
         self.sets: dict[str, list[str]] = {}
+        self._refuse()
         self.made = CarriedDeck([self._body(body) for body in source.bodies])
         self.notes = self.made.notes
         self.axes_of: dict[str, set[int]] = {}  # point -> its axes that an equation moves
@@ -95,9 +98,25 @@ class _Carrying:
         self._points()
         self.made.clamps += [Clamp(group) for group in self.table.fixed]
         self.made.clamps += [Clamp(group, axes) for group, axes in self.table.fixed_axes.items()]
-        unused = [f"not used: {clause}" for clause in (*self.source.unused, *self.notes)]
+        left = [f"{self.source.refused[name]}, by ignore" for name in self.table.ignore]
+        unused = [f"not used: {clause}" for clause in (*self.source.unused, *self.notes, *left)]
         self.made.notes = [f"decks.{self.name}: {sentence}" for sentence in (*self.source.notes, *unused)]
         return self.made
+
+    def _refuse(self) -> None:
+        """Raise ValueError where the deck has what is not carried over, unless the scene ignores it."""
+        refused, ignore = self.source.refused, self.table.ignore
+        if unknown := [name for name in ignore if name not in refused]:
+            raise ValueError(
+                f"ignore: '{unknown[0]}' is not refused, {', '.join(refused) or 'nothing'} is: correct the name"
+            )
+        if left := [name for name in refused if name not in ignore]:
+            listed = ", ".join(refused[name] for name in left)
+            names = ", ".join(f'"{name}"' for name in left)
+            raise ValueError(
+                f"the deck has {listed}, not carried over though stiffness, mass, support or load may change: give it "
+                f"in the scene, and leave it out by decks.{self.name}.ignore = [{names}]"
+            )
 
     # bodies
 
@@ -112,49 +131,11 @@ class _Carrying:
                 rules[face] = rule.rule
         mesh, node_sets = picking.with_faces(found.mesh, found.node_sets, rules)
         mesh, node_sets = refine.halved(mesh, node_sets, self.table.halved)
-        material = self._material(name, mesh)
+        made = material(self.deck, name, mesh, self.table, self.materials, self.name)
         for group in {*node_sets, *(mesh.boundaries or {})}:
             kept = self.faces if group in (mesh.boundaries or {}) else self.sets
             kept.setdefault(group, []).append(f"{name}.{group}")
-        return Body(name, mesh, node_sets, material)
-
-    def _material(self, name: str, mesh: Any) -> Any:
-        """Material of a body, or volume group -> material where it has several."""
-        given: dict[str, AnyMaterial] = {}
-        count = np.zeros(mesh.nelements, dtype=int)
-        for one in self.deck.materials:
-            for group in one.groups:
-                if group in (mesh.subdomains or {}):
-                    given[group] = self._solid(one)
-                    count[mesh.subdomains[group]] += 1
-        if (count > 1).any():
-            many = int((count > 1).sum())
-            raise ValueError(f"the sections of body '{name}' overlap in {many} elements: correct them")
-        if (count == 1).all():
-            return given if len(given) > 1 else next(iter(given.values()))
-        if self.table.material is None:
-            raise ValueError(
-                f"the deck gives {int((count == 0).sum())} of {mesh.nelements} elements of body '{name}' no material: "
-                f'name one of the scene with decks.{self.name}.material = "name"'
-            )
-        other = self.materials[self.table.material]
-        if not given:
-            return other
-        raise ValueError(f"the deck gives a part of body '{name}' no material: give all its elements a section")
-
-    def _solid(self, one: deck.DeckMaterial) -> AnyMaterial:
-        if one.name in self.materials:
-            return self.materials[one.name]
-        instead = f"give [materials.{one.name}] in the scene, which takes its place"
-        if one.density is None:
-            raise ValueError(f"material '{one.name}' of the deck has no density: {instead}")
-        along = one.expansion or 0.0
-        if one.engineering is not None:
-            e = one.engineering
-            return Orthotropic(e[:3], e[3:6], e[6:], one.density, expansion=(along,) * 3)
-        if one.young is None or one.poisson is None:
-            raise ValueError(f"material '{one.name}' of the deck has no elastic constants that are known: {instead}")
-        return Material(one.young, one.poisson, one.density, along)
+        return Body(name, mesh, node_sets, made)
 
     # constraints
 
@@ -187,16 +168,25 @@ class _Carrying:
     def _equations(self, equations: Sequence[deck.Equation]) -> None:
         for number, one in enumerate(equations, 1):
             what = f"equation {number} of deck {self.name}"
-            terms = []
-            for group, axis, factor in one.terms:
-                if group in self.source.points:
-                    self.axes_of.setdefault(group, set()).add(axis)
-                    terms.append((group if axis < 3 else f"{group}.turn", axis % 3, factor))
-                elif axis < 3:
-                    terms.append((self._groups(group, what)[0], axis, factor))
-                else:
-                    raise ValueError(f"{what} turns a node of a solid, which has no rotation; correct the deck")
-            self.made.constraints.append(Equation(what, tuple(terms)))
+            self.made.constraints.append(Equation(what, self._terms(one.terms, what)))
+
+    def _springs(self, springs: Sequence[deck.Spring]) -> None:
+        for number, one in enumerate(springs, 1):
+            terms = self._terms(one.terms, f"spring {number} of deck {self.name}")
+            self.made.springs.append(ElongationSpring(terms, one.stiffness))
+
+    def _terms(self, terms: Sequence[tuple[str, int, float]], what: str) -> tuple[tuple[str, int, float], ...]:
+        """Terms of an equation or a spring over the nodes of the assembly."""
+        found = []
+        for group, axis, factor in terms:
+            if group in self.source.points:
+                self.axes_of.setdefault(group, set()).add(axis)
+                found.append((group if axis < 3 else f"{group}.turn", axis % 3, factor))
+            elif axis < 3:
+                found.append((self._groups(group, what)[0], axis, factor))
+            else:
+                raise ValueError(f"{what} turns a node of a solid, which has no rotation; correct the deck")
+        return tuple(found)
 
     def _masses(self, masses: Sequence[deck.PointMass]) -> None:
         for one in masses:
@@ -261,7 +251,7 @@ class _Carrying:
             self.notes.append(f"points {', '.join(idle)}, which carry nothing")
 
     def _needs_coupling(self, group: str, what: str) -> None:
-        if group in self.source.points and group not in self.carried:
+        if group in self.source.points and group not in self.carried and group not in self.axes_of:
             raise ValueError(f"a {what} acts on point '{group}', which is coupled to nothing; couple it to a face")
 
     def _faces(self, place: str, what: str) -> list[str]:
@@ -287,3 +277,66 @@ def _held(point: str, axes: set[int]) -> list[Clamp]:
     """Clamps of a reference point along axes 0..5."""
     shifts, turns = ("".join(AXES[axis % 3] for axis in sorted(axes) if axis // 3 == k) for k in (0, 1))
     return [Clamp(name, letters) for name, letters in ((point, shifts), (f"{point}.turn", turns)) if letters]
+
+
+def material(
+    of: deck.Deck, name: str, mesh: Any, table: Table, materials: Mapping[str, AnyMaterial], deck_name: str = "NAME"
+) -> Any:
+    """Material of a body of a deck, or volume group -> material where it has several.
+
+    Raises  ValueError where an element has none or two
+    """
+    given: dict[str, AnyMaterial] = {}
+    count = np.zeros(mesh.nelements, dtype=int)
+    for one in of.materials:
+        for group in one.groups:
+            if group in (mesh.subdomains or {}):
+                given[group] = _solid(one, group, materials)
+                count[mesh.subdomains[group]] += 1
+    if (count > 1).any():
+        many = int((count > 1).sum())
+        raise ValueError(f"the sections of body '{name}' overlap in {many} elements: correct them")
+    if (count == 1).all():
+        return given if len(given) > 1 else next(iter(given.values()))
+    if table.material is None:
+        raise ValueError(
+            f"the deck gives {int((count == 0).sum())} of {mesh.nelements} elements of body '{name}' no material: "
+            f'name one of the scene with decks.{deck_name}.material = "name"'
+        )
+    if not given:
+        return materials[table.material]
+    raise ValueError(f"the deck gives a part of body '{name}' no material: give all its elements a section")
+
+
+def _solid(one: deck.DeckMaterial, group: str, materials: Mapping[str, AnyMaterial]) -> AnyMaterial:
+    """A material of the deck along the axes of a group, or the one of the scene that takes its place."""
+    axes: Any = one.directions.get(group, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+    if one.name in materials:
+        other = materials[one.name]
+        return replace(other, axes=axes) if group in one.directions and not isinstance(other, Material) else other
+    instead = f"give [materials.{one.name}] in the scene, which takes its place"
+    if one.density is None:
+        raise ValueError(f"material '{one.name}' of the deck has no density: {instead}")
+    along = one.expansion or 0.0
+    if one.stiffness is not None:
+        return Anisotropic(np.array(one.stiffness), one.density, axes, (along,) * 3)
+    if one.engineering is not None:
+        e = one.engineering
+        return Orthotropic(e[:3], e[3:6], e[6:], one.density, axes, (along,) * 3)
+    if one.young is None or one.poisson is None:
+        raise ValueError(f"material '{one.name}' of the deck has no elastic constants that are known: {instead}")
+    return Material(one.young, one.poisson, one.density, along)
+
+
+def part(name: str, table: Table, materials: Mapping[str, AnyMaterial], folder: Path) -> Part:
+    """All that a deck says as one part: bodies, what joins and holds them, its loads.
+
+    Raises  ValueError as `structure` does
+    """
+    made = structure(name, table, materials, folder)
+    whole = Assembly(made.bodies, {point: list(place) for point, place in made.points.items()})
+    own = {body.name: body.material for body in whole.bodies}
+    return build(
+        whole, whole.node_sets, own, made.clamps, [], {load_name(name): made.load}, {},
+        springs=made.springs, constraints=made.constraints, masses=made.masses,
+    )  # fmt: skip

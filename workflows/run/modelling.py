@@ -135,6 +135,7 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
     loads |= rods
     geometry = scene.geometry if isinstance(scene, PartScene | StructureScene) else None
     turning = None if geometry is None else geometry.no_turning
+    brought = bodies.deck_springs(scene, folder or Path()) if isinstance(scene, StructureScene) else []
     masses = bodies.masses(scene, folder or Path()) if isinstance(scene, StructureScene) else []
     if masses and scene.wheel is not None and scene.wheel.speed:
         raise ValueError(
@@ -153,7 +154,7 @@ def make_part(scene: MeshScene, mesh: Any, node_sets: dict[str, np.ndarray], fol
             for name, output in {settings.OUTPUT: scene.response, **scene.response.others}.items()
         }
         | {tightening.output(name): Elongation(rod) for name, rod in rods.items()},
-        springs=[*springs(scene), *(rod for rod in rods.values() if rod.stiffness)],
+        springs=[*springs(scene), *brought, *(rod for rod in rods.values() if rod.stiffness)],
         held=[] if turning is None else [NoMeanRotation(turning)],
         constraints=bodies.constraints(scene, folder or Path()) if isinstance(scene, StructureScene) else (),
         masses=masses,

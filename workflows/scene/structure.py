@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import BeforeValidator, Field, PrivateAttr, StrictInt, ValidationInfo, model_validator
 
@@ -54,8 +54,8 @@ class FaceRule(Table):
         return Rule(self.box, self.nearest, self.normal, self.within, self.cad)
 
 
-Use = Literal["ties", "couplings", "equations", "masses", "supports", "forces", "pressures"]
-EVERYTHING: tuple[Use, ...] = ("ties", "couplings", "equations", "masses", "supports", "forces", "pressures")
+Use = Literal["ties", "couplings", "equations", "springs", "masses", "supports", "forces", "pressures"]
+EVERYTHING: tuple[Use, ...] = get_args(Use)
 
 
 def in_metres(value: object) -> object:
@@ -83,6 +83,9 @@ class DeckTable(Table):
     """Its unit of length, such as "mm"; a deck in mm counts in N, mm, t and s."""
     use: tuple[Use, ...] = EVERYTHING
     """What is taken from it beside bodies and materials; everything by default."""
+    ignore: tuple[str, ...] = ()
+    """Cards and elements that are not carried over though they would change the structure, by their names in the
+    refusal: what they do is left out, on your own decision."""
     material: str | None = None
     """Material of the scene for elements to which the deck gives none."""
     halved: Annotated[StrictInt, Field(ge=0, le=3)] = 0

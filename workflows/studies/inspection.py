@@ -16,12 +16,14 @@ from tribodyn.fem.material import Material
 from tribodyn.fem.modes import modes
 from tribodyn.geometry.facts import area, facts
 from tribodyn.geometry.sources import read as sources
+from tribodyn.geometry.sources.deck import Deck
 from tribodyn.workflows.pictures import groups as group_pictures
 from tribodyn.workflows.result.columns import named_lines
-from tribodyn.workflows.run import modelling, part_reduction, sanity_checks
+from tribodyn.workflows.run import decks, modelling, part_reduction, sanity_checks
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Pressure, quantity
 from tribodyn.workflows.scene.source import AnyPath, Overrides, read_scene
+from tribodyn.workflows.scene.structure import DeckTable
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,7 @@ class Inspection:
     groups: Mapping[str, Mapping[str, Any]]
     worst: Mapping[str, Any]
     unused: tuple[str, ...] = ()
+    refused: tuple[str, ...] = ()
     said: tuple[str, ...] = ()
     gaps: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     frequencies: tuple[float, ...] = ()
@@ -72,6 +75,7 @@ class Inspection:
             "bodies": dict(self.bodies),
             "groups": dict(self.groups),
             "unused": list(self.unused),
+            "refused": list(self.refused),
             "worst_element": dict(self.worst),
             "gaps": dict(self.gaps),
             "frequencies_hz": list(self.frequencies),
@@ -99,9 +103,10 @@ class Inspection:
         for name, gap in self.gaps.items():
             lines.append(("gap", f"{name}: {1e6 * gap['least_m']:.4g} to {1e6 * gap['largest_m']:.4g} um"))
         if self.frequencies:
-            lines.append(("free modes", ", ".join(f"{f:.5g}" for f in self.frequencies) + " Hz"))
+            lines.append(("modes", ", ".join(f"{f:.5g}" for f in self.frequencies) + " Hz"))
         lines += [("done", sentence) for sentence in self.said]
         lines += [("not used", clause) for clause in self.unused]
+        lines += [("refused", f"{clause}, which a scene has to ignore by name") for clause in self.refused]
         return named_lines(lines + [("warning", sentence) for sentence in self.remarks])
 
     def write(self, folder: Path) -> list[Path]:
@@ -119,6 +124,7 @@ def inspect(
     poisson: Number = 0.3,
     density: Annotated[float | None, quantity("kg/m3")] = None,
     modes: int = 0,
+    free: bool = False,
     overrides: Overrides = (),
 ) -> Inspection:
     """Show what a mesh, a deck, a CAD file or a scene holds: size, mass, bodies, groups, worst element, gaps, warnings.
@@ -128,7 +134,8 @@ def inspect(
     young : Young's modulus of a file that gives no material, such as 210GPa
     poisson : Poisson's ratio likewise
     density : density likewise, such as "7860 kg/m3"
-    modes : number of natural frequencies to compute, free of contact; supports and springs of a scene hold
+    modes : number of natural frequencies to compute, free of contact; what a deck or a scene says joins and holds
+    free : of the bodies of a file by themselves, each free in space
     Raises  ValueError: what cannot be, one sentence
     """
     if modes < 0:
@@ -137,37 +144,48 @@ def inspect(
         raise ValueError("--young and --density go together: give both or none")
     material = None if young is None or density is None else Material(young, poisson, density)
     if Path(what).suffix.lower() in sources.ENDINGS:
-        return _of_file(Path(what), unit, material, modes)
+        return _of_file(Path(what), unit, material, modes, free)
     if unit != "m" or material is not None:
         raise ValueError("--unit, --young, --poisson and --density are for files: a scene has its own")
     return _of_scene(read_scene(what, overrides), modes)
 
 
-def _of_file(path: Path, unit: str, material: Material | None, n_modes: int) -> Inspection:
+def _of_file(path: Path, unit: str, material: Material | None, n_modes: int, free: bool) -> Inspection:
     source = sources.read(path, unit)
-    given = {group: one for one in source.deck.materials for group in one.groups}
-    solids, remarks = [], []
+    named = {"given": material} if material is not None else {}
+    table = DeckTable(file=path.name, unit=sources.UNITS[unit][0], material=next(iter(named), None))
+    solids = []
     for name, body in source.bodies.items():
-        own = next((given[group] for group in body.mesh.subdomains or {} if group in given), None)
-        made = material
-        if own is not None and own.young and own.poisson is not None and own.density:
-            made = Material(own.young, own.poisson, own.density)
+        try:
+            made = decks.material(source.deck, name, body.mesh, table, named)
+        except ValueError:  # no or no whole material
+            made = None
         solids.append(Solid(name, body.mesh, body.node_sets, made))
     found = measured(solids, (f"{sentence}" for sentence in source.notes), source.unused)
+    found = replace(found, refused=tuple(source.refused.values()))
     if n_modes:
-        if any(solid.material is None for solid in solids):
+        if material is None and not any(one.groups for one in source.deck.materials):
             raise ValueError(f"{path} gives no material to compute modes with: give --young, --poisson and --density")
-        found = replace(found, frequencies=_free_frequencies(solids, n_modes))
+        if free or source.deck == Deck(materials=source.deck.materials):
+            found = replace(found, frequencies=_free_frequencies(solids, n_modes))
+        else:
+            part = decks.part(path.stem, table, named, path.parent)
+            found = replace(found, frequencies=_frequencies(part.system, n_modes))
     hint = 'give --unit mm (in a scene: unit = "mm")'
-    remarks += sanity_checks.check_size(found.size, hint) + _check_materials(solids)
+    remarks = sanity_checks.check_size(found.size, hint) + _check_materials(solids)
     return replace(found, remarks=tuple(remarks))
+
+
+def _frequencies(system: Any, count: int) -> tuple[float, ...]:
+    """The lowest natural frequencies of a system [Hz]."""
+    omega, _ = modes(system.stiffness, system.mass, min(count, system.mass.shape[0]))
+    return tuple((omega / (2 * np.pi)).tolist())
 
 
 def _free_frequencies(solids: Sequence[Solid], count: int) -> tuple[float, ...]:
     """The lowest natural frequencies of bodies that nothing holds [Hz]; rigid motions are 0."""
     found: list[float] = []
     for solid in solids:
-        assert solid.material is not None
         M, K = assemble(solid.mesh, solid.material)
         omega, _ = modes(K, M, min(count, K.shape[0]))
         elastic = omega.copy()
@@ -182,9 +200,7 @@ def _of_scene(file: scene_file.SceneFile, n_modes: int) -> Inspection:
         part = modelling.make_part(file.mesh_scene, mesh, node_sets, file.folder)
     found = of_part(file, part)
     if n_modes:
-        system = part.system
-        omega, _ = modes(system.stiffness, system.mass, min(n_modes, system.mass.shape[0]))
-        found = replace(found, frequencies=tuple((omega / (2 * np.pi)).tolist()))
+        found = replace(found, frequencies=_frequencies(part.system, n_modes))
     return found
 
 
@@ -251,5 +267,5 @@ def measured(solids: Sequence[Solid], said: Iterable[str] = (), unused: Iterable
         "centre_m": all_facts[name].worst_centre.tolist(),
     }
     return Inspection(
-        tuple(solids), high - low, volume, mass, centre, bodies, groups, worst, tuple(unused), tuple(said)
+        tuple(solids), high - low, volume, mass, centre, bodies, groups, worst, tuple(unused), said=tuple(said)
     )
