@@ -506,7 +506,7 @@ class _Cards:
     def _springs(self) -> Iterator[deck.Spring]:
         for instance, scope in {**self.assembly.instances, "": self.assembly.top}.items():
             for card in scope.springs:
-                if len(card.data) < 2 or {"NONLINEAR", "ORIENTATION"} & set(card.options):
+                if not card.data or {"NONLINEAR", "ORIENTATION"} & set(card.options):
                     self._refused(card, ", ".join({"NONLINEAR", "ORIENTATION"} & set(card.options)) or "no stiffness")
                     continue
                 axes = [card.whole(text) - 1 for text in card.data[0] if text]
@@ -522,7 +522,7 @@ class _Cards:
                     else:
                         terms = [(r, axis, s) for r, axis, s in zip(rows, axes, (1.0, -1.0), strict=False)]
                     kept = tuple((self._node(r), axis, float(factor)) for r, axis, factor in terms if factor)
-                    yield deck.Spring(kept, card.number(card.data[1][0]))
+                    yield deck.Spring(kept, card.number(card.data[-1][0]))
 
     def _masses(self) -> Iterator[deck.PointMass]:
         for instance, scope in {**self.assembly.instances, "": self.assembly.top}.items():
