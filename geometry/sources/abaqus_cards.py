@@ -394,17 +394,6 @@ class _Cards:
     def finished(self) -> RawMesh:
         """The mesh with everything that the cards give."""
         solid = self.solid
-        for row in [row for row in self.references if solid[row]]:
-            self.nodes[self.references[row]] = np.array([row])
-        points = {name: self.raw.points[row] for row, name in self.references.items() if not solid[row]}
-        named = {**self.raw.nodes, **self.nodes}
-        for name, rows in named.items():
-            if len(rows) == 1 and not solid[rows[0]]:
-                points.setdefault(name, self.raw.points[rows[0]])
-        nodes = {name: rows for name, rows in named.items() if name not in points}
-        unused = list(self.unused)
-        unused += self.met.unused()
-        notes = [f"the loads and supports of {self.steps} steps are taken together"] if self.steps > 1 else []
         made = deck.Deck(
             tuple(self._with_groups()),
             tuple(self.ties),
@@ -416,6 +405,17 @@ class _Cards:
             tuple(self.supports),
             tuple(self._masses()),
         )
+        for row in [row for row in self.references if solid[row]]:
+            self.nodes[self.references[row]] = np.array([row])
+        points = {name: self.raw.points[row] for row, name in self.references.items() if not solid[row]}
+        named = {**self.raw.nodes, **self.nodes}
+        for name, rows in named.items():
+            if len(rows) == 1 and not solid[rows[0]]:
+                points.setdefault(name, self.raw.points[rows[0]])
+        nodes = {name: rows for name, rows in named.items() if name not in points}
+        unused = list(self.unused)
+        unused += self.met.unused()
+        notes = [f"the loads and supports of {self.steps} steps are taken together"] if self.steps > 1 else []
         return replace(
             self.raw,
             nodes=nodes,
@@ -509,7 +509,7 @@ class _Cards:
                 if not card.data or {"NONLINEAR", "ORIENTATION"} & set(card.options):
                     self._refused(card, ", ".join({"NONLINEAR", "ORIENTATION"} & set(card.options)) or "no stiffness")
                     continue
-                axes = [card.whole(text) - 1 for text in card.data[0] if text]
+                axes = [card.whole(text) - 1 for line in card.data[:-1] for text in line if text]
                 for where, label in self.assembly.elements(card.option("ELSET"), instance):
                     kind, nodes = self.assembly.scope(where).elements[label]
                     rows = [self.row[where, node] for node in nodes]
