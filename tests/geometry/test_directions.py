@@ -8,19 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.helpers.small_decks import bricks, by_calculix, frequencies
+from tests.helpers.small_decks import ENDING, bricks, by_calculix, frequencies, straight
 from tribodyn.geometry.sources.directions import System, turned
 
-ENDING = """*MATERIAL, NAME=PLY
-*ELASTIC, TYPE=ENGINEERING CONSTANTS
-140000., 9000., 10000., .3, .28, .4, 5000., 4500.,
-3500.
-*DENSITY
-1.6e-9
-*SOLID SECTION, ELSET=ALL, MATERIAL=PLY, ORIENTATION=OWN
-*BOUNDARY
-FOOT, 1, 3
-"""
 TENSOR = """*ELASTIC, TYPE=ANISO
 150000., 4000., 12000., 5000., 4200., 13000., 3000., 100.,
 200., 5000., -400., 150., 90., 60., 4500., 80.,
@@ -29,10 +19,6 @@ TENSOR = """*ELASTIC, TYPE=ANISO
 Z30, Z_30 = (
     f"{np.cos(a):.9f}, {np.sin(a):.9f}, 0., {-np.sin(a):.9f}, {np.cos(a):.9f}, 0." for a in (np.pi / 6, -np.pi / 6)
 )
-
-
-def straight(x: np.ndarray) -> np.ndarray:
-    return x * [100.0, 20.0, 10.0]
 
 
 def swept(x: np.ndarray) -> np.ndarray:

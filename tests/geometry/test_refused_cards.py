@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.geometry.test_directions import ENDING, straight
-from tests.helpers.small_decks import bricks, frequencies
+from tests.helpers.small_decks import ENDING, bricks, frequencies, straight
 from tribodyn.geometry.sources import read
 from tribodyn.workflows.run import decks
 from tribodyn.workflows.scene.structure import DeckTable

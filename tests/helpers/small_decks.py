@@ -14,6 +14,21 @@ from tribodyn.workflows.studies import inspection
 
 Shape = Callable[[np.ndarray], np.ndarray]
 
+ENDING = """*MATERIAL, NAME=PLY
+*ELASTIC, TYPE=ENGINEERING CONSTANTS
+140000., 9000., 10000., .3, .28, .4, 5000., 4500.,
+3500.
+*DENSITY
+1.6e-9
+*SOLID SECTION, ELSET=ALL, MATERIAL=PLY, ORIENTATION=OWN
+*BOUNDARY
+FOOT, 1, 3
+"""
+
+
+def straight(x: np.ndarray) -> np.ndarray:
+    return x * [100.0, 20.0, 10.0]
+
 
 def bricks(counts: tuple[int, int, int], shape: Shape) -> str:
     """Nodes and elements C3D20 of the unit cube, cut and mapped by a function of points; sets ALL, FOOT at x = 0.
