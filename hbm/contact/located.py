@@ -29,6 +29,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 TURN = 2 * math.pi
 STICK = 0.0  # kinds of segment; slip is the sign of T
 CELLS_PER_HARMONIC = 8  # of the grid on which roots are isolated: a polynomial of degree H has at most 2 H roots
+MOST_CELLS = 256  # that are looked into, for each cell of the grid: a double root takes some hundred
 SEGMENT_COLUMNS = 6  # of a segment: start, stop, kind, w, origin (-1: memory), d w / d N at the origin
 SHORT = 0.5  # rad of the highest harmonic, below which a force is integrated by Gauss's rule: six points leave 1e-16
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(6)
@@ -181,15 +182,18 @@ def _roots(c, hs, value_grid, slope_grid, end_grid, out, n):
 
     A cell of width d without a root or with a monotone polynomial is recognised by Taylor's bound about its middle,
     |f(t) - f(m) - f'(m) (t - m)| <= F d^2 / 8 with F = sum h^2 |c_h|; every other cell is halved. The depth is limited:
-    at 1e-9 rad only a double root is left, which changes nothing.
+    at 1e-9 rad only a double root is left, which changes nothing. So is the number of cells: there are at most two roots
+    for each harmonic, and what is no number has none.
     """
     bound = _size(c, hs, 2)
-    if abs(c[0]) > _size(c, hs, 0) or bound == 0.0:
+    if not abs(c[0]) <= _size(c, hs, 0) or not 0.0 < bound < math.inf:
         return n
     cells = value_grid.size
     cell, level = 0, 0
     left, positive = 0.0, end_grid[-1] >= 0.0
-    while cell < cells << level:
+    for _ in range(MOST_CELLS * (cells + hs[-1])):
+        if cell >= cells << level:
+            break
         width = TURN / (cells << level)
         if level == 0:
             value, slope = value_grid[cell], slope_grid[cell]

@@ -48,14 +48,15 @@ class Sample:
 def vertex(points: Sequence[Sample]) -> tuple[float, float]:
     """Frequency [rad/s] and height [m] of the peak through three points whose middle one is the highest."""
     middle = points[1]
-    w = np.array([point.omega - middle.omega for point in points])
+    unit = abs(points[2].omega - points[0].omega)
+    w = np.array([point.omega - middle.omega for point in points]) / unit
     ratio = np.array([middle.height / max(point.height, 1e-6 * middle.height) for point in points])
     bend, slope, least = np.polyfit(w, ratio**2, 2)
     at = float(np.clip(-0.5 * slope / bend, *sorted((w[0], w[2])))) if bend > 0 else 0.0
     level = least + slope * at + bend * at**2
     if level < RULES.too_high**-2:  # no such resonance
         return middle.omega, middle.height
-    return middle.omega + at, middle.height / float(np.sqrt(level))
+    return middle.omega + unit * at, middle.height / float(np.sqrt(level))
 
 
 def candidates(omega: np.ndarray, heights: np.ndarray) -> list[tuple[int, int]]:
@@ -104,10 +105,12 @@ def highest(
 
 def refined(balance: HarmonicBalance, points: Sequence[Sample], site: AtPeak) -> OperatingPoint:
     """The peak within three points, by parabolas through the nearest ones; by its slope where these do not close in."""
-    solves, start = 0, points[1]
+    solves = 0
     shape = (balance.contact.n_pair, -1, balance.basis.n_coeff)
     for _ in range(RULES.closings):
         omega, height = vertex(points)
+        if any(abs(omega - point.omega) <= site.tolerance * omega for point in points):  # no vertex of its own
+            break
         guess = extrapolate(np.array([p.omega for p in points]), [p.x for p in points], omega)
         solution = newton.solve(balance, omega, guess.reshape(shape), site.newton)
         found = OperatingPoint.of(balance, solution, site.output, solves := solves + 1)
@@ -118,5 +121,6 @@ def refined(balance: HarmonicBalance, points: Sequence[Sample], site: AtPeak) ->
         ordered = sorted((*points, Sample(omega, solution.state.flat, found.amplitude)), key=lambda p: p.omega)
         top = min(max(int(np.argmax([p.height for p in ordered])), 1), len(ordered) - 2)
         points = ordered[top - 1 : top + 2]
-    found = site.next(balance, start.omega, start.x.reshape(shape))
+    best = max(points, key=lambda point: point.height)
+    found = site.next(balance, best.omega, best.x.reshape(shape))
     return replace(found, solves=found.solves + solves)

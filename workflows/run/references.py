@@ -99,8 +99,8 @@ def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: st
         stiffness = system.stiffness if springs is None else stuck_stiffness(system.stiffness, B, springs)
         lam, phi = sla.eigh(stiffness, system.mass, subset_by_index=(0, min(LINEAR.modes, system.n_dof) - 1))
         shift = float((h * omega.mean()) ** 2)
-        if lam[0] > LINEAR.rigid * shift:
-            shift = 0.0
+        # a free body that turns is even driven outwards: its lam is below zero
+        shift = 0.0 if lam[0] > LINEAR.rigid * shift else max(shift, -2 * lam[0])
         factor = sla.cho_factor(stiffness + shift * system.mass if shift else stiffness)
         rate = system.velocity_matrix
         damping = np.zeros((len(lam),) * 2) if rate is None else phi.conj().T @ rate @ phi

@@ -142,7 +142,7 @@ def _add_normal(kn, n_open, N, product, t, jac):
         return
     j = 0
     while j < n_time:
-        if N[j] <= 0.0:
+        if not N[j] > 0.0:  # no number either
             j += 1
             continue
         start = j

@@ -27,7 +27,6 @@ from tribodyn.hbm.continuation.methods import adaptive, arc_length
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
 from tribodyn.hbm.linear.travelling_wave import at_sector
 from tribodyn.hbm.mistuning import MistunedWheel, spread
-from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.threads import limited
 from tribodyn.reduction import mistuning as reduction
 from tribodyn.reduction.cyclic import ReducedSector
@@ -52,9 +51,7 @@ from tribodyn.workflows.studies.many.task import Row, Status
 from tribodyn.workflows.studies.wheels import wheel as wheels
 
 FURTHEST = 3.0  # standard deviations at which what is drawn is cut off
-SHORTEST, LONGEST = 2e-3, 0.15  # steps of a scan, of its range: beyond a jump it continues
-SCANNED_TO = 1e-4  # residual of the points of a scan
-FOUND_TO = 1e-6  # residual of a peak
+SHORTEST, LONGEST = 1e-4, 0.15  # steps of a scan, of its range: beyond a jump it continues
 
 
 @dataclass(frozen=True)
@@ -120,16 +117,12 @@ class Blades:
         return _converged(settings.peak_of(self.file.scene).first(self.wheel.wave), "sectors alike")
 
     @cached_property
-    def _scanned(self) -> NewtonOptions:
-        return replace(settings.newton_options(self.file.scene), tolerance=SCANNED_TO)
-
-    @cached_property
     def beginning(self) -> np.ndarray:
         """(n_pair, n_component, n_coeff) of sectors alike at the lowest frequency, from which every pattern begins."""
         low, _ = settings.response_range(self.file.scene)
         one, info = self.wheel.wave, self.wheel.wave.model.info
         assert info.engine_order is not None
-        x = arc_length.solve_along_load(one, low, self._scanned).state.x
+        x = arc_length.solve_along_load(one, low, settings.newton_options(self.file.scene)).state.x
         n = self.wheel.n_sectors
         return np.concatenate([at_sector(one.basis, x, info.engine_order, n, k) for k in range(n)])
 
@@ -158,7 +151,7 @@ class Blades:
             step=0.02,
             max_step=LONGEST,
             min_step=SHORTEST,
-            newton=self._scanned,
+            newton=settings.newton_options(scene),
             guess=self.beginning,
         )
         branch = adaptive.follow(balance, low, high, scan)
@@ -167,9 +160,7 @@ class Blades:
         heights = amplitude(branch.response[:, [branch.output_names.index(name) for name in names]])
         if heights.argmax() // len(names) in (0, len(heights) - 1):
             raise SolveFailed("the response still rises at an end of response.frequency: extend it")
-        exact = replace(settings.newton_options(scene), tolerance=max(FOUND_TO, scene.solver.tolerance))
-        site = replace(settings.peak_of(scene), newton=exact)
-        best, blade = highest_peak.highest(balance, branch, names, site)
+        best, blade = highest_peak.highest(balance, branch, names, settings.peak_of(scene))
         if best is None or best.amplitude < (1 - asked_of(self.file).tolerance) * heights.max():
             raise SolveFailed(f"the highest peak, near {_hertz(branch.omega[heights.argmax() // len(names)])}, is lost")
         return best, blade
