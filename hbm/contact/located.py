@@ -182,8 +182,8 @@ def _roots(c, hs, value_grid, slope_grid, end_grid, out, n):
 
     A cell of width d without a root or with a monotone polynomial is recognised by Taylor's bound about its middle,
     |f(t) - f(m) - f'(m) (t - m)| <= F d^2 / 8 with F = sum h^2 |c_h|; every other cell is halved. The depth is limited:
-    at 1e-9 rad only a double root is left, which changes nothing. So is the number of cells: a harmonic has two roots at
-    most, and what is no number has none.
+    at 1e-9 rad only a double root is left, which changes nothing. So is the number of cells: a harmonic has at most two
+    roots, and what is no number has none.
     """
     bound = _size(c, hs, 2)
     if not abs(c[0]) <= _size(c, hs, 0) or not 0.0 < bound < math.inf:
