@@ -156,7 +156,7 @@ def common(one: Side, two: Side, reach: float) -> Common:
         region = _reference(one.corners)[None].repeat(len(i), axis=0)
         m = outline.shape[1]
         s = _place(one.points[i].repeat(m, 0), outline.reshape(-1, 3), frames.repeat(m, 0))
-        subject = s.T.reshape(len(i), -1, 2)
+        subject = s.T.reshape(len(i), m, 2)
     else:
         region = np.einsum("pkx,pdx->pkd", corners[i] - one.centre[i][:, None], frames)
         subject = np.einsum("pkx,pdx->pkd", outline - one.centre[i][:, None], frames)

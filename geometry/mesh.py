@@ -84,10 +84,10 @@ def quality(mesh: Any) -> Quality:
     element, _ = np.unravel_index(scaled.argmin(), scaled.shape)
     lowest = float(scaled.min())
     if not lowest > 0.0:
-        centre = ", ".join(f"{x:.4g}" for x in mesh.p[:, mesh.t[:, element]].mean(axis=1))
+        centre = ", ".join(f"{1e3 * x:.4g}" for x in mesh.p[:, mesh.t[:, element]].mean(axis=1))
         inverted = int((~(scaled > 0.0)).any(axis=1).sum())
         raise ValueError(
-            f"{inverted} of {mesh.nelements} mesh elements are inverted or degenerate, the worst at ({centre}) m: "
+            f"{inverted} of {mesh.nelements} mesh elements are inverted or degenerate, the worst at ({centre}) mm: "
             "refine the mesh there or soften the shape"
         )
     volume = float((determinant[:, -len(weights) :] @ weights).sum())

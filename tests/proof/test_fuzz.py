@@ -83,7 +83,7 @@ def test_a_scene_that_does_not_end_well_as_it_is_is_no_scene_to_fuzz() -> None:
         raise KeyError(words)
 
     with pytest.raises(RuntimeError, match="beam as it is does not end well: traceback"):
-        fuzz.fuzz("beam", TINY, values=40, runs=1, command=fails)
+        fuzz.fuzz("beam", TINY, values=80, runs=1, command=fails)
 
 
 def test_a_wrong_number_in_a_result_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
