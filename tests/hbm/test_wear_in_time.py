@@ -34,6 +34,14 @@ def problem() -> WearProblem:
     return wear_problem(balance=balance_of(pressed_body(), tuple(range(8))), lost_below=LEFT)
 
 
+def flipping() -> WearProblem:
+    """A motion that takes two periods where the balance has one."""
+    flips = three_pairs(friction=0.05, static=30.0, shaker=60.0, top=7)
+    site = AtFrequency(flips.compliance.output_names[0], FLIPS_AT)
+    given = {"balance": flips, "mission": (Duty(site),), "area": np.full(flips.contact.n_pair, 1e-4)}
+    return wear_problem(**given, lost_below=0.5)
+
+
 @pytest.fixture(scope="module")
 def run(problem: WearProblem) -> WearHistory:
     return error_controlled_rule.evolve(problem, Tolerance(0.02, 2e-4))
@@ -58,11 +66,21 @@ def test_a_motion_that_is_the_balances_is_not_followed(
     np.testing.assert_array_equal(found.depth, run.depth[:3])
 
 
+def test_a_balance_that_is_stable_again_is_taken_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = flipping()
+    first = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 3, motion="machine")
+    assert first.in_time.all()
+    until = first.cycles[1]
+    monkeypatch.setattr(MachineMotion, "_is_left", lambda self, state: state.cycles <= until)
+    found = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 4, motion="machine")
+    assert found.in_time.tolist() == [True, True, False, False]
+    assert str(found.end).count("at 0 cycles") == 1
+    assert str(found.end).count("the balance again") == 1
+
+
 def test_a_motion_that_a_machine_leaves_is_worn_in_time_and_resumes_bit_for_bit() -> None:
-    flips = three_pairs(friction=0.05, static=30.0, shaker=60.0, top=7)
-    site = AtFrequency(flips.compliance.output_names[0], FLIPS_AT)
-    given = {"balance": flips, "mission": (Duty(site),), "area": np.full(flips.contact.n_pair, 1e-4)}
-    problem = wear_problem(**given, lost_below=0.5)
+    problem = flipping()
+    flips = problem.balance
     rows: list[WearRow] = []
     whole = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 6, rows.append, motion="machine")
     assert whole.in_time.all()
