@@ -138,16 +138,16 @@ def evolve(
 
 
 def _told(worn: WearHistory) -> str:
-    """What to say of frequencies that moved on to another peak, and of motions that left the balance or came back."""
+    """What to say of frequencies that moved on to another peak, and of motions in time."""
     said = [
         f"; the response jumped from {worn.frequency[i]:.5g} to {worn.frequency[i + 1]:.5g} Hz "
         f"at {worn.cycles[i + 1]:.3g} cycles"
         for i in worn.jumps
     ]
-    in_time = worn.in_time.astype(int)
-    for i in np.flatnonzero(np.diff(in_time, prepend=0)):
-        motion = "the machine's motion leaves that of the balance" if in_time[i] else "it is that of the balance again"
-        said.append(f"; {motion} at {worn.cycles[i]:.3g} cycles")
+    if worn.in_time.any():
+        share = worn.cycles_in_step[worn.in_time].sum() / (worn.cycles_in_step.sum() or 1.0)
+        first = worn.cycles[worn.in_time.argmax()]
+        said.append(f"; the motion was followed in time for {share:.0%} of the cycles, from {first:.3g} cycles on")
     return "".join(said)
 
 
