@@ -27,7 +27,7 @@ from numba.core.errors import NumbaExperimentalFeatureWarning
 from tribodyn.hbm.contact.law import SEPARATES
 
 # a contact law is passed as a function
-warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning, module=__name__)
+warnings.filterwarnings("ignore", "First-class function type", NumbaExperimentalFeatureWarning)
 
 SWEEPS, SLOW = 60, 0.5  # at most of Gauss-Seidel; factor per sweep from which on it is slow
 LOCAL, DAMPED = 40, 20  # iterations of one pair; from which on its steps are halved
