@@ -6,12 +6,15 @@ python -m tests.proof.cases.brb.prediction compare FILE.json MEASURED.csv PICTUR
 
 from __future__ import annotations
 
+import csv
 import json
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.optimize import least_squares
 
 SCENE = "brb_half"
 DRIVEN = 0.1  # of the length from the end: a photograph
@@ -95,5 +98,89 @@ def predict(path: Path) -> None:
     path.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
 
+@dataclass(frozen=True)
+class Resonance:
+    """What one stepped sine says: control and run, frequency [Hz], damping, modal mass of the driven point [kg]
+
+    acceleration [m/s2], force [N] : at resonance; misfit : rms of the accelerance left, over its largest
+    """
+
+    control: str
+    run: str
+    frequency_hz: float
+    damping: float
+    mass: float
+    acceleration: float
+    force: float
+    misfit: float
+
+
+def resonances(path: Path) -> list[Resonance]:
+    """One linear mode fitted to the complex accelerance of each run."""
+    with path.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    runs: dict[tuple[str, str], list[list[float]]] = {}
+    for row in rows:
+        numbers = [float(row[name]) for name in ("frequency_hz", "response_m_s2", "force_N", "phase_deg")]
+        runs.setdefault((row["control"], row["run"]), []).append(numbers)
+    return [_fitted(*key, np.array(points)) for key, points in runs.items()]
+
+
+def _fitted(control: str, run: str, points: np.ndarray) -> Resonance:
+    hertz, a, force, phase = points.T
+    measured = a / force * np.exp(1j * np.radians(phase))
+    omega = 2 * np.pi * hertz
+    top = int(np.abs(measured).argmax())
+
+    def fit(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        w, zeta = omega[top] * (1 + p[0]), np.exp(p[1])
+        basis = (omega**2 / (w**2 - omega**2 + 2j * zeta * w * omega))[:, None]
+        amount = np.linalg.lstsq(basis, measured, rcond=None)[0]
+        return basis @ amount - measured, amount
+
+    found = least_squares(lambda p: fit(p)[0].view(float), [0.0, np.log(3e-3)], x_scale=[1e-3, 1.0])
+    left, amount = fit(found.x)
+    return Resonance(
+        control, run, float(hertz[top] * (1 + found.x[0])), float(np.exp(found.x[1])), float(1 / np.abs(amount[0])),
+        float(a[top]), float(force[top]), float(np.sqrt(np.mean(np.abs(left) ** 2)) / np.abs(measured).max()),
+    )  # fmt: skip
+
+
+def compare(path: Path, measured: Path, picture: Path) -> None:
+    """Print the measurement beside the prediction, and draw both."""
+    from matplotlib import pyplot as plt
+
+    said = json.loads(path.read_text(encoding="utf-8"))
+    at = np.log(said["acceleration_m_s2"])
+    print("control run   m/s2     Hz   predicted  damping %  predicted (range)   force N  predicted   mass kg  misfit")
+    for one in resonances(measured):
+        inside = np.log(one.acceleration) <= at[-1]
+        hertz, zeta, least, most, force = (
+            float(np.exp(np.interp(np.log(one.acceleration), at, np.log(said[name][kind])))) if inside else np.nan
+            for name, kind in (
+                ("frequency_hz", "predicted"), ("damping", "predicted"), ("damping", "least"), ("damping", "most"),
+                ("force_N", "predicted"),
+            )
+        )  # fmt: skip
+        print(
+            f"{one.control:8} {one.run} {one.acceleration:7.1f} {one.frequency_hz:7.2f} {hertz:8.2f} "
+            f"{100 * one.damping:9.3f} {100 * zeta:9.3f} ({100 * least:.2f} to {100 * most:.2f}) "
+            f"{one.force:8.3f} {force:8.3f} {one.mass:9.2f} {one.misfit:8.3f}"
+        )
+    figure, both = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+    for axes, name, label in zip(both, ("frequency_hz", "damping"), ("frequency / Hz", "damping ratio"), strict=True):
+        axes.fill_between(said["acceleration_m_s2"], said[name]["least"], said[name]["most"], alpha=0.2)
+        axes.plot(said["acceleration_m_s2"], said[name]["predicted"], label="predicted, with its range")
+        for control, mark in (("force", "o"), ("response", "s")):
+            runs = [one for one in resonances(measured) if one.control == control]
+            values = [getattr(one, name) for one in runs]
+            axes.plot([one.acceleration for one in runs], values, mark, ms=4, label=f"measured, constant {control}")
+        axes.set(xscale="log", xlabel="acceleration of the driven point / (m/s²)", ylabel=label)
+    both[1].set_yscale("log")
+    both[0].legend(fontsize=8)
+    figure.savefig(picture, dpi=150)
+
+
 if __name__ == "__main__":
-    predict(Path(sys.argv[2]))
+    word, *files = sys.argv[1:]
+    {"predict": predict, "compare": compare}[word](*map(Path, files))
