@@ -16,13 +16,15 @@ from tribodyn.workflows.scene.scene_file import SceneError
 from tribodyn.workflows.studies.many import study_file
 from tribodyn.workflows.studies.many.proposal import Known, best_trades, propose
 from tribodyn.workflows.studies.many.table import StudyTable
+from tribodyn.workflows.studies.many.task import numbers_of
 
 pytest.importorskip("sklearn")
 
 LINEAR = {
     "scene": "beam", "design": "sobol", "runs": 8, "seed": 3,
     "set": ["geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "reduction.modes=3", "wear=",
-            "harmonics.kept=[0, 1]", "response.points=10", "contact.friction=50"],
+            "harmonics.kept=[0, 1]", "response.points=16", "response.frequency=['1700 Hz', '2600 Hz']",
+            "contact.friction=50"],
 }  # fmt: skip
 FORCE, DAMPING = "loads.harmonic.shake.value", "damping.modal"
 
@@ -104,6 +106,13 @@ def test_the_linear_scene_comes_to_its_corner_and_resumes(tmp_path: Path, capsys
     (check,) = found.checked
     assert check.again["peak_m_first"] == pytest.approx(amplitude, rel=1e-4)
     assert check.keeps is True
+
+
+def test_a_response_that_is_highest_at_its_end_has_no_peak_to_win_with() -> None:
+    below = ["response.frequency=['300 Hz', '350 Hz']"]
+    numbers = numbers_of(td.run("beam", overrides=[*LINEAR["set"], "verdict.enabled=false", *below]))
+    assert numbers["peak_at_end"] == 1.0
+    assert not {"peak_hz_first", "peak_m_first", "peak_m_last"} & set(numbers)
 
 
 def test_a_contact_that_survives_lives_longest() -> None:

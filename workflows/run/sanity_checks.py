@@ -83,6 +83,8 @@ def lines(file: SceneFile, model: Model) -> Iterator[str]:
         remarks += check_deflection(
             scene, reduced.system, lambda q: part.largest(reduced.reconstruct(q)), float(np.linalg.norm(size))
         )
+    if model.reduced.at_harmonic(1)[0].damping is None:
+        remarks.append("there is no damping but that of friction: give [damping]")
     yield from (f"warning: {remark}" for remark in remarks)
 
 

@@ -28,6 +28,7 @@ from tribodyn.workflows.scene.schema import PartScene
 Status = Literal["complete", "failed", "refused", "lost"]
 ENDS = ("peak_hz", "peak_m", "preload_N")  # of which a summary has the first and the last
 UNDRAWN = ("pictures.plots=false", "pictures.renders=false")
+NO_PEAK = "; the response is highest at an end of its range: no peak"
 SINGLE = ("energy_J", "depth_max_m", "volume_m3", "cycles", "life_cycles")
 
 
@@ -115,7 +116,9 @@ def solve(task: Task) -> Row:
             return ended("failed", error)
         except Exception as error:  # one run that nobody foresaw does not stop the others
             return ended("failed", f"{type(error).__name__}: {error}")
-        return ended("complete", result.state, numbers_of(result))
+        numbers = numbers_of(result)
+        state = result.state + (NO_PEAK if numbers.get("peak_at_end") else "")
+        return ended("complete", state, numbers)
 
 
 def _set_up(task: Task) -> None:
@@ -135,11 +138,14 @@ def _model(file: SceneFile) -> modelling.Model:
 
 
 def numbers_of(result: Result) -> dict[str, float]:
-    """The numbers of a result by column: those of its summary, and of its verdict where it has one."""
+    """The numbers of a result by column: those of its summary, and of its verdict where it has one.
+
+    A response that is highest at an end of its range has no peak.
+    """
     summary = result.summary()
     numbers: dict[str, float | None] = {}
     for name in ENDS:
-        first, last = summary[name] or (None, None)
+        first, last = (None, None) if summary["peak_at_end"] else summary[name] or (None, None)
         numbers |= {f"{name}_first": first, f"{name}_last": last}
     numbers |= {name: summary[name] for name in SINGLE}
     numbers["peak_at_end"] = summary["peak_at_end"]
