@@ -65,6 +65,19 @@ class Correction:
 
 
 @dataclass(frozen=True)
+class Overtaking:
+    """What a search for a higher peak than the tracked one has found.
+
+    point : the higher peak, None where the tracked one is the highest; solves : balance solves spent
+    nearness : height of the highest other maximum over that which overtakes; 0 where none was found
+    """
+
+    point: OperatingPoint | None = None
+    solves: int = 0
+    nearness: float = 0.0
+
+
+@dataclass(frozen=True)
 class AtFrequency:
     """The cycle at a fixed frequency [rad/s]."""
 
@@ -88,9 +101,9 @@ class AtFrequency:
             solution, solves = arc_length.solve_along_load(balance, self.omega, self.newton), 2
         return OperatingPoint.of(balance, solution, self.output, solves)
 
-    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> tuple[OperatingPoint | None, int]:
+    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> Overtaking:
         """None, without a solve: the frequency is given."""
-        return None, 0
+        return Overtaking()
 
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
         """The distance of a state to the fixed frequency."""
@@ -116,6 +129,7 @@ class AtPeak:
     coarsest : longest step of the first search, share of its range
     overtakes : amplitude over that of the tracked peak, from which on another resonance dominates: what fewer harmonics
         miss of a peak is less, and a peak that emerges passes this at once
+    same_peak : share of the tracked peak's frequency within which a maximum of a scan is taken for it
     near : half widths from the peak within which a point beside failed solves is taken for it
     stride : first step from a neighbouring peak, in half widths of the resonance
     reach : half widths between the points beside a maximum of a scan, by which its peak may lie outside them
@@ -136,6 +150,7 @@ class AtPeak:
     scan_misses: float = 0.15
     coarsest: float = 0.05
     overtakes: float = 1.2
+    same_peak: float = 0.1
     near: float = 0.1
     stride: float = 0.02
     reach: float = 2.0
@@ -200,7 +215,7 @@ class AtPeak:
                 return found
             known, point = more, found
 
-    def _scan(self, balance: HarmonicBalance) -> Branch:
+    def _scan(self, balance: HarmonicBalance, guess: np.ndarray | None = None) -> Branch:
         step = min(1 / self.n_scan, self.coarsest)
         scan = adaptive.Options(
             tolerance=self.scan_tolerance,
@@ -209,6 +224,7 @@ class AtPeak:
             min_step=1e-3 * step,
             newton=self.newton,
             load_paths=not self._is_rough(balance),
+            guess=guess,
         )
         return adaptive.follow(balance, self.start, self.stop, scan)
 
@@ -246,47 +262,57 @@ class AtPeak:
         return self._refine(balance, omega, x, None)
 
     @single
-    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> tuple[OperatingPoint | None, int]:
+    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> Overtaking:
         """The higher peak that a sweep with rising frequency meets, None where the tracked one is the highest.
 
         point : the tracked peak
-        Returns the peak and the balance solves spent, those of a sweep without any peak apart. Where pairs impact and
-        no solution with all harmonics is found beside that with fewer, the peak has fewer, and zeros in the others
+        Where pairs impact and no solution with all harmonics is found beside that with fewer, the peak has fewer, and
+        zeros in the others
         """
         if self.overtakes * point.amplitude >= self.highest * balance.load_factor:
-            return None, 0
+            return Overtaking()
         low, high = sorted((self.start, self.stop))
         tracked = float(np.clip(point.state.omega, low, high))
         few, fewer = (self._few(balance, top) for top in (self.scanned, min(self.scanned_above, self.scanned)))
         parts = [(low, tracked, few), (tracked, high, fewer)] if few.basis != fewer.basis else [(low, high, few)]
-        found, solves = None, 0
+        known = Overtaking()
         for start, stop, scanned in parts:
-            if found is None and stop > start:
+            if known.point is None and stop > start:
                 part = replace(self, start=start, stop=stop)
-                found, further = part._higher(scanned, balance, point)
-                solves += further
-        return found, solves
+                found = part._higher(scanned, balance, point)
+                known = Overtaking(found.point, known.solves + found.solves, max(known.nearness, found.nearness))
+        return known
 
-    def _higher(
-        self, few: HarmonicBalance, balance: HarmonicBalance, point: OperatingPoint
-    ) -> tuple[OperatingPoint | None, int]:
+    def _higher(self, few: HarmonicBalance, balance: HarmonicBalance, point: OperatingPoint) -> Overtaking:
         """The same by one sweep of this range with few harmonics."""
-        branch = self._scan(few)
+        guess = _carried(balance, point, few)
+        if self.start != point.state.omega:  # the contact has about the mean that it has at the peak
+            mean, guess = guess[..., :1], few.stuck(self.start)
+            guess = np.concatenate([mean, guess[..., 1:]], axis=-1) if few.basis.has_static else guess
+        branch = self._scan(few, guess)
+        solves = len(branch.omega)
         try:
             maxima = self._maxima(branch)
         except NoPeak:
-            return None, len(branch.omega)
-        might = branch.amplitude(self.output)[maxima] > (1 - self.scan_misses) * self.overtakes * point.amplitude
+            return Overtaking(None, solves)
+        wanted = self.overtakes * point.amplitude
+        height = branch.amplitude(self.output)[maxima]
+        others = height[np.abs(branch.omega[maxima] / point.state.omega - 1) > self.same_peak]
+        nearness = float(others.max(initial=0.0)) / wanted
+        might = height > (1 - self.scan_misses) * wanted
         if not might.any():
-            return None, len(branch.omega)
+            return Overtaking(None, solves, nearness)
         scanned = self._highest(few, branch, maxima[might])
         if self._is_rough(few) and not scanned.solution.converged:  # no slope vanishes: the highest point of the sweep
             best = maxima[might][0]
             scanned = self._at(few, branch.omega[best], _point(few, branch, best), scanned.solves)
         if not self._is_higher(scanned, point):
-            return None, scanned.solves
+            return Overtaking(None, scanned.solves, nearness)
         found = self._raised(few, balance, scanned, far_enough=True)
-        return found if self._is_higher(found, point) else None, found.solves + scanned.solves
+        solves = found.solves + scanned.solves
+        if not self._is_higher(found, point):
+            return Overtaking(None, solves, nearness)
+        return Overtaking(found, solves, found.amplitude / wanted)
 
     def _is_higher(self, found: OperatingPoint, point: OperatingPoint) -> bool:
         omega = found.state.omega

@@ -8,7 +8,7 @@ import numpy as np
 
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
-from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak, Correction, OperatingPoint
+from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak, Correction, OperatingPoint, Overtaking
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.threads import single
 
@@ -44,17 +44,17 @@ class BesidePeak:
         return replace(found, solves=found.solves + solves)
 
     @single
-    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> tuple[OperatingPoint | None, int]:
-        """The cycle at the ratio to a peak that has overtaken the tracked one, None where none has; solves spent."""
+    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> Overtaking:
+        """The cycle at the ratio to a peak that has overtaken the tracked one, None where none has."""
         omega = point.state.omega
         back, solves = self._walk(balance, omega, omega / self.ratio, point.state.x)
         tracked = self.peak.next(balance, omega / self.ratio, back.state.x)
-        peak, searched = self.peak.overtaken(balance, tracked)
-        spent = solves + tracked.solves + searched
-        if peak is None:
-            return None, spent
-        found = self._beside(balance, peak)
-        return found, spent - peak.solves + found.solves
+        higher = self.peak.overtaken(balance, tracked)
+        spent = solves + tracked.solves + higher.solves
+        if higher.point is None:
+            return replace(higher, solves=spent)
+        found = self._beside(balance, higher.point)
+        return Overtaking(found, spent - higher.point.solves + found.solves, higher.nearness)
 
     @single
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:

@@ -36,6 +36,7 @@ from tribodyn.hbm.wear.history import LARGEST_SHIFT, LIFE_SHARE, WearHistory, We
 from tribodyn.hbm.wear.implicit_stage import WearingBalance
 from tribodyn.hbm.wear.machine_motion import MachineMotion
 from tribodyn.hbm.wear.preload_at_rest import PreloadAtRest
+from tribodyn.hbm.wear.state_stability import with_growth
 from tribodyn.hbm.wear.step_control import STEP_RATIO_LIMITS, Tolerance, growth, local_error
 
 GAMMA = 1 - 1 / np.sqrt(2)
@@ -53,7 +54,12 @@ class StepRules:
     least_preload_share: float = 1e-4
     # share of the tolerance, of the cycles, within which a jump to another peak is located
     overtaking_accuracy: float = 0.5
-    looked_at: float = 0.97  # ratio of preloads, counted from the first, at which higher peaks are looked for
+    # ratio of preloads after which higher peaks are looked for again; where the highest other one has a share below
+    # `near` of the height that overtakes, its power (near / share)^2, `rarest` at most
+    looked_at: float = 0.97
+    near: float = 0.5
+    rarest: float = 16.0
+    located_beside: float = 0.4  # of the accuracy, how far beside the estimated instant of a jump the next trial is
     # a peak that moves further than LARGEST_SHIFT, unless less than so many times as far as the step before leads to
     # expect
     unexpected: float = 4.0
@@ -104,7 +110,7 @@ def evolve(
     state: WearState | None
     if rows:  # the state after the last step was not kept: take the step again, to the same bits
         again = rows.pop()
-        before = replace(state_of(problem, again), solves=0)
+        before = replace(state_of(problem, again), solves=0, growth=again.growth)
         if machine is not None:
             machine.take_up(again)
             before = machine.of(before)
@@ -115,14 +121,14 @@ def evolve(
     at_rest = PreloadAtRest(problem)
     end = WearEnd.STEPS_DONE.say(f" {max_steps} wear steps")
     while len(rows) < max_steps and state is not None:
-        state = at_rest.of(state)
+        state = with_growth(problem, at_rest.of(state), always=machine is not None)
         if machine is not None:
             state = machine.of(state)
         first = (first_preload(problem, rows, state), first_at_rest(rows, state))
         reason = reason_to_stop(problem, state, *first, rows, tolerance.share * tolerance.scale)
         if reason:
             nothing = np.zeros_like(problem.area)
-            rows.append(row_of(problem, state, 0.0, nothing, nothing, 0.0, np.zeros(1 + len(state.points))))
+            rows.append(row_of(problem, state, 0.0, nothing, nothing, 0.0, _no_plan(state)))
             end = reason
         else:
             taken = _taken(problem, machine, tolerance, state, rows)
@@ -182,7 +188,7 @@ def _taken(
         return _step_in_time(problem, machine, tolerance, state, rows)
     except IntegrationFailed as failure:
         nothing = np.zeros_like(problem.area)
-        row = row_of(problem, state, 0.0, nothing, nothing, 0.0, np.zeros(1 + len(state.points)))
+        row = row_of(problem, state, 0.0, nothing, nothing, 0.0, _no_plan(state))
         return _Taken(row, None, WearEnd.SOLVE_FAILED.say(f" in time: {failure}"))
 
 
@@ -204,14 +210,18 @@ def _step_in_time(
         if error <= 1.0 or stride <= RULES.shortest_in_time * unit:
             break
         stride = max(stride * growth(error), RULES.shortest_in_time * unit)
-    plan = np.array([stride * growth(error), *np.full(len(state.points), RULES.unknown_slope)])
+    slopes, look = np.full(len(state.points), RULES.unknown_slope), _next_look(problem, state, rows)
+    stride_after = stride * growth(error)
     after = assess(problem, state.depth + worn, state.cycles + stride, state)
     solves += after.solves
-    if not after.failure and _is_due(problem, state, there, rows):
-        found, spent = _overtaken(problem, after)
-        solves += spent
-        if found is not None:
-            after, plan = worn_state(problem, after.depth, after.cycles, found, 0), np.zeros(1 + len(state.points))
+    if not after.failure and _share_left(problem, after, rows, state) <= look:
+        found = _overtaken(problem, after)
+        solves += found.solves
+        look = _look_after(found, _share_left(problem, after, rows, state))
+        if found.points is not None:
+            after, stride_after = worn_state(problem, after.depth, after.cycles, found.points, 0), 0.0
+            slopes = np.zeros_like(slopes)
+    plan = np.array([stride_after, *slopes, look])
     work = stride * 0.5 * (state.work + there.work)
     row = row_of(problem, replace(state, solves=solves), stride, worn, work, error, plan)
     return _Taken(replace(row, periods=periods), replace(after, solves=0))
@@ -256,16 +266,17 @@ def _step_of(
     stride = 10 * shortest
     drift, slopes = np.zeros(len(state.points)), np.full(len(state.points), RULES.unknown_slope)
     if rows and rows[-1].plan[0] > 0:
-        stride, slopes = float(rows[-1].plan[0]), rows[-1].plan[1:]
+        stride, slopes = float(rows[-1].plan[0]), rows[-1].plan[1:-1]
         top = problem.balance.basis.harmonics[-1]
         if fewer_harmonics.top_harmonic(whole.balance.basis, list(rows[-1].duty_displacement)) == top:
             omega = np.array([point.state.omega for point in state.points])
             drift = (omega - rows[-1].duty_omega) / (state.cycles - rows[-1].cycles)
     target = _event(problem, state, rows)
     solves, longest = state.solves, np.inf
-    highest_until = 0.0  # stride after which the tracked peak is still the highest
+    highest_until, low, high = 0.0, 0.0, 0.0  # stride after which the tracked peak is still the highest; nearness
     jumped: tuple[float, WearState, WearState, float, tuple[OperatingPoint, ...]] | None = None  # ... and where not
     higher: tuple[OperatingPoint, ...] | None = None
+    look = _next_look(problem, state, rows)
     while True:
         searches = [_Search(slope) for slope in slopes]
         first, second = _stages(problem, state, stride, drift, searches)
@@ -282,18 +293,23 @@ def _step_of(
             preload = problem.preload_of(second)
             if preload >= RULES.event_window[0] * target:
                 found = None
-                if jumped or _is_due(problem, state, second, rows):
-                    found, spent = _overtaken(searched, fewer_harmonics.carried(searched, second))
-                    solves += spent
-                if found is not None:
-                    jumped = (stride, first, second, error, found)
+                left = _share_left(problem, second, rows, state)
+                if jumped or left <= look:
+                    found = _overtaken(searched, fewer_harmonics.carried(searched, second))
+                    solves += found.solves
+                if found is not None and found.points is not None:
+                    jumped, high = (stride, first, second, error, found.points), found.nearness
                 elif jumped is None:
+                    look = look if found is None else _look_after(found, left)
                     break
                 else:
-                    highest_until = stride
-                if jumped[0] - highest_until <= RULES.overtaking_accuracy * tolerance.share * second.cycles:
+                    assert found is not None
+                    high = high if highest_until == 0 else np.sqrt(high)  # Illinois: the end that stays counts less
+                    highest_until, low = stride, found.nearness
+                accuracy = RULES.overtaking_accuracy * tolerance.share * second.cycles
+                if jumped[0] - highest_until <= accuracy:
                     break
-                stride = 0.5 * (highest_until + jumped[0])
+                stride = _instant(highest_until, low, jumped[0], high, accuracy)
                 continue
             longest = stride
             stride *= _share_to(target, problem.preload_of(state), preload)
@@ -305,25 +321,51 @@ def _step_of(
             return _Lost(second.failure or (SHIFTED if lost else None), solves)
     if jumped is not None:
         stride, first, second, error, higher = jumped
+        look = RULES.looked_at * _share_left(problem, second, rows, state)
     worn = second.depth - state.depth
     work = stride * ((1 - GAMMA) * first.work + GAMMA * second.work)
     trend = (rows[-1].step_error / error) ** RULES.error_trend_power if rows and error > 0 else 1.0
     ratio = float(np.clip(growth(error) * min(trend, 1.0), *STEP_RATIO_LIMITS))
-    plan = np.array([stride * ratio, *slopes])
+    plan = np.array([stride * ratio, *slopes, look])
     if higher is not None:
-        second, plan = worn_state(searched, second.depth, second.cycles, higher, 0), np.zeros(1 + len(slopes))
+        second = worn_state(searched, second.depth, second.cycles, higher, 0)
+        plan = _no_plan(state, look)
     row = row_of(problem, replace(state, solves=solves), stride, worn, work, error, plan)
     return _Taken(row, replace(second, solves=0))
 
 
-def _is_due(problem: WearProblem, state: WearState, second: WearState, rows: Sequence[WearRow]) -> bool:
-    """Whether higher peaks are looked for after a step from a state: each time the preload has fallen by some share."""
-    first = first_preload(problem, rows, state)
-    shares = np.array([problem.preload_of(s) for s in (state, second)]) / (first or 1.0)
-    if np.any(shares <= 0):
-        return True
-    before, after = np.floor(np.log(shares) / np.log(RULES.looked_at))
-    return bool(before != after)
+def _no_plan(state: WearState, look: float = 1.0) -> np.ndarray:
+    """The plan of a step behind which all but the next look for higher peaks begins anew."""
+    return np.array([0.0, *np.zeros(len(state.points)), look])
+
+
+def _share_left(problem: WearProblem, there: WearState, rows: Sequence[WearRow], state: WearState) -> float:
+    """Preload of a state after `state` over the first one."""
+    return problem.preload_of(there) / (first_preload(problem, rows, state) or 1.0)
+
+
+def _next_look(problem: WearProblem, state: WearState, rows: Sequence[WearRow]) -> float:
+    """The share of the first preload at which higher peaks are looked for next."""
+    return float(rows[-1].plan[-1]) if rows else RULES.looked_at * _share_left(problem, state, rows, state)
+
+
+def _look_after(found: _Overtaken, left: float) -> float:
+    """The same after a search at a share of the first preload: the later, the lower the other peaks are."""
+    rarity = RULES.rarest if found.nearness == 0 else (RULES.near / found.nearness) ** 2
+    return left * RULES.looked_at ** float(np.clip(rarity, 1.0, RULES.rarest))
+
+
+def _instant(before: float, low: float, after: float, high: float, accuracy: float) -> float:
+    """The stride to try for the instant of a jump, between one before it and one after it.
+
+    low, high : nearness of the higher peak there, whose logarithm is interpolated; halves where it is not known
+    """
+    if not 0 < low < 1 < high:
+        return 0.5 * (before + after)
+    estimate = before + (after - before) * np.log(1 / low) / np.log(high / low)
+    beside = RULES.located_beside * accuracy
+    trial = estimate + (beside if estimate - before < after - estimate else -beside)
+    return float(np.clip(trial, before + 0.5 * beside, after - 0.5 * beside))
 
 
 def _shifts(state: WearState, second: WearState, expected: np.ndarray) -> bool:
@@ -336,19 +378,25 @@ def _shifts(state: WearState, second: WearState, expected: np.ndarray) -> bool:
     return bool(np.any(np.abs(after - omega) > limit))
 
 
-def _overtaken(problem: WearProblem, state: WearState) -> tuple[tuple[OperatingPoint, ...] | None, int]:
-    """The duties of a state, those at a peak that another one has overtaken at that one; None where none has.
+@dataclass(frozen=True)
+class _Overtaken:
+    """A look for higher peaks: the duties at them, None where none has overtaken; solves spent; the nearest one's."""
 
-    Returns them and the balance solves spent
-    """
+    points: tuple[OperatingPoint, ...] | None
+    solves: int
+    nearness: float
+
+
+def _overtaken(problem: WearProblem, state: WearState) -> _Overtaken:
+    """Look for peaks that have overtaken those of a state's duties."""
     searched = [
         duty.site.overtaken(problem.in_duty(duty, state.depth), point)
         for duty, point in zip(problem.mission, state.points, strict=True)
     ]
-    solves = sum(spent for _, spent in searched)
-    if not any(new for new, _ in searched):
-        return None, solves
-    return tuple(new or old for (new, _), old in zip(searched, state.points, strict=True)), solves
+    points = None
+    if any(found.point for found in searched):
+        points = tuple(found.point or old for found, old in zip(searched, state.points, strict=True))
+    return _Overtaken(points, sum(found.solves for found in searched), max(found.nearness for found in searched))
 
 
 def _explicit_step(
@@ -367,7 +415,7 @@ def _explicit_step(
     problem : that the state is solved in; it is looked for with the harmonics of scans, failing that with fewer
     """
     nothing = np.zeros_like(problem.area)
-    plan = np.zeros(1 + len(state.points))
+    plan = _no_plan(state)
     scans = fewer_harmonics.of_scans(whole)
     fewer = fewer_harmonics.with_fewer(scans)
     tried = next((i for i, row in enumerate(reversed(rows)) if row.plan[0] > 0), len(rows))

@@ -152,6 +152,7 @@ class WearState:
     preload_at_rest : [N], nan where it was not asked for
     lost : why there is no preload at rest, or no motion in time
     means : of the motion in time where a machine leaves that of the balance, see hbm.wear.machine_motion
+    growth : of the perturbation of the balance's motions that grows fastest, per radian; nan where it is not known
     """
 
     depth: np.ndarray
@@ -164,6 +165,7 @@ class WearState:
     preload_at_rest: float = float("nan")
     lost: Outcome[WearEnd] | None = None
     means: Means | None = None
+    growth: float = float("nan")
 
     @property
     def failure(self) -> Outcome[WearEnd] | None:
@@ -319,7 +321,7 @@ def row_of(
     balance = problem.in_duty(problem.mission[0], state.depth)
     taken = (cycles_in_step, worn, work, state.solves, step_error, plan, state.preload_at_rest)
     preload = problem.preload_of(state)
-    row = WearRow.of(balance, state.points, state.depth, state.cycles, preload, *taken)
+    row = replace(WearRow.of(balance, state.points, state.depth, state.cycles, preload, *taken), growth=state.growth)
     means = state.means
     if means is None:
         return row

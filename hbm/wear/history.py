@@ -46,6 +46,7 @@ class WearRow:
     duty_omega: np.ndarray
     duty_displacement: np.ndarray
     preload_at_rest: float = float("nan")
+    growth: float = float("nan")
     spread: float = 0.0
     mean_error: float = 0.0
     settled: bool = True
@@ -121,14 +122,16 @@ class WearHistory:
     response : (n_row, n_output, n_coeff) Fourier coefficients of the outputs [m]
     solves : (n_row,) harmonic balance solves spent on the row
     step_error : (n_row,) estimated local error of the step over its tolerance; 0 where the rule has no estimate
-    plan : (n_row, n_plan) what the rule tries next: cycles, then d (distance to the site) / d omega of every duty;
-        n_plan is 0 where a rule does not plan
+    plan : (n_row, n_plan) what the rule tries next: cycles, d (distance to the site) / d omega of every duty, and the
+        share of the first preload at which higher peaks are looked for; n_plan is 0 where a rule does not plan
     work : (n_row, n_pair) friction work from this row to the next [J]
     duty_omega, duty_displacement : (n_row, n_duty) [rad/s], (n_row, n_duty, n_contact, n_coeff) [m]: every duty of a
         mission; the fields above show the first
     end : why the run ended; its text is a sentence
     preload_at_rest : (n_row,) static normal force of the whole contact without the harmonic loads [N]; nan where the
         end of the run does not depend on it
+    growth : (n_row,) of the perturbation of the balance's motion that grows fastest, per radian, by Hill's method; nan
+        where it is not known, None where it is nowhere
     periods : (n_row,) marched in time, where a machine leaves the motion of the balance: energy, normal_force, preload
         and amplitude then are means over its own, while omega, displacement, force and response stay the balance's;
         zero elsewhere. None in a run that is nowhere marched, as the four below
@@ -158,6 +161,7 @@ class WearHistory:
     duty_displacement: np.ndarray
     end: Outcome[WearEnd]
     preload_at_rest: np.ndarray | None = None
+    growth: np.ndarray | None = None
     spread: np.ndarray | None = None
     mean_error: np.ndarray | None = None
     settled: np.ndarray | None = None
@@ -236,6 +240,7 @@ def history(rows: list[WearRow], end: Outcome[WearEnd]) -> WearHistory:
         width = max(len(row.moving) for row in rows)
         rows = [replace(row, moving=np.pad(row.moving, (0, width - len(row.moving)))) for row in rows]
     columns = {name: np.array([getattr(row, name) for row in rows]) for name in names}
-    if np.isnan(columns["preload_at_rest"]).all():
-        del columns["preload_at_rest"]
+    for name in ("preload_at_rest", "growth"):
+        if np.isnan(columns[name]).all():
+            del columns[name]
     return WearHistory(**columns, end=end)

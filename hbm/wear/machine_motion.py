@@ -21,7 +21,6 @@ import numpy as np
 
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.outcome import WearEnd
-from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.time import wave_in_time
 from tribodyn.hbm.time.mean_motion import Follower, MeanMotion, MeanOptions
 from tribodyn.hbm.time.stepper import IntegrationFailed
@@ -29,6 +28,7 @@ from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.evolution import Means, WearProblem, WearState
 from tribodyn.hbm.wear.history import WearRow
+from tribodyn.hbm.wear.state_stability import grows
 
 GAMMA = 1 - 1 / np.sqrt(2)
 
@@ -113,7 +113,7 @@ class MachineMotion:
 
     def of(self, state: WearState) -> WearState:
         """A state of the balance with the rates of the machine's motion; as it is where that is the balance's own."""
-        if not self._serves or state.failure or not (self._always or self._is_left(state)):
+        if not self._serves or state.failure or not (self._always or bool(grows(np.array(state.growth)))):
             self._followers, self._moving = [], np.zeros(0)
             return state
         self._moving = np.concatenate([f.kept() for f in self._followers]) if self._followers else np.zeros(0)
@@ -149,15 +149,6 @@ class MachineMotion:
     def _ahead(self, state: WearState, stride: float) -> tuple[np.ndarray, np.ndarray]:
         matrix = np.eye(len(state.depth)) + GAMMA * stride * self._fall(state)
         return matrix, np.linalg.solve(matrix, state.rate)
-
-    def _is_left(self, state: WearState) -> bool:
-        """Whether Hill's method finds a perturbation of one of the duties that grows."""
-        balances = (self._problem.in_duty(duty, state.depth) for duty in self._problem.mission)
-        try:
-            return any(not exponents.stability(b, p.state).stable for b, p in zip(balances, state.points, strict=True))
-        except ValueError:  # a model without exponents
-            self._serves = False
-            return False
 
     def _begins(self, state: WearState) -> bool:
         """March the motion of every duty from the balance; False where there is no equation of motion in time."""

@@ -23,7 +23,7 @@ from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.evolution import Duty, WearProblem
 from tribodyn.hbm.wear.history import WearHistory, WearRow, cycles_to_preload, history
 from tribodyn.hbm.wear.law import JointWear
-from tribodyn.hbm.wear.machine_motion import MachineMotion, MotionExposure
+from tribodyn.hbm.wear.machine_motion import MotionExposure
 from tribodyn.hbm.wear.step_control import Tolerance
 
 LEFT = 0.5  # share of the preload
@@ -60,7 +60,7 @@ def test_a_motion_that_is_the_balances_is_not_followed(
     problem: WearProblem, run: WearHistory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whatever Hill's method says of it."""
-    monkeypatch.setattr(MachineMotion, "_is_left", lambda self, state: True)
+    monkeypatch.setattr(error_controlled_rule, "with_growth", lambda _, state, always: replace(state, growth=1.0))
     found = error_controlled_rule.evolve(problem, Tolerance(0.02, 2e-4), max_steps=3, motion="machine")
     assert not found.in_time.any()
     np.testing.assert_array_equal(found.depth, run.depth[:3])
@@ -71,7 +71,11 @@ def test_a_balance_that_is_stable_again_is_taken_again(monkeypatch: pytest.Monke
     first = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 3, motion="machine")
     assert first.in_time.all()
     until = first.cycles[1]
-    monkeypatch.setattr(MachineMotion, "_is_left", lambda self, state: state.cycles <= until)
+    monkeypatch.setattr(
+        error_controlled_rule,
+        "with_growth",
+        lambda _, state, always: replace(state, growth=1.0 if state.cycles <= until else -1.0),
+    )
     found = error_controlled_rule.evolve(problem, Tolerance(0.05, 1e-6), 4, motion="machine")
     assert found.in_time.tolist() == [True, True, False, False]
     assert "from 0 cycles on" in str(found.end)

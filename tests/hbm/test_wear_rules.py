@@ -17,6 +17,7 @@ from tribodyn.hbm.continuation.operating_point import (
     Correction,
     NoPeak,
     OperatingPoint,
+    Overtaking,
 )
 from tribodyn.hbm.continuation.sites import BesidePeak
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -352,13 +353,17 @@ def test_a_peak_is_overtaken_by_a_higher_one_that_a_sweep_meets(problem: WearPro
     highest = site.first(problem.balance)
     lower = AtPeak("tip", 500.0, 545.0).first(problem.balance)
     assert lower.amplitude < highest.amplitude / 2
-    found, solves = site.overtaken(problem.balance, lower)
-    assert found is not None
-    assert solves > found.solves > 0  # the sweep's, too
-    assert found.state.omega == pytest.approx(highest.state.omega, rel=1e-4)
-    assert site.overtaken(problem.balance, highest)[0] is None
+    found = site.overtaken(problem.balance, lower)
+    assert found.point is not None
+    assert found.solves > found.point.solves > 0  # the sweep's, too
+    assert found.point.state.omega == pytest.approx(highest.state.omega, rel=1e-4)
+    assert found.nearness == pytest.approx(highest.amplitude / (site.overtakes * lower.amplitude), rel=1e-6)
+    none = site.overtaken(problem.balance, highest)
+    assert none.point is None
+    assert lower.amplitude / (1.01 * site.overtakes * highest.amplitude) < none.nearness < 0.5
     beside = BesidePeak(site, 1.01)
-    moved, _ = beside.overtaken(problem.balance, beside.next(problem.balance, 1.01 * lower.state.omega, lower.state.x))
+    here = beside.next(problem.balance, 1.01 * lower.state.omega, lower.state.x)
+    moved = beside.overtaken(problem.balance, here).point
     assert moved is not None
     assert moved.state.omega == pytest.approx(1.01 * highest.state.omega, rel=1e-4)
 
@@ -367,9 +372,9 @@ def test_no_higher_peak_is_looked_for_above_what_any_linear_response_reaches(pro
     site = AtPeak("tip", 250.0, 1200.0)
     point = site.first(problem.balance)
     low, high = 1.1 * point.amplitude, 2 * point.amplitude
-    assert replace(site, highest=low).overtaken(problem.balance, point) == (None, 0)
-    assert replace(site, highest=high).overtaken(problem.balance, point)[1] > 0
-    assert replace(site, highest=high).overtaken(problem.balance.with_load(0.5), point) == (None, 0)
+    assert replace(site, highest=low).overtaken(problem.balance, point) == Overtaking()
+    assert replace(site, highest=high).overtaken(problem.balance, point).solves > 0
+    assert replace(site, highest=high).overtaken(problem.balance.with_load(0.5), point) == Overtaking()
 
 
 def test_a_point_beside_failed_solves_is_no_peak(problem: WearProblem, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -416,11 +421,12 @@ LEAP_DEPTH, SECOND = 2e-5, 520.0  # depth [m] from which on a second place is th
 class TwoPlaces(AtFrequency):
     """A fixed frequency that another one overtakes at a given depth."""
 
-    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> tuple[OperatingPoint | None, int]:
-        if balance.contact.gap.max() < LEAP_DEPTH or point.state.omega != self.omega:
-            return None, 0
+    def overtaken(self, balance: HarmonicBalance, point: OperatingPoint) -> Overtaking:
+        depth = float(balance.contact.gap.max())
+        if depth < LEAP_DEPTH or point.state.omega != self.omega:
+            return Overtaking(nearness=depth / LEAP_DEPTH)
         found = AtFrequency("tip", SECOND).first(balance)
-        return found, found.solves
+        return Overtaking(found, found.solves, depth / LEAP_DEPTH)
 
     def correct(self, balance: HarmonicBalance, state: State) -> Correction:
         return Correction(0.0, np.zeros_like(state.x), 0)

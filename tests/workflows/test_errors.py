@@ -15,6 +15,7 @@ import tribodyn as td
 from tests.proof import reference
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.stability.stays import MULTIPLIERS
+from tribodyn.hbm.wear.state_stability import unstable_share
 from tribodyn.workflows.errors import accuracy, in_time, measure, refine, verdict
 from tribodyn.workflows.errors.accuracy import Bound
 from tribodyn.workflows.errors.in_time import Finding
@@ -125,9 +126,32 @@ def test_depth_and_life_are_those_of_a_finer_wear_run() -> None:
     finer = refine.wear(refine.harmonics(refine.modes(refine.mesh(file, 2.0)[0], 2) or file, 5), 2.0)
     there = td.run(finer, overrides=["verdict.enabled=false"])
     assert there.summary()["life_cycles"] == pytest.approx(combined["life"].refined, rel=1e-6)
-    statement = loaded(result.verdict).statements["life"]
-    ratio = loaded(result.verdict).ratio
-    assert statement.error == pytest.approx(DEFAULT.total(combined["life"].relative or 0.0, ratio))
+    assert result.wear is not None
+    stated(result, unstable_share(result.wear))
+
+
+def test_a_coarser_mesh_is_worn_where_a_finer_one_takes_too_much_work() -> None:
+    """An unstable motion of the balance is followed in time, or its share of the cycles is doubt."""
+    file = scene_file.read("beam", (*TINY, "geometry.n_patch=5", "wear.at=700 Hz", "wear.tolerance=30 %"))
+    result = td.run(file, overrides=["verdict.enabled=false"])
+    verdict_of = verdict.judge(file, td.build(file), result, td_progress(), replace(DEFAULT, max_wear=0.0))
+    assert verdict_of.worn_ratio == pytest.approx(refine.mesh(file, 1 / 1.5)[1])
+    judged = replace(result, verdict=verdict_of.dumped())
+    coarser = refine.harmonics(refine.modes(refine.mesh(file, 1 / 1.5)[0], 2) or file, 5)
+    there = td.run(coarser, overrides=["verdict.enabled=false"])
+    assert rows(judged, Refinement.COMBINED)["life"].refined == pytest.approx(there.summary()["life_cycles"], rel=1e-6)
+    assert result.wear is not None
+    assert result.wear.growth is not None
+    stated(judged, unstable_share(result.wear))
+    left = replace(result.wear, growth=np.where(np.arange(len(result.wear.growth)) < 2, 1e-3, -1e-3))
+    assert unstable_share(left) == pytest.approx(left.cycles_in_step[:2].sum() / left.cycles_in_step.sum())
+
+
+def stated(result: td.Result, unstable: float) -> None:
+    """The life's error follows from its row by the rule."""
+    found = loaded(result.verdict)
+    own = DEFAULT.total(rows(result, Refinement.COMBINED)["life"].relative or 0.0, found.worn_ratio)
+    assert found.statements["life"].error == pytest.approx(own + unstable)
 
 
 def finding(**changes: object) -> Finding:

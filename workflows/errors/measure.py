@@ -36,13 +36,14 @@ class Table:
     """Rows as they are measured.
 
     first : the scene's own unworn state, None without one, as `why` says
-    ratio : of the refined mesh, None where that was not solved
+    ratio : of the refined mesh, None where that was not solved; worn_ratio : of the mesh that was worn beside it
     """
 
     rows: list[Change] = field(default_factory=list)
     first: State | None = None
     why: str = ""
     ratio: float | None = None
+    worn_ratio: float | None = None
 
     def add(self, refinement: Refinement, before: Answers, after: Answers, how: str) -> None:
         """What a refinement changed in a state."""
@@ -199,40 +200,47 @@ def _estimates(file: SceneFile, table: Table, result: Result) -> None:
 
 
 def _worn(file: SceneFile, finer: SceneFile | None, why: str, table: Table, result: Result, options: Options) -> None:
-    """Depth and life of the whole run on the refined scene, with finer wear steps."""
+    """Depth and life of the whole run on another mesh, with more modes, harmonics and wear steps.
+
+    The refined mesh is taken where the work allows it, else one coarser than the scene's own, whose run takes about as
+    much work as the scene's.
+    """
     own, wear = table.first, result.wear
     assert own is not None
     assert wear is not None
-    if finer is None:
-        table.refuse(Refinement.COMBINED, why, OF_WEAR)
-        return
-    ratio, life = table.ratio or options.ratios[0], summary.life(result)
+    life = summary.life(result)
     if life is None:
         table.refuse(Refinement.COMBINED, "no life has ended", OF_WEAR)
         return
     top = top_of(own, options)
     periods = 0 if wear.periods is None else wear.periods.sum()  # one costs about as much as a solve
-    work = float(wear.solves.sum() + periods) * ratio**2 * own.balance.contact.stiffness.size * (2 * top + 1)
-    if work > options.max_wear:
-        table.refuse(
-            Refinement.COMBINED,
-            f"the refined wear takes some {work:.2g} solves times unknowns, above the limit of {options.max_wear:g}",
-            OF_WEAR,
-        )
-        return
-    fine = refine.wear(refine.harmonics(finer, top), 2.0)
-    how = f"{ratio:.3g} times the elements along every edge, more modes, harmonics 0 to {top}, half the wear steps"
-    table_of_wear = fine.scene.wear
+    work = float(wear.solves.sum() + periods) * own.balance.contact.stiffness.size * (2 * top + 1)
+    ratio = table.ratio or options.ratios[0]
+    steps = options.wear_steps
+    if finer is None or work * ratio**2 > options.max_wear:
+        try:
+            finer, ratio = refine.mesh(file, 1 / options.coarser)
+        except refine.NoMesh as refusal:
+            why = str(refusal)
+        if finer is None or ratio >= 1:
+            table.refuse(Refinement.COMBINED, why or "the mesh is given and can only be cut", OF_WEAR)
+            return
+        finer, steps = refine.modes(finer, options.modes) or finer, 1.0
+    other = refine.wear(refine.harmonics(finer, top), steps)
+    how = f"{ratio:.3g} times the elements along every edge, more modes, harmonics 0 to {top}"
+    how += f", {steps:g} times the wear steps" if steps > 1 else ""
+    table_of_wear = other.scene.wear
     assert table_of_wear is not None
     try:
-        model = modelling.build(fine, None, Progress())
-        worn = wear_run.worn_out(fine, model, table_of_wear.lost_below)
+        model = modelling.build(other, None, Progress())
+        worn = wear_run.worn_out(other, model, table_of_wear.lost_below)
         there = life_of(worn, model, table_of_wear)
         if worn.ended.failed or there is None:
             raise RuntimeError(str(worn.end))
     except REFUSALS as refusal:
         table.refuse(Refinement.COMBINED, f"{how}: {refusal}", OF_WEAR)
         return
+    table.worn_ratio = ratio
     pairs = (
         ("depth", float(result.depth_after(-1).max()), float((worn.depth[-1] + worn.worn[-1]).max())),
         ("life", life, there),

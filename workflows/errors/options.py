@@ -14,7 +14,10 @@ class Options:
     harmonics : highest harmonic of the refined balance, at the least; else two more than the scene's highest
     max_dofs : of the refined mesh; some 20 s to reduce on one core
     max_unknowns : of the refined balance; some 10 s to find its peak on one core
-    max_wear : unknowns of the refined balance times solves of the scene's own wear; some 40 s on one core
+    max_wear : unknowns of the refined balance times solves of the scene's own wear, up to which that is worn; above it
+        a coarser mesh is
+    coarser : elements along every edge of the scene over those of the coarser mesh
+    wear_steps : on the refined mesh over those of the scene
     max_time_components : of a contact whose motions are integrated in time
     order : of convergence that is relied on: errors at contact kinks and corners fall with the element size
     safety : on the extrapolated error (Roache 1994: 1.25)
@@ -28,6 +31,8 @@ class Options:
     max_dofs: int = 100_000
     max_unknowns: int = 5000
     max_wear: float = 5e5
+    coarser: float = 1.5
+    wear_steps: float = 2.0
     max_time_components: int = 30
     order: float = 1.0
     safety: float = 1.25
@@ -35,11 +40,12 @@ class Options:
     largest: float = 0.5
 
     def factor(self, ratio: float | None) -> float:
-        """Total error over the change by a refinement with a ratio of element sizes.
+        """Total error over the change by another mesh with so many times the elements along every edge.
 
-        Source  Roache, J. Fluids Eng. 116 (1994), grid convergence index of the coarser of two grids
+        Source  Roache, J. Fluids Eng. 116 (1994), grid convergence index of the coarser of two grids, and of the finer
+        one where the other mesh is coarser
         """
-        return self.safety / (1 - (ratio or self.ratios[0]) ** -self.order)
+        return self.safety / abs(1 - (ratio or self.ratios[0]) ** -self.order)
 
     def total(self, change: float, ratio: float | None) -> float:
         """Total relative error of a value that the combined refinement changes so much."""

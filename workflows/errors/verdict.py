@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from time import process_time
 
+from tribodyn.hbm.wear.state_stability import unstable_share
 from tribodyn.workflows.errors import in_time
 from tribodyn.workflows.errors.in_time import Finding
 from tribodyn.workflows.errors.measure import OF_WEAR, Table, at_given_frequency, measure
@@ -36,7 +37,7 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, opt
         findings = in_time.check(file, model.balance, result, table.first, file.scene.verdict.in_time, options)
     values = values_of(table, result)
     statements = {name: _statement(name, values[name], table, findings, result, options) for name in QUANTITIES}
-    return Verdict(statements, tuple(table.rows), table.ratio, process_time() - clock)
+    return Verdict(statements, tuple(table.rows), table.ratio, process_time() - clock, table.worn_ratio)
 
 
 def values_of(table: Table, result: Result) -> dict[str, float | None]:
@@ -58,8 +59,12 @@ def _statement(
     if name == "peak_frequency" and table.first is not None and at_given_frequency(table.first):
         return Statement(value, 0.0, None, Status.REPORTED, "given by the scene")
     own = [row for row in table.rows if row.quantity == name]
-    error, why = error_of(own, table.ratio, options)
+    error, why = error_of(own, table.worn_ratio if name in OF_WEAR else table.ratio, options)
     dominated = dominating(own)
+    unstable = 0.0 if result.wear is None or name not in OF_WEAR else unstable_share(result.wear)
+    error = None if error is None else error + unstable  # what a machine wears there instead is not known
+    if unstable > options.largest:
+        return Statement(value, error, dominated, Status.UNSTABLE, f"for {unstable:.0%} of the cycles")
     concerned = _beside(findings, result) if name in OF_WEAR else findings[:1]
     for finding in () if name == "peak_frequency" else concerned:
         status, reason = finding.judged(name, error)

@@ -118,6 +118,7 @@ SCHEMA: dict[str, tuple[type, dict[str, tuple[tuple[str, ...], str]]]] = {
             "duty_omega": (("row", "duty"), "rad/s"),
             "duty_displacement": (("row", "duty", "contact", "coefficient"), "m"),
             "preload_at_rest": (("row",), "N"),
+            "growth": (("row",), ""),
             "spread": (("row",), ""),
             "mean_error": (("row",), ""),
             "settled": (("row",), ""),

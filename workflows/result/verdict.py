@@ -81,13 +81,15 @@ class Verdict:
     """The table of changes and what follows for every quantity.
 
     statements : by QUANTITIES; changes : rows of the table; ratio : elements along every edge of the refined mesh over
-    those of the scene, None where that was not solved; seconds : of one processor, for information alone
+    those of the scene, None where that was not solved; worn_ratio : the same of the mesh that was worn beside it
+    seconds : of one processor, for information alone
     """
 
     statements: dict[str, Statement]
     changes: tuple[Change, ...]
     ratio: float | None
     seconds: float
+    worn_ratio: float | None = None
 
     def dumped(self) -> str:
         """The verdict as JSON text."""
@@ -98,7 +100,13 @@ def loaded(text: str) -> Verdict:
     """A verdict from its JSON text."""
     data: dict[str, Any] = json.loads(text)
     statements = {name: Statement(**item) for name, item in data["statements"].items()}
-    return Verdict(statements, tuple(Change(**item) for item in data["changes"]), data["ratio"], data["seconds"])
+    return Verdict(
+        statements,
+        tuple(Change(**item) for item in data["changes"]),
+        data["ratio"],
+        data["seconds"],
+        data["worn_ratio"],
+    )
 
 
 def record(text: str) -> dict[str, dict[str, Any]] | None:
