@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm.continuation.parameter import Parameter
+from tribodyn.hbm.continuation.parameter import LOAD, Parameter
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import BranchEnd, Outcome, SolveEnd
 
@@ -73,9 +73,19 @@ class Branch:
         found: np.ndarray = row[:, static] - 1j * row[:, static + 1]
         return found
 
+    @property
+    def controlled(self) -> bool:
+        """Whether the force of each point was found, not given."""
+        return self.parameter_name != LOAD and len(self.load_factor) > 0 and bool(np.ptp(self.load_factor) > 0)
+
+    def height(self, output: str) -> np.ndarray:
+        """(n_point,) what is highest in resonance, -1 at no solution: amplitude [m], per load factor under control."""
+        size = self.amplitude(output) / self.load_factor if self.controlled else self.amplitude(output)
+        return np.where(self.converged, size, -1.0)
+
     def peak(self, output: str) -> int | None:
         """The highest point of an output, None where that is an end of the branch: an end is no resonance."""
-        height = np.where(self.converged, self.amplitude(output), -1.0)
+        height = self.height(output)
         best = int(np.argmax(height))
         return None if best in (0, len(height) - 1) else best
 

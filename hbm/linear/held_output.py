@@ -1,7 +1,7 @@
 """The linear side of a structure one output of which moves as a given cosine, whatever force that takes.
 
-In harmonic 1 the output moves by y = F a + L g, with the excitation F, its receptance a and the contact forces g. Held at
-y, the force is F = (y - L g) / a and the contact moves by
+In harmonic 1 the output moves by y = F a + L g, with the excitation F, its receptance a and the contact forces g. Held
+at y, the force is F = (y - L g) / a and the contact moves by
 
     x = F x_F + G g = y x_F / a + (G - x_F L / a) g :
 

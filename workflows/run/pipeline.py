@@ -90,7 +90,7 @@ def run(
                 count = scene.wear.responses
                 curves = curve.worn_responses(result, model.balance, count, again, advance)
                 result = keep(replace(result, worn=curves))
-        if judge is not None and scene.verdict.enabled:
+        if judge is not None and scene.verdict.enabled and scene.response.control == "force":
             result = judge(file, model, result, progress)
         return keep(replace(result, stage=Stage.COMPLETE))
 
