@@ -112,9 +112,7 @@ class HeldPoint(CompliancePoint):
             return moved[0], moved[1]
         free, loose = super().slope(g), self.loose(g)
         turn = self._fundamental(free[1])[row]
-        moved = [
-            self._moved(f, -loose * t - turn * way) for f, t, way in zip(free, turned, self._ways, strict=True)
-        ]
+        moved = [self._moved(f, -loose * t - turn * way) for f, t, way in zip(free, turned, self._ways, strict=True)]
         return moved[0], moved[1]
 
     def jacobian_product(self, rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
