@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.hbm.test_contact_rough import ALL, E_STAR, FACE, MU, POISSON, RADIUS, STEEL, YOUNG, G, moving
+from tests.helpers.steel_asperities import ALL, E_STAR, FACE, MU, POISSON, RADIUS, STEEL, YOUNG, G, moving
 from tribodyn.hbm.contact import aft
 from tribodyn.hbm.contact import law as contact_law
 from tribodyn.hbm.contact.asperity import asperity

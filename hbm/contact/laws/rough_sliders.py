@@ -26,7 +26,9 @@ from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactCycle, Con
 from tribodyn.hbm.contact.laws import rough
 from tribodyn.hbm.harmonics import HarmonicBasis
 
-COMPONENTS, OWN_STIFFNESS, TABLE = rough.COMPONENTS, True, rough.TABLE
+COMPONENTS = (("t1", "t2", "n"), ("t1", "n"), ("t2", "n"))
+OWN_STIFFNESS = True  # its springs follow from its own numbers
+TABLE = ("gap in m", "asperities per m2 and per m of gap, or per m2 where there is one row")
 HEIGHTS = 101  # at which asperities stand
 ROWS = 128  # depths beyond yield at which radius and plastic depth are tabulated, equidistant in their root
 TURNS = 2  # cycles marched, the last of which counts
