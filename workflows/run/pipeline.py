@@ -71,7 +71,7 @@ def run(
             linear = None
             if not row_only:
                 with progress.stage("linear references"):
-                    start, stop = (2 * np.pi * f for f in scene.response.references or scene.response.frequency)
+                    start, stop = (2 * np.pi * f for f in scene.response.references or scene.response.range)
                     linear = references.linear_references(model.balance, settings.OUTPUT, start, stop)
             result = keep(replace(result, response=frf, references=linear, stage=Stage.RESPONSE))
         check_branch(result.response)

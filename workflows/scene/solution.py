@@ -52,8 +52,8 @@ def _amplitudes(value: object) -> object:
 class Response(Table):
     """The frequency response that is computed."""
 
-    frequency: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]]
-    """Range of the response, [low, high]."""
+    frequency: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]] | None = None
+    """Range of the response, [low, high]; what only looks at a scene goes without, such as `tribodyn inspect`."""
     references: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]] | None = None
     """Range in which the linear references are drawn; the same as `frequency` by default."""
     points: Annotated[StrictInt, Field(ge=2, le=20_000)] = 60
@@ -119,10 +119,18 @@ class Response(Table):
 
     @model_validator(mode="after")
     def _range(self) -> Response:
-        for key, (low, high) in (("frequency", self.frequency), ("references", self.references or self.frequency)):
-            if low >= high:
-                raise ValueError(f"expected {key} = [low, high] with low below high, got {low:g} Hz and {high:g} Hz")
+        for key, ends in (("frequency", self.frequency), ("references", self.references)):
+            if ends is not None and ends[0] >= ends[1]:
+                got = f"{ends[0]:g} Hz and {ends[1]:g} Hz"
+                raise ValueError(f"expected {key} = [low, high] with low below high, got {got}")
         return self
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """`frequency` where it is needed [Hz]; raises ValueError where it is missing."""
+        if self.frequency is None:
+            raise ValueError('response.frequency is missing: give its range, such as ["100 Hz", "200 Hz"]')
+        return self.frequency
 
 
 class PartResponse(Response, Output):

@@ -248,7 +248,8 @@ class TieTable(Table):
     second: str
     """Face that it is glued to."""
     reach: Annotated[Length, Field(ge=0)] | None = None
-    """Farthest opening at which the faces still meet; a tenth of the length of the first face by default."""
+    """Farthest opening that is bridged. By default faces meet up to a tenth of the length of the first, and are refused
+    where they are apart by more than 0.5 % of it on average."""
 
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
