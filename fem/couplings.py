@@ -28,7 +28,8 @@ SMALL = 1e-13  # of a coefficient that is left out
 class Tie:
     """Glue a face to another one: the jump vanishes in the mean against every shape function of the first face.
 
-    what : name for errors; first, second : boundary names; reach : farthest opening [m]
+    what : name for errors; first, second : boundary names; reach : farthest opening [m], which is then bridged; where
+        it is None a tenth of the length of the first face, and faces that are apart are refused
     """
 
     what: str
@@ -47,6 +48,10 @@ class Tie:
         shared = common(one, two, reach)
         if not len(shared.weight):
             raise ValueError(f"{self.what}: {apart(one, two, reach).replace('contact faces', 'tied faces')}")
+        gap = float(np.average(np.abs(shared.gap), weights=np.abs(shared.weight)))
+        if self.reach is None and gap > MORTAR.apart * one.length:
+            who = f"{self.first} and {self.second} are {1e3 * gap:.3g} mm apart on average"
+            raise ValueError(f'{self.what}: {who}: bring them together, or give reach = "{2e3 * gap:.2g} mm"')
         n = mesh.doflocs.shape[1]
         parts: list[list[tuple[np.ndarray, np.ndarray, np.ndarray]]] = [[], []]
         for i, j, g in shared.each():

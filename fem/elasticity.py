@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import block_diag, csr_matrix, identity, kron
 
+from tribodyn.fem import linear_reduced
 from tribodyn.fem.assembly import materials_of
 from tribodyn.fem.elements import batches, connectivity, scatter
 from tribodyn.fem.material import AnyMaterial, Material
@@ -42,6 +43,10 @@ def _assemble(
     kinds, _ = of_elements(mesh, material)
     isotropic = all(isinstance(one, Material) for one in kinds)
     rho = densities(mesh, material)
+    if any(isinstance(one, Material) and one.linear_reduced for one in kinds):
+        if len(kinds) > 1:
+            raise ValueError('material: a mesh with elements = "linear_reduced" has one material')
+        return _linear_reduced(mesh, material)
     if isotropic:
         lam, mu, _ = per_element(mesh, material)
     else:
@@ -58,6 +63,17 @@ def _assemble(
         stiffness[elements] = symmetric(blocks)
     n_node = mesh.doflocs.shape[1]
     return kron(scatter(nodes, n_node, mass), identity(3), format="csr"), scatter(nodes, n_node, stiffness)
+
+
+def _linear_reduced(mesh: Any, material: AnyMaterial | Mapping[str, AnyMaterial]) -> tuple[csr_matrix, csr_matrix]:
+    lam, mu, rho = (np.tile(values, 8) for values in per_element(mesh, material))
+    cells, gradient, volume, hourglass = linear_reduced.elements(mesh)
+    stiffness = stiffness_blocks(gradient[:, None], volume[:, None], lam, mu)
+    stiffness += (mu[:, None, None] * hourglass)[..., None, None] * np.eye(3)
+    lumped = (rho * volume / 8)[:, None, None, None, None] * np.eye(8)[None, :, :, None, None]
+    n_node = mesh.doflocs.shape[1]
+    mass = kron(scatter(cells, n_node, lumped), identity(3), format="csr")
+    return mass, scatter(cells, n_node, symmetric(stiffness))
 
 
 def mass_blocks(N: np.ndarray, weight: np.ndarray) -> np.ndarray:

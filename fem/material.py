@@ -16,12 +16,14 @@ VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 class Material:
     """E : Young's modulus [Pa]; nu : Poisson's ratio, between -1 and 0.5; rho : density [kg/m3];
     expansion : coefficient of thermal expansion [1/K]
+    linear_reduced : whether its elements are linear hexahedra with reduced integration, see `linear_reduced`
     """
 
     E: float
     nu: float
     rho: float
     expansion: float = 0.0
+    linear_reduced: bool = False
 
     def __post_init__(self) -> None:
         if not self.E > 0:

@@ -37,6 +37,7 @@ class MortarOptions:
     whole : part of a facet that counts as all of it
     few : part of a point's own area that is too little to carry, or to be tied
     rounding : gap that is rounding of node positions, over the length of the face
+    apart : mean gap of two tied faces, over the length of the first, from which on they do not touch
     """
 
     reach: float = 0.1
@@ -49,6 +50,7 @@ class MortarOptions:
     whole: float = 1 - 1e-6
     few: float = 1e-6
     rounding: float = 1e-9
+    apart: float = 5e-3
 
 
 MORTAR = MortarOptions()
@@ -148,6 +150,9 @@ def common(one: Side, two: Side, reach: float) -> Common:
     Returns the points, none where the sides do not meet
     """
     i, j = _candidates(one, two, reach)
+    if not len(i):
+        none, pairs = np.zeros(0), np.zeros((2, 0))
+        return Common(i, j, pairs, pairs, none, np.zeros((0, 3)), none, np.zeros(1, int), np.zeros(len(one.nodes)))
     frames = _planes(one.normal)[i]
     curved = one.bulge > MORTAR.curved
     outline = _outline(two, two.bulge > MORTAR.curved)[j]

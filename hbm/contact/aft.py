@@ -113,6 +113,8 @@ def history(
     """
     if memory is None:
         memory = np.zeros((parameters.n_pair, law.n_state(parameters.components)))
+    if hasattr(law, "history"):
+        return law.history(x, parameters, memory, basis)
     every = 1 if basis.transitions == "sampled" else -(-PLOT_SAMPLES // basis.n_samples)
     fine = HarmonicBasis(basis.harmonics, every * basis.n_samples)
     samples = fine.to_time(x)

@@ -42,7 +42,7 @@ class Bed:
     @classmethod
     def of(cls, x, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, located: bool) -> Bed:
         """The bed at the deepest approach of the cycle x (n_pair, n_component, n_coeff) [m] and its past."""
-        peak, angle = _deepest(x[:, -1], basis, located)
+        peak, angle = deepest_of(x[:, -1], basis, located)
         peak = peak - parameters.gap
         grows = peak > memory[:, 0]
         springs = bed(parameters.packed(), np.where(grows, peak, memory[:, 0]))
@@ -232,7 +232,7 @@ def _by_pair(values: np.ndarray, pair: np.ndarray, n_pair: int) -> np.ndarray:
     return found
 
 
-def _deepest(x: np.ndarray, basis: HarmonicBasis, located: bool) -> tuple[np.ndarray, np.ndarray]:
+def deepest_of(x: np.ndarray, basis: HarmonicBasis, located: bool) -> tuple[np.ndarray, np.ndarray]:
     """Largest value (n_pair,) of displacements (n_pair, n_coeff) over the period, and the angle at which it is met."""
     samples = basis.to_time(x)
     at = samples.argmax(axis=1)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.hbm.continuation.parameter import Parameter
+from tribodyn.hbm.continuation.parameter import LOAD, Parameter
 from tribodyn.hbm.newton import Solution
 from tribodyn.hbm.outcome import BranchEnd, Outcome, SolveEnd
 
@@ -26,6 +26,7 @@ class Branch:
     end : why and where the branch ends; its text is a sentence
     folds : indices of the points that are folds, where the branch turns back
     parameter_name : what was stepped; parameter : (n_point,) its values, the same as omega where it is the frequency
+    load_factor : (n_point,) on the vibrating loads, which a test under control finds, see `control`
     """
 
     omega: np.ndarray
@@ -39,6 +40,7 @@ class Branch:
     folds: tuple[int, ...] = ()
     parameter_name: str = "frequency"
     parameter: np.ndarray = field(default_factory=lambda: np.empty(0))
+    load_factor: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     @property
     def ended(self) -> BranchEnd:
@@ -64,9 +66,26 @@ class Branch:
         """(n_point,) vibration amplitude of an output, see `amplitude` [m]."""
         return amplitude(self.response[:, self.output_names.index(output)])
 
+    def fundamental(self, output: str) -> np.ndarray:
+        """(n_point,) complex amplitude a_1 - i b_1 of an output [m]."""
+        row = self.response[:, self.output_names.index(output)]
+        static = row.shape[1] % 2
+        found: np.ndarray = row[:, static] - 1j * row[:, static + 1]
+        return found
+
+    @property
+    def controlled(self) -> bool:
+        """Whether the force of each point was found, not given."""
+        return self.parameter_name != LOAD and len(self.load_factor) > 0 and bool(np.ptp(self.load_factor) > 0)
+
+    def height(self, output: str) -> np.ndarray:
+        """(n_point,) what is highest in resonance, -1 at no solution: amplitude [m], per load factor under control."""
+        size = self.amplitude(output) / self.load_factor if self.controlled else self.amplitude(output)
+        return np.where(self.converged, size, -1.0)
+
     def peak(self, output: str) -> int | None:
         """The highest point of an output, None where that is an end of the branch: an end is no resonance."""
-        height = np.where(self.converged, self.amplitude(output), -1.0)
+        height = self.height(output)
         best = int(np.argmax(height))
         return None if best in (0, len(height) - 1) else best
 
@@ -81,6 +100,8 @@ class Branch:
         rows |= {"contact": point.x.reshape(self.contact.shape[1:])}
         if len(self.parameter):
             rows["parameter"] = point.value
+        if len(self.load_factor):
+            rows["load_factor"] = self.load_factor[at - 1]
         grown: dict[str, Any] = {name: np.insert(getattr(self, name), at, row, axis=0) for name, row in rows.items()}
         outcome = (*self.outcome[:at], point.outcome, *self.outcome[at:])
         return replace(self, **grown, outcome=outcome, folds=tuple(i + (i >= at) for i in self.folds))
@@ -151,10 +172,10 @@ class BranchBuilder:
     def finish(self, end: Outcome[BranchEnd]) -> Branch:
         """The branch; `end` says why it ends where it ends."""
         points, x = self.points, np.stack(self.x)
-        balance, _ = self._parameter.place(points[-1].value)
+        balances = [self._parameter.place(p.value)[0] for p in points]
         return Branch(
             omega=np.array([p.omega for p in points]),
-            output_names=balance.compliance.output_names,
+            output_names=balances[-1].compliance.output_names,
             response=np.stack([p.response for p in points]),
             contact=x.reshape(len(x), -1, x.shape[-1]),
             energy=np.array([p.energy for p in points]),
@@ -164,4 +185,5 @@ class BranchBuilder:
             folds=tuple(self.folds),
             parameter_name=self._parameter.name,
             parameter=np.array(self.value),
+            load_factor=np.array([balance.load_factor for balance in balances]),
         )

@@ -49,16 +49,17 @@ class Point:
 
 
 class Bordered(Protocol):
-    """[D, r; r^H, 0] of one harmonic, or [D, 0; 0, 1] where nothing borders it; solves for rhs (n + 1,)."""
+    """[D, r; l, 0] of one harmonic, or [D, 0; 0, 1] where nothing borders it; solves for rhs (n + 1,)."""
 
     def solve(self, rhs: np.ndarray) -> np.ndarray: ...
 
 
 class DenseBordered:
-    """With a full D (n, n); border : (n,)."""
+    """With a full D (n, n); border, left : r, l (n,), l = r^H by default."""
 
-    def __init__(self, d: np.ndarray, border: np.ndarray, corner: float):
-        self._factor = sla.lu_factor(np.block([[d, border[:, None]], [border.conj()[None], np.array([[corner]])]]))
+    def __init__(self, d: np.ndarray, border: np.ndarray, corner: float, left: np.ndarray | None = None):
+        left = border.conj() if left is None else left
+        self._factor = sla.lu_factor(np.block([[d, border[:, None]], [left[None], np.array([[corner]])]]))
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """Solution (n + 1,)."""
@@ -66,11 +67,12 @@ class DenseBordered:
 
 
 class DiagonalBordered:
-    """With a diagonal D (n,), as proportional damping has it; one of its entries may vanish where r is largest."""
+    """With a diagonal D (n,), as proportional damping has it; one of its entries may vanish where r l is largest."""
 
-    def __init__(self, d: np.ndarray, border: np.ndarray, corner: float):
-        self._d, self._r, self._left, self._corner = d, border, border.conj(), corner
-        self._pivot = int(np.abs(border).argmax())
+    def __init__(self, d: np.ndarray, border: np.ndarray, corner: float, left: np.ndarray | None = None):
+        self._d, self._r, self._corner = d, border, corner
+        self._left = border.conj() if left is None else left
+        self._pivot = int(np.abs(border * self._left).argmax())
         with np.errstate(divide="ignore", invalid="ignore"):
             self._inverse = 1.0 / d
         if not corner:
@@ -130,6 +132,9 @@ class FreeVibration:
     output : whose motion in the reference mode measures the amplitude
     reference_omega : [rad/s]; reference_damping : ratio of the mode with Coriolis forces, damping and flow
     per_amplitude : motion of the output per modal amplitude a; one_system : whether all harmonics see the same
+    column, row : (n,) border of harmonic 1, what acts to hold the amplitude and what measures it
+    sustained : 1 where zeta is that of the term added to the structure, 0 where it says how large a force drives it
+    push : modal force of what acts, per unit of it
     Raises  ValueError for what has no such mode
     """
 
@@ -174,12 +179,17 @@ class FreeVibration:
         self.per_amplitude = float(abs(moved[names.index(self.output)]))
         if self.per_amplitude <= 1e-9 * np.abs(self.modes[self.first].O).max():
             raise ValueError(f"output '{self.output}' does not move in mode {mode}: choose another output")
+        self.column, self.row = self.reference, self.reference.conj()
+        self.sustained, self.push = 1.0, 1.0 + 0j
+
+    def driving(self, omega: float, zeta: float, a: float) -> complex:
+        """Factor on what acts in the column, besides what the border needs; none in free vibration."""
+        return 0j
 
     def _reference(self, mode: int | None, apart: np.ndarray) -> tuple[np.ndarray, float, float]:
         """Modal shape (n,) of unit mass, frequency [rad/s] and damping ratio of the reference mode."""
         m = self.modes[self.first]
-        open_springs = m.UH[:, apart] @ (self.k[apart, None] * m.U[apart])
-        squares, shapes = np.linalg.eigh(np.diag(m.lam) - open_springs)
+        squares, shapes = self._at_rest(apart)
         if mode is not None and not 0 <= mode < self.n:
             raise ValueError(f"there is no mode {mode}: the model has modes 0 to {self.n - 1}")
         system, _ = self.balance.model.at_harmonic(1)
@@ -197,6 +207,13 @@ class FreeVibration:
         order = np.argsort(values.imag) if mode is not None else np.argsort(-values.real)
         value, shape = values[order[mode or 0]], few @ vectors[:, order[mode or 0]]
         return shape / np.linalg.norm(shape), float(value.imag), float(-value.real / abs(value))
+
+    def _at_rest(self, apart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Squared frequencies and modal shapes of the structure stuck where it is closed at rest."""
+        m = self.modes[self.first]
+        open_springs = m.UH[:, apart] @ (self.k[apart, None] * m.U[apart])
+        squares, shapes = np.linalg.eigh(np.diag(m.lam) - open_springs)
+        return squares, shapes
 
     def _static_state(self) -> tuple[np.ndarray, np.ndarray]:
         """x at rest, and which contacts are open there."""
@@ -242,13 +259,14 @@ class FreeVibration:
         factors: list[Bordered] = []
         for h, m in zip(self.basis.harmonics, self.modes, strict=True):
             s = 1j * h * omega
-            undamped = (m.lam if h else m.held) + s * s - 2 * zeta * omega * s
-            border, corner = (self.reference, 0.0) if h == 1 else (np.zeros(self.n), 1.0)
+            undamped = (m.lam if h else m.held) + s * s - 2 * self.sustained * zeta * omega * s
+            none = np.zeros(self.n)
+            border, corner, left = (self.column, 0.0, self.row) if h == 1 else (none, 1.0, none)
             if m.proportional or (not h and m.flow is None):
-                factors.append(DiagonalBordered(undamped + s * np.diag(m.damping), border, corner))
+                factors.append(DiagonalBordered(undamped + s * np.diag(m.damping), border, corner, left))
             else:
                 flow = 0.0 if m.flow is None else m.flow
-                factors.append(DenseBordered(s * m.damping + np.diag(undamped) + flow, border, corner))
+                factors.append(DenseBordered(s * m.damping + np.diag(undamped) + flow, border, corner, left))
         rhs = self._rhs(self._modal(self.basis.to_complex(g)), a)
         if self.basis.has_static:
             rhs[:-1, 0] += self.static_load
@@ -256,7 +274,7 @@ class FreeVibration:
         move = self._moved(eta)
         if self.basis.has_static:
             move[:, 0] -= self.base
-        residual = self._residual(a, flat - move, mismatch)
+        residual = self._residual(a, flat - move, mismatch + self.driving(omega, zeta, a))
         return Point(coordinates, a, x, omega, zeta, cycle, eta, residual, factors)
 
     def _modal(self, force: np.ndarray) -> np.ndarray:
@@ -293,7 +311,7 @@ class FreeVibration:
         """x_0 relative to rest and vibration, the vibration and the mismatch relative to the vibration."""
         vibration = self._units(a)[-1]
         scale = np.where(self.basis.order == 0, np.maximum(self._units(a), vibration), vibration)
-        relative = mismatch / (self.reference_omega**2 * a)
+        relative = mismatch * self.push / (self.reference_omega**2 * a)
         return np.concatenate([(x / scale).ravel(), [relative.real, relative.imag]])
 
     def correction(self, p: Point, normal: np.ndarray, tolerance: float, max_products: int) -> np.ndarray:
@@ -318,12 +336,17 @@ class FreeVibration:
         """Derivatives of the residual at fixed x by the logarithm of omega, by zeta and by the logarithm of a."""
         h = np.asarray(self.basis.harmonics)
         damped = np.stack([m.damping @ p.eta[:, i] for i, m in enumerate(self.modes)], axis=1)
-        by_omega = 1j * h * damped + (-2 * h**2 * p.omega - 4j * p.zeta * h * p.omega) * p.eta
-        by_zeta = (-2j * h * p.omega**2) * p.eta
+        by_omega = 1j * h * damped + (-2 * h**2 * p.omega - 4j * self.sustained * p.zeta * h * p.omega) * p.eta
+        by_zeta = (-2j * self.sustained * h * p.omega**2) * p.eta
+        drive, per_zeta = (self.driving(p.omega, zeta, p.a) for zeta in (p.zeta, 1.0))
         found = []
-        for rhs in (self._rhs(-p.omega * by_omega, 0.0), self._rhs(-by_zeta, 0.0), self._rhs(0.0, p.a)):
+        for rhs, more in (
+            (self._rhs(-p.omega * by_omega, 0.0), 2 * drive),  # it goes as omega^2 zeta a
+            (self._rhs(-by_zeta, 0.0), per_zeta),
+            (self._rhs(0.0, p.a), drive),
+        ):
             eta, mismatch = self._solve(p.factors, rhs)
-            found.append(self._residual(p.a, -self._moved(eta), mismatch))
+            found.append(self._residual(p.a, -self._moved(eta), mismatch + more))
         return tuple(found)
 
     def outputs(self, p: Point) -> np.ndarray:

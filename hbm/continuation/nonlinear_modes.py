@@ -137,7 +137,7 @@ def backbone(
     problem = FreeVibration(balance, mode, output)
     a, goal = np.log(np.array([start, stop]) / (1.0 if modal else problem.per_amplitude))
     solved, end = walk(problem, float(a), float(goal), options)
-    return _result(problem, mode, solved, end)
+    return result(problem, mode, solved, end)
 
 
 def walk(
@@ -210,7 +210,7 @@ def newton_on(problem: FreeVibration, point: Point, normal: np.ndarray, options:
     return point, SolveEnd.STEPS_SPENT.say(f" {options.max_steps} steps: {error:.1e}"), options.max_steps
 
 
-def _result(problem: FreeVibration, number: int | None, solved: list[_Solved], end: Outcome[BranchEnd]) -> Backbone:
+def result(problem: FreeVibration, number: int | None, solved: list[_Solved], end: Outcome[BranchEnd]) -> Backbone:
     points = [p for p, _, _ in solved]
     basis = problem.basis
     t = problem.balance.contact.tangential

@@ -10,6 +10,7 @@ the modes alone, and what these leave out is a product with a sparse factor.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -160,11 +161,14 @@ class ContactCompliance:
 
     def at(self, omega: float) -> CompliancePoint:
         """The compliance at one excitation frequency [rad/s]; the last RULES.points_kept ones are kept."""
-        point = self._points.pop(omega, None) or CompliancePoint(self, omega)
+        point = self._points.pop(omega, None) or self._make(omega)
         self._points[omega] = point
         if len(self._points) > RULES.points_kept:
             del self._points[next(iter(self._points))]
         return point
+
+    def _make(self, omega: float) -> CompliancePoint:
+        return CompliancePoint(self, omega)
 
     def moving(self, rows: np.ndarray) -> np.ndarray:
         """The rows of harmonics >= 1 of (n_coeff, ...), single precision: powers of s multiply no others."""
@@ -331,7 +335,7 @@ class CompliancePoint:
                 moved[:, p] = 1j * self._harmonics[p] * port.slope(force[:, p])
         return c.basis.to_real(moved[: c.n_contact]), c.basis.to_real(moved[c.n_contact + c.n_load :])
 
-    def jacobian_product(self, rows: np.ndarray) -> JacobianProduct:
+    def jacobian_product(self, rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """The product with G restricted to contact rows (active ones), to the accuracy a Newton direction needs."""
         return JacobianProduct(self, rows)
 

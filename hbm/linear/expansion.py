@@ -110,8 +110,9 @@ class Expansion:
         self._system = (mass, damping)
         n = len(mass)
         loose = SingularStuckSystem(
-            "the part can move as a rigid body even with all contacts stuck: clamp it, add a spring, "
-            "or raise the contact stiffness"
+            "the part, or a body of it, can move as a rigid body even with all contacts stuck, and its contacts move "
+            "with it: join it to the rest by a tie or a link, hold it by a clamp or a spring, or raise the contact "
+            "stiffness; a structure that hangs free as a whole needs nothing"
         )
         count = n if n < RULES.all_modes_below else RULES.truncations[-1][0]
         self.hermitian = system.gyroscopic is None and system.circulatory is None

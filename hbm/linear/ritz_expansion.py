@@ -40,7 +40,9 @@ class RitzExpansion(Expansion):
         stuck = np.asarray(system.stiffness) + b.T @ (stiffness[:, None] * b)
         self.lam, phi = sla.eigh(0.5 * (stuck + stuck.T), np.asarray(system.mass))
         if self.lam[0] <= 0.0:
-            raise SingularStuckSystem("the part can move as a rigid body even with all contacts stuck: clamp it")
+            raise SingularStuckSystem(
+                "the part can move as a rigid body even with all contacts stuck: clamp it, or join its bodies"
+            )
         self.static_lam, self.rigid, self.flow = self.lam, np.zeros((len(self.lam), 0)), None
         self.hermitian = system.gyroscopic is None
         rate = system.velocity_matrix

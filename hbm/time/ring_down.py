@@ -1,10 +1,11 @@
-"""A free decay in time from a nonlinear mode, and frequency and damping by amplitude from its output alone.
+"""A free decay in time, and frequency and damping by amplitude from its output alone.
 
-The motion starts in the nonlinear mode and is left alone under the static loads. As in an experiment only one output is
-looked at. In a window of some periods that slides along it, a harmonic whose logarithm of amplitude and whose phase are
-straight lines, bent a little, is fitted together with its multiples and the mean: their slopes are the damping and the
-frequency. Like a narrow filter the smooth window leaves out other modes that ring along; peaks do not, and one
-thousandth of the seventh harmonic's frequency changes the damping between two peaks by per cents.
+The motion starts in a nonlinear mode, or at rest with a hammer's blow, and is left alone under the static loads. As in
+an experiment only one output is looked at. In a window of some periods that slides along it, a harmonic whose logarithm
+of amplitude and whose phase are straight lines, bent a little, is fitted together with its multiples and the mean:
+their slopes are the damping and the frequency. Like a narrow filter the smooth window leaves out other modes that ring
+along; peaks do not, and one thousandth of the seventh harmonic's frequency changes the damping between two peaks by per
+cents.
 Source  damping by amplitude from a decay: Jin, Chen, Brake and Song, MSSP 141 (2020) 106479; their filter and peaks are
 one local fit here
 """
@@ -15,10 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone
 from tribodyn.hbm.threads import single
 from tribodyn.hbm.time.stepper import IntegrationFailed, Options, TimeStepper
+from tribodyn.hbm.time.time_step import Moving
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,7 @@ class RingDown:
     time : (n,) [s]; displacement : (n,) of the output about its mean [m]
     amplitude : (k,) of the first harmonic [m]; omega : (k,) [rad/s]; damping : (k,) logarithmic decrement of a period
         over 2 pi; all at the middles of the windows
+    rest : (k,) root mean square of what else rings in a window, over the amplitude
     """
 
     time: np.ndarray
@@ -48,6 +52,7 @@ class RingDown:
     amplitude: np.ndarray
     omega: np.ndarray
     damping: np.ndarray
+    rest: np.ndarray
 
     @property
     def last(self) -> float:
@@ -69,7 +74,47 @@ def ring_down(balance: HarmonicBalance, mode: Backbone, periods: int, steps: int
     stepper = TimeStepper(free, omega, Options(steps=steps))
     x = mode.contact[-1].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
     moving = stepper.start_from(free.evaluate(omega, x), added=float(mode.damping[-1]))
-    row, found = balance.compliance.output_names.index(mode.output), []
+    row = balance.compliance.output_names.index(mode.output)
+    return from_decay(*_marched(stepper, moving, row, periods, least), omega)
+
+
+@single
+def hammer(
+    balance: HarmonicBalance,
+    impulse: float,
+    omega: float,
+    output: str,
+    periods: int,
+    steps: int = 256,
+    least: float = 0.0,
+) -> RingDown:
+    """Let the structure swing freely after a blow on it at rest.
+
+    impulse : of the blow, where and in which direction the vibrating load acts [N s]; it takes no time, and what is so
+        stiff that the time steps leave its inertia out does not feel it
+    omega : a guess of the frequency that is looked for [rad/s]; output : in which; else as `ring_down`
+    Raises  ValueError where several loads vibrate, or the structure has no equilibrium
+    """
+    struck = [name for (h, name), value in balance.excitation.loads.items() if h and value != 0]
+    if len(set(struck)) != 1:
+        raise ValueError(f"a blow acts where the one vibrating load does: there are {len(set(struck))}")
+    free = balance.with_load(0.0)
+    still = newton.solve(free, omega, free.stuck(omega))
+    if not still.converged:
+        raise ValueError(f"no static equilibrium to be struck in: {still.outcome}")
+    stepper = TimeStepper(free, omega, Options(steps=steps))
+    moving = stepper.start_from(still.state, at_rest=True)
+    m = stepper.n_dynamic
+    moving.z[m:] += stepper.h * impulse * (stepper.modes[1][:, :m].T @ np.real(balance.model.system.loads[struck[0]]))
+    row = balance.compliance.output_names.index(output)
+    return from_decay(*_marched(stepper, moving, row, periods, least), omega, several=True)
+
+
+def _marched(
+    stepper: TimeStepper, moving: Moving, row: int, periods: int, least: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Time [s] and output [m] of periods marched, until it swings less than `least`."""
+    found = []
     for _ in range(periods):
         moving, record, _, _ = stepper.period(moving)
         found.append(record.y[:, row])
@@ -78,14 +123,14 @@ def ring_down(balance: HarmonicBalance, mode: Backbone, periods: int, steps: int
     displacement = np.concatenate(found)
     if not np.isfinite(displacement).all():
         raise IntegrationFailed("the free decay grows without bound: take more steps per period")
-    time = stepper.h * np.arange(1, len(displacement) + 1)
-    return from_decay(time, displacement, omega)
+    return stepper.h * np.arange(1, len(displacement) + 1), displacement
 
 
-def from_decay(time: np.ndarray, displacement: np.ndarray, omega: float) -> RingDown:
+def from_decay(time: np.ndarray, displacement: np.ndarray, omega: float, several: bool = False) -> RingDown:
     """Frequency and damping by amplitude of a decaying oscillation (n,), sampled at equal steps.
 
     omega : a guess of its frequency [rad/s]
+    several : whether other modes may ring along, which `rest` then tells; those within half of the frequency disturb
     Raises  ValueError for a decay that is too short, IntegrationFailed where several modes ring
     """
     step = time[1] - time[0]
@@ -103,14 +148,14 @@ def from_decay(time: np.ndarray, displacement: np.ndarray, omega: float) -> Ring
         for _ in range(RULES.refined):
             size, slope, left = _fitted(seen, rate * step * n, inside, weight)
             rate += slope / (size * step * n)
-        if not left < RULES.ringing * abs(size):
+        if not several and not left < RULES.ringing * abs(size):
             raise IntegrationFailed(
                 f"the decay is no single oscillation: {left / abs(size):.0%} of its amplitude is other modes that ring "
                 "too; begin at a smaller amplitude, or end at a larger one"
             )
-        rows.append((abs(size), rate.imag, -rate.real / rate.imag))
-    amplitude, frequency, damping = np.array(rows).T
-    return RingDown(time, displacement - displacement.mean(), amplitude, frequency, damping)
+        rows.append((abs(size), rate.imag, -rate.real / rate.imag, left / abs(size)))
+    amplitude, frequency, damping, rest = np.array(rows).T
+    return RingDown(time, displacement - displacement.mean(), amplitude, frequency, damping, rest)
 
 
 def _fitted(seen: np.ndarray, rate: complex, inside: np.ndarray, weight: np.ndarray) -> tuple[complex, complex, float]:

@@ -199,3 +199,15 @@ def test_a_link_joins_the_points_of_two_bodies_in_all_motions_or_leaves_one_free
     assert np.abs(u[sliding.node_sets["a.x_max"]]).max() < 1e-6 * abs(other[0])
     with pytest.raises(ValueError, match=r"links\.m and links\.l both move the same nodes"):
         part(bar, [Clamp("a.x_min")], constraints=[*soft, Link("links.l", *soft), Link("links.m", *soft)])
+
+
+def test_tied_faces_that_are_apart_are_refused_by_name_unless_a_reach_bridges_them():
+    bar = two(L(0, 2, 3), L(2.02, 5, 3))
+    with pytest.raises(ValueError, match=r"ties\.t: a\.x_max and b\.x_min are 20 mm apart"):
+        part(bar, constraints=[Tie("ties.t", "a.x_max", "b.x_min")])
+    bridged = part(bar, constraints=[Tie("ties.t", "a.x_max", "b.x_min", 0.05)])
+    assert abs(modes(bridged.system.stiffness, bridged.system.mass, 7)[0][:6]).max() < 1e-2
+    beside = two(L(0, 2, 3), L(0, 2, 3))
+    for tied in (("a.x_max", "b.x_max"), ("a.x_max", "b.y_min"), ("a.y_max", "b.x_min")):
+        with pytest.raises(ValueError, match=r"ties\.t: the two tied faces"):
+            part(beside, constraints=[Tie("ties.t", *tied)])

@@ -7,6 +7,7 @@ import time
 import numpy as np
 import pytest
 
+from tests.helpers.steel_asperities import ALL, E_STAR, FACE, MU, POISSON, RADIUS, STEEL, YOUNG, G, moving
 from tribodyn.hbm.contact import aft
 from tribodyn.hbm.contact import law as contact_law
 from tribodyn.hbm.contact.asperity import asperity, heights, pressure
@@ -14,13 +15,6 @@ from tribodyn.hbm.contact.bed import bed
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactParameters
 from tribodyn.hbm.contact.laws import rough
 from tribodyn.hbm.harmonics import HarmonicBasis
-
-YOUNG, POISSON, RADIUS, MU = 192.31e9, 0.3, 1.36493e-3, 0.3
-E_STAR, G = YOUNG / (2 * (1 - POISSON**2)), YOUNG / (2 * (1 + POISSON))
-STEEL = {"young": YOUNG, "poisson": POISSON, "radius": RADIUS, "yield_stress": 331.7e6, "tangent_modulus": 620e6}
-ALL = ("t1", "t2", "n")
-HEIGHTS = np.linspace(0, 28e-6, 101)
-FACE = np.column_stack([HEIGHTS, 1.4e6 * np.exp(-0.5 * ((HEIGHTS - 14e-6) / 4e-6) ** 2) / (4e-6 * np.sqrt(2 * np.pi))])
 
 
 def one_asperity(**numbers: float) -> ContactParameters:
@@ -123,14 +117,6 @@ def test_a_face_is_the_sum_of_its_asperities_on_loading_and_unloading():
         found = (k * np.maximum(u[:, None] - g, 0.0)).sum(axis=1)
         np.testing.assert_allclose(found, unloading, atol=1e-3 * unloading[0])
         assert (k >= 0).all()
-
-
-def moving(n_pair: int, n_comp: int, basis: HarmonicBasis, seed: int) -> np.ndarray:
-    """Displacements that deepen the contact, slip in part, and nearly open it."""
-    rng = np.random.default_rng(seed)
-    x = rng.normal(size=(n_pair, n_comp, basis.n_coeff)) * 10 ** rng.uniform(-9, -6.3, (n_pair, 1, 1))
-    x[:, -1, 0] = rng.uniform(6e-6, 9e-6, n_pair)
-    return x
 
 
 @pytest.mark.parametrize("components", rough.COMPONENTS, ids="".join)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from enum import IntEnum
 from pathlib import Path
 from typing import Any
@@ -96,14 +95,14 @@ def _spectra(result: Result) -> list[dict[str, Any]]:
     frf = result.response
     if frf is None:
         return []
-    names, force = terms(result.harmonics), driving_force(result)
+    names, force = terms(result.harmonics), result.driving_force
     found = []
     for position, output in enumerate(frf.output_names):
         for h in (h for h in result.harmonics if h):
             a, b = (frf.response[:, position, names.index(f"{letter}{h}")] for letter in "ab")
             value, kind, text = a - 1j * b, Function.GENERAL, f"{output}, harmonic {h}"
             if h == 1 and force is not None:
-                value, kind, text = value / force, Function.FRF, f"{output} over force, harmonic 1"
+                value, kind, text = value / (force * frf.load_factor), Function.FRF, f"{output} over force, harmonic 1"
             entry = _function(
                 kind, text, "frequency", DataKind.FREQUENCY, "Hz", frf.frequency, DataKind.DISPLACEMENT, "m", value
             )
@@ -112,18 +111,6 @@ def _spectra(result: Result) -> list[dict[str, Any]]:
                 entry |= {"orddenom_axis_units_lab": "N"}
             found.append(entry)
     return found
-
-
-def driving_force(result: Result) -> complex | None:
-    """The one force that drives a scene in harmonic 1, F exp(i phase) [N]; None where something else drives it too."""
-    scene = json.loads(result.provenance["scene"])
-    loads = list(((scene.get("loads") or {}).get("harmonic") or {}).values())
-    if len(loads) != 1 or scene.get("motion") or loads[0].get("pressure") is not None:
-        return None
-    load = loads[0]
-    if load.get("harmonic", 1) != 1 or not load.get("value"):
-        return None
-    return complex(load["value"] * np.exp(1j * load.get("phase", 0.0)))
 
 
 def _histories(result: Result) -> list[dict[str, Any]]:

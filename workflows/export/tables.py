@@ -57,6 +57,11 @@ def response(result: Result) -> Table:
         columns[f"{name}_amplitude_m"] = frf.amplitude(name)
         for k, term in enumerate(terms(result.harmonics)):
             columns[f"{name}_{term}_m"] = frf.response[:, position, k]
+    columns |= {"load_factor": frf.load_factor}
+    if result.driving_force is not None:
+        columns |= {"force_N": abs(result.driving_force) * frf.load_factor}
+        for name in frf.output_names if 1 in result.harmonics else ():
+            columns[f"{name}_phase_rad"] = np.angle(frf.fundamental(name) / result.driving_force)
     columns |= {
         "energy_J": frf.energy,
         "newton_steps": frf.newton_steps,

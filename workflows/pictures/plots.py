@@ -41,6 +41,7 @@ def figures(result: Result) -> dict[str, Callable[[Result], Figure]]:
     mapped = result.patch is not None and len(result.patch.faces) > 0 and has_states(result)
     every: list[tuple[str, Callable[[Result], Figure], bool]] = [
         ("frf", response, result.response is not None or result.wear is not None),
+        ("control", controlled, result.response is not None and result.response.controlled),
         ("outputs", output_amplitudes, result.response is not None and len(result.response.output_names) > 1),
         *((name, draw, worn) for name, draw in COURSES.items()),
         ("hysteresis", hysteresis, result.loops is not None and has_friction(result)),
@@ -227,6 +228,30 @@ def status_against_cycles(result: Result) -> Figure:
         )  # fmt: skip
         axes.set(ylabel="share of the area / %", ylim=(0, 100), title=titled(result, "contact status under wear"))
         figure.legend(loc="outside lower center", ncols=min(4, len(present)))
+    return figure
+
+
+def controlled(result: Result) -> Figure:
+    """Fundamental amplitude, force and phase over frequency of a test whose force was found."""
+    frf, force = result.response, result.driving_force
+    assert frf is not None
+    good, name = frf.converged, frf.output_names[0]
+    y = frf.fundamental(name)[good]
+    unit, scale = length_unit(float(np.abs(y).max()))
+    phase = np.degrees(np.angle(y if force is None else y * np.conj(force)))
+    size, of = (1.0, "factor on the loads") if force is None else (abs(force), "force / N")
+    rows = ((scale * np.abs(y), f"amplitude / {unit}"), (size * frf.load_factor[good], of), (phase, "phase / deg"))
+    with axes_of(7.2, 6.4, rows=3) as (figure, axes):
+        heading(figure, result, "response under control")
+        for each, (values, label) in zip(axes, rows, strict=True):
+            each.plot(frf.frequency[good], values, color=BLUE)
+            each.set_ylabel(label)
+        for each, (values, _) in zip(axes[:2], rows[:2], strict=True):
+            if values.max() > 1.01 * values.min():
+                log_axis(each.yaxis, *_ends(values))
+            else:
+                each.set_ylim(0.0, 1.2 * values.max())
+        axes[2].set(ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180), xlabel="frequency / Hz")
     return figure
 
 

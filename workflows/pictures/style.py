@@ -47,6 +47,7 @@ class Layout:
     ringed : of the width of a view, below which a contact is ringed
     smooth : subdivisions of the faces of curved elements
     lift : of the size of a contact, by which colours lie above it
+    sunk : of the thinnest body, by which bodies that slide are drawn into each other at most
     """
 
     dpi: int = 200
@@ -72,6 +73,7 @@ class Layout:
     ringed: float = 0.07
     smooth: int = 2
     lift: float = 4e-3
+    sunk: float = 0.1
 
 
 LAYOUT = Layout()

@@ -24,7 +24,7 @@ def numbers(result: Result) -> Lines:
     threads = result.provenance.get("threads", "1")
     return [
         *_model(result, found),
-        *_response(found),
+        *_response(result, found),
         *(_wear(result, found) if found["depth_max_m"] is not None else ()),
         *((f"  {name}", _joint(joint)) for name, joint in found["joints"].items()),
         ("computing", f"{found['seconds']:.1f} s on {threads} thread{'s' if threads != '1' else ''}"),
@@ -48,11 +48,15 @@ def _model(result: Result, found: dict[str, Any]) -> Lines:
     return shown
 
 
-def _response(found: dict[str, Any]) -> Lines:
+def _response(result: Result, found: dict[str, Any]) -> Lines:
     shown: Lines = []
     if found["peak_hz"] is not None:
         shown.append(("frequency", _course(found, "peak_hz", 1, "Hz")))
         shown.append(("amplitude", _course(found, "peak_m", 1e3, "mm")))
+    if found["load_factor"] is not None:
+        least, most = (abs(result.driving_force or 1.0) * factor for factor in found["load_factor"])
+        unit = " times the loads" if result.driving_force is None else " N"
+        shown.append(("force", f"{least:.4g} to {most:.4g}{unit}, found"))
     if found["peak_at_end"]:
         shown.append(("", "no peak: the response is highest at an end of response.frequency, widen it"))
     if found["jumped"]:

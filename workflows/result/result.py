@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -281,6 +282,18 @@ class Result:
             return np.unique([0, last // 2, last])
         return np.zeros(0, int) if self.response is None else peaks(self.response)
 
+    @property
+    def driving_force(self) -> complex | None:
+        """The one force that drives in harmonic 1, F exp(i phase) [N]; None where something else drives it too."""
+        scene = json.loads(self.provenance["scene"])
+        loads = list(((scene.get("loads") or {}).get("harmonic") or {}).values())
+        if len(loads) != 1 or scene.get("motion") or loads[0].get("pressure") is not None:
+            return None
+        load = loads[0]
+        if load.get("harmonic", 1) != 1 or not load.get("value"):
+            return None
+        return complex(load["value"] * np.exp(1j * load.get("phase", 0.0)))
+
     def depth_after(self, row: int) -> np.ndarray:
         """(n_pair,) wear depth when the step of a row is done [m]."""
         assert self.wear is not None
@@ -294,7 +307,7 @@ class Result:
 
 def peaks(frf: Branch, count: int = PEAKS) -> np.ndarray:
     """Points of the highest local maxima of a curve's first output, by frequency; else the highest point."""
-    height = np.where(frf.converged, frf.amplitude(frf.output_names[0]), -1.0)
+    height = frf.height(frf.output_names[0])
     inner = np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:]) & (height[1:-1] > 0)) + 1
     best = inner[np.argsort(-height[inner])][:count] if len(inner) else np.array([int(np.argmax(height))])
     return np.asarray(best[np.argsort(frf.omega[best])])

@@ -74,6 +74,7 @@ SCHEMA: dict[str, tuple[type, dict[str, tuple[tuple[str, ...], str]]]] = {
             "newton_steps": (("point",), ""),
             "folds": (("fold",), ""),
             "parameter": (("point",), ""),
+            "load_factor": (("point",), ""),
         },
     ),
     "stability": (

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tribodyn.hbm.continuation.parameter import FREQUENCY
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.wear.events import events
@@ -31,6 +32,8 @@ def summary(result: Result) -> dict[str, Any]:
     wear_steps, hbm_solves : steps taken and balance solves spent on wear
     peak_hz, peak_m, preload_N : [first, last] of the wear run, or the peak of the response curve without one
     peak_at_end : whether that peak is no peak, but an end of the response curve
+    load_factor : [least, largest] factor on the vibrating loads, where it was found under control, else None; the peak
+        is then where it takes least per amplitude
     jumped : whether the response is a sweep that jumped at a fold, so that the curve may have a higher peak
     peak_is_stable : whether that peak of the curve is stable, None where this was not asked for
     stable_peak_hz, stable_peak_m : the highest point of the curve that is
@@ -152,9 +155,9 @@ def _peak(result: Result) -> dict[str, Any]:
         }
     if frf is not None:
         amplitude = frf.amplitude(frf.output_names[0])
-        best = int(np.argmax(np.where(frf.converged, amplitude, -1.0)))
+        best = int(np.argmax(frf.height(frf.output_names[0])))
         hertz, height = float(frf.frequency[best]), float(amplitude[best])
-        at_end = frf.peak(frf.output_names[0]) is None
+        at_end = frf.peak(frf.output_names[0]) is None if frf.parameter_name == FREQUENCY else None
         return {"peak_hz": [hertz, hertz], "peak_m": [height, height], "preload_N": None, "peak_at_end": at_end}
     return dict.fromkeys(("peak_hz", "peak_m", "preload_N", "peak_at_end"))
 
@@ -181,6 +184,7 @@ def _curve(result: Result) -> dict[str, Any]:
         "harmonics_error": result.facts.harmonics_error,
         "response_end": None if frf is None else str(frf.end),
         "jumped": None if frf is None else frf.ended is BranchEnd.JUMPED,
+        "load_factor": None if frf is None or not frf.controlled else _ends(frf.load_factor[frf.converged]),
         "folds_hz": [] if frf is None else [float(frf.frequency[i]) for i in frf.folds],
         "unstable_points": None,
         "bifurcations": None,
@@ -199,6 +203,10 @@ def _curve(result: Result) -> dict[str, Any]:
         numbers["shear_spread"] = float(np.nanmax(result.bounds.spread))
         numbers["shear_spread_at_peak"] = float(result.bounds.spread[best])
     return numbers
+
+
+def _ends(values: np.ndarray) -> list[float]:
+    return [float(values.min()), float(values.max())]
 
 
 def plain(value: Any) -> Any:

@@ -146,7 +146,8 @@ def solid(table: SolidMaterial) -> AnyMaterial:
         return Orthotropic(table.young, table.poisson, table.shear, table.density, axes, along)
     assert isinstance(table.poisson, float)
     assert isinstance(table.expansion, float)
-    return Material(table.young, table.poisson, table.density, table.expansion)
+    reduced = table.elements == "linear_reduced"
+    return Material(table.young, table.poisson, table.density, table.expansion, reduced)
 
 
 def _middle(whole: Assembly, table: structure.CouplingTable) -> list[float]:

@@ -9,10 +9,11 @@ import numpy as np
 
 from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance
-from tribodyn.hbm.continuation import harmonic_choice, peaks, residual_shear
+from tribodyn.hbm.continuation import control, harmonic_choice, peaks, residual_shear
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.harmonic_choice import HarmonicChoice
 from tribodyn.hbm.continuation.methods import arc_length
+from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions
 from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import BranchEnd
@@ -38,12 +39,28 @@ def follow_response(
     method, options = continuation.load(scene.response.method_name), settings.response_options(scene)
     low, high = settings.response_range(scene)
     high = max(low, min(high, highest))
-    branch = method.follow(balance, low, high, options, lambda done, wanted: advance(done / wanted, ""))
-    as_swept = "method" in scene.response.model_fields_set and scene.response.method_name != "adaptive"
+    asked = scene.response
+    if asked.control == "phase":
+        assert isinstance(asked.amplitude, tuple)
+        way = BackboneOptions(asked.points, newton=settings.newton_options(scene))
+        return control.phase_resonance(balance, settings.OUTPUT, low, high, *asked.amplitude, way)
+    ends = (low, high) if asked.sweep == "up" else (high, low)
+
+    def along(problem: HarmonicBalance) -> Branch:
+        found: Branch = method.follow(problem, *ends, options, lambda done, wanted: advance(done / wanted, ""))
+        return found
+
+    if asked.control == "amplitude":
+        assert isinstance(asked.amplitude, float)
+        held = control.constant_response(balance, settings.OUTPUT, asked.amplitude)
+        return control.driven(held, along(held))
+    branch = along(balance)
+    named = "method" in asked.model_fields_set and asked.method_name != "adaptive"
+    as_swept = named or "sweep" in asked.model_fields_set
     if folds and branch.ended is BranchEnd.JUMPED and not as_swept:
         rules = arc_length.Rules(max_gaps=0)  # a curve with gaps does not lead from fold to fold
         round_folds = arc_length.Options(rules=rules, newton=settings.newton_options(scene))
-        whole = arc_length.follow(balance, low, high, round_folds)
+        whole = arc_length.follow(balance, *ends, round_folds)
         if whole.arrived:
             branch = replace(whole, end=whole.end.kind.say(f"{whole.end.detail} by arc length: a sweep jumps"))
     return peaks.with_peaks(balance, branch, settings.peak_of(scene))

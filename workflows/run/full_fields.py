@@ -20,12 +20,14 @@ class Solved:
     """A solved state of the contact: what it shares with a WearRow.
 
     omega : [rad/s]; depth : (n_pair,) worn off [m]; displacement, force : (n_contact, n_coeff) [m], [N]
+    load_factor : on the vibrating loads
     """
 
     omega: float
     depth: np.ndarray
     displacement: np.ndarray
     force: np.ndarray
+    load_factor: float
 
 
 States = Sequence[Solved | WearRow]
@@ -46,7 +48,9 @@ def with_shown(scene: Scene, result: Result, balance: HarmonicBalance, part: Par
         states = [rows[i] for i in numbers]
     else:
         assert result.response is not None
-        states = [_of_point(balance, result.response.omega[i], result.response.contact[i]) for i in numbers]
+        frf = result.response
+        loaded = [balance.with_load(float(frf.load_factor[i])) for i in numbers]
+        states = [_of_point(b, frf.omega[i], frf.contact[i]) for b, i in zip(loaded, numbers, strict=True)]
     if scene.pictures.renders and part is not None:
         result = replace(result, fields=displacement_fields(balance, part, states, numbers))
     if scene.pictures.plots:
@@ -58,7 +62,7 @@ def _of_point(balance: HarmonicBalance, omega: float, x: np.ndarray) -> Solved:
     """The state of a point of the response of the unworn contact."""
     n_pair = balance.contact.n_pair
     state = balance.evaluate(float(omega), x.reshape(n_pair, -1, balance.basis.n_coeff), jacobian=False)
-    return Solved(float(omega), np.zeros(n_pair), x, state.cycle.force.reshape(x.shape))
+    return Solved(float(omega), np.zeros(n_pair), x, state.cycle.force.reshape(x.shape), balance.load_factor)
 
 
 def displacement_fields(balance: HarmonicBalance, part: Part, states: States, numbers: np.ndarray) -> Fields:
@@ -66,7 +70,10 @@ def displacement_fields(balance: HarmonicBalance, part: Part, states: States, nu
 
     balance : the unworn problem under the load that the states come from; numbers : (n_field,) rows or points
     """
-    found = [part.field(full_displacement(balance, s.displacement, s.force, s.omega)) for s in states]
+    loaded = [balance.with_load(s.load_factor) if isinstance(s, Solved) else balance for s in states]
+    found = [
+        part.field(full_displacement(b, s.displacement, s.force, s.omega)) for b, s in zip(loaded, states, strict=True)
+    ]
     return Fields(np.asarray(numbers), np.stack(found))
 
 

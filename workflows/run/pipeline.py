@@ -71,7 +71,7 @@ def run(
             linear = None
             if not row_only:
                 with progress.stage("linear references"):
-                    start, stop = (2 * np.pi * f for f in scene.response.references or scene.response.frequency)
+                    start, stop = (2 * np.pi * f for f in scene.response.references or scene.response.range)
                     linear = references.linear_references(model.balance, settings.OUTPUT, start, stop)
             result = keep(replace(result, response=frf, references=linear, stage=Stage.RESPONSE))
         check_branch(result.response)
@@ -90,7 +90,7 @@ def run(
                 count = scene.wear.responses
                 curves = curve.worn_responses(result, model.balance, count, again, advance)
                 result = keep(replace(result, worn=curves))
-        if judge is not None and scene.verdict.enabled:
+        if judge is not None and scene.verdict.enabled and scene.response.control == "force":
             result = judge(file, model, result, progress)
         return keep(replace(result, stage=Stage.COMPLETE))
 

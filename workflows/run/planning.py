@@ -152,7 +152,7 @@ def plan(file: SceneFile) -> Plan:
         wear_steps=steps,
         wear_solves=solves,
         solve_seconds=5e-3 + basis.n_coeff * (COSTS.sparse * full if sparse else COSTS.solve * contact**2),
-        verdict=scene.verdict.enabled,
+        verdict=scene.verdict.enabled and scene.response.control == "force",
     )
 
 

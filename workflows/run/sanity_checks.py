@@ -165,7 +165,7 @@ def check_deflection(
         if name in system.loads:
             moved[name] = (largest(solve(system.loads[name] * load.amplitude)), "at rest")
     ratio = scene.damping.modal
-    if ratio:
+    if ratio and scene.response.frequency:
         omega, phi = modes(system.stiffness, system.mass, min(USUAL.modes, system.mass.shape[0]))
         low, high = (2 * np.pi * f for f in scene.response.frequency)
         for name, load in scene.loads.harmonic.items():

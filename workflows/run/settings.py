@@ -46,14 +46,14 @@ def response_options(scene: Scene) -> Any:
 
 def response_range(scene: Scene) -> tuple[float, float]:
     """Lowest and highest frequency of the response [rad/s]."""
-    low, high = scene.response.frequency
+    low, high = scene.response.range
     return 2 * np.pi * low, 2 * np.pi * high
 
 
 def highest_frequency(scene: Scene) -> float:
     """Highest frequency that is asked for, of the response or of a place where cycles are taken [rad/s]."""
     worn = () if scene.wear is None else scene.wear.duties
-    return 2 * np.pi * max([scene.response.frequency[1], *(duty.at.frequency or 0.0 for duty in worn)])
+    return 2 * np.pi * max([scene.response.range[1], *(duty.at.frequency or 0.0 for duty in worn)])
 
 
 def newton_options(scene: Scene) -> NewtonOptions:

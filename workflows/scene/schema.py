@@ -85,6 +85,13 @@ class Scene(Table, ABC):
     def joints(self) -> Mapping[str, ContactTable]:
         """The contacts by name."""
 
+    @model_validator(mode="after")
+    def _wears_under_its_loads(self) -> Scene:
+        if self.wears and self.response.control != "force":
+            raise ValueError(f'response.control = "{self.response.control}" is for a contact that does not wear: '
+                             "leave [wear] out, or give wear.max_steps = 0")  # fmt: skip
+        return self
+
     @property
     def wears(self) -> bool:
         """Whether wear steps are asked for."""

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
+    BeforeValidator,
     Field,
     PrivateAttr,
     StrictBool,
@@ -22,11 +23,13 @@ from tribodyn.hbm import continuation
 from tribodyn.workflows.scene.fields import (
     Direction,
     Frequency,
+    Length,
     Number,
     Table,
     quantity,
 )
 from tribodyn.workflows.scene.own import beside, folder_of, is_file, numbers, own_file
+from tribodyn.workflows.scene.units import to_si
 
 HIGHEST = 15  # harmonic that kept = "auto" may keep, where the scene does not name one
 
@@ -40,17 +43,31 @@ class Output(Table):
     """Direction in which it is observed."""
 
 
+def _amplitudes(value: object) -> object:
+    if isinstance(value, (list, tuple)):
+        return tuple(to_si(entry, "m") for entry in value)
+    return to_si(value, "m")
+
+
 class Response(Table):
     """The frequency response that is computed."""
 
-    frequency: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]]
-    """Range of the response, [low, high]."""
+    frequency: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]] | None = None
+    """Range of the response, [low, high]; what only looks at a scene goes without, such as `tribodyn inspect`."""
     references: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]] | None = None
     """Range in which the linear references are drawn; the same as `frequency` by default."""
     points: Annotated[StrictInt, Field(ge=2, le=20_000)] = 60
     """Number of frequency steps of the continuation."""
     method: str = "natural"
     """Continuation method: natural, arc_length or adaptive."""
+    sweep: Literal["up", "down"] = "up"
+    """Way of the sweep through `frequency`. A natural or adaptive one jumps where a measured one does."""
+    control: Literal["force", "amplitude", "phase"] = "force"
+    """What the test holds: the loads as they stand ("force"); the fundamental amplitude of the response ("amplitude");
+    or its lag of a quarter of a cycle behind the load, while the amplitude goes from the first to the second
+    of `amplitude` ("phase"): the mode at rest then lies in `frequency`. The factor on the loads is found."""
+    amplitude: Annotated[Length | tuple[Length, Length], BeforeValidator(_amplitudes)] | None = None
+    """Amplitude that is held, or the two that a phase resonance goes between."""
     stability: StrictBool = False
     """Mark where the curve is stable and where it bifurcates."""
     bounds: StrictBool = False
@@ -80,6 +97,21 @@ class Response(Table):
         self._own = own_file(folder_of(info), self.method, "response.method")
         return self
 
+    @model_validator(mode="after")
+    def _controls(self) -> Self:
+        given = self.amplitude if isinstance(self.amplitude, tuple) else (self.amplitude,)
+        wanted = {"force": (), "amplitude": (1,), "phase": (2,)}[self.control]
+        if (self.amplitude is None) != (not wanted) or (wanted and len(given) not in wanted):
+            kind = {"force": "no amplitude", "amplitude": 'amplitude = "10 um"'}.get(
+                self.control, 'amplitude = ["1 um", "1 mm"]'
+            )
+            raise ValueError(f'expected {kind} with control = "{self.control}"')
+        if wanted and (not min(a or 0.0 for a in given) > 0 or len(set(given)) < len(given)):
+            raise ValueError(f"expected amplitude above 0, and two that differ, got {self.amplitude}")
+        if wanted and (self.stability or self.bounds):
+            raise ValueError(f'expected no stability and no bounds with control = "{self.control}"')
+        return self
+
     @property
     def method_name(self) -> str:
         """The continuation for hbm: its name, or the path of the file beside the scene."""
@@ -87,10 +119,18 @@ class Response(Table):
 
     @model_validator(mode="after")
     def _range(self) -> Response:
-        for key, (low, high) in (("frequency", self.frequency), ("references", self.references or self.frequency)):
-            if low >= high:
-                raise ValueError(f"expected {key} = [low, high] with low below high, got {low:g} Hz and {high:g} Hz")
+        for key, ends in (("frequency", self.frequency), ("references", self.references)):
+            if ends is not None and ends[0] >= ends[1]:
+                got = f"{ends[0]:g} Hz and {ends[1]:g} Hz"
+                raise ValueError(f"expected {key} = [low, high] with low below high, got {got}")
         return self
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """`frequency` where it is needed [Hz]; raises ValueError where it is missing."""
+        if self.frequency is None:
+            raise ValueError('response.frequency is missing: give its range, such as ["100 Hz", "200 Hz"]')
+        return self.frequency
 
 
 class PartResponse(Response, Output):

@@ -205,6 +205,9 @@ class SolidMaterial(Table):
     """First and second axis of an orthotropic material; x and y by default."""
     expansion: Expansion | tuple[Expansion, Expansion, Expansion] = 0.0
     """Coefficient of thermal expansion; three along the axes of an orthotropic material."""
+    elements: Literal["quadratic", "linear_reduced"] = "quadratic"
+    """Elements of bodies of this material: the mesh's own, or eight linear hexahedra with reduced integration and
+    hourglass stiffness on the nodes of each 27-node one, for comparison with models of such elements."""
 
     @model_validator(mode="after")
     def _one_kind(self) -> SolidMaterial:
@@ -213,6 +216,8 @@ class SolidMaterial(Table):
             raise ValueError("expected three values each of young, poisson and shear for an orthotropic material")
         if not three and (self.axes is not None or isinstance(self.expansion, tuple)):
             raise ValueError("expected axes and three expansions only with three values of young, poisson and shear")
+        if three and self.elements != "quadratic":
+            raise ValueError(f'expected no elements = "{self.elements}" with an orthotropic material')
         return self
 
 
@@ -243,7 +248,8 @@ class TieTable(Table):
     second: str
     """Face that it is glued to."""
     reach: Annotated[Length, Field(ge=0)] | None = None
-    """Farthest opening at which the faces still meet; a tenth of the length of the first face by default."""
+    """Farthest opening that is bridged. By default faces meet up to a tenth of the length of the first, and are refused
+    where they are apart by more than 0.5 % of it on average."""
 
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,7 +18,9 @@ from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.joint import Joint, joint_transitions
 from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.continuation import nonlinear_modes as modes
-from tribodyn.hbm.continuation.branch import Branch, amplitude
+from tribodyn.hbm.continuation.branch import Branch
+from tribodyn.hbm.continuation.branch import amplitude as vibration
+from tribodyn.hbm.continuation.control import constant_response, driven, phase_resonance
 from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -152,7 +154,7 @@ class Cycle:
 
     def amplitude(self, output: str) -> float:
         """Square root of the sum over harmonics of a_h^2 + b_h^2 of an output [m]."""
-        return float(amplitude(self.outputs[output]))
+        return float(vibration(self.outputs[output]))
 
     @property
     def displacement(self) -> np.ndarray:
@@ -219,21 +221,39 @@ class Balance:
         stop: float,
         points: int | None = None,
         method: str = "natural",
+        *,
+        control: Literal["force", "amplitude", "phase"] = "force",
+        amplitude: float | tuple[float, float] | None = None,
+        output: str | None = None,
         **options: Any,
     ) -> Branch:
-        """The response from one frequency to another [Hz] by a continuation method.
+        """The response from one frequency to another [Hz] by a continuation method; downwards where start > stop.
 
         points : for the methods that take them; options : of the method, see its `Options`
+        control : what the test holds: the force; the fundamental amplitude [m] of an output, the first by default; or
+            its lag of a quarter of a cycle, while the amplitude goes from the first to the last of two and the mode at
+            rest lies between the frequencies. The force is then the branch's `load_factor`
         Raises  ValueError for methods and options that do not exist
         """
+        if control == "phase":
+            if not isinstance(amplitude, tuple):
+                raise ValueError("control of the phase: give the first and the last amplitude [m], as (1e-6, 1e-3)")
+            way = modes.BackboneOptions(points or modes.BackboneOptions.n_points, **options, newton=self.newton)
+            low, high = HZ * min(start, stop), HZ * max(start, stop)
+            return phase_resonance(self.problem, self._output(output), low, high, *amplitude, way)
+        problem = self.problem
+        if control == "amplitude":
+            if not isinstance(amplitude, (int, float)):
+                raise ValueError("control of the amplitude: give the one amplitude [m] that is held")
+            problem = constant_response(problem, self._output(output), amplitude)
         module = continuation.load(method)
         chosen = {**({} if points is None else {"n_points": points}), **options, "newton": self.newton}
         try:
             made = module.Options(**chosen)
-        except TypeError as problem:
-            raise ValueError(f"continuation {method}: {problem}") from None
-        branch: Branch = module.follow(self.problem, HZ * start, HZ * stop, made)
-        return branch
+        except TypeError as wrong:
+            raise ValueError(f"continuation {method}: {wrong}") from None
+        branch: Branch = module.follow(problem, HZ * start, HZ * stop, made)
+        return driven(problem, branch) if control == "amplitude" else branch
 
     def stability(self, branch: Branch) -> floquet.BranchStability:
         """Stability of every point of a response of this balance, and its bifurcations, by Hill's method."""

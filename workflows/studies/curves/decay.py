@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,6 +12,7 @@ from scipy.interpolate import PchipInterpolator
 
 from tribodyn.hbm import rest
 from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation.free_vibration import FreeVibration
 from tribodyn.hbm.continuation.nonlinear_modes import Backbone
 from tribodyn.hbm.threads import limited
 from tribodyn.hbm.time import ring_down as time_ring_down
@@ -20,10 +21,11 @@ from tribodyn.hbm.time.ring_down import RingDown
 from tribodyn.workflows.pictures.figures import axes_of, length_unit, log_axis
 from tribodyn.workflows.pictures.style import BLUE, ORANGE
 from tribodyn.workflows.result.columns import named_lines
-from tribodyn.workflows.run import modelling
+from tribodyn.workflows.run import modelling, settings
 from tribodyn.workflows.run.failure import SolveFailed
-from tribodyn.workflows.run.progress import Report, reporter
-from tribodyn.workflows.scene.fields import Length
+from tribodyn.workflows.run.progress import Progress, Report, reporter
+from tribodyn.workflows.scene.fields import Length, quantity
+from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.studies.curves.backbones import AmplitudeRange, along
 from tribodyn.workflows.studies.files import write_files
@@ -63,6 +65,7 @@ class Decay:
             "amplitude_m": d.amplitude,
             "frequency_hz": d.omega / (2 * np.pi),
             "damping": d.damping,
+            "other_modes": d.rest,
             "backbone_frequency_hz": self.at(self.mode.omega) / (2 * np.pi),
             "backbone_decrement": self.at(self.expected),
             "backbone_damping": self.at(self.mode.damping),
@@ -91,6 +94,7 @@ class Decay:
                 ("amplitude", f"{first['amplitude_m']:.4g} -> {last['amplitude_m']:.4g} m"),
                 ("frequency", f"{first['frequency_hz']:.6g} -> {last['frequency_hz']:.6g} Hz"),
                 ("damping", f"{100 * first['damping']:.4g} -> {100 * last['damping']:.4g} %"),
+                ("other modes", f"{100 * first['other_modes']:.3g} -> {100 * last['other_modes']:.3g} % of it"),
                 ("from the backbone", f"frequency at most {frequency} off"),
                 ("", f"damping at most {of_decrement} off its decrement"),
                 ("", f"and {damping} off its damping ratio, which counts otherwise"),
@@ -135,6 +139,7 @@ def ring_down(
     points: int | None = None,
     periods: int = 400,
     steps: int = 256,
+    impulse: Annotated[float | None, quantity("N s")] = None,
     overrides: Overrides = (),
     progress: Report = None,
 ) -> Decay:
@@ -150,9 +155,13 @@ def ring_down(
     points : points of the backbone where it bends little; 40 or those of [backbone] by default
     periods : periods after which the decay ends at the latest
     steps : time steps per period
+    impulse : let it begin at rest with a hammer's blow of this size on the harmonic load, such as "0.1 N s", instead of
+        in the mode; the amplitude at which it begins then follows, and other modes ring along
     Raises  ValueError for what cannot be; SolveFailed where the backbone ends before the amplitude asked for
     """
     file, report = read_scene(scene, overrides), reporter(progress)
+    if impulse is not None:
+        return _struck(file, start, mode or 0, points or 40, periods, steps, impulse, report)
     asked = AmplitudeRange.of(file, start, stop, mode, points)
     if not asked.stop > asked.start:
         raise ValueError("a free decay ends at a smaller amplitude than it begins at: give --from below --to")
@@ -167,6 +176,29 @@ def ring_down(
             least = float(swung.first_harmonic[0])
             swing = time_ring_down.ring_down(balance, swung, periods, steps, least)
             return Decay(swung, swing, decrement(balance, swung), least)
+
+
+def _struck(
+    file: SceneFile,
+    least: float | None,
+    mode: int,
+    points: int,
+    periods: int,
+    steps: int,
+    impulse: float,
+    report: Progress,
+) -> Decay:
+    """The decay after a blow, beside the backbone through its amplitudes."""
+    if least is None or not (impulse > 0 and least > 0):
+        raise ValueError("a blow needs --impulse above 0 and --from, the amplitude at which its decay ends")
+    with limited(file.scene.solver.threads):
+        balance = modelling.build(file, None, report).balance
+        with report.stage("free decay"):
+            omega = FreeVibration(balance, mode, settings.OUTPUT).reference_omega
+            swing = time_ring_down.hammer(balance, impulse, omega, settings.OUTPUT, periods, steps, least)
+        ends = float(swing.amplitude.min()), float(swing.amplitude.max())
+        swung = _reached(along(file, balance, AmplitudeRange(*ends, mode, points), report))
+        return Decay(swung, swing, decrement(balance, swung), least)
 
 
 def _reached(mode: Backbone) -> Backbone:

@@ -179,7 +179,7 @@ def _peaks(
         raise SolveFailed(f"the peak {end}")
     rows = [(value, point.state.omega / (2 * np.pi), point.amplitude) for value, point in found]
     values, frequency, amplitude = np.array(rows).T
-    at_limit = np.flatnonzero(np.min(np.abs(frequency[:, None] / file.scene.response.frequency - 1), axis=1) < LIMIT)
+    at_limit = np.flatnonzero(np.min(np.abs(frequency[:, None] / file.scene.response.range - 1), axis=1) < LIMIT)
     if len(at_limit):
         where = path.say(values[at_limit[0]])
         beyond = f"; from {where} on some are no peaks but ends of response.frequency: widen it"

@@ -127,7 +127,7 @@ def mistuned(
         wheel = wheels.build(file)
         n = wheel.n_sectors
         factors = deviations(n, spread, seed) if stiffness is None else checked(stiffness, n)
-        frequency = file.scene.response.frequency
+        frequency = file.scene.response.range
         branch = wheels.follow(wheel.whole([float(one) for one in factors]), frequency, TOLERANCE)
         alike = wheels.follow(wheel.wave(), frequency, TOLERANCE)
     rows = [branch.output_names.index(f"{OUTPUT}@{i}") for i in range(n)]

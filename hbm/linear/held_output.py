@@ -1,0 +1,127 @@
+"""The linear side of a structure one output of which moves as a given cosine, whatever force that takes.
+
+In harmonic 1 the output moves by y = F a + L g, with the excitation F, its receptance a and the contact forces g. Held
+at y, the force is F = (y - L g) / a and the contact moves by
+
+    x = F x_F + G g = y x_F / a + (G - x_F L / a) g :
+
+the compliance of another structure, whose response has no fold where that of the driven one has.
+Source  elimination of the force is ours; the test is constant-response control, as in Karaagacli and Ozguven 2021
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tribodyn.hbm.linear.compliance import CompliancePoint, ContactCompliance
+
+
+class HeldOutput(ContactCompliance):
+    """The compliance of `inner` with the fundamental of an output held at amplitude [m] times cos w t.
+
+    row : of the output; the load factor of a balance multiplies the amplitude
+    """
+
+    row: int
+    amplitude: float
+
+    @classmethod
+    def of(cls, inner: ContactCompliance, output: str, amplitude: float) -> HeldOutput:
+        """The expansions are shared."""
+        held = object.__new__(cls)
+        held.__dict__.update(inner.__dict__)
+        held.row, held.amplitude, held._points = inner.output_names.index(output), amplitude, {}
+        return held
+
+    def at(self, omega: float) -> HeldPoint:
+        """The compliance at one excitation frequency [rad/s]."""
+        point = super().at(omega)
+        assert isinstance(point, HeldPoint)
+        return point
+
+    def _make(self, omega: float) -> HeldPoint:
+        return HeldPoint(self, omega)
+
+
+class HeldPoint(CompliancePoint):
+    """The same at one frequency. receptance : complex, of the output under the excitation as it stands [m]."""
+
+    compliance: HeldOutput
+
+    def __init__(self, compliance: HeldOutput, omega: float):
+        super().__init__(compliance, omega)
+        self._first = compliance.basis.harmonics.index(1)
+        x, y = self._fundamental(self.x_lin), self._fundamental(self.outputs_lin)
+        self.receptance = complex(y[compliance.row])
+        if self.receptance == 0.0:
+            name = compliance.output_names[compliance.row]
+            raise ValueError(f"the loads do not move output '{name}' in harmonic 1: its amplitude cannot be held")
+        self._ways = x / self.receptance, y / self.receptance
+        missing = compliance.amplitude - self.receptance
+        self.x_lin = self._moved(self.x_lin, self._ways[0] * missing)
+        self.outputs_lin = self._moved(self.outputs_lin, self._ways[1] * missing)
+
+    def _fundamental(self, coefficients: np.ndarray) -> np.ndarray:
+        """(n,) complex amplitudes of harmonic 1 of coefficients (n, n_coeff)."""
+        found: np.ndarray = self.compliance.basis.to_complex(coefficients)[:, self._first]
+        return found
+
+    def _moved(self, coefficients: np.ndarray, by: np.ndarray) -> np.ndarray:
+        """Coefficients (n, n_coeff) with complex amplitudes (n,) added to harmonic 1."""
+        out = np.array(coefficients, float)
+        cosine = int(np.flatnonzero(self.compliance.basis.order == 1)[0])
+        out[:, cosine] += by.real
+        out[:, cosine + 1] -= by.imag
+        return out
+
+    def loose(self, g: np.ndarray) -> complex:
+        """What contact forces g (n_contact, n_coeff) alone would move the output by in harmonic 1 [m]."""
+        return complex(self._fundamental(super().outputs(g))[self.compliance.row])
+
+    def force(self, g: np.ndarray, factor: float) -> complex:
+        """The excitation that it takes, over the one that is given; factor : on the amplitude held."""
+        return (self.compliance.amplitude * factor - self.loose(g)) / self.receptance
+
+    def apply(self, g: np.ndarray) -> np.ndarray:
+        """G g."""
+        if self.compliance.residual is not None:  # made of `nearly`
+            return super().apply(g)
+        return self._moved(super().apply(g), -self.loose(g) * self._ways[0])
+
+    def nearly(self, g: np.ndarray) -> np.ndarray:
+        """G g without what a factor would have to be asked for."""
+        if self.compliance.residual is None:  # made of `apply`
+            return super().nearly(g)
+        return self._moved(super().nearly(g), -self.loose(g) * self._ways[0])
+
+    def outputs(self, g: np.ndarray) -> np.ndarray:
+        """(n_output, n_coeff) outputs under contact forces g alone [m]."""
+        return self._moved(super().outputs(g), -self.loose(g) * self._ways[1])
+
+    def slope(self, g: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+        """d / d omega of contact displacement and outputs under g alone, or of what is held where g is None."""
+        row, a = self.compliance.row, self.receptance
+        excited = super().slope(None)
+        turn = self._fundamental(excited[1])[row]
+        turned = [(self._fundamental(e) - way * turn) / a for e, way in zip(excited, self._ways, strict=True)]
+        if g is None:
+            held = self.compliance.amplitude
+            moved = [self._moved(e, held * t - self._fundamental(e)) for e, t in zip(excited, turned, strict=True)]
+            return moved[0], moved[1]
+        free, loose = super().slope(g), self.loose(g)
+        turn = self._fundamental(free[1])[row]
+        moved = [self._moved(f, -loose * t - turn * way) for f, t, way in zip(free, turned, self._ways, strict=True)]
+        return moved[0], moved[1]
+
+    def jacobian_product(self, rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """The product with G restricted to contact rows (active ones)."""
+        free, way = super().jacobian_product(rows), self._ways[0][rows]
+        whole = np.zeros((self.compliance.n_contact, self.compliance.basis.n_coeff))
+
+        def product(d: np.ndarray) -> np.ndarray:
+            whole[rows] = d
+            return self._moved(free(d), -self.loose(whole) * way)
+
+        return product

@@ -1,0 +1,98 @@
+"""Tests under control from a scene: force levels in tables and pictures, and what cannot be."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tribodyn as td
+from tests.helpers.command import leave
+from tests.helpers.matrix_scene import matrix_folder
+from tribodyn.workflows.export import formats
+from tribodyn.workflows.pictures import plots
+
+PLAIN = ("wear.max_steps=0", "verdict.enabled=false", "harmonics.kept=[0, 1]", "response.points=12")
+
+
+def test_the_amplitude_is_held_and_the_force_is_stored_point_by_point(tmp_path: Path):
+    scene = matrix_folder(tmp_path) / "own.toml"
+    held = (*PLAIN, "response.control=amplitude", "response.amplitude=3 um")
+    result = td.run(scene, tmp_path / "out", overrides=held)
+    loaded = td.load(tmp_path / "out")
+    assert loaded.response is not None
+    np.testing.assert_array_equal(loaded.response.load_factor, result.response.load_factor)
+    assert loaded.response.controlled
+    formats.write(loaded, ["csv"], tmp_path)
+    with next(tmp_path.rglob("response.csv")).open() as file:
+        names = file.readline().strip().split(",")
+        rows = np.genfromtxt(file, delimiter=",", converters={names.index("converged"): lambda _: 1.0})
+    table = dict(zip(names, rows.T, strict=True))
+    a, b = table["response_a1_m"], table["response_b1_m"]
+    np.testing.assert_allclose(np.hypot(a, b), 3e-6, rtol=1e-8)
+    np.testing.assert_allclose(table["force_N"], 20.0 * table["load_factor"])
+    np.testing.assert_allclose(table["response_phase_rad"], np.arctan2(-b, a), atol=1e-12)
+    i = int(np.argmin(table["force_N"]))
+    assert result.summary()["peak_hz"][0] == pytest.approx(table["frequency_Hz"][i])
+    at = f"['{table['frequency_Hz'][i]:.12g} Hz', '121 Hz']"  # constant force of this size has the same amplitude there
+    value = f"loads.harmonic.shaker.value={table['force_N'][i]:.12g} N"
+    given = td.run(scene, None, overrides=(*PLAIN, value, f"response.frequency={at}"))
+    assert abs(given.response.fundamental("response")[0]) == pytest.approx(3e-6, rel=1e-6)
+
+
+def test_a_phase_resonance_from_a_scene_lags_by_a_quarter_and_is_drawn(tmp_path: Path):
+    scene = matrix_folder(tmp_path) / "own.toml"
+    control = ("response.control=phase", 'response.amplitude=["0.1 um", "20 um"]')
+    result = td.run(scene, tmp_path / "out", overrides=(*PLAIN, *control))
+    frf = result.response
+    np.testing.assert_allclose(np.abs(np.angle(frf.fundamental("response"))), np.pi / 2, atol=1e-6)
+    np.testing.assert_allclose(np.abs(frf.fundamental("response")), frf.parameter, rtol=1e-8)
+    assert frf.parameter[-1] == pytest.approx(20e-6)
+    assert "control" in plots.figures(result)
+    assert len(plots.controlled(result).axes) == 3
+    assert result.summary()["peak_at_end"] is None
+
+
+@pytest.mark.parametrize(
+    ("sets", "sentence"),
+    [
+        (("response.control=amplitude",), 'expected amplitude = "10 um" with control = "amplitude"'),
+        (("response.amplitude=1 um",), 'expected no amplitude with control = "force"'),
+        (("response.control=phase", "response.amplitude=1 um"), 'expected amplitude = ["1 um", "1 mm"]'),
+        (("response.control=amplitude", "response.amplitude=0 um"), "expected amplitude above 0"),
+        (("response.control=amplitude", "response.amplitude=1 um", "response.stability=true"), "no stability"),
+        (("response.control=amplitude", "response.amplitude=1 um", "wear.max_steps=1"), "does not wear"),
+    ],
+)
+def test_what_cannot_be_controlled_is_one_sentence(sets, sentence, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    scene = matrix_folder(tmp_path) / "own.toml"
+    words = [word for text in ("wear.max_steps=0", *sets) for word in ("--set", text)]
+    code, _, err = leave(["run", str(scene), *words], capsys)
+    assert code == 2
+    assert sentence in err
+    assert err.count("\n") == 1
+
+
+def test_a_blow_rings_down_and_says_what_rings_along(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    scene = matrix_folder(tmp_path) / "own.toml"
+    free = ["--set", "contact.friction=100", "--set", "harmonics.kept=[0, 1]", "--out", str(tmp_path / "out")]
+    words = ["curve", "ring-down", str(scene), *free, "--impulse", "1e-4 N s", "--from", "10nm", "--json"]
+    code, out, err = leave([*words, "--periods", "30"], capsys)
+    assert code == 0, err
+    rows = json.loads(out)["rows"]
+    assert rows[0]["amplitude_m"] > rows[-1]["amplitude_m"]
+    assert all(row["other_modes"] > 0 for row in rows)
+    code, _, err = leave([*words[:-3]], capsys)
+    assert code == 2
+    assert "--from" in err
+
+
+def test_a_scene_without_a_frequency_is_inspected_and_does_not_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    path = matrix_folder(tmp_path) / "own.toml"
+    text = path.read_text().replace('frequency = ["35 Hz", "120 Hz"]\n', "")
+    path.write_text(text)
+    code, _, err = leave(["run", str(path)], capsys)
+    assert code == 2
+    assert 'response.frequency is missing: give its range, such as ["100 Hz", "200 Hz"]' in err
