@@ -38,19 +38,42 @@ import numpy as np
 import scipy.sparse as sp
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface, checked_components, contact_frames
+from tribodyn.fem.modes import modes
 from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.reduction import abaqus_matrix, harwell_boeing, matrix_files
 from tribodyn.reduction.abaqus_matrix import Labels
 from tribodyn.reduction.model import ModelInfo, ReducedModel
 
-NAMES = {"mass": "M", "stiffness": "K", "damping": "C"}
-"""Variables looked for in a file that holds all matrices."""
+NAMES = {"mass": ("M", "MAA", "MAAX"), "stiffness": ("K", "KAA", "KAAX"), "damping": ("C", "BAA", "BAAX")}
+"""Variables looked for in a file that holds all matrices, the first that is there."""
 
 Dof = int | Sequence[int | str]
 """A DOF: number from 0, or (node, component)."""
 
 Terms = Dof | Mapping[Any, float] | np.ndarray
 """A load or output: one DOF, DOF -> factor, or the vector (n,) itself."""
+
+
+@dataclass(frozen=True)
+class MatrixFacts:
+    """What matrices by themselves say about their structure.
+
+    frequency : (n,) [Hz] of its lowest modes, those of rigid bodies first, which are n_rigid
+    mass : [kg] moved along each of x, y, z along which it is free; empty where it is held or the rows have no labels
+    remarks : doubts, one sentence each
+    """
+
+    frequency: np.ndarray
+    n_rigid: int
+    mass: tuple[float, ...]
+    remarks: tuple[str, ...]
+
+    def lines(self) -> list[str]:
+        """Sentences, the doubts as warnings."""
+        elastic = ", ".join(f"{f:.5g}" for f in self.frequency[self.n_rigid :][:6])
+        held = f"{self.n_rigid} rigid-body modes" if self.n_rigid else "no rigid-body mode: it is held"
+        free = f", mass {' / '.join(f'{m:.5g}' for m in self.mass)} kg along its free directions" if self.mass else ""
+        return [f"matrices: {held}{free}; first elastic modes {elastic} Hz", *(f"warning: {r}" for r in self.remarks)]
 
 
 @dataclass(frozen=True)
@@ -95,6 +118,34 @@ class ForeignMatrices:
     def node_dofs(self, nodes: Sequence[int], components: Sequence[int | str] = (1, 2, 3)) -> np.ndarray:
         """(n_node, n_component) rows of the components of nodes, for `contact`."""
         return np.array([[self.dof((node, component)) for component in components] for node in nodes])
+
+    def facts(self) -> MatrixFacts:
+        """What the matrices by themselves say about their structure, without damping, loads and contacts.
+
+        Raises  ValueError where they have no modes, as where the mass matrix is not positive definite
+        """
+        K, M = self.stiffness, self.mass
+        frequency = modes(K, M, min(12, self.n_dof))[0] / (2 * np.pi)
+        n_rigid = int((frequency < 1e-3 * frequency[-1]).sum())
+        mass: list[float] = []
+        for axis in (1, 2, 3):
+            along = np.array([label[1] == axis for label in self.labels or ()], float)
+            if along.any() and abs(K @ along).max() <= 1e-6 * abs(K).max():
+                mass.append(float(along @ (M @ along)))
+        remarks = []
+        if n_rigid not in (0, 6):
+            remarks.append(
+                f"{n_rigid} rigid-body modes: a structure has none where it is held, and six where it is free"
+            )
+        if mass and max(mass) > 1.01 * min(mass):
+            each = ", ".join(f"{m:.4g}" for m in mass)
+            remarks.append(f"its mass is not the same in all directions ({each} kg): rows are missing or turned")
+        elastic = frequency[n_rigid] if n_rigid < len(frequency) else 0.0
+        if not 1e-2 < elastic < 1e6:
+            remarks.append(f"its first elastic mode is at {elastic:.3g} Hz: check that both matrices are in one system")
+        if mass and not 1e-4 < mass[0] < 1e5:
+            remarks.append(f"its mass is {mass[0]:.3g} kg, as in tonnes or grams: give scale, 1e3 for N, mm, t and s")
+        return MatrixFacts(frequency, n_rigid, tuple(mass), tuple(remarks))
 
     def system(self, loads: Mapping[str, Terms], outputs: Mapping[str, Terms]) -> SecondOrderSystem:
         """The matrices with named unit loads and observed displacements, sparse: what Craig-Bampton takes."""
@@ -224,21 +275,23 @@ def read_matrices(
 ) -> ForeignMatrices:
     """Read the matrices of a structure.
 
-    path : one .npz or .mat that holds all of them, by default as M, K and, if present, C
+    path : one .npz, .mat, .op4 or DMIG file that holds all of them, by default as M, K and, if present, C (in files of
+        Nastran also MAA, KAA, BAA or MAAX, KAAX, BAAX)
     mass, stiffness, damping : one file for each instead; formats as in matrix_files.read_matrix, mixed at will
     mapping : ANSYS .mapping file that labels the rows
     names : other variable names, such as {"mass": "Mred"}
     scale : factor on all matrices to reach SI; 1e3 for N-mm-t-s (rotations then count in units of 1000 rad)
     Raises  ValueError: not square, not symmetric, sizes that differ, a missing file or variable
     """
-    wanted = {**NAMES, **(names or {})}
-    unknown = sorted(set(wanted) - set(NAMES))
+    unknown = sorted(set(names or {}) - set(NAMES))
     if unknown:
         raise ValueError(f"names has the key {unknown[0]}: the keys are mass, stiffness and damping")
     files = {"mass": mass, "stiffness": stiffness, "damping": damping}
+    held = [] if path is None else matrix_files.variables(Path(path))
+    wanted = {part: next((name for name in usual if name in held), usual[0]) for part, usual in NAMES.items()}
+    wanted |= names or {}
     if path is not None:
         whole = Path(path)
-        held = matrix_files.variables(whole)
         if not held:
             raise ValueError(f"{whole.name} does not hold several matrices: give mass= and stiffness= as one file each")
         for part, variable in wanted.items():
@@ -252,8 +305,9 @@ def read_matrices(
     labels: dict[str, Labels | None] = {}
     for part, file in files.items():
         if file is not None:
-            name = wanted[part] if matrix_files.variables(Path(file)) else None
-            matrix, labels[part] = matrix_files.read_matrix(Path(file), name)
+            inside = matrix_files.variables(Path(file))
+            alone = inside[0] if len(inside) == 1 and part not in (names or {}) else wanted[part]
+            matrix, labels[part] = matrix_files.read_matrix(Path(file), alone if inside else None)
             read[part] = matrix * scale
     rows = labels["stiffness"]
     for part, own in labels.items():
@@ -380,9 +434,11 @@ def _component(component: int | str) -> int:
         name = "U" + name if name in ("X", "Y", "Z") else name
         if name in harwell_boeing.COMPONENT_NAMES:
             return harwell_boeing.COMPONENT_NAMES.index(name) + 1
-    elif 1 <= component <= 6:
+    elif 0 <= component <= 6:
         return int(component)
-    raise ValueError(f"component {component!r} is unknown: give 1 to 6, x, y, z or UX, UY, UZ, ROTX, ROTY, ROTZ")
+    raise ValueError(
+        f"component {component!r} is unknown: give 1 to 6, x, y, z or UX, UY, UZ, ROTX, ROTY, ROTZ (0: a scalar point)"
+    )
 
 
 def _signs(signs: Sequence[float] | None, n_component: int) -> np.ndarray:

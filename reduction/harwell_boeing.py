@@ -50,7 +50,7 @@ def read(path: Path) -> sp.csr_matrix:
     try:
         matrix = sp.csc_matrix(
             (
-                np.array([_number(word) for word in value]),
+                np.array([number(word) for word in value]),
                 np.array(index, dtype=np.int64) - 1,
                 np.array(pointer, dtype=np.int64) - 1,
             ),
@@ -72,6 +72,7 @@ def read(path: Path) -> sp.csr_matrix:
 def read_mapping(path: Path) -> tuple[tuple[int, int], ...]:
     """(node, component 1..6) of each equation, from the .mapping file that HBMAT writes on request.
 
+    A list of one's own in its form, equation, node and component (UX or 1), is taken too.
     Raises  ValueError: no such file, no mapping file
     """
     if not path.is_file():
@@ -80,7 +81,7 @@ def read_mapping(path: Path) -> tuple[tuple[int, int], ...]:
     for line in path.read_text(encoding="ascii", errors="replace").splitlines():
         words = line.split()
         if len(words) == 3 and words[0].isdigit() and words[1].isdigit():
-            name = words[2].upper()
+            name = COMPONENT_NAMES[int(words[2]) - 1] if words[2] in "123456" else words[2].upper()
             if name not in COMPONENT_NAMES:
                 raise ValueError(
                     f"{path.name} maps equation {words[0]} to {name}: only {', '.join(COMPONENT_NAMES)} are structural"
@@ -112,7 +113,7 @@ def _fields(lines: list[str], layout: tuple[int, int], size: int) -> list[str]:
     return [field for field in fields if field]
 
 
-def _number(word: str) -> float:
+def number(word: str) -> float:
     """A Fortran real, also 1.5D+03 and 1.5-103."""
     word = word.upper().replace("D", "E")
     return float(word if "E" in word else _NO_EXPONENT_LETTER.sub(r"E\1", word))

@@ -15,7 +15,7 @@ import scipy.io
 import scipy.sparse as sp
 from scipy.io.matlab import MatReadError
 
-from tribodyn.reduction import abaqus_matrix, harwell_boeing
+from tribodyn.reduction import abaqus_matrix, harwell_boeing, nastran_matrix
 from tribodyn.reduction.abaqus_matrix import Labels
 
 MATRIX_MARKET = "%%MatrixMarket"
@@ -34,13 +34,18 @@ def variables(path: Path) -> list[str]:
                 with h5py.File(path, "r") as archive:
                     return sorted(name for name in archive if not name.startswith("#"))
             return sorted(name for name, _, _ in _whosmat(path))
+        if path.suffix.lower() == ".op4":
+            return list(nastran_matrix.read_op4(path))
+        if nastran_matrix.holds_dmig(path):
+            return list(nastran_matrix.read_dmig(path))
     return []
 
 
 def read_matrix(path: Path, variable: str | None = None) -> tuple[sp.csr_matrix, Labels | None]:
     """Read a real matrix, and the (node, component) labels of its rows where the file has them.
 
-    path : .npz (numpy or scipy.sparse), .mat (also version 7.3), Matrix Market, Harwell-Boeing, Abaqus text
+    path : .npz (numpy or scipy.sparse), .mat (also version 7.3), Nastran .op4 or DMIG, Matrix Market, Harwell-Boeing,
+        Abaqus text
     variable : its name in a container
     Raises  ValueError: no such file or variable, an unknown format, complex or non-finite entries
     """
@@ -55,6 +60,10 @@ def read_matrix(path: Path, variable: str | None = None) -> tuple[sp.csr_matrix,
             matrix = _from_npz(path, variable)
         elif path.suffix.lower() == ".mat":
             matrix = _from_mat(path, str(variable))
+        elif path.suffix.lower() == ".op4":
+            matrix = nastran_matrix.read_op4(path)[str(variable)]
+        elif known:
+            matrix, labels = nastran_matrix.read_dmig(path)[str(variable)]()
         else:
             matrix, labels = _from_text(path)
     return real(matrix, f"{path.name} {variable or ''}".strip()), labels
@@ -66,7 +75,10 @@ def read_array(path: Path, variable: str) -> np.ndarray:
     if variable not in known:
         raise ValueError(f"{path.name} has no variable '{variable}': it holds {', '.join(known) or 'one matrix alone'}")
     with _as_one_sentence(path):
-        found = _from_npz(path, variable) if path.suffix.lower() == ".npz" else _from_mat(path, variable)
+        if path.suffix.lower() not in (".npz", ".mat"):
+            found = read_matrix(path, variable)[0]
+        else:
+            found = _from_npz(path, variable) if path.suffix.lower() == ".npz" else _from_mat(path, variable)
     array = found.toarray() if sp.issparse(found) else np.asarray(found)
     if array.dtype.kind not in "fiub" or not np.isfinite(array).all():
         raise ValueError(f"{path.name} {variable} must hold finite real numbers")
@@ -169,6 +181,14 @@ def _after_sizes(text: bytes) -> bytes:
 def _require(path: Path) -> None:
     if not path.is_file():
         raise ValueError(f"there is no file {path}: check the name and the folder")
+    ways = {
+        ".sub": "in Ansys, *DMAT, K, D, IMPORT, SUB, FILE, STIFF and *EXPORT, K, MMF, k.mtx, and likewise for MASS",
+        ".op2": "in Nastran, EXTSEOUT(STIFFNESS, MASS, DMIGPCH), or the matrices by OUTPUT4",
+        ".sim": "in Abaqus, *MATRIX GENERATE or *SUBSTRUCTURE MATRIX OUTPUT in text (.mtx)",
+    }
+    way = ways.get(path.suffix.lower().replace(".dsub", ".sub"))
+    if way is not None:
+        raise ValueError(f"{path.name} is in a format of its program alone: export its matrices ({way})")
 
 
 def real(matrix: Any, name: str) -> sp.csr_matrix:

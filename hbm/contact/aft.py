@@ -8,8 +8,10 @@ from types import ModuleType
 import numba
 import numpy as np
 
+from tribodyn.hbm.contact import events
 from tribodyn.hbm.contact import law as contact_law
 from tribodyn.hbm.contact.compiled_law import pointer
+from tribodyn.hbm.contact.events import CycleNotPeriodic
 from tribodyn.hbm.contact.law import ContactCycle, ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 
@@ -24,10 +26,6 @@ LEAST_CONTRACTION = 1e-10  # per cycle, of a memory that does not depend on its 
 Turn = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
 
 
-class CycleNotPeriodic(RuntimeError):
-    """The memory of a contact law did not repeat after MAX_CYCLES cycles."""
-
-
 def cycle(
     law: ModuleType,
     x: np.ndarray,
@@ -36,20 +34,22 @@ def cycle(
     memory: np.ndarray | None = None,
     jacobian: bool = True,
 ) -> ContactCycle:
-    """Periodic contact cycle of all pairs, by the law's own closed form where it has one, else by marching.
+    """Periodic contact cycle of all pairs, by the law's own closed form where it has one, else by its steps.
 
     x : (n_pair, n_component, n_coeff) relative displacement [m]
     memory : (n_pair, n_state) memory at the start of the load path, zeros if None
-    Raises  ValueError where the basis asks for located transitions and the law does not locate them
+    Raises  ValueError where the basis asks for located transitions and the law is one of samples alone
     """
     contact_law.require_order(law, parameters)
     if memory is None:
         memory = np.zeros((parameters.n_pair, law.n_state(parameters.components)))
     if basis.transitions == "located":
-        if not hasattr(law, "located"):
+        if not contact_law.locates(law):
             name = contact_law.called(law)
             raise ValueError(f"contact law '{name}' does not locate its transitions: take transitions = 'sampled'")
-        return law.located(x, parameters, memory, basis, jacobian)
+        own = getattr(law, "located", None)
+        arguments = x, parameters, memory, basis, jacobian
+        return events.cycle(law, *arguments) if own is None else own(*arguments)
     if hasattr(law, "cycle"):
         return law.cycle(x, parameters, memory, basis, jacobian)
     return march(law, x, parameters, memory, basis, jacobian)

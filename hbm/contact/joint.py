@@ -55,7 +55,7 @@ class Joint:
 def joint_transitions(joints: Joint | Sequence[Joint]) -> str:
     """How forces of these joints are taken best: "located" where all their laws can, else "sampled"."""
     every = [joints] if isinstance(joints, Joint) else joints
-    return "located" if all(hasattr(joint.module, "located") for joint in every) else "sampled"
+    return "located" if all(contact_law.locates(joint.module) for joint in every) else "sampled"
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,10 @@ A law is a module `hbm/contact/laws/<name>.py`, or a file of one's own, with
   wear by slip path; without it a pair has one slider, at x less the force over the stiffness
 - `step` : numba function that advances one pair by one time sample (see `hbm.contact.aft.march`); its p is a packed row
 - optionally `cycle(x, parameters, memory, basis, jacobian)` : the same periodic cycle at the samples, faster
-- optionally `located(x, parameters, memory, basis, jacobian)` : the cycle with its transitions located between samples
+- optionally `located(x, parameters, memory, basis, jacobian)` : the cycle with its transitions located between samples,
+  faster than `hbm.contact.events` finds them from `step`
+- optionally `BY_SAMPLES = True` : its cycle is that at the samples, as it has no transitions (a smooth law) or its step
+  integrates along the path (planar friction); where there is no `located`, none is looked for
 """
 
 from __future__ import annotations
@@ -146,6 +149,11 @@ def load(name: str) -> ModuleType:
     if not isinstance(getattr(module, "COMPONENTS", None), tuple):
         raise ValueError(f'contact law file \'{name}\' has no COMPONENTS, such as (("t1", "n"),)')
     return module
+
+
+def locates(law: ModuleType) -> bool:
+    """Whether the transitions of a law are located between samples, by itself or from its steps."""
+    return hasattr(law, "located") or not getattr(law, "BY_SAMPLES", False)
 
 
 def called(law: ModuleType) -> str:

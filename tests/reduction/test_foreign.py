@@ -1,13 +1,19 @@
 """Matrices from other programs: every format gives the same structure; what cannot be is refused in one sentence."""
 
+import itertools
+
 import h5py
 import numpy as np
+import pandas as pd
 import pytest
 import scipy.io
 import scipy.sparse as sp
+from pyyeti.nastran import bulk, op4
 
-from tribodyn.reduction.foreign import ForeignMatrices, read_matrices, reduced_model
-from tribodyn.reduction.matrix_files import read_matrix, variables
+from tribodyn import matrices as own
+from tribodyn.reduction.foreign import ForeignMatrices, from_arrays, read_matrices, reduced_model
+from tribodyn.reduction.matrix_files import read_array, read_matrix, variables
+from tribodyn.reduction.nastran_matrix import read_op4, write_op4
 
 N_NODE = 5
 LABELS = [(10 * node + 7, component) for node in range(N_NODE) for component in (1, 2, 3)]
@@ -123,9 +129,30 @@ def from_abaqus_coordinate(folder):
     return read_matrices(mass=folder / "m", stiffness=folder / "k")
 
 
+def from_op4(folder):
+    op4.write(str(folder / "part.op4"), {"maax": MASS, "kaax": STIFFNESS})
+    return read_matrices(folder / "part.op4")
+
+
+def from_op4_text(folder):
+    for name, matrix in (("m", MASS), ("k", STIFFNESS)):
+        op4.write(str(folder / f"{name}.op4"), {f"{name}red": matrix}, binary=False, digits=16, sparse="bigmat")
+    rows = [f"{k + 1} {node} {c}" for k, (node, c) in enumerate(LABELS)]
+    (folder / "rows.txt").write_text("\n".join(rows))
+    return read_matrices(mass=folder / "m.op4", stiffness=folder / "k.op4", mapping=folder / "rows.txt")
+
+
+def with_dmig(folder, mass=MASS, labels=LABELS):
+    """A punch file as an external superelement has it; 16 columns keep ten digits."""
+    rows = pd.MultiIndex.from_tuples(labels)
+    frames = {name: pd.DataFrame(m, rows, rows) for name, m in (("MAAX", mass), ("KAAX", STIFFNESS))}
+    bulk.wtdmig(str(folder / "part.pch"), frames)
+    return read_matrices(folder / "part.pch")
+
+
 READERS = [
     from_npz, from_sparse_npz, from_matrix_market, from_matlab, from_matlab_73, from_ansys, from_ansys_unsymmetric,
-    from_abaqus, from_abaqus_coordinate,
+    from_abaqus, from_abaqus_coordinate, from_op4, from_op4_text,
 ]  # fmt: skip
 
 
@@ -136,10 +163,76 @@ def test_every_format_gives_the_same_structure(reader, tmp_path):
     np.testing.assert_allclose(matrices.stiffness.toarray(), STIFFNESS, rtol=1e-14)
     assert (matrices.stiffness != matrices.stiffness.T).nnz == 0
     assert matrices.damping is None
-    if reader in (from_ansys, from_abaqus):
+    if reader in (from_ansys, from_abaqus, from_op4_text):
         assert matrices.labels == tuple(LABELS)
         assert matrices.dof((27, "UY")) == 7
         assert matrices.node_dofs([47, 7]).tolist() == [[12, 13, 14], [0, 1, 2]]
+
+
+def test_op4_is_read_and_written_as_another_program_does_bit_for_bit(tmp_path):
+    rng = np.random.default_rng(1)
+    sparse = rng.normal(size=(7, 7)) * (rng.random((7, 7)) < 0.4)
+    wanted = {"A": sparse + sparse.T, "B": rng.normal(size=(7, 3)), "Z": np.zeros((3, 3)), "C": sparse * (1 - 2j)}
+    for binary, kind, order in itertools.product((True, False), ("dense", "bigmat", "nonbigmat"), "<>"):
+        op4.write(str(tmp_path / "a.op4"), wanted, binary=binary, endian=order, sparse=kind, digits=16)
+        read = read_op4(tmp_path / "a.op4")
+        assert all(np.array_equal(read[name].toarray(), matrix) for name, matrix in wanted.items()), (binary, kind)
+    write_op4(tmp_path / "b.op4", wanted)
+    for read in (
+        op4.read(str(tmp_path / "b.op4")),
+        {n.lower(): m.toarray() for n, m in read_op4(tmp_path / "b.op4").items()},
+    ):
+        assert all(np.array_equal(read[name.lower()], matrix) for name, matrix in wanted.items())
+    assert read_array(tmp_path / "b.op4", "B").shape == (7, 3)
+
+
+def test_dmig_keeps_grid_points_components_and_scalar_points(tmp_path):
+    labels = [*LABELS[:-1], (900, 0)]
+    matrices = with_dmig(tmp_path, labels=labels)
+    assert matrices.labels == tuple(labels)
+    assert matrices.dof((900, 0)) == 14
+    np.testing.assert_allclose(matrices.stiffness.toarray(), STIFFNESS, rtol=1e-9, atol=1e-9 * STIFFNESS.max())
+    theirs = bulk.rddmig(str(tmp_path / "part.pch"))["kaax"]
+    assert np.array_equal(matrices.stiffness.toarray(), theirs.to_numpy())
+    free = "DMIG,K,0,6,1,0,,,2\nDMIG,K,1,1,,1,1,4.0,,+a\n+a,2,3,-1.5+0\nDMIG,K,2,3,,2,3,2.D0\n"
+    small = "".join(f"{w:8s}" for w in ["DMIG", "M", "1", "1", "", "1", "1", "2.0"]) + "\n"
+    small = (
+        "DMIG    M              0       6       1\n"
+        + small
+        + "DMIG    M              2       3               2       3      3.\n"
+    )
+    (tmp_path / "two.bdf").write_text("$ a comment\n" + free + small + "ENDDATA\n")
+    again = read_matrices(tmp_path / "two.bdf")
+    assert again.labels == ((1, 1), (2, 3))
+    assert again.stiffness.toarray().tolist() == [[4, -1.5], [-1.5, 2]]
+    assert again.mass.diagonal().tolist() == [2, 3]
+
+
+def test_a_model_of_another_program_runs_to_its_response(tmp_path):
+    """Written by pyYeti: the response with an open contact is the linear one by hand."""
+    matrices = from_op4_text(tmp_path)
+    pad = own.Contact("pad", matrices.contact([[(7, "x")]], area=1.0, gap=1.0), "unilateral", 0.0, 1e7)
+    made = own.reduce(matrices, pad, loads={"shaker": (47, 1)}, outputs={"tip": (47, "z")}, damping_ratio=0.02)
+    balance = made.balance((0, 1), up_to=400.0, harmonic={1: {"shaker": 2.0}})
+    system = made.model.system
+    for frequency in (100.0, 350.0):
+        omega = 2 * np.pi * frequency
+        Z = STIFFNESS - omega**2 * MASS + 1j * omega * np.asarray(system.damping)
+        assert balance.solve(frequency).amplitude("tip") == pytest.approx(2 * abs(np.linalg.inv(Z)[14, 12]), rel=1e-8)
+
+
+def test_facts_of_a_free_and_of_a_held_structure():
+    assert grounded().facts().n_rigid == 0
+    chain = 1e6 * (2 * np.eye(N_NODE) - np.eye(N_NODE, k=1) - np.eye(N_NODE, k=-1))
+    chain[0, 0] = chain[-1, -1] = 1e6
+    free, mass = np.kron(chain, np.eye(3)), np.kron(np.diag([0.5, 1, 1, 1, 0.5]), np.eye(3))
+    found = from_arrays(mass, free, labels=tuple(LABELS)).facts()
+    assert found.n_rigid == 3
+    assert found.mass == pytest.approx((4.0, 4.0, 4.0))
+    assert "3 rigid-body modes" in found.remarks[0]
+    mass[0, 0] = 0.1
+    assert any("rows are missing" in r for r in from_arrays(mass, free, labels=tuple(LABELS)).facts().remarks)
+    assert any("tonnes" in r for r in from_arrays(mass / 1e6, free / 1e6, labels=tuple(LABELS)).facts().remarks)
 
 
 def test_harwell_boeing_agrees_with_scipy(tmp_path):
@@ -251,6 +344,14 @@ def with_nan():
     return matrix
 
 
+DMIG = "DMIG,K,0,{form},{kind},0,,,2\nDMIG,M,0,6,1\nDMIG,M,1,1,,1,1,1.0\nDMIG,K,1,1,,1,1,{value}\n"
+
+
+def named(folder, name, content):
+    (folder / name).write_text(content)
+    return read_matrices(folder / name)
+
+
 def text(folder, content):
     (folder / "k").write_text(content)
     return read_matrices(mass=folder / "k", stiffness=folder / "k")
@@ -269,6 +370,14 @@ def text(folder, content):
         (lambda f: bad_npz(f, M=MASS, K=0 * STIFFNESS), "is zero"),
         (lambda f: bad_npz(f, M=MASS, Kred=STIFFNESS), "no variable 'K': it holds Kred, M"),
         (lambda f: read_matrices(f / "none.npz"), "no file"),
+        (lambda f: named(f, "part.sub", "any"), r"part.sub is in a format .*EXPORT, K, MMF"),
+        (lambda f: named(f, "part.op2", "any"), "DMIGPCH"),
+        (lambda f: named(f, "part.op4", "      31      25  what"), "no OUTPUT4 file"),
+        (lambda f: named(f, "part.pch", DMIG.format(form=2, kind=1, value="1.0")), "form 2: only square"),
+        (lambda f: named(f, "part.pch", DMIG.format(form=6, kind=3, value="1.0")), "type 3: real numbers"),
+        (lambda f: named(f, "part.pch", DMIG.format(form=6, kind=1, value="x1")), "not numbers"),
+        (lambda f: named(f, "part.pch", DMIG.format(form=6, kind=1, value="1.0\n+,1,1,2.0")), "an entry twice"),
+        (lambda f: named(f, "part.pch", "DMIG,K,1,1,,1,1,1.\n"), "before its first entry"),
         (lambda f: read_matrices(mass=f / "m"), "no stiffness matrix is given"),
         (lambda f: read_matrices(f / "x.npz", names={"massa": "M"}), "the keys are mass, stiffness and damping"),
         (lambda f: text(f, "hello\nworld\n"), "no format known"),
@@ -285,14 +394,23 @@ def test_bad_files_are_refused_in_one_sentence(call, words, tmp_path):
     assert "\n" not in str(refusal.value)
 
 
-COUNTED = [from_npz, from_sparse_npz, from_matrix_market, from_matlab, from_matlab_73, from_ansys_unsymmetric]
+COUNTED = [
+    from_npz,
+    from_sparse_npz,
+    from_matrix_market,
+    from_matlab,
+    from_matlab_73,
+    from_ansys_unsymmetric,
+    from_op4,
+    from_op4_text,
+]
 
 
 @pytest.mark.parametrize("reader", COUNTED, ids=lambda reader: reader.__name__)
 def test_a_file_that_ends_early_is_refused_in_one_sentence(reader, tmp_path):
     """Of the formats that say how many entries there are; nobody can tell where the last number lost its end."""
     reader(tmp_path)
-    for path in (path for path in tmp_path.iterdir() if path.suffix != ".mapping"):
+    for path in (path for path in tmp_path.iterdir() if path.suffix not in (".mapping", ".txt")):
         whole = path.read_bytes()
         names = variables(path) or [None]
         for share in np.linspace(0.01, 0.95, 40):

@@ -20,6 +20,7 @@ from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridRead
 
 from tests.helpers.synthetic_result import LENGTH, WIDTH, block, result
 from tribodyn.reduction import foreign
+from tribodyn.reduction.nastran_matrix import read_op4
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.export import curves, formats, matrix_file, tables, vtk
 from tribodyn.workflows.pictures import exploded
@@ -219,7 +220,7 @@ def test_xarray_opens_the_result_file(tmp_path: Path) -> None:
 def test_reduced_matrices_are_those_of_the_run(small: Result, tmp_path: Path) -> None:
     model = matrix_file.reduced_model(small)
     wanted = matrix_file.arrays(model)
-    written = formats.write(small, ["npz", "mtx", "abaqus"], tmp_path)
+    written = formats.write(small, ["npz", "mtx", "abaqus", "op4", "matlab"], tmp_path)
     npz = foreign.read_matrices(tmp_path / "npz" / "reduced.npz")
     inp = foreign.read_matrices(
         **{name: tmp_path / "abaqus" / f"reduced_{letter}.inp" for name, letter in (("mass", "M"), ("stiffness", "K"))}
@@ -232,6 +233,18 @@ def test_reduced_matrices_are_those_of_the_run(small: Result, tmp_path: Path) ->
             read.stiffness.toarray(), wanted["K"], rtol=1e-12, atol=1e-12 * np.abs(wanted["K"]).max()
         )
         np.testing.assert_allclose(read.mass.toarray(), wanted["M"], rtol=1e-12, atol=1e-12 * np.abs(wanted["M"]).max())
+    exact = {name: (wanted[name] + wanted[name].T) / 2 for name in "MKC"}
+    for ending, folder in (("op4", "op4"), ("mat", "matlab")):
+        again = foreign.read_matrices(tmp_path / folder / f"reduced.{ending}")
+        assert again.damping is not None
+        for name, read in zip("MKC", (again.mass, again.stiffness, again.damping), strict=True):
+            assert np.array_equal(read.toarray(), exact[name])
+    op4 = read_op4(tmp_path / "op4" / "reduced.op4")
+    about = json.loads((tmp_path / "op4" / "reduced.json").read_text())
+    assert np.array_equal(op4["B"].toarray(), wanted["B"])
+    for kind in ("loads", "outputs"):
+        for k, name in enumerate(about[kind]):
+            assert np.array_equal(op4[kind.upper()].toarray()[:, k], wanted[f"{kind[:-1]}_{name}"])
     assert npz.damping is not None
     free = np.sort(np.linalg.eigvals(np.linalg.solve(npz.mass.toarray(), npz.stiffness.toarray())).real)
     np.testing.assert_allclose(np.sqrt(free[:2]) / (2 * np.pi), small.facts.free_hz[:2], rtol=1e-6)

@@ -14,6 +14,7 @@ from tribodyn.geometry import parts
 from tribodyn.hbm import continuation
 from tribodyn.hbm.contact import aft
 from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact.joint import Joint, joint_transitions
 from tribodyn.hbm.contact.law import ContactParameters
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.wear import law as wear_law
@@ -211,9 +212,17 @@ def test_reading_and_planning_run_none_of_them(scene: Path) -> None:
     assert not (scene.parent / "ran").exists()
 
 
-def test_a_law_of_ones_own_does_not_locate_its_transitions(scene: Path) -> None:
-    with pytest.raises(ValueError, match="'my_law' does not locate its transitions: take transitions = 'sampled'"):
-        td.run(scene, overrides={"harmonics.transitions": "located"})
+def test_a_law_of_ones_own_locates_its_transitions_unless_it_says_otherwise(scene: Path) -> None:
+    own = str(scene.parent / "my_law.py")
+    basis = HarmonicBasis((0, 1), 16, "located")
+    parameters = ContactParameters.of(("t1", "t2", "n"), np.ones((1, 3)), friction=0.3)
+    assert joint_transitions(Joint("contact", own, parameters)) == "located"
+    by_samples = scene.parent / "my_samples.py"
+    by_samples.write_text(Path(own).read_text() + "\nBY_SAMPLES = True\n")
+    joint = Joint("contact", str(by_samples), parameters)
+    assert joint_transitions(joint) == "sampled"
+    with pytest.raises(ValueError, match="'my_samples' does not locate its transitions: take transitions = 'sampled'"):
+        aft.cycle(joint.module, np.ones((1, 3, 3)), contact_law.checked(joint.law, parameters), basis)
 
 
 @pytest.mark.parametrize("name", [n for n in contact_law.names() if not hasattr(contact_law.load(n), "TABLE")])

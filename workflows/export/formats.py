@@ -19,6 +19,8 @@ FORMATS: dict[str, tuple[str, Callable[[Result, Path], list[Path]]]] = {
         lambda r, f: mesh_file.write_mesh(r, f / "part.xdmf"),
     ),
     "npz": ("reduced matrices for NumPy, and for a scene's [model]", matrix_file.write_npz),
+    "matlab": ("reduced matrices for MATLAB, and for a scene's [model]", matrix_file.write_matlab),
+    "op4": ("reduced matrices, Nastran OUTPUT4", matrix_file.write_op4),
     "mtx": ("reduced matrices, Matrix Market", matrix_file.write_mtx),
     "abaqus": ("reduced matrices, Abaqus *MATRIX INPUT", matrix_file.write_abaqus),
 }

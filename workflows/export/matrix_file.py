@@ -1,4 +1,4 @@
-"""The reduced model of a result for other solvers: npz, Matrix Market and Abaqus matrix input."""
+"""The reduced model of a result for other solvers: npz, MATLAB, Nastran OUTPUT4, Matrix Market, Abaqus matrix input."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.io import mmwrite
+from scipy.io import mmwrite, savemat
 
+from tribodyn.reduction import nastran_matrix
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run import modelling
@@ -59,28 +60,59 @@ def write_npz(result: Result, folder: Path) -> list[Path]:
     return [path]
 
 
-def write_mtx(result: Result, folder: Path) -> list[Path]:
-    """reduced_M.mtx and so on in the Matrix Market format, and reduced.json that describes them."""
-    model = reduced_model(result)
-    written = []
-    for name, matrix in arrays(model).items():
-        path = folder / f"reduced_{name}.mtx"
-        symmetric = name in ("M", "K", "C")
-        kind = "general" if not symmetric else "hermitian" if np.iscomplexobj(matrix) else "symmetric"
-        if symmetric:
-            matrix = sp.coo_matrix((matrix + matrix.conj().T) / 2)
-        elif matrix.ndim != 2:
-            matrix = matrix.reshape(len(matrix), -1)
-        mmwrite(path, matrix, symmetry=kind, precision=17)
-        written.append(path)
-    about_file = folder / "reduced.json"
+def _symmetric(found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """M, K, C without the rounding of their reduction, so that they come back bit for bit."""
+    return found | {name: (found[name] + found[name].conj().T) / 2 for name in ("M", "K", "C") if name in found}
+
+
+def _about(model: ReducedModel, folder: Path, **more: Any) -> Path:
+    """reduced.json, which describes the matrices beside it."""
+    path = folder / "reduced.json"
     about = {
         "components": model.interface.components,
         "units": "SI",
         "contact": "x = B q, row pair * n_component + component",
     }
-    about_file.write_text(json.dumps(about, indent=2), encoding="utf-8")
-    return [*written, about_file]
+    path.write_text(json.dumps(about | more, indent=2), encoding="utf-8")
+    return path
+
+
+def write_matlab(result: Result, folder: Path) -> list[Path]:
+    """reduced.mat with the same variables as reduced.npz, which a scene's [model] reads again."""
+    model, path = reduced_model(result), folder / "reduced.mat"
+    components = np.array(model.interface.components, dtype=object)
+    savemat(path, _symmetric(arrays(model)) | {"components": components}, long_field_names=True, do_compression=True)
+    return [path]
+
+
+def write_op4(result: Result, folder: Path) -> list[Path]:
+    """reduced.op4, with M, K, C, B, AREA, GAP, LOADS and OUTPUTS in binary, and reduced.json, which names columns."""
+    model = reduced_model(result)
+    found = _symmetric(arrays(model))
+    held: dict[str, np.ndarray] = {name: found[name] for name in ("M", "K", "C", "B") if name in found}
+    held |= {"AREA": found["contact_area"][:, None], "GAP": found["contact_gap"][:, None]}
+    columns = {}
+    for kind in ("load", "output"):
+        names = [name for name in found if name.startswith(f"{kind}_")]
+        columns[f"{kind}s"] = [name.removeprefix(f"{kind}_") for name in names]
+        if names:
+            held[f"{kind}s".upper()] = np.column_stack([found[name] for name in names])
+    nastran_matrix.write_op4(folder / "reduced.op4", held)
+    return [folder / "reduced.op4", _about(model, folder, **columns)]
+
+
+def write_mtx(result: Result, folder: Path) -> list[Path]:
+    """reduced_M.mtx and so on in the Matrix Market format, and reduced.json that describes them."""
+    model = reduced_model(result)
+    written = []
+    for name, matrix in _symmetric(arrays(model)).items():
+        path = folder / f"reduced_{name}.mtx"
+        symmetric = name in ("M", "K", "C")
+        kind = "general" if not symmetric else "hermitian" if np.iscomplexobj(matrix) else "symmetric"
+        stored = sp.coo_matrix(matrix) if symmetric else matrix.reshape(len(matrix), -1) if matrix.ndim != 2 else matrix
+        mmwrite(path, stored, symmetry=kind, precision=17)
+        written.append(path)
+    return [*written, _about(model, folder)]
 
 
 def write_abaqus(result: Result, folder: Path) -> list[Path]:
@@ -90,7 +122,7 @@ def write_abaqus(result: Result, folder: Path) -> list[Path]:
     Raises  ValueError for the complex matrices of a wheel
     """
     model, written, called = reduced_model(result), [], []
-    found = arrays(model)
+    found = _symmetric(arrays(model))
     if np.iscomplexobj(found["K"]):
         raise ValueError("abaqus: the matrices of a wheel are complex, which Abaqus does not take; export npz or mtx")
     words = {"K": "STIFFNESS", "M": "MASS", "C": "VISCOUS DAMPING"}
@@ -98,7 +130,7 @@ def write_abaqus(result: Result, folder: Path) -> list[Path]:
         if name not in found:
             continue
         path = folder / f"reduced_{name}.inp"
-        lower = np.tril((found[name] + found[name].T) / 2)
+        lower = np.tril(found[name])
         rows, columns = np.nonzero(lower)
         with path.open("w", encoding="ascii") as file:
             for i, j in zip(rows, columns, strict=True):

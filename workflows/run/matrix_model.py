@@ -28,6 +28,14 @@ def read(files: MatrixFiles, folder: Path) -> ForeignMatrices:
     return read_matrices(path, **named, names=files.names, scale=files.scale)
 
 
+def lines(matrices: ForeignMatrices) -> list[str]:
+    """Sentences on matrices: what was changed on reading, their rigid-body modes, mass and first modes, doubts."""
+    try:
+        return [*matrices.notes, *matrices.facts().lines()]
+    except ValueError as problem:  # such as massless DOFs, which a balance can do with
+        return [*matrices.notes, f"matrices: their modes are not known, {problem}"]
+
+
 def make(scene: MatrixScene, folder: Path) -> ReducedModel:
     """The model of a scene, with the damping of its files.
 

@@ -21,7 +21,8 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.geometry import mesh as mesh_reader
 from tribodyn.geometry.facts import facts
 from tribodyn.geometry.sources import cad
-from tribodyn.workflows.run import bodies, part_reduction
+from tribodyn.workflows.run import bodies, matrix_model, part_reduction
+from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.scene.schema import MeshScene, PartScene
 from tribodyn.workflows.scene.structure import StructureScene
@@ -52,9 +53,11 @@ USUAL = Usual()
 
 
 def lines(file: SceneFile, model: Model) -> Iterator[str]:
-    """Sentences on the structure of a scene; none for one of matrices."""
+    """Sentences on the structure of a scene."""
     part = model.part
     if part is None:
+        if isinstance(file.scene, MatrixScene):
+            yield from matrix_model.lines(matrix_model.read(file.scene.model, file.folder))
         return
     scene = file.mesh_scene
     names = [body.name for body in part.mesh.bodies] if isinstance(part.mesh, Assembly) else [""]

@@ -21,6 +21,7 @@ from tribodyn.declare import number
 from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
 
 COMPONENTS = (("t1", "t2", "n"),)
+BY_SAMPLES = True
 LINEAR_WHERE_STUCK = True
 
 

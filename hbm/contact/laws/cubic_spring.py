@@ -14,6 +14,7 @@ from tribodyn.declare import number
 from tribodyn.hbm.contact.law import STICKS
 
 COMPONENTS = (("t1", "t2", "n"), ("t1", "t2"), ("t1", "n"), ("t2", "n"), ("t1",), ("t2",), ("n",))
+BY_SAMPLES = True
 
 
 @dataclass(frozen=True)

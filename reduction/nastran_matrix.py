@@ -1,0 +1,251 @@
+"""Nastran matrices: OUTPUT4 files (.op4), in ASCII and binary, and DMIG entries of bulk data and punch files.
+
+An OUTPUT4 file holds several named matrices, column by column: a run of rows for each column, or strings of rows where
+it is sparse. A DMIG entry labels its rows by grid point and component; scalar points have component 0.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+
+from tribodyn.reduction.abaqus_matrix import Labels
+from tribodyn.reduction.harwell_boeing import number
+
+DECKS = (".pch", ".bdf", ".nas", ".dat", ".dmig")
+
+Column = tuple[int, int, np.ndarray]
+Matrix = tuple[str, tuple[int, int], int, Iterator[Column]]
+
+
+def read_op4(path: Path) -> dict[str, sp.csr_matrix]:
+    """All matrices of an OUTPUT4 file by name, real or complex, in the order of the file.
+
+    Raises  ValueError for a file that is not one, or ends early
+    Source  MSC Nastran, DMAP Programmer's Guide, module OUTPUT4, remarks on the formats of its files
+    """
+    data = path.read_bytes()
+    order = {b"\x18\0\0\0": "<", b"\x30\0\0\0": "<", b"\0\0\0\x18": ">", b"\0\0\0\x30": ">"}.get(data[:4])
+    found = {}
+    try:
+        for name, shape, kind, columns in _ascii(data) if order is None else _binary(data, order):
+            rows, cols, values = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0)]
+            for column, row, string in columns:
+                own = string if kind < 3 else string.view(complex)
+                rows.append(np.arange(row - 1, row - 1 + len(own)))
+                cols.append(np.full(len(own), column - 1))
+                values.append(own)
+            entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(cols))
+            found[name] = sp.csr_matrix(sp.coo_matrix(entries, shape=shape))
+    except (ValueError, IndexError, StopIteration, OverflowError, RuntimeError):
+        raise ValueError(f"{path.name} is no OUTPUT4 file, or ends early: export it again with OUTPUT4") from None
+    if not found:
+        raise ValueError(f"{path.name} holds no matrix: export it again with OUTPUT4")
+    return found
+
+
+def _binary(data: bytes, order: str) -> Iterator[Matrix]:
+    """Matrices of Fortran records, with words of four or of eight bytes."""
+    at = 0
+    word = 4 if data[0] + data[3] == 24 else 8
+    integers = np.dtype(f"{order}i{word}")
+
+    def record() -> bytes:
+        nonlocal at
+        size = int(np.frombuffer(data, f"{order}i4", 1, at)[0])
+        if size < 0 or data[at : at + 4] != data[at + 4 + size : at + 8 + size]:
+            raise ValueError("a record without its end")
+        at += 8 + size
+        return data[at - 4 - size : at - 4]
+
+    def columns(n_column: int, real: np.dtype, big: bool) -> Iterator[Column]:
+        while True:
+            body = record()
+            column, row, count = (int(i) for i in np.frombuffer(body, integers, 3))
+            if column > n_column:
+                return
+            place = 3 * word
+            end = place + count * word
+            if len(body) < end:
+                raise ValueError("a column that is shorter than announced")
+            if row > 0:
+                yield column, row, np.frombuffer(body[place:end], real).astype(float)
+                continue
+            while place < end:
+                head = np.frombuffer(body, integers, 2 if big else 1, place).astype(int)
+                length, row = _string(*head)
+                place += len(head) * word
+                yield column, row, np.frombuffer(body[place : place + length * word], real).astype(float)
+                place += length * word
+
+    while at < len(data):
+        head = record()
+        n_column, n_row, _, kind = (int(i) for i in np.frombuffer(head, integers, 4))
+        name = head[4 * word :].decode("ascii", "replace").replace(" ", "").strip("\0")
+        real = np.dtype(f"{order}f{8 if word == 8 or kind in (2, 4) else 4}")
+        yield name.upper(), (abs(n_row), n_column), kind, columns(n_column, real, _is_big(n_row))
+
+
+def _ascii(data: bytes) -> Iterator[Matrix]:
+    """Matrices of fixed fields: eight columns for whole numbers, the width of the file's own format for reals."""
+    lines = iter(data.decode("ascii", "replace").splitlines())
+
+    def reals(count: int, per_line: int, width: int) -> np.ndarray:
+        taken = [next(lines) for _ in range(-(-count // per_line))]
+        words = [line[i : i + width] for line in taken for i in range(0, min(per_line * width, len(line)), width)]
+        if len(words) < count:
+            raise ValueError("a column that is shorter than announced")
+        return np.array([number(word.strip()) for word in words[:count]])
+
+    def columns(n_column: int, words: int, big: bool, layout: tuple[int, int]) -> Iterator[Column]:
+        while True:
+            line = next(lines)
+            column, row, count = (int(line[i : i + 8]) for i in (0, 8, 16))
+            if column > n_column:
+                reals(1, *layout)
+                return
+            if row > 0:
+                yield column, row, reals(count, *layout)
+                continue
+            while count > 0:
+                line = next(lines)
+                head = [int(line[:8]), int(line[8:16])] if big else [int(line)]
+                length, row = _string(*head)
+                count -= length + len(head)
+                yield column, row, reals(length // words, *layout)
+
+    for line in lines:
+        if not line.strip():
+            continue
+        n_column, n_row, _, kind = (int(line[i : i + 8]) for i in (0, 8, 16, 24))
+        layout = re.search(r"(\d*)[ED](\d+)\.", line[40:].upper())
+        sizes = (int(layout[1] or 1), int(layout[2])) if layout else (5, 16)
+        words = 2 if kind in (2, 4) else 1
+        name = line[32:40].strip().upper()
+        yield name, (abs(n_row), n_column), kind, columns(n_column, words, _is_big(n_row), sizes)
+
+
+def _is_big(n_row: int) -> bool:
+    return n_row < 0 or n_row > 65535
+
+
+def _string(first: int, row: int | None = None) -> tuple[int, int]:
+    """Length in words and first row of a string, from its one packed word, or from its two of a BIGMAT."""
+    length, row = (first - 1, row) if row is not None else ((first >> 16) - 1, first & 65535)
+    if length < 1:
+        raise ValueError("a string without length")
+    return length, row
+
+
+def write_op4(path: Path, matrices: Mapping[str, np.ndarray]) -> None:
+    """Write dense matrices (m, n), real or complex, as a binary OUTPUT4 file in double precision, bit for bit.
+
+    Raises  ValueError for a name that Nastran does not take
+    """
+    with path.open("wb") as file:
+
+        def record(words: list[int], body: bytes) -> None:
+            mark = np.int32(4 * len(words) + len(body)).astype("<i4").tobytes()
+            file.write(mark + np.array(words, "<i4").tobytes() + body + mark)
+
+        for name, matrix in matrices.items():
+            if not re.fullmatch(r"[A-Z][A-Z0-9]{0,7}", name):
+                raise ValueError(f"{name} is no name for Nastran: a letter and up to seven letters or digits")
+            n_row, n_column = matrix.shape
+            square = n_row == n_column and np.array_equal(matrix, matrix.T)
+            form = 6 if square else 1 if n_row == n_column else 2
+            whole = np.asarray(matrix, complex if np.iscomplexobj(matrix) else float)
+            record([n_column, n_row, form, 4 if np.iscomplexobj(whole) else 2], f"{name:8s}".encode())
+            for k, column in enumerate(whole.T, start=1):
+                body = np.ascontiguousarray(column).astype(whole.dtype.newbyteorder("<")).tobytes()
+                record([k, 1, len(body) // 4], body)
+            record([n_column + 1, 1, 2], np.array([1.0], "<f8").tobytes())
+
+
+def holds_dmig(path: Path) -> bool:
+    """Whether a text has DMIG entries: near its beginning, or anywhere where its ending is that of bulk data."""
+    with path.open(encoding="ascii", errors="replace") as stream:
+        whole = path.suffix.lower() in DECKS
+        return any(line[:4].upper() == "DMIG" for k, line in enumerate(stream) if whole or k < 50)
+
+
+def read_dmig(path: Path) -> dict[str, Callable[[], tuple[sp.csr_matrix, Labels]]]:
+    """The matrices of DMIG entries by name, each with what reads it: matrix and (grid, component) of its rows.
+
+    Raises  ValueError: an entry that contradicts itself; what reads one also for rectangular and complex matrices
+    Source  MSC Nastran, Quick Reference Guide, bulk data entry DMIG
+    """
+    heads: dict[str, list[str]] = {}
+    columns: dict[str, list[list[str]]] = {}
+    for fields in _dmig_entries(path):
+        name = fields[0].upper()
+        if fields[1].strip() == "0":
+            heads[name] = fields
+        elif name in heads:
+            columns.setdefault(name, []).append(fields)
+        else:
+            raise ValueError(f"{path.name} has columns of DMIG {name} before its first entry, DMIG {name} 0: repair it")
+    return {name: partial(_square, name, head, columns.get(name, []), path) for name, head in heads.items()}
+
+
+def _dmig_entries(path: Path) -> Iterator[list[str]]:
+    """Fields of each DMIG entry, continuations joined, in small, large and free form."""
+    fields: list[str] | None = None
+    for line in path.read_text(encoding="ascii", errors="replace").splitlines():
+        line = line.split("$")[0].rstrip()
+        if not line:
+            continue
+        if "," in line:
+            head, *own = [word.strip() for word in line.split(",")]
+            own = (own + [""] * 8)[:8] if "*" not in head else (own + [""] * 4)[:4]
+        else:
+            line = line.expandtabs(8)
+            head = line[:8].strip()
+            width = 16 if "*" in head else 8
+            own = [line[i : i + width].strip() for i in range(8, 72, width)]
+        if head[:1] in ("", "+", "*"):
+            if fields is not None:
+                fields += own
+            continue
+        if fields is not None:
+            yield fields
+        fields = own if head.rstrip("*").upper() == "DMIG" else None
+    if fields is not None:
+        yield fields
+
+
+def _square(name: str, head: list[str], columns: list[list[str]], path: Path) -> tuple[sp.csr_matrix, Labels]:
+    """A square DMIG matrix; of a symmetric one either triangle is given."""
+    where = f"DMIG {name} of {path.name}"
+    form, kind = ([*head, "", ""][2] or "6"), ([*head, "", "", ""][3] or "1")
+    if form not in ("1", "6"):
+        raise ValueError(f"{where} has form {form}: only square (1) and symmetric (6) matrices are read")
+    if kind not in ("1", "2"):
+        raise ValueError(f"{where} has type {kind}: real numbers are needed (1 or 2)")
+    pairs: list[tuple[tuple[int, int], tuple[int, int]]] = []
+    values: list[float] = []
+    try:
+        for fields in columns:
+            column = int(fields[1]), int(fields[2] or 0)
+            for k in range(4, len(fields) - 2, 4):
+                if fields[k]:
+                    pairs.append(((int(fields[k]), int(fields[k + 1] or 0)), column))
+                    values.append(number(fields[k + 2]))
+    except (ValueError, IndexError):
+        raise ValueError(f"{where} has fields that are not numbers: export it again") from None
+    if not pairs:
+        raise ValueError(f"{where} has no entries: export it again")
+    if len({frozenset(pair) if form == "6" else pair for pair in pairs}) < len(pairs):
+        raise ValueError(f"{where} gives an entry twice: export it again")
+    labels = tuple(sorted({label for pair in pairs for label in pair}))
+    place = {label: k for k, label in enumerate(labels)}
+    rows, cols = np.array([[place[row], place[column]] for row, column in pairs]).T
+    matrix = sp.coo_matrix((values, (rows, cols)), shape=(len(labels),) * 2).tocsr()
+    if form == "6":
+        matrix = (matrix + matrix.T - sp.diags(matrix.diagonal())).tocsr()
+    return matrix, labels

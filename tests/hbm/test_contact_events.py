@@ -1,0 +1,131 @@
+"""Transitions of any law located from its own steps: beside the closed forms of laws that locate them themselves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numba
+import numpy as np
+import pytest
+
+from tests.helpers.contact_draws import HARMONICS, LOCATED, draw
+from tests.helpers.verification_models import oscillator, slab
+from tribodyn.fem.interface import ContactInterface
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.contact import events
+from tribodyn.hbm.contact import law as contact_law
+from tribodyn.hbm.contact.joint import Joint, joint_transitions
+from tribodyn.hbm.contact.law import STICKS, ContactParameters
+from tribodyn.hbm.continuation.methods import arc_length
+from tribodyn.hbm.excitation import Excitation
+from tribodyn.hbm.harmonics import HarmonicBasis
+
+CLOSED_FORMS = [(name, c) for name, c in LOCATED if contact_law.load(name).__name__.rsplit(".", 1)[-1] != "rough"]
+
+OWN = '''
+"""A law of one's own that has its steps alone."""
+from dataclasses import dataclass
+from tribodyn.declare import number
+from tribodyn.hbm.contact.laws.{name} import COMPONENTS, n_state, step
+'''
+FRICTION = '''
+@dataclass(frozen=True)
+class Parameters:
+    friction: float = number("", low=0.0)
+    """Coulomb coefficient."""
+'''
+
+
+@pytest.mark.parametrize(("name", "components"), CLOSED_FORMS, ids=lambda v: v if isinstance(v, str) else "".join(v))
+@pytest.mark.parametrize("harmonics", HARMONICS, ids=str)
+def test_forces_and_jacobians_are_those_of_the_closed_form(name, components, harmonics):
+    law, basis = contact_law.load(name), HarmonicBasis(harmonics, 16, "located")
+    x, parameters, memory = draw(law, components, basis, 40, seed=7)
+    exact = law.located(x, parameters, memory, basis, True)
+    found = events.cycle(law, x, parameters, memory, basis, True)
+    size = np.abs(exact.force).max()
+    np.testing.assert_allclose(found.force, exact.force, atol=1e-10 * size)
+    np.testing.assert_allclose(found.jacobian, exact.jacobian, atol=2e-5 * np.abs(exact.jacobian).max())
+    assert (found.status == exact.status).mean() > 0.95  # but where a transition merely grazes
+    alone = events.cycle(law, x, parameters, memory, basis, False)
+    np.testing.assert_allclose(alone.force, exact.force, atol=1e-10 * size)
+    assert alone.jacobian is None
+
+
+@numba.njit
+def two_slopes(x, s, p, f, dfx, dfs, dsx, dss):
+    """A spring that is three times as stiff beyond a limit on either side, and says nothing about it."""
+    beyond = max(abs(x[0]) - 0.4, 0.0)
+    f[0] = p[0] * (x[0] + 2.0 * beyond * (1.0 if x[0] > 0.0 else -1.0))
+    dfx[0, 0] = p[0] * (3.0 if beyond > 0.0 else 1.0)
+    return STICKS
+
+
+def test_a_kink_that_only_the_slope_tells_is_located():
+    law, basis = SimpleNamespace(step=two_slopes), HarmonicBasis((0, 1, 2, 3), 16, "located")
+    x = np.random.default_rng(5).normal(size=(20, 1, basis.n_coeff)) * 0.4
+    parameters = ContactParameters.of(("n",), np.full((20, 1), 2.0))
+    found = events.cycle(law, x, parameters, np.zeros((20, 0)), basis)
+    edges = np.linspace(0, 2 * np.pi, 200_001)
+    t = 0.5 * (edges[1:] + edges[:-1])
+    phi = basis.functions(t)
+    motion = x[:, 0] @ phi.T
+    beyond = np.maximum(np.abs(motion) - 0.4, 0) * np.sign(motion)
+    exact = 2.0 * (motion + 2 * beyond) @ phi / len(t) * np.where(np.arange(basis.n_coeff) > 0, 2, 1)
+    np.testing.assert_allclose(found.force[:, 0], exact, atol=1e-8)
+    step = 1e-6 * np.random.default_rng(6).normal(size=x.shape)
+    ahead, back = (events.cycle(law, x + e * step, parameters, np.zeros((20, 0)), basis).force for e in (1, -1))
+    slope = (found.jacobian @ step.reshape(20, -1, 1))[..., 0]
+    np.testing.assert_allclose(slope, (ahead - back)[:, 0] / 2, atol=1e-11)
+
+
+def own_file(folder: Path, name: str) -> str:
+    path = folder / f"my_{name}.py"
+    path.write_text(OWN.format(name=name) + (FRICTION if name == "jenkins" else ""))
+    return str(path)
+
+
+def stop(law: str) -> HarmonicBalance:
+    """A mass that hits an elastic stop, twenty times stiffer than its spring, at less than its resonant amplitude."""
+    parameters = ContactParameters.of(("n",), [[20.0]], gap=1.0)
+    return HarmonicBalance.of(
+        oscillator(1.0, 1.0, 0.02, "n"),
+        Joint("contact", law, parameters),
+        HarmonicBasis((0, 1, 2, 3, 4, 5), 128, joint_transitions(Joint("contact", law, parameters))),
+        Excitation.of(harmonic={1: {"force": 0.1}}),
+        10.0,
+    )
+
+
+def lifting(law: str) -> HarmonicBalance:
+    """Four pairs with friction that slide, rock and lift: six folds within the first resonance."""
+    model = slab(2, 2, ratio=0.01)
+    assert isinstance(model.interface, ContactInterface)
+    parameters = ContactParameters.of(("t1", "t2", "n"), model.interface.stiffness(4e6, 6e6), friction=0.3)
+    joint = Joint("contact", law, parameters)
+    excitation = Excitation.of({"press": 60.0}, {1: {"rock": 2.0, "shake": 2.0 / 3}})
+    return HarmonicBalance.of(model, joint, HarmonicBasis((0, 1, 2), 128, joint_transitions(joint)), excitation, 8e3)
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "ends"), [(stop, "unilateral", (0.5, 2.5)), (lifting, "jenkins", (4800.0, 6000.0))]
+)
+def test_a_law_of_ones_own_gives_the_same_curve_from_both_ends(make, name, ends, tmp_path):
+    mine, theirs = make(own_file(tmp_path, name)), make(name)
+    assert mine.basis.transitions == "located"
+    for start, end in (ends, ends[::-1]):
+        own, exact = (arc_length.follow(balance, start, end) for balance in (mine, theirs))
+        assert str(own.end) == str(exact.end)  # reached, or turned back where the stop is within a loop of the curve
+        assert len(own.folds) == len(exact.folds) >= 1
+        np.testing.assert_allclose(own.omega[list(own.folds)], exact.omega[list(exact.folds)], rtol=1e-6)
+        output = next(iter(mine.model.system.outputs))
+        assert own.amplitude(output).max() == pytest.approx(exact.amplitude(output).max(), rel=1e-3)  # of its points
+        harmonic = np.hypot(*own.response[:, 0, theirs.basis.order == 1].T)
+        for omega, contact, amplitude in zip(own.omega, own.contact, harmonic, strict=True):
+            x = contact.reshape(theirs.contact.n_pair, -1, contact.shape[-1])
+            found = theirs.evaluate(omega, x, jacobian=False)
+            assert newton.relative_residual(found, theirs.x_lin(omega)) < 1e-6
+            y = theirs.outputs(found)[0]
+            assert np.hypot(*y[theirs.basis.order == 1]) == pytest.approx(amplitude, rel=1e-6)
