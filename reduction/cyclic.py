@@ -257,12 +257,12 @@ def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:
 
 
 def stuck_ritz(
-    system: SecondOrderSystem, B: np.ndarray, springs: np.ndarray, n_modes: int = LIMITS.ritz_modes
+    system: SecondOrderSystem, B: np.ndarray, springs: np.ndarray, n_modes: int | None = None
 ) -> np.ndarray:
     """Basis (n, m) of a dense system: modes with its contact stuck, and its static shapes under a unit force on every
     contact row, under every load and under every output.
 
-    B : (n_contact, n) contact map; springs : (n_pair, n_component) [N/m]
+    B : (n_contact, n) contact map; springs : (n_pair, n_component) [N/m]; n_modes : `LIMITS.ritz_modes` by default
     Statics are exact, and what is left out of the motion of the contact falls with the fourth power of the frequency
     over that of the first mode left out
     Raises  LinAlgError where the system can move with its contact stuck, or is unstable then
@@ -270,7 +270,7 @@ def stuck_ritz(
     """
     K = stuck_stiffness(system.stiffness, B, springs)
     K = (K + K.conj().T) / 2
-    n = len(K)
+    n, n_modes = len(K), LIMITS.ritz_modes if n_modes is None else n_modes
     factor = sla.cho_factor(K)
     nu, phi = sla.eigh(system.mass, K, subset_by_index=(max(n - n_modes, 0), n - 1))  # of unit energy
     forces = np.column_stack(
