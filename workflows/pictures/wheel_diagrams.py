@@ -140,7 +140,7 @@ def campbell(
             axes.plot(rpm, abs(order) * speeds, ":", color=color, lw=1.2)
             end = min(1.0, top / (abs(order) * speeds[-1]))
             axes.annotate(
-                f"EO {abs(order)}", (end * rpm[-1], end * abs(order) * speeds[-1]), (-4, -9),
+                f"EO {abs(order)}", (end * rpm[-1], end * abs(order) * speeds[-1]), (-8, 3),
                 textcoords="offset points", ha="right", fontsize=9, color=color,
             )  # fmt: skip
         at = [(60 * speed, abs(order) * speed) for order, all_of in critical.items() for speed in all_of]
