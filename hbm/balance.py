@@ -23,6 +23,7 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.krylov import gmres
 from tribodyn.hbm.linear import pair_slopes
 from tribodyn.hbm.linear.compliance import CompliancePoint, ContactCompliance
+from tribodyn.hbm.linear.speed_line import LineCompliance, compliance_of
 from tribodyn.reduction.model import ReducedModel
 
 ROUNDING = 1e-13  # of the work that a pair's force and motion could do at most
@@ -101,7 +102,7 @@ class HarmonicBalance:
         if memory is None:
             memory = np.zeros((contact.n_pair, contact.n_state))
         springs = contact.stiffness if model.residual is None else model.residual.stiffness
-        compliance = ContactCompliance(model, springs, basis, excitation, omega_max)
+        compliance = compliance_of(model, springs, basis, excitation, omega_max)
         return cls(model, contact, basis, excitation, omega_max, memory, compliance)
 
     @property
@@ -143,6 +144,13 @@ class HarmonicBalance:
         basis = replace(self.basis, harmonics=tuple(harmonics))
         self.excitation.check(basis, {name: None for _, name in self.excitation.loads})
         return replace(self, basis=basis, compliance=self.compliance.restricted(basis))
+
+    def standing(self, omega: float) -> HarmonicBalance:
+        """The same problem at the speed that belongs to a frequency [rad/s], whatever frequency is asked for then."""
+        if not isinstance(self.compliance, LineCompliance):
+            return self
+        model, compliance = self.compliance.there(omega)
+        return replace(self, model=model, compliance=compliance)
 
     def at(self, omega: float) -> CompliancePoint:
         """The linear side at one frequency."""

@@ -10,7 +10,7 @@ Source  Tamatam 2021, eq. 3.12 to 3.22
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -25,6 +25,9 @@ from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ModelInfo, ReducedModel
+
+WaveIndex = Callable[[int], tuple[SecondOrderSystem, np.ndarray, np.ndarray]]
+"""Small system, contact map and way back T (q = T z) of a harmonic index."""
 
 
 @dataclass(frozen=True)
@@ -48,23 +51,27 @@ def reduce_sector(
     both = replace(sector.interface, B=vstack([sector.interface.B, sector.left], format="csr"))
     seams = np.concatenate([sector.seam_right.ravel(), sector.seam_left.ravel()])
     model = craig_bampton(sector.system, both, n_modes, cutoff, extra_masters=seams.tolist(), attached=attached)
-    masters = model.info.master_dofs
-    right, left = np.split(np.asarray(model.interface.B), 2)
-    small = replace(
-        sector,
-        system=model.system,
-        interface=replace(sector.interface, B=right),
-        left=left,
-        seam_right=np.searchsorted(masters, sector.seam_right),
-        seam_left=np.searchsorted(masters, sector.seam_left),
-        prestress=None,
-    )
     assert model.basis is not None
     info = replace(model.info, joints=dict(sector.joints))
     if sector.prestress is not None:
         rest = sector.prestress
         info = replace(info, prestress_residual=rest.residual, prestress_rotation=rest.rotation)
-    return ReducedSector(small, model.basis, info)
+    return in_coordinates(sector, model.system, model.basis, info)
+
+
+def in_coordinates(sector: Sector, system: SecondOrderSystem, basis: np.ndarray, info: ModelInfo) -> ReducedSector:
+    """A full sector as the system it is in the coordinates of a basis (n_full, n), its masters first."""
+    masters = info.master_dofs
+    small = replace(
+        sector,
+        system=system,
+        interface=replace(sector.interface, B=np.asarray(sector.interface.B @ basis)),
+        left=np.asarray(sector.left @ basis),
+        seam_right=np.searchsorted(masters, sector.seam_right),
+        seam_left=np.searchsorted(masters, sector.seam_left),
+        prestress=None,
+    )
+    return ReducedSector(small, basis, info)
 
 
 def nodal_diameters(
@@ -102,14 +109,21 @@ def travelling_wave(
         are the relative displacements, then accessories, then the rest; `reconstruct` takes the harmonic. One object
         serves all harmonics of one index
     """
-    wave = _Wave(reduced, engine_order, _Indices(reduced, cutoff, springs))
-    system, B = wave.model(1)
-    info = replace(_shared_info(reduced), engine_order=engine_order)
+    model = wave_of(reduced, engine_order, WaveIndices(reduced, cutoff, springs))
     try:
+        system = model.system
         omega, _ = hermitian_modes(system.stiffness, system.mass, min(LIMITS.reported_modes, system.n_dof))
-        info = replace(info, free_frequency=omega / (2 * np.pi))
+        model = replace(model, info=replace(model.info, free_frequency=omega / (2 * np.pi)))
     except StaticDivergence:  # rotation carries away what only the contact holds
         pass
+    return model
+
+
+def wave_of(reduced: ReducedSector, engine_order: int, index_of: WaveIndex) -> ReducedModel:
+    """The model of a wave from the small system, contact map and way back of every harmonic index."""
+    wave = _Wave(reduced, engine_order, index_of)
+    system, B = wave.model(1)
+    info = replace(_shared_info(reduced), engine_order=engine_order)
     interface = replace(reduced.sector.interface, B=B)
     return ReducedModel(system, interface, None, info, wave.model, wave.basis, wave.at_index)
 
@@ -136,7 +150,7 @@ def _shared_info(reduced: ReducedSector) -> ModelInfo:
     )
 
 
-class _Indices:
+class WaveIndices:
     """Small system, contact map and way back T (q = T z) of each harmonic index, each made once."""
 
     def __init__(self, reduced: ReducedSector, cutoff: float | None, springs: np.ndarray | None = None):
@@ -180,7 +194,7 @@ class _Wave:
 
     reduced: ReducedSector
     engine_order: int
-    index_of: _Indices
+    index_of: WaveIndex
 
     def model(self, h: int) -> tuple[SecondOrderSystem, np.ndarray]:
         """Small system and contact map of harmonic h."""
@@ -242,11 +256,13 @@ def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:
     return S @ np.concatenate([right.conj().T, follow], axis=1), len(right) + len(accessories)
 
 
-def stuck_ritz(system: SecondOrderSystem, B: np.ndarray, springs: np.ndarray) -> np.ndarray:
+def stuck_ritz(
+    system: SecondOrderSystem, B: np.ndarray, springs: np.ndarray, n_modes: int | None = None
+) -> np.ndarray:
     """Basis (n, m) of a dense system: modes with its contact stuck, and its static shapes under a unit force on every
     contact row, under every load and under every output.
 
-    B : (n_contact, n) contact map; springs : (n_pair, n_component) [N/m]
+    B : (n_contact, n) contact map; springs : (n_pair, n_component) [N/m]; n_modes : `LIMITS.ritz_modes` by default
     Statics are exact, and what is left out of the motion of the contact falls with the fourth power of the frequency
     over that of the first mode left out
     Raises  LinAlgError where the system can move with its contact stuck, or is unstable then
@@ -254,9 +270,9 @@ def stuck_ritz(system: SecondOrderSystem, B: np.ndarray, springs: np.ndarray) ->
     """
     K = stuck_stiffness(system.stiffness, B, springs)
     K = (K + K.conj().T) / 2
-    n = len(K)
+    n, n_modes = len(K), LIMITS.ritz_modes if n_modes is None else n_modes
     factor = sla.cho_factor(K)
-    nu, phi = sla.eigh(system.mass, K, subset_by_index=(max(n - LIMITS.ritz_modes, 0), n - 1))  # of unit energy
+    nu, phi = sla.eigh(system.mass, K, subset_by_index=(max(n - n_modes, 0), n - 1))  # of unit energy
     forces = np.column_stack(
         [B.conj().T, *(v for v in system.loads.values()), *(np.conj(v) for v in system.outputs.values())]
     )

@@ -15,6 +15,8 @@ class ReductionLimits:
     turned_at_once : rows of the shapes that are turned in place; memory only
     most_modes : below a cutoff: dense matrices of more modes, and their eigensolve, take minutes
     many : coordinates of a wave from which on its damping and compliance cost more than `stuck_ritz`
+    many_along, modes_along : the same along a range of speeds, where these are computed anew at every one
+    speeds_apart : relative error of frequencies between the speeds of a line
     ritz_modes : modes of `stuck_ritz`, as many as the compliance is expanded in at the most
     clusters : of pairs, each with a uniform traction for every component; docs/theory/residual_flexibility.md
     power_steps, power_vectors : of the iteration that measures how much flexibility is left out
@@ -33,6 +35,9 @@ class ReductionLimits:
     turned_at_once: int = 4096
     most_modes: int = 1000
     many: int = 1000
+    many_along: int = 300
+    modes_along: int = 48
+    speeds_apart: float = 1e-6
     ritz_modes: int = 192
     clusters: int = 64
     power_steps: int = 6

@@ -30,6 +30,7 @@ class ModelInfo:
     n_interface_modes, interface_omitted_frequency : modes of the boundary, and the first one left out [Hz]
     n_sectors, engine_order : of a wheel
     prestress_residual, prestress_rotation : of a wheel that turns, see fem.prestress.Prestress
+    line_error : along speeds, largest relative error of the lowest stuck frequencies that interpolation makes
     joints : joint -> its pairs; reaction : what prescribed coordinates need, see `prescribed.prescribe`
     """
 
@@ -50,6 +51,7 @@ class ModelInfo:
     engine_order: int | None = None
     prestress_residual: float | None = None
     prestress_rotation: float | None = None
+    line_error: float | None = None
     joints: Mapping[str, slice] = field(default_factory=dict)
     reaction: StaticReaction | None = None
 
@@ -74,6 +76,7 @@ class ReducedModel:
     harmonic_basis : harmonic -> (n_full, n) basis where the coordinates of a harmonic are its own
     per_index : of a travelling wave, index -> (system, B) of any wave of the wheel, real for 0 and N/2; matrices of
         index -j are the conjugates of those of j
+    along : of a wheel whose speed goes with the frequency, frequency [rad/s] -> the model there
     residual : static contact flexibility that the coordinates leave out, None where they hold every contact DOF
     """
 
@@ -85,6 +88,7 @@ class ReducedModel:
     harmonic_basis: Callable[[int], np.ndarray] | None = None
     per_index: Callable[[int], tuple[SecondOrderSystem, np.ndarray]] | None = None
     residual: ResidualFlexibility | None = None
+    along: Callable[[float], ReducedModel] | None = None
 
     def at_harmonic(self, h: int) -> tuple[SecondOrderSystem, np.ndarray]:
         """System and contact map (n_pair * n_component, n) that harmonic h sees."""
@@ -157,7 +161,8 @@ class ReducedModel:
             system, B = any_wave(index)
             return damped(system, B), B
 
-        return replace(self, system=first, per_harmonic=per_harmonic, per_index=per_index)
+        whole, along = replace(self, system=first, per_harmonic=per_harmonic, per_index=per_index), self.along
+        return whole if along is None else replace(whole, along=lambda omega: along(omega).with_damping(make))
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.linear.compliance import ContactCompliance
+from tribodyn.hbm.linear.speed_line import compliance_of
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.threads import single
 
@@ -167,7 +168,7 @@ def widened(balance: HarmonicBalance, highest: int, error: float | None = None) 
     known = _WIDE.get(own)
     serves = known is not None and known.basis.harmonics[-1] >= top and (known.wanted or 0.0) <= (error or 0.0)
     if known is None or not serves or not np.array_equal(known.k, springs):
-        known = _WIDE[own] = ContactCompliance(balance.model, springs, basis, excitation, balance.omega_max, error)
+        known = _WIDE[own] = compliance_of(balance.model, springs, basis, excitation, balance.omega_max, error)
     return replace(balance, basis=basis, excitation=excitation, compliance=known.restricted(basis), at_rest=None)
 
 

@@ -22,7 +22,7 @@ import scipy.linalg as sla
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.homotopy import DECADES, lead
-from tribodyn.hbm.linear.compliance import ContactCompliance
+from tribodyn.hbm.linear.speed_line import compliance_of
 from tribodyn.hbm.newton import NewtonOptions, Solution
 from tribodyn.hbm.outcome import CONVERGED
 from tribodyn.hbm.threads import single
@@ -116,7 +116,7 @@ def _softened(balance: HarmonicBalance, level: float, other: HarmonicBalance | N
     reference = np.minimum(contact.stiffness, _of_the_body(balance)) if residual is None else residual.stiffness
     if other is not None and np.array_equal(other.reference_stiffness, reference.ravel()):
         return other.with_contact(contact)
-    compliance = ContactCompliance(balance.model, reference, balance.basis, balance.excitation, balance.omega_max)
+    compliance = compliance_of(balance.model, reference, balance.basis, balance.excitation, balance.omega_max)
     return replace(balance, contact=contact, compliance=compliance, at_rest=None)
 
 

@@ -114,7 +114,7 @@ class ContactCompliance:
     def restricted(self, basis: HarmonicBasis) -> ContactCompliance:
         """The same for fewer of the harmonics; the expansions are shared."""
         old = self.basis.harmonics
-        other = object.__new__(ContactCompliance)
+        other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
         other.basis = basis
         other._active, other._points = None, {}

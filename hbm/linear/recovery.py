@@ -17,6 +17,7 @@ def coordinates(
     Solves D_h q_h = F_h + B^H (k x - f), where the contact springs k, stuck and closed, are part of D_h so that a
     structure held by its contact alone is no exception
     """
+    balance = balance.standing(omega)
     basis, excitation = balance.basis, balance.excitation
     k = balance.reference_stiffness
     moved = displacement if excitation.base is None else displacement + balance.loaded(excitation.base)
@@ -47,6 +48,7 @@ def full_displacement(
 
     Of a cyclic part: of sector 0 in its own frame
     """
+    balance = balance.standing(omega)
     amplitudes = coordinates(balance, displacement, force, omega)
     harmonics = balance.basis.harmonics
     full = [balance.model.reconstruct(q, h) for h, q in zip(harmonics, amplitudes, strict=True)]

@@ -143,6 +143,7 @@ def stability(
     """
     if method not in ("hill", "floquet"):
         raise ValueError(f"no stability method '{method}': there are hill, floquet")
+    balance = balance.standing(state.omega)
     model = balance.model
     model.require_masters("stability")
     if method == "hill" and model.per_index is not None:

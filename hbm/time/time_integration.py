@@ -113,7 +113,7 @@ def integrate(
     Returns the last period, also where it is not periodic within max_periods, as its outcome then says
     Raises  ValueError for models with no equation of motion in time; IntegrationFailed
     """
-    options = options or Options()
+    options, balance = options or Options(), balance.standing(omega)
     whole, begin = _in_time(balance, omega, start, options)
     stepper = TimeStepper(whole, omega, options)
     motion = stepper.start_from(begin) if begin is not None else _rest(stepper)
@@ -130,7 +130,7 @@ def leave_alone(
     then are what a machine shows
     Raises  ValueError for models with no equation of motion in time; IntegrationFailed
     """
-    options = replace(options or Options(), accelerate=False)
+    options, balance = replace(options or Options(), accelerate=False), balance.standing(omega)
     whole, begin = _in_time(balance, omega, start, options)
     assert begin is not None
     stepper = TimeStepper(whole, omega, options)

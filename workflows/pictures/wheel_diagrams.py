@@ -2,7 +2,8 @@
 
 The SAFE diagram (Singh, Vargo, Schiffer and Dello, Texas A&M Turbomachinery Symposium, 1988) shows whether an engine
 order meets a mode in frequency and in shape: a wave of engine order k excites the nodal diameter |k - N round(k/N)| of
-N sectors alone.
+N sectors alone. An excitation that stands in space runs against the rotation, and so does what it excites up to N/2
+diameters; seen through the sectors, orders from N/2 to N run with it. Coriolis forces part the two.
 """
 
 from __future__ import annotations
@@ -22,7 +23,12 @@ from tribodyn.workflows.pictures.style import BLUE, GREY, INK, ORANGE, PAPER, RE
 Families = Mapping[str, np.ndarray]
 """Frequencies (n_diameter, family) [Hz] of the nodal diameters from 0 on, by the state of the contact."""
 
-STATES = {"free": ("o--", GREY, "contact free"), "stuck": ("o-", BLUE, "contact stuck")}
+STATES = {
+    "free": ("o--", GREY, "contact free"), "stuck": ("o-", BLUE, "contact stuck"),
+    "free, against": (".:", GREY, "free, against the rotation"),
+    "stuck, against": (".--", BLUE, "stuck, against the rotation"),
+}  # fmt: skip
+AGAINST = ", against"  # of a state: waves against the rotation, where they are others than those with it
 
 
 @dataclass(frozen=True)
@@ -45,23 +51,42 @@ def diameter_of(engine_order: int, n_sectors: int) -> int:
     return min(rest, n_sectors - rest)
 
 
-def crossings(frequency: np.ndarray, n_sectors: int, slow: float, fast: float) -> list[Crossing]:
-    """Where engine orders excite modes in a range of speeds, by engine order and family.
+def crossings(
+    frequency: np.ndarray,
+    n_sectors: int,
+    slow: float,
+    fast: float,
+    highest: int | None = None,
+    against: np.ndarray | None = None,
+) -> list[Crossing]:
+    """Where engine orders that stand in space excite modes in a range of speeds, by engine order and family.
 
     frequency : (n_diameter, family) of the nodal diameters from 0 on [Hz], taken as the same at all speeds of the range
-    slow, fast : ends of the range [Hz], slow above 0
+    slow, fast : ends of the range [Hz], slow above 0; highest : engine order, None for any
+    against : the same for waves against the rotation, where they differ
     """
     found: list[Crossing] = []
     if np.isnan(frequency).all():
         return found
-    for order in range(1, int(np.nanmax(frequency) / slow) + 1):
+    top = int(np.nanmax(frequency) / slow)
+    for order in range(1, (top if highest is None else min(top, highest)) + 1):
         diameter = diameter_of(order, n_sectors)
         if diameter >= len(frequency):
             continue
-        for family, hertz in enumerate(frequency[diameter]):
+        backward = against is not None and 2 * (order % n_sectors) <= n_sectors
+        for family, hertz in enumerate((against if backward else frequency)[diameter]):  # type: ignore[index]
             if slow <= hertz / order <= fast:
                 found.append(Crossing(order, diameter, family, float(hertz / order), float(hertz)))
     return found
+
+
+def meetings(families: Families, n_sectors: int, slow: float, fast: float) -> dict[str, list[Crossing]]:
+    """Modes that engine orders up to the number of sectors meet in a range of speeds [Hz], by state of the contact."""
+    return {
+        state: crossings(values, n_sectors, slow, fast, n_sectors, families.get(state + AGAINST))
+        for state, values in families.items()
+        if not state.endswith(AGAINST)
+    }
 
 
 def _top(families: Families) -> float:
@@ -82,6 +107,8 @@ def nodal_diameters(families: Families, scene: str = "") -> Figure:
 
 
 def _families(axes: Any, values: np.ndarray, style: str, color: str, label: str) -> None:
+    if np.isnan(values).all():
+        return
     for i, hertz in enumerate(values.T):
         axes.plot(np.arange(len(hertz)), hertz, style, color=color, ms=3.5, label=label if i == 0 else None)
 
@@ -93,27 +120,42 @@ def campbell(
     critical: Mapping[int, Sequence[float]],
     scene: str = "",
 ) -> Figure:
-    """Frequencies of the first mode of several engine orders' waves over the speed, with the lines of these orders.
+    """Frequencies of several engine orders' waves over the speed, families and directions, with the orders' lines.
 
-    speeds : (n_speed,) [Hz]; found : "free" and "stuck" (n_speed, n_order, family) [Hz], as studies.wheel.campbell
-    critical : engine order -> speeds [Hz] at which it meets its first stuck frequency
+    speeds : (n_speed,) [Hz]; found : "free" and "stuck" (n_speed, n_order, family) [Hz], as studies.wheel.campbell, and
+        "stuck, against" of the waves that run the other way, where these differ
+    critical : engine order -> speeds [Hz] at which it meets its stuck frequencies
     scene : its name, for the title
     """
     with axes_of(7.2, 4.8) as (figure, axes):
         rpm = 60 * speeds
-        axes.plot(rpm, found["free"][:, 0, 0], "--", color=GREY, label="free")
-        top = 1.3 * float(found["stuck"][:, :, 0].max())
+        if not np.isnan(found["free"]).all():
+            axes.plot(rpm, found["free"][:, 0], "--", color=GREY, label=_first("free", found["free"][:, 0]))
+        top = 1.08 * max(float(np.nanmax(found["stuck"])), *(s * abs(o) for o, at in critical.items() for s in at), 0.0)
         for i, (order, color) in enumerate(zip(orders, shades(len(orders)), strict=True)):
-            axes.plot(rpm, found["stuck"][:, i, 0], color=color, label=f"stuck, engine order {order}")
-            axes.plot(rpm, abs(order) * speeds, ":", color=color, lw=1)
-            for speed in critical.get(order, ()):
-                axes.plot(60 * speed, abs(order) * speed, "o", color=RED, ms=6, zorder=4)
-        axes.plot([], [], "o", color=RED, ms=6, label="critical speed")
+            own = found["stuck"][:, i]
+            axes.plot(rpm, own, color=color, label=_first(f"stuck, wave {order}", own))
+            if (other := found.get("stuck" + AGAINST)) is not None:
+                axes.plot(rpm, other[:, i], "--", color=color, lw=1, label=_first(f"stuck, wave {-order}", own))
+            axes.plot(rpm, abs(order) * speeds, ":", color=color, lw=1.2)
+            end = min(1.0, top / (abs(order) * speeds[-1]))
+            axes.annotate(
+                f"EO {abs(order)}", (end * rpm[-1], end * abs(order) * speeds[-1]), (-8, 3),
+                textcoords="offset points", ha="right", fontsize=9, color=color,
+            )  # fmt: skip
+        at = [(60 * speed, abs(order) * speed) for order, all_of in critical.items() for speed in all_of]
+        if at:
+            axes.plot(*np.transpose(at), "o", color=RED, ms=6, zorder=4, ls="none", label="critical speed")
         axes.set(xlabel="speed / rpm", ylabel="frequency / Hz", ylim=(0, top))
-        axes.set_title(named(scene, "Campbell diagram, first mode"))
+        axes.set_title(named(scene, "Campbell diagram"))
         axes.set_xlim(0, rpm[-1])
         figure.legend(loc="outside right upper", fontsize=9)
     return figure
+
+
+def _first(label: str, curves: np.ndarray) -> list[str]:
+    """Labels of curves (n, m) drawn at once: the first one's alone is in the legend."""
+    return [label, *["_"] * (curves.shape[1] - 1)]
 
 
 def safe(families: Families, n_sectors: int, slow: float, fast: float, scene: str = "") -> Figure:
@@ -127,24 +169,25 @@ def safe(families: Families, n_sectors: int, slow: float, fast: float, scene: st
     most = max(len(values) for values in families.values()) - 1
     top = _top(families)
     with axes_of(7.6, 5.2) as (figure, axes):
-        orders = np.arange(1, int(top / slow) + 2)
+        orders = np.arange(1, min(int(top / slow) + 1, n_sectors) + 1)
         places = np.array([diameter_of(int(order), n_sectors) for order in orders])
         there = places <= most
         for speed, style in ((slow, "-"), (fast, "--")):
-            label = f"engine orders at {60 * speed:.5g} rpm"
+            label = f"engine orders to {orders[-1]} at {60 * speed:.5g} rpm"
             axes.plot(
                 places[there], orders[there] * speed, style, color=ORANGE, lw=1, label=label, zorder=1,
             )  # fmt: skip
         axes.vlines(places[there], orders[there] * slow, orders[there] * fast, color=ORANGE, lw=5, alpha=0.35, zorder=1)
         for state, values in families.items():
             _families(axes, values, *STATES[state])
-        rings = [crossing for values in families.values() for crossing in crossings(values, n_sectors, slow, fast)]
-        axes.plot(
-            [m.diameter for m in rings], [m.frequency for m in rings], "o", ms=10, mfc="none", color=RED,
-            label=f"met by an engine order ({len(rings)})",
-        )  # fmt: skip
+        rings = [met for found in meetings(families, n_sectors, slow, fast).values() for met in found]
+        if rings:
+            axes.plot(
+                [m.diameter for m in rings], [m.frequency for m in rings], "o", ms=10, mfc="none", color=RED,
+                label=f"met by an engine order ({len(rings)})",
+            )  # fmt: skip
         for order, place in zip(orders[there], places[there], strict=True):
-            if order * fast < top and order <= max(n_sectors // 2, 1):
+            if order * fast < top:
                 axes.annotate(
                     f"{order}", (place, order * fast), (-9, 3), textcoords="offset points", ha="center", fontsize=8,
                     color=INK, bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 0.5, "alpha": 0.8},

@@ -216,6 +216,8 @@ def reduce_part(scene: MeshScene, part: Part) -> ReducedModel:
 
 def plain_model(scene: MeshScene, part: Part) -> ReducedModel:
     """The same, not damped and with nothing prescribed; of a wheel one wave of it."""
+    if scene.wheel is not None and scene.wheel.along_speed:
+        return sector.along_speed(scene, part)
     if scene.wheel is not None:
         small = sector.reduced(scene, sector.sector(scene, part))
         contact = ReducedModel(small.sector.system, small.sector.interface, info=small.info)

@@ -35,7 +35,9 @@ OF_STRESS = ("contact", "loads")  # ... but not where a wheel spins: its stress 
 def early_of(scene: PartScene) -> str:
     """What a part and its reduction are made of: equal texts, equal models."""
     spins = scene.wheel is not None and scene.wheel.speed > 0
-    late = {key: what for key, what in LATE.items() if not (spins and key in OF_STRESS)}
+    along = scene.wheel is not None and scene.wheel.along_speed  # its speeds are those of the response
+    own = (*(OF_STRESS if spins else ()), *(("response",) if along else ()))
+    late = {key: what for key, what in LATE.items() if key not in own}
     return json.dumps(scene.model_dump(mode="json", exclude=late), sort_keys=True)
 
 

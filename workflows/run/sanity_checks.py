@@ -38,7 +38,7 @@ class Usual:
     size : of the whole [m]; density : from foams to the heaviest metals [kg/m3]; young : from rubber to diamond [Pa]
     bent : largest displacement over the size that a linear model describes
     rigid : of the largest squared frequency, below which the lowest one is rounding
-    modes : whose resonance is checked
+    modes : whose resonance is checked; line_error : of frequencies between the speeds of an operating line
     """
 
     size: tuple[float, float] = (1e-4, 20.0)
@@ -47,6 +47,7 @@ class Usual:
     bent: float = 0.1
     rigid: float = 1e-12
     modes: int = 6
+    line_error: float = 1e-4
 
 
 USUAL = Usual()
@@ -86,6 +87,7 @@ def lines(file: SceneFile, model: Model) -> Iterator[str]:
         remarks += check_deflection(
             scene, reduced.system, lambda q: part.largest(reduced.reconstruct(q)), float(np.linalg.norm(size))
         )
+    remarks += check_speed(scene, model.reduced.info.line_error)
     if model.reduced.at_harmonic(1)[0].damping is None:
         remarks.append("there is no damping but that of friction: give [damping]")
     yield from (f"warning: {remark}" for remark in remarks)
@@ -138,6 +140,26 @@ def check_materials(materials: Mapping[str, Material]) -> list[str]:
                 'write it with its unit, such as "210 GPa"'
             )
     return remarks
+
+
+def check_speed(scene: MeshScene, line_error: float | None) -> list[str]:
+    """Remarks on a speed that does not excite the frequencies of the response, and on stress between speeds."""
+    wheel, (low, high) = scene.wheel, scene.response.frequency
+    if line_error is not None and line_error > USUAL.line_error:
+        return [
+            f"the stress of the wheel changes abruptly along its speeds: frequencies between those at which it was "
+            f"computed are right to {line_error:.1e} only; shorten the range"
+        ]
+    if wheel is None or not wheel.speed or not wheel.engine_order or wheel.sweep is not None:
+        return []
+    order = abs(wheel.engine_order)
+    if low <= order * wheel.speed <= high:
+        return []
+    return [
+        f"at {60 * wheel.speed:.5g} rpm engine order {order} excites {order * wheel.speed:.5g} Hz, not {low:.5g} to "
+        f"{high:.5g} Hz, which it does from {60 * low / order:.5g} to {60 * high / order:.5g} rpm: leave wheel.speed "
+        'out and set wheel.sweep = "speed", or set it to "frequency" if the speed is meant to stay'
+    ]
 
 
 def _free(system: SecondOrderSystem) -> bool:

@@ -30,8 +30,9 @@ from tribodyn.reduction.limits import LIMITS
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ModelInfo, ReducedModel
 from tribodyn.reduction.residual_flexibility import residual_flexibility
+from tribodyn.reduction.speed_line import SpeedLine, reduce_alike
 from tribodyn.workflows.run import joints, part_reduction
-from tribodyn.workflows.scene.schema import MeshScene, PartScene
+from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene, PartScene
 from tribodyn.workflows.scene.structure import StructureScene
 
 SEAM = ("cyclic_right", "cyclic_left")  # what a part calls the faces where its wheel is one piece
@@ -87,6 +88,51 @@ def reduced(scene: MeshScene, full: Sector) -> ReducedSector:
         if not speed:
             raise
         raise ValueError(f"at wheel.speed = {60 * speed:.6g} rpm {trouble}, or let it turn slower") from None
+
+
+def along_speed(scene: MeshScene, part: Part) -> ReducedModel:
+    """The model of the wheel's wave on its operating line, not damped: that of the speed in the middle, and `along`.
+
+    The sector is reduced at speeds that halve the intervals of their squares until the frequencies which the others
+    foretell at the newest one are right to `LIMITS.speeds_apart`, at most seven of them
+    Raises  ValueError where it cannot stand at one of them
+    """
+    wheel, (lowest, highest) = scene.wheel, scene.response.frequency
+    assert wheel is not None
+    worn = () if scene.wear is None else scene.wear.duties
+    places = [lowest, highest, *(duty.at.frequency for duty in worn if duty.at.frequency)]
+    low, high = (end(places) / abs(wheel.engine_order) for end in (min, max))
+    squares = low**2 + (high**2 - low**2) * np.array([0.0, 1.0, 0.5, 0.25, 0.75, 0.125, 0.875])
+    turning: list[Sector] = []
+    error = np.inf
+    for count, speed in enumerate(speeds := np.sqrt(squares).tolist(), start=1):
+        own = wheel.model_copy(update={"speed": speed, "sweep": None})
+        there = scene.model_copy(update={"wheel": own})
+        try:
+            turning.append(sector(there, part))
+            if count <= 3:
+                continue
+            reduction = scene.reduction
+            alike = reduce_alike(turning, reduction.modes, reduction.cutoff, distributed(scene, turning[0]))
+        except ValueError as trouble:
+            raise ValueError(f"at {60 * speed:.6g} rpm of the operating line {trouble}") from None
+        first = alike[0]
+        springs = joints.contact_stiffness(
+            scene, ReducedModel(first.sector.system, first.sector.interface, info=first.info)
+        )
+        line = SpeedLine(tuple(alike), tuple(speeds[:count]), wheel.engine_order, CENTRIFUGAL, wheel.speed, springs)
+        error = line.without_last.error(speed, alike[-1])
+        if error <= LIMITS.speeds_apart:
+            break
+    model = line(2 * np.pi * abs(wheel.engine_order) * wheel.speed)
+    rest = [one.prestress for one in turning if one.prestress is not None]
+    info = replace(
+        model.info,
+        prestress_residual=max(one.residual for one in rest),
+        prestress_rotation=max(one.rotation for one in rest),
+        line_error=error,
+    )
+    return replace(model, info=info, along=line)
 
 
 def spun(scene: MeshScene, part: Part, cut: Sector) -> Sector:

@@ -27,7 +27,7 @@ from tribodyn.workflows.scene.fields import (
 )
 from tribodyn.workflows.scene.loads import HarmonicLoad, Loads, Motion, Prescribed, SpringTable, StaticLoad
 from tribodyn.workflows.scene.own import folder_of
-from tribodyn.workflows.scene.sectors import FlowTable, Mistuning, WheelTable
+from tribodyn.workflows.scene.sectors import FlowTable, Mistuning, WheelTable, operating_line
 from tribodyn.workflows.scene.solution import (
     Damping,
     Harmonics,
@@ -169,6 +169,15 @@ class MeshScene(Scene):
             return data
         return {**data, **({"contacts": {**contacts, **found}} if several is contacts else found)}
 
+    @model_validator(mode="before")
+    @classmethod
+    def _operating_line(cls, data: Any) -> Any:
+        """A wheel whose speed goes with the frequency has the speed in the middle for its own."""
+        wheel, response = (data.get(name) if isinstance(data, dict) else None for name in ("wheel", "response"))
+        if not isinstance(wheel, dict) or not isinstance(response, dict):
+            return data
+        return {**data, **operating_line(wheel, response)}
+
     @property
     def other_speeds(self) -> tuple[float, ...]:
         """Speeds of the wheel [Hz] in duties of the mission, without that of the wheel itself."""
@@ -180,6 +189,11 @@ class MeshScene(Scene):
     def _speeds_of_a_wheel(self) -> MeshScene:
         if self.other_speeds and (self.wheel is None or not self.wheel.speed):
             raise ValueError("wear.mission has a speed: give the speed of the wheel too, in wheel.speed")
+        if self.other_speeds and self.wheel is not None and self.wheel.along_speed:
+            raise ValueError(
+                "wear.mission has a speed, but along an operating line the speed follows from the frequency of the "
+                'duty: leave it out, or set wheel.sweep = "frequency"'
+            )
         return self
 
     @model_validator(mode="after")

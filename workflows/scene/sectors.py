@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, StrictBool, StrictInt, model_validator
+from pydantic import Field, StrictBool, StrictInt, TypeAdapter, ValidationError, model_validator
 
 from tribodyn.workflows.scene.fields import Direction, Frequency, Length, Number, Table
 
@@ -28,10 +28,58 @@ class WheelTable(Table):
     """Right and left face where sectors are one piece; left out where only the contact couples them."""
     speed: Annotated[Frequency, Field(ge=0)] = 0.0
     """Speed of rotation: its centrifugal force is a static load, its stress stiffens, its frame softens and turns."""
+    sweep: Literal["speed", "frequency"] | None = None
+    """What the response is followed along: "speed", an operating line on which the frequency is the engine order times
+    the speed, stress and contact at rest those of every speed; or "frequency", at constant `speed`. "speed" where
+    `response.speed` is given, else "frequency"."""
     coriolis: StrictBool = True
     """Whether the Coriolis forces of the turning frame act: they part waves with the rotation from those against."""
 
+    @property
+    def along_speed(self) -> bool:
+        """Whether the response is followed along an operating line."""
+        return self.sweep == "speed"
 
+
+def operating_line(wheel: dict[str, Any], response: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """The tables [wheel] and [response] of a scene, not checked yet, with what an operating line fills in.
+
+    The frequency follows from `response.speed`, or the speeds from the frequency; the wheel's own speed is the one in
+    the middle. Raises ValueError where they contradict each other
+    """
+    order, speed, frequency = wheel.get("engine_order"), response.get("speed"), response.get("frequency")
+    sweep = wheel.get("sweep") or ("frequency" if speed is None else "speed")
+    if sweep != "speed":
+        if speed is not None:
+            raise ValueError('response.speed is for wheel.sweep = "speed": give response.frequency instead')
+        return {}
+    if order == 0:
+        raise ValueError(
+            'wheel.sweep = "speed": the frequency of engine order 0 does not go with the speed; set it to "frequency"'
+        )
+    try:
+        both = {"speed": speed, "frequency": frequency}
+        given = {key: RANGE.validate_python(value) for key, value in both.items() if value}
+        own = FREQUENCY.validate_python(wheel["speed"]) if "speed" in wheel else None
+        each = abs(int(order))  # type: ignore[arg-type]
+    except (ValidationError, TypeError, ValueError):
+        return {}  # reported where the key itself is read
+    if not given:
+        return {}
+    speeds = np.array(given["speed"] if "speed" in given else given["frequency"]) / (1 if "speed" in given else each)
+    if len(given) == 2 and not np.allclose(given["frequency"], each * speeds, rtol=1e-9):
+        raise ValueError("response.speed and response.frequency are both given: leave one of them out")
+    middle = float(speeds.mean())
+    if own and not np.isclose(own, middle, rtol=1e-9):
+        raise ValueError(
+            'wheel.speed is given, but with wheel.sweep = "speed" it follows from the response: leave it out'
+        )
+    hertz = given.get("frequency") or [float(each * s) for s in speeds]
+    return {"wheel": {**wheel, "sweep": "speed", "speed": middle}, "response": {**response, "frequency": hertz}}
+
+
+FREQUENCY = TypeAdapter(Frequency)
+RANGE = TypeAdapter(tuple[Frequency, Frequency])
 Spread = Annotated[Number, Field(ge=0, le=0.3)]
 
 

@@ -138,6 +138,8 @@ class PartResponse(Response, Output):
 
     others: dict[str, Output] = Field(default_factory=dict)
     """Displacements observed besides, by name."""
+    speed: tuple[Annotated[Frequency, Field(gt=0)], Annotated[Frequency, Field(gt=0)]] | None = None
+    """Range of speeds of a wheel's operating line, such as ["5000 rpm", "7000 rpm"], instead of `frequency`."""
 
 
 class Reduction(Table):

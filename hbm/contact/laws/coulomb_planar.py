@@ -2,23 +2,34 @@
 
     N = max(k_n (v - gap), 0),   T_c = k_c (u_c - w_c),   |T| <= mu N,   dw = dlambda T, dlambda >= 0
 
-The slider w creeps along the friction force, so friction opposes the slip velocity whatever the springs are. One time
-sample is one implicit step: T = T* / (1 + lambda k) componentwise from the trial T* = k (u - w), with |T| = mu N. For
+The slider w creeps along the friction force, so friction opposes the slip velocity whatever the springs are. One step
+in time is implicit: T = T* / (1 + lambda k) componentwise from the trial T* = k (u - w), with |T| = mu N. For
 k_1 = k_2 this is the radial return; for unequal springs it is the projection in the elastic metric (not the radial one
-in force space, whose slip is not parallel to friction). The error is of second order in the sample spacing along a
-line, of first order where the path turns: on a circle friction lags by half a sample, pi / n_samples rad.
-Source  Simo and Hughes 1998, chapter 3 (return mapping); Sanliturk and Ewins 1996 and Afzal et al. 2016 for k_1 = k_2.
+in force space, whose slip is not parallel to friction). On a circle friction lags by half a step.
+
+Cycles of equal springs take displacement and normal load as linear between samples and follow the slider exactly: where
+contact and slip begin is located, and a slider that is dragged on a leash of length r = mu N / k is a tractrix,
+    tan(theta / 2) falls by exp(-integral |du| / r),   theta between T and the motion,
+so that the error is of second order in the sample spacing. Those of unequal springs step implicitly, of first order
+where the path turns.
+Source  Simo and Hughes 1998, chapter 3 (return mapping); Sanliturk and Ewins 1996 and Afzal et al. 2016 for k_1 = k_2;
+tractrix of a varying leash ours.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from types import ModuleType, SimpleNamespace
+from typing import cast
 
 import numba
+import numpy as np
 
 from tribodyn.declare import number
-from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS
+from tribodyn.hbm.contact.aft import march
+from tribodyn.hbm.contact.law import SEPARATES, SLIPS, STICKS, ContactCycle, ContactParameters
+from tribodyn.hbm.harmonics import HarmonicBasis
 
 COMPONENTS = (("t1", "t2", "n"),)
 BY_SAMPLES = True
@@ -109,3 +120,162 @@ def _slip(creep, limit, w, p, f, dfx, dfs, dsx, dss):
             dfs[c, b] = -dfx[c, b]
             dsx[c, b] = f[c] * along + creep * dfx[c, b]
             dss[c, b] = (1.0 if b == c else 0.0) - dsx[c, b]
+
+
+def cycle(
+    x: np.ndarray, parameters: ContactParameters, memory: np.ndarray, basis: HarmonicBasis, jacobian: bool = True
+) -> ContactCycle:
+    """The periodic cycle at the samples of the basis, the slider followed exactly along the chords between them.
+
+    x : (n_pair, 3, n_coeff) [m]; memory : (n_pair, 2) slider positions at the start [m]
+    A pair that stays closed and below its limit at all samples is its springs
+    """
+    samples, k = basis.to_time(x), parameters.stiffness
+    pull = k[:, :2, None] * (samples[:, :2] - memory[..., None])
+    load = k[:, 2:] * (samples[:, 2] - parameters.gap[:, None])
+    limit = parameters.numbers["friction"][:, None] * load
+    moving = np.flatnonzero(~((load > 0) & (np.hypot(pull[:, 0], pull[:, 1]) <= limit)).all(axis=1))
+    force, status = k[..., None] * x, np.full(len(x), STICKS)
+    if basis.has_static:
+        force[:, :, 0] -= k * np.column_stack([memory, parameters.gap])
+    spring = np.repeat(k, x.shape[2], axis=1)
+    jac = spring[..., None] * np.eye(spring.shape[1]) if jacobian else None
+    start = np.concatenate([memory, samples[:, :, -1]], axis=1)[moving]  # where the first chord begins
+    law = cast(ModuleType, SimpleNamespace(step=chord))
+    found = march(law, x[moving], parameters.taken(moving), start, basis, jacobian)
+    force[moving], status[moving] = found.force, found.status
+    if jac is not None:
+        jac[moving] = found.jacobian
+    return ContactCycle(force, jac, status)
+
+
+@numba.njit(cache=True)
+def chord(x, s, p, f, dfx, dfs, dsx, dss):
+    """As `step`, from the displacement that the memory ends with, along a straight line; s = [w, displacement]."""
+    k, r = p[0], 0.0
+    if p[0] != p[1] or k == 0.0 or p[4] == 0.0 or x[2] <= p[3]:
+        bits = step(x, s, p, f, dfx, dfs, dsx, dss)
+    else:
+        r = p[4] * p[2] / k
+        f[2] = p[2] * (x[2] - p[3])
+        dfx[2, 2] = p[2]
+        bits = _dragged(x, s, k, r, p[3], f, dfx, dfs, dsx, dss)
+    for c in range(3):
+        s[2 + c] = x[c]
+        dsx[2 + c, c] = 1.0
+    return bits
+
+
+@numba.njit(cache=True)
+def _dragged(x, s, k, r, gap, f, dfx, dfs, dsx, dss):
+    """One chord that ends in contact, the leash r (v - gap) [m]; arguments as of `chord`."""
+    dx, dy, ax, ay = x[0] - s[2], x[1] - s[3], s[2] - s[0], s[3] - s[1]
+    before, after = r * (s[4] - gap), r * (x[2] - gap)
+    far = math.hypot(dx, dy)
+    if before <= 0.0:  # touches on the way, without shear
+        share = after / (after - before)
+        slips, where = share * far > after, 1.0 - share
+    else:
+        slips, where = _lets_go(ax, ay, dx, dy, before, after)
+        share = 1.0 - where
+    if before > 0.0 and not slips:
+        for c in range(2):
+            f[c] = k * (x[c] - s[c])
+            dfx[c, c], dfs[c, c], dss[c, c] = k, -k, 1.0
+        return STICKS
+    size = math.hypot(ax + where * dx, ay + where * dy)
+    for q in range(8):  # directions: x, y, v at the end; w and x, y, v at the beginning
+        ex, ey, ev, wx = _unit(q, 0), _unit(q, 1), _unit(q, 2), _unit(q, 3)
+        wy, bx, by, bv = _unit(q, 4), _unit(q, 5), _unit(q, 6), _unit(q, 7)
+        ddx, ddy, dax, day = ex - bx, ey - by, bx - wx, by - wy
+        d_before, d_after = r * bv, r * ev
+        if before <= 0.0:
+            d_share = (d_after - share * (d_after - d_before)) / (after - before)
+            if slips:
+                across = (dx * ddy - dy * ddx) / far**3
+                px, py = after * dx / far, after * dy / far
+                tx = d_after * dx / far - after * across * dy
+                ty = d_after * dy / far + after * across * dx
+            else:
+                px, py = share * dx, share * dy
+                tx, ty = d_share * dx + share * ddx, d_share * dy + share * ddy
+        else:
+            lash = before + where * (after - before)
+            gx, gy = dax + where * ddx, day + where * ddy
+            d_lash, d_where = d_before + where * (d_after - d_before), 0.0
+            hx, hy = (ax + where * dx) / size, (ay + where * dy) / size
+            if where > 0.0:
+                d_where = (d_lash - hx * gx - hy * gy) / (hx * dx + hy * dy - (after - before))
+                gx, gy, d_lash = gx + d_where * dx, gy + d_where * dy, d_lash + d_where * (after - before)
+            turn = (hx * gy - hy * gx) / size
+            px, py, tx, ty = _tractrix(
+                hx, hy, turn, dx, dy, ddx, ddy, far, share, -d_where, lash, d_lash, after, d_after
+            )
+        if q < 3:
+            dfx[0, q], dfx[1, q] = k * tx, k * ty
+            dsx[0, q], dsx[1, q] = ex - tx, ey - ty
+        else:
+            dfs[0, q - 3], dfs[1, q - 3] = k * tx, k * ty
+            dss[0, q - 3], dss[1, q - 3] = -tx, -ty
+    f[0], f[1] = k * px, k * py
+    s[0], s[1] = x[0] - px, x[1] - py
+    return SLIPS if slips else STICKS
+
+
+@numba.njit(cache=True)
+def _unit(q, i):
+    return 1.0 if q == i else 0.0
+
+
+@numba.njit(cache=True)
+def _lets_go(ax, ay, dx, dy, before, after):
+    """Whether a chord slips, and the share of it after which: stretch a + s d longer than before + s (after - before).
+
+    Once it slips it does so to the end, for the stretch only turns towards the motion
+    """
+    fall, least = before - after, 1e-12 * before * before
+    squared, rises = dx * dx + dy * dy - fall * fall, ax * dx + ay * dy + before * fall
+    beyond = ax * ax + ay * ay - before * before
+    if beyond > least or (beyond >= -least and rises > 0.0):
+        return True, 0.0
+    within = max(-beyond, 0.0)
+    root = rises * rises + squared * within
+    if root < 0.0 or (squared <= 0.0 and rises <= 0.0):
+        return False, 1.0
+    where = within / (rises + math.sqrt(root)) if rises > 0.0 else (math.sqrt(root) - rises) / squared
+    return where < 1.0, min(where, 1.0)
+
+
+@numba.njit(cache=True)
+def _tractrix(hx, hy, turn, dx, dy, ddx, ddy, far, share, d_share, lash, d_lash, after, d_after):
+    """Stretch at the end of a slip and its derivative in one direction; (hx, hy) : its sense at the beginning.
+
+    turn : derivative of the angle of that; the leash goes from lash to after while (dx, dy) times share is gone
+    """
+    cosine, sine, drawn, d_drawn, tilt = 1.0, 0.0, 0.0, 0.0, 0.0
+    nx, ny = hx, hy
+    if far > 0.0:
+        nx, ny = dx / far, dy / far
+        tilt = (nx * ddy - ny * ddx) / far  # derivative of the angle of the motion
+        z = (after - lash) / lash
+        if abs(z) > 1e-4:
+            mean = math.log1p(z) / z
+            slope = (1.0 / (1.0 + z) - mean) / z
+        else:
+            mean, slope = 1.0 - z / 2 + z * z / 3, -0.5 + 2 * z / 3 - 0.75 * z * z
+        drawn = share * far * mean / lash
+        d_far = nx * ddx + ny * ddy
+        d_drawn = (d_share * far + share * d_far) * mean / lash - drawn * d_lash / lash
+        d_drawn += share * far * slope / lash * (d_after - (1.0 + z) * d_lash) / lash
+        cosine, sine = nx * hx + ny * hy, nx * hy - ny * hx
+        turn -= tilt
+    decay = math.exp(-drawn)
+    low, high = decay * decay * (1.0 - cosine), 1.0 + cosine
+    if low + high == 0.0:
+        co, si, d_angle = cosine, sine, turn
+    else:
+        co, si = (high - low) / (high + low), 2 * decay * sine / (high + low)
+        d_angle = 2 * decay / (high + low) * turn - si * d_drawn
+    d_angle += tilt
+    px, py = co * nx - si * ny, co * ny + si * nx
+    return after * px, after * py, d_after * px - after * d_angle * py, d_after * py + after * d_angle * px

@@ -12,10 +12,13 @@ from matplotlib.figure import Figure
 
 from tribodyn.hbm.threads import limited
 from tribodyn.workflows.pictures import wheel_diagrams
+from tribodyn.workflows.pictures.wheel_diagrams import AGAINST
 from tribodyn.workflows.scene.fields import Frequency
 from tribodyn.workflows.scene.source import Overrides, Source, read_scene
 from tribodyn.workflows.studies.files import write_files
 from tribodyn.workflows.studies.wheels.wheel import build, campbell, critical_speeds
+
+FAMILIES = 3  # of a Campbell diagram, where more cross each other
 
 
 @dataclass(frozen=True)
@@ -39,18 +42,20 @@ class WheelModes:
 
     @property
     def critical(self) -> dict[int, list[float]]:
-        """Engine order -> speeds [Hz] at which it meets its first stuck frequency."""
+        """Engine order -> speeds [Hz] at which it meets its stuck frequencies."""
         if not len(self.speeds):
             return {}
-        first = self.waves["stuck"][:, :, 0]
-        return {order: critical_speeds(self.speeds, first[:, i], order) for i, order in enumerate(self.orders)}
+        stuck = self.waves["stuck"]
+        return {
+            order: sorted(at for family in stuck[:, i].T for at in critical_speeds(self.speeds, family, order))
+            for i, order in enumerate(self.orders)
+        }
 
     def meetings(self) -> dict[str, list[wheel_diagrams.Crossing]]:
         """Modes that engine orders meet in the range of speeds, by the state of the contact."""
         if self.slow is None or self.fast is None:
             return {}
-        slow, fast = self.slow, self.fast
-        return {s: wheel_diagrams.crossings(v, self.n_sectors, slow, fast) for s, v in self.families.items()}
+        return wheel_diagrams.meetings(self.families, self.n_sectors, self.slow, self.fast)
 
     def figures(self) -> dict[str, Figure]:
         """The pictures by name."""
@@ -80,11 +85,11 @@ class WheelModes:
             low, high = values[:, 0].min(), values[:, 0].max()
             said.append(f"first family, contact {state}: {low:.6g} to {high:.6g} Hz")
         for state, met in self.meetings().items():
-            said += [
-                f"engine order {m.engine_order} meets nodal diameter {m.diameter}, family {m.family + 1}, contact "
-                f"{state}, at {60 * m.speed:.5g} rpm, {m.frequency:.6g} Hz"
-                for m in met
-            ]
+            for order in sorted({m.engine_order for m in met}):
+                of_order = [m for m in met if m.engine_order == order]
+                each = [f"family {m.family + 1} at {60 * m.speed:.5g} rpm, {m.frequency:.5g} Hz" for m in of_order]
+                where = f"engine order {order}, nodal diameter {of_order[0].diameter}, contact {state}"
+                said.append(f"{where}: {', '.join(each)}")
         for order, at in self.critical.items():
             said.append(
                 f"engine order {order}: critical at {', '.join(f'{60 * s:.0f}' for s in at) or 'no'} rpm, stuck"
@@ -95,7 +100,7 @@ class WheelModes:
         """Write nodal_diameters.csv and the pictures."""
         columns = {"nodal_diameter": np.arange(len(self.families["stuck"]))}
         for state, values in self.families.items():
-            columns |= {f"{state}_{i + 1}_Hz": values[:, i] for i in range(values.shape[1])}
+            columns |= {f"{state.replace(', ', '_')}_{i + 1}_Hz": values[:, i] for i in range(values.shape[1])}
         return write_files(folder, {"nodal_diameters": columns}, self.figures(), self.formats)
 
 
@@ -141,8 +146,15 @@ def modes(
         assert own is not None
         diameters = range(wheel.n_sectors // 2 + 1)
         found = {state: wheel.diagram(diameters, families, state == "stuck") for state in ("free", "stuck")}
+        if turns := wheel.full.system.gyroscopic is not None:
+            back = [-d for d in diameters]
+            found |= {state + AGAINST: wheel.diagram(back, families, state == "stuck") for state in ("free", "stuck")}
         chosen = tuple(orders) or (own.engine_order or 1,)
         turning, waves = np.zeros(0), dict[str, np.ndarray]()
         if fast is not None:
-            turning, waves = campbell(wheel, fast, speeds, chosen, 1)
+            shown = chosen + (tuple(-order for order in chosen) if turns else ())
+            turning, each = campbell(wheel, fast, speeds, shown, min(families, FAMILIES))
+            waves = {state: rows[:, : len(chosen)] for state, rows in each.items()}
+            if turns:
+                waves["stuck" + AGAINST] = each["stuck"][:, len(chosen) :]
     return WheelModes(file.name, wheel.n_sectors, found, slow, fast, chosen, turning, waves, tuple(formats))

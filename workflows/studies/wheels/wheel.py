@@ -75,6 +75,11 @@ class Wheel:
     def _asked(self, engine_order: int | None, frequency: tuple[float, float] | None) -> MeshScene:
         wheel, response = self.scene.wheel, self.scene.response
         assert wheel is not None
+        if wheel.along_speed:
+            raise SceneError(
+                'wheel.sweep = "speed": this study is at one speed; give --set wheel.sweep=frequency '
+                f'--set "wheel.speed={60 * wheel.speed:.6g} rpm" and a range in response.frequency'
+            )
         if engine_order is not None:
             wheel = wheel.model_copy(update={"engine_order": engine_order})
         if frequency is not None:
@@ -99,7 +104,7 @@ class Wheel:
         """The same wheel turning at a speed [Hz]: stiffened by its stress, softened by its frame; not meshed again."""
         wheel = self.scene.wheel
         assert wheel is not None
-        scene = self.scene.model_copy(update={"wheel": wheel.model_copy(update={"speed": speed})})
+        scene = self.scene.model_copy(update={"wheel": wheel.model_copy(update={"speed": speed, "sweep": None})})
         return assembled(replace(self.file, scene=scene), self.part.mesh, dict(self.part.node_sets))
 
 

@@ -1,0 +1,129 @@
+"""A sector along a range of speeds: reduced at a few of them in the same coordinates, interpolated between these.
+
+Mass and Coriolis matrix over the speed are the same at all speeds and spin softening goes with the square of it, so
+that what is interpolated, in polynomials of the squared speed, is the stress of the contact as it settles alone.
+Source  method of Rayleigh and Ritz; Lagrange
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import scipy.linalg as sla
+
+from tribodyn.fem.cyclic import Sector, at_index, projected
+from tribodyn.fem.modes import hermitian_modes
+from tribodyn.fem.system import SecondOrderSystem
+from tribodyn.reduction.cyclic import ReducedSector, WaveIndices, in_coordinates, reduce_sector, stuck_ritz, wave_of
+from tribodyn.reduction.limits import LIMITS
+from tribodyn.reduction.linear import stuck_stiffness
+from tribodyn.reduction.model import ReducedModel
+
+
+def reduce_alike(
+    sectors: Sequence[Sector], n_modes: int | None, cutoff: float | None, attached: Sequence[str] = ()
+) -> list[ReducedSector]:
+    """Sectors of one mesh that differ in stiffness and Coriolis forces, as `reduce_sector`, in the same coordinates.
+
+    Masters stay; all fixed-interface modes, and what the constraint modes differ by, share one basis of the rest
+    """
+    alone = [reduce_sector(sector, n_modes, cutoff, attached) for sector in sectors]
+    first = alone[0]
+    m, energy = len(first.info.master_dofs), np.diag(first.sector.system.stiffness)
+    columns = [one.basis[:, m:] / np.sqrt(np.diag(one.sector.system.stiffness)[m:]) for one in alone]
+    columns += [(one.basis[:, :m] - first.basis[:, :m]) / np.sqrt(energy[:m]) for one in alone[1:]]
+    own = independent(np.concatenate(columns, axis=1), sectors[0].system.stiffness)
+    basis = np.concatenate([first.basis[:, :m], own], axis=1)
+    info = replace(first.info, n_modes=own.shape[1])
+    return [in_coordinates(sector, projected(sector.system, basis), basis, info) for sector in sectors]
+
+
+def independent(columns: np.ndarray, stiffness: Any) -> np.ndarray:
+    """Shapes (n, k) of unit energy that span columns (n, m), but for the share `LIMITS.dependent` of unit energy."""
+    energy, turn = sla.eigh(columns.conj().T @ (stiffness @ columns))
+    kept = energy > LIMITS.dependent
+    return np.asarray((columns @ turn[:, kept]) / np.sqrt(energy[kept]))
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedLine:
+    """A wave of an engine order whose frequency is that order times the speed: frequency [rad/s] -> its model.
+
+    reduced : at `speeds` [Hz], above 0, as `reduce_alike` gives them; load : name of the one that goes with the square
+        of the speed, which stands for `nominal` [Hz]; springs : (n_pair, n_component) contact springs [N/m]
+    """
+
+    reduced: tuple[ReducedSector, ...]
+    speeds: tuple[float, ...]
+    engine_order: int
+    load: str
+    nominal: float
+    springs: np.ndarray
+    made: dict[int, tuple[tuple[SecondOrderSystem, ...], np.ndarray, np.ndarray]] = field(default_factory=dict)
+
+    def __call__(self, omega: float) -> ReducedModel:
+        """The model at the speed that belongs to a frequency [rad/s]."""
+        return wave_of(self.reduced[0], self.engine_order, AtSpeed(self, self.speed(omega)))
+
+    @property
+    def without_last(self) -> SpeedLine:
+        """The same without its last speed."""
+        return replace(self, reduced=self.reduced[:-1], speeds=self.speeds[:-1], made={})
+
+    def speed(self, omega: float) -> float:
+        """The speed [Hz] whose engine order has a frequency [rad/s]."""
+        return omega / (2 * np.pi * abs(self.engine_order))
+
+    def between(self, systems: Sequence[SecondOrderSystem], speed: float) -> SecondOrderSystem:
+        """The system at a speed from those at `speeds`."""
+        squares, at = np.square(self.speeds), speed**2
+        weights = [np.prod((at - np.delete(squares, i)) / (s - np.delete(squares, i))) for i, s in enumerate(squares)]
+        one, turning = systems[0], systems[0].gyroscopic
+        return replace(
+            one,
+            stiffness=np.sum([w * s.stiffness for w, s in zip(weights, systems, strict=True)], axis=0),
+            gyroscopic=None if turning is None else speed / self.speeds[0] * turning,
+            loads={**one.loads, self.load: (speed / self.nominal) ** 2 * one.loads[self.load]},
+        )
+
+    def at_index(self, index: int) -> tuple[tuple[SecondOrderSystem, ...], np.ndarray, np.ndarray]:
+        """Systems at all speeds, contact map and way back of a harmonic index, in few coordinates."""
+        if index not in self.made:
+            each = [WaveIndices(one, None)(index) for one in self.reduced]
+            _, B, T = each[0]
+            systems = tuple(system for system, _, _ in each)
+            if systems[0].n_dof > LIMITS.many_along:
+                shapes = [stuck_ritz(s, B, self.springs, LIMITS.modes_along) for s in (systems[0], systems[-1])]
+                V = independent(np.concatenate(shapes, axis=1), stuck_stiffness(systems[0].stiffness, B, self.springs))
+                systems, B, T = tuple(projected(s, V) for s in systems), B @ V, T @ V
+            self.made[index] = systems, B, T
+        return self.made[index]
+
+    def error(self, speed: float, there: ReducedSector, n_modes: int = 6) -> float:
+        """Largest relative error of the lowest frequencies of the stuck wave that interpolation makes at a speed.
+
+        there : the sector at this speed in the same coordinates
+        """
+        system, B = at_index(there.sector, self.engine_order)
+        nodes = [at_index(one.sector, self.engine_order)[0] for one in self.reduced]
+        omega, phi = hermitian_modes(stuck_stiffness(system.stiffness, B, self.springs), system.mass, n_modes)
+        missed = self.between(nodes, speed).stiffness - system.stiffness
+        return float(np.abs(np.einsum("ij,ij->j", phi.conj(), missed @ phi) / (2 * omega**2)).max())
+
+
+@dataclass(frozen=True, eq=False)
+class AtSpeed:
+    """System, contact map and way back of each harmonic index at one speed [Hz]."""
+
+    line: SpeedLine
+    speed: float
+    made: dict[int, tuple[SecondOrderSystem, np.ndarray, np.ndarray]] = field(default_factory=dict)
+
+    def __call__(self, index: int) -> tuple[SecondOrderSystem, np.ndarray, np.ndarray]:
+        if index not in self.made:
+            systems, B, T = self.line.at_index(index)
+            self.made[index] = self.line.between(systems, self.speed), B, T
+        return self.made[index]

@@ -1,0 +1,102 @@
+"""A wheel whose speed goes with the frequency, against the whole wheel at each speed, and its scene keys."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.helpers.wheel_scene import WHEEL
+from tribodyn.hbm import newton
+from tribodyn.hbm.balance import HarmonicBalance
+from tribodyn.hbm.continuation.methods import arc_length
+from tribodyn.hbm.continuation.operating_point import AtPeak
+from tribodyn.hbm.linear import travelling_wave as waves
+from tribodyn.workflows.run import modelling
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.sanity_checks import check_speed
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies.wheels import wheel
+
+EXACT = newton.NewtonOptions(tolerance=1e-11)
+LINE = ('wheel.sweep="speed"', "reduction.modes=24", "contact.friction=0.3", 'loads.harmonic.wave.value="300 N"')
+
+
+def scene(sectors: int, *overrides: str) -> scene_file.SceneFile:
+    text = WHEEL.replace("n_blades = 6", f"n_blades = {sectors}").replace("sectors = 6", f"sectors = {sectors}")
+    return scene_file.parse(text, "w.toml", overrides, Path())
+
+
+def line(sectors: int, order: int, *overrides: str) -> HarmonicBalance:
+    return modelling.build(scene(sectors, *LINE, f"wheel.engine_order={order}", *overrides), None, Progress()).balance
+
+
+@pytest.mark.parametrize(
+    ("sectors", "order", "hertz"), [(5, -2, (240, 264)), pytest.param(6, -1, (110, 150), marks=pytest.mark.slow)]
+)
+def test_a_line_of_speeds_is_the_whole_wheel_at_each(sectors, order, hertz):
+    """Slipping, with Coriolis forces, near a resonance; the wheel anew at every speed, with nothing alike assumed."""
+    low, high = hertz
+    span = f'response.frequency=["{low} Hz", "{high} Hz"]'
+    one = line(sectors, order, span)
+    for f in (0.5 * (low + high), high - 1.0):
+        own = (*LINE[1:], f"wheel.engine_order={order}", f'wheel.speed="{f / abs(order)} Hz"', span)
+        whole = wheel.build(scene(sectors, *own)).whole()
+        mine, theirs = (arc_length.solve_along_load(b, 2 * np.pi * f, EXACT) for b in (one, whole))
+        assert mine.converged
+        assert theirs.converged
+        assert one.energy(mine.state).sum() > 1e-4
+        outputs, found, names = one.outputs(mine.state), whole.outputs(theirs.state), whole.compliance.output_names
+        for n in range(sectors):
+            expected = waves.at_sector(one.basis, outputs[0], order, sectors, n)
+            miss = found[names.index(f"response@{n}")] - expected
+            assert np.abs(miss).max() < 1e-4 * np.abs(expected).max()
+
+
+def test_the_peak_of_a_line_is_where_it_meets_a_mode():
+    """The slope over the frequency is that of the whole problem, speed and all; the peak that it finds is the top."""
+    one = line(5, -2, 'response.frequency=["240 Hz", "280 Hz"]')
+    peak = AtPeak("response", 2 * np.pi * 240, 2 * np.pi * 280).first(one)
+    omega, x = peak.state.omega, peak.state.x
+    beside = [one.evaluate(omega * (1 + s), x).residual for s in (1e-4, -1e-4)]
+    expected = (beside[0] - beside[1]) / (2e-4 * omega)
+    assert np.abs(one.frequency_slope(peak.state)[0] - expected).max() < 1e-5 * np.abs(expected).max()
+    heights = []
+    for s in (-2e-4, 0.0, 2e-4):
+        beside = newton.solve(one, omega * (1 + s), x, EXACT)
+        assert beside.converged
+        heights.append(np.linalg.norm(one.outputs(beside.state)[0, 1:]))
+    assert heights[1] == max(heights)
+    there = wheel.build(scene(5, *LINE[1:], f'wheel.speed="{omega / (4 * np.pi)} Hz"'))
+    free, stuck = (float(there.diagram([-2], 1, state)[0, 0]) for state in (False, True))
+    assert 2 * np.pi * free < omega < 2 * np.pi * stuck
+
+
+def test_speeds_and_frequencies_of_a_scene_belong_together():
+    by_speed = scene(6, 'response.speed=["3000 rpm", "4200 rpm"]', "response.frequency=", "wheel.engine_order=-2").scene
+    by_frequency = scene(
+        6, 'wheel.sweep="speed"', 'response.frequency=["100 Hz", "140 Hz"]', "wheel.engine_order=-2"
+    ).scene
+    for one in (by_speed, by_frequency):
+        assert one.response.frequency == pytest.approx((100, 140))
+        assert one.wheel.speed == pytest.approx(60)
+        assert scene_file.from_json(one.model_dump_json()).wheel == one.wheel
+    for wrong in (
+        ('response.speed=["3000 rpm", "4200 rpm"]',),
+        ('wheel.sweep="speed"', 'wheel.speed="3000 rpm"'),
+        ('wheel.sweep="speed"', "wheel.engine_order=0"),
+        ('wheel.sweep="frequency"', 'response.speed=["3000 rpm", "4200 rpm"]', "response.frequency="),
+    ):
+        with pytest.raises(scene_file.SceneError, match=r"wheel|response"):
+            scene(6, *wrong)
+
+
+@pytest.mark.parametrize(("given", "said"), [((), True), (('wheel.sweep="frequency"',), False)])
+def test_a_speed_that_does_not_excite_the_range_is_told(given, said):
+    one = scene(6, 'wheel.speed="3000 rpm"', *given).mesh_scene
+    remarks = check_speed(one, None)
+    assert bool(remarks) is said
+    assert not said or "24000" in remarks[0]  # rpm at which engine order 1 excites 400 Hz
+    fits = one.model_copy(update={"wheel": one.wheel.model_copy(update={"speed": 402.0})})
+    assert not check_speed(fits, None)
