@@ -75,6 +75,7 @@ class _Cards:
     number: dict[Node, int]
     materials: dict[str, deck.DeckMaterial] = field(default_factory=dict)
     ties: list[deck.Tie] = field(default_factory=list)
+    contacts: list[deck.Tie] = field(default_factory=list)
     couplings: list[deck.Coupling] = field(default_factory=list)
     equations: list[deck.Equation] = field(default_factory=list)
     forces: list[deck.Force] = field(default_factory=list)
@@ -309,6 +310,9 @@ class _Cards:
     def _contact_pair(self, card: Card) -> None:
         for line in card.data:
             self.unused.append(f"contact pair {' on '.join(line)}, which the scene gives as [contacts.NAME]")
+            if len(line) == 2:
+                slave, master = (self._place(name, card, face=True) for name in line)
+                self.contacts.append(deck.Tie(" on ".join(line), slave, master))
 
     def _initial_conditions(self, card: Card) -> None:
         if card.option("TYPE").upper() == "TEMPERATURE":
@@ -395,6 +399,7 @@ class _Cards:
         made = deck.Deck(
             tuple(self._with_groups()),
             tuple(self.ties),
+            tuple(self.contacts),
             tuple(self.couplings),
             tuple(self.equations),
             tuple(self._springs()),

@@ -36,7 +36,7 @@ class DeckMaterial:
 
 @dataclass(frozen=True)
 class Tie:
-    """Two faces glued; slave and master as the deck calls them. tolerance [m], None where the deck leaves it."""
+    """Two faces glued, or that may touch, as the deck calls them. tolerance [m], None where the deck leaves it."""
 
     name: str
     slave: str
@@ -133,10 +133,11 @@ def stiffness(upper: list[float], order: Sequence[int]) -> tuple[tuple[float, ..
 
 @dataclass(frozen=True)
 class Deck:
-    """All of it; empty for files that hold a mesh alone."""
+    """All of it; empty for files that hold a mesh alone. contacts : pairs of faces, of which a scene makes contacts"""
 
     materials: tuple[DeckMaterial, ...] = ()
     ties: tuple[Tie, ...] = ()
+    contacts: tuple[Tie, ...] = ()
     couplings: tuple[Coupling, ...] = ()
     equations: tuple[Equation, ...] = ()
     springs: tuple[Spring, ...] = ()
