@@ -246,8 +246,8 @@ class _Cards:
 
     def _rigid_body(self, card: Card) -> None:
         face = card.option("NSET", "TIENSET", "PINNSET")
-        if not face or card.option("ELSET"):
-            self._refused(card, "ELSET")
+        if not face or card.option("ELSET") or card.option("ROTNODE"):
+            self._refused(card, "ROT NODE" if card.option("ROTNODE") else "ELSET")
             return
         point = self._reference(card.option("REFNODE"), card)
         name = f"rigid{len(self.couplings) + 1}"
