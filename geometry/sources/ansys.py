@@ -45,9 +45,10 @@ def read(path: Path) -> RawMesh:
 class _Archive:
     """A file that is read line by line.
 
-    i : the next line; types : of elements, by number; options : of types; constants : of materials by name
+    i : the next line; types, options : of elements, by the number of their kind; constants : of materials by name
     systems : local ones; of_solids : volume group -> its material and local system; turned : node -> its own axes
-    equation : the one that a CE has begun; loads : on nodes along axes that may be turned
+    equations : by number, and the number of the last; alike : set of CP -> its first node
+    loads : on nodes, along axes that may be turned
     """
 
     path: Path
@@ -60,7 +61,9 @@ class _Archive:
     systems: dict[int, System] = field(default_factory=dict)
     of_solids: dict[str, tuple[int, int]] = field(default_factory=dict)
     turned: dict[int, np.ndarray] = field(default_factory=dict)
-    equation: Terms = field(default_factory=list)
+    equations: dict[str, Terms] = field(default_factory=dict)
+    equation: str = ""
+    alike: dict[str, int] = field(default_factory=dict)
     loads: Terms = field(default_factory=list)
 
     def taken(self) -> RawMesh:
@@ -295,19 +298,23 @@ class _Archive:
     def ce(self, words: list[str]) -> None:
         """An equation, or more terms of it."""
         if words[1].upper().startswith("R"):
-            new, constant, terms = words[2].upper() == "DEFI", words[5], words[3:] if words[2].upper() == "NODE" else []
+            number, constant = (words[4], words[5]) if words[2].upper() == "DEFI" else (self.equation, "")
+            terms = words[3:] if words[2].upper() == "NODE" else []
         else:
-            new, constant, terms = words[1].upper() != "HIGH", words[2], words[3:]
-        if new:
-            self.equation = []
-            self.mesh.equations.append(self.equation)
-        if new and float(constant or 0):
+            number, constant, terms = words[1].upper(), words[2], words[3:]
+            if number in ("", "HIGH", "NEXT"):
+                number = f"{len(self.equations) + 1}" if number == "NEXT" else self.equation
+        self.equation = number
+        if number not in self.equations:
+            self.equations[number] = []
+            self.mesh.equations.append(self.equations[number])
+        if float(constant or 0):
             self.mesh.met.refuse("CE, a constant term")
         for node, label, factor in zip(terms[::3], terms[1::3], terms[2::3], strict=False):
             if node and label.upper() not in _AXES:
                 self.mesh.met.refuse(f"CE, {label}")
             elif node:
-                self.equation.append((int(node), _AXES[label.upper()], float(factor or 0)))
+                self.equations[number].append((int(node), _AXES[label.upper()], float(factor or 0)))
 
     def cp(self, words: list[str]) -> None:
         """Displacements that are alike."""
@@ -316,9 +323,10 @@ class _Archive:
         if not set(labels) <= set(_AXES) or not all(word.isdigit() for word in (words[1], *nodes)):
             self.mesh.met.refuse(f"CP, {words[1]}, {words[2]}")
             return
-        for label in labels:
+        for node in map(int, nodes):
+            first = self.alike.setdefault(words[1], node)  # a set may go on in a further command
             self.mesh.equations += [
-                [(int(other), _AXES[label], 1.0), (int(nodes[0]), _AXES[label], -1.0)] for other in nodes[1:]
+                [(node, _AXES[label], 1.0), (first, _AXES[label], -1.0)] for label in labels if node != first
             ]
 
 

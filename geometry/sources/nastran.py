@@ -112,7 +112,7 @@ class _Bulk:
             self.grids[_int(fields[0], card)] = fields
             fields[1:8] = [own or preset for own, preset in zip(fields[1:8], self.common[1:8], strict=True)]
         elif card.startswith("CORD2"):
-            self.systems[_int(fields[0], card)] = card, fields[1:]
+            self.systems[_int(fields[0], card)] = card, [*fields[1:], *[""] * 9]
         else:
             for start in (start for start in (0, 4) if fields[start]):
                 number = _int(fields[start], card)
@@ -166,7 +166,7 @@ class _Bulk:
         """An isotropic, orthotropic or anisotropic material."""
         number = _int(fields[0], card)
         one = deck.DeckMaterial(f"{card} {number}")
-        given = [_float(x, card) if x else None for x in fields[1:]]
+        given = [_float(x, card) if x else None for x in (*fields[1:], *[""] * 28)]
         filled = [value or 0.0 for value in given]
         if card == "MAT1":
             young, shear, poisson = given[:3]
@@ -254,7 +254,7 @@ class _Bulk:
                 break
             if "." in word:
                 weights.add(word)
-                axes = "".join(sorted({*axes} & {*next(words)}))
+                axes = "".join(sorted({*axes} & {*next(words, "")}))
             elif word:
                 members.append(_int(word, card))
         if len(weights) > 1 or axes != "123" or not set("123") <= set(fields[3]):
