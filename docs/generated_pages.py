@@ -23,6 +23,8 @@ from pydantic_core import PydanticUndefined
 
 from tribodyn.found import Kind
 from tribodyn.geometry import parts
+from tribodyn.geometry.sources import abaqus_cards, ansys, nastran
+from tribodyn.geometry.sources.card_table import words as words_of
 from tribodyn.hbm import continuation
 from tribodyn.hbm.contact import law as contact_law
 from tribodyn.hbm.wear import law as wear_law
@@ -56,6 +58,7 @@ def write(folder: Path) -> None:
         "wear_laws": numbers_of(wear_law.KIND),
         "commands": commands(app),
         "result": result_layout(),
+        "cards": cards(),
         "folders": folders(),
         "lines": lines_by_folder(),
     }
@@ -279,6 +282,24 @@ def result_layout() -> str:
             where = " x ".join(shape) if shape is not None else "attribute"
             rows.append((f"`{item.name}`", where, unit, _paragraph(meanings.get(item.name, ""))))
         lines += _table(("name", "dimensions", "unit", "meaning"), rows)
+    return "\n".join(lines)
+
+
+# Cards of decks
+
+
+def cards() -> str:
+    """A section for each format of a deck: what is read of it, what is harmless, and what leaves no word."""
+    lines: list[str] = []
+    for name, table in (
+        ("Abaqus and CalculiX", abaqus_cards.TABLE),
+        ("Nastran", nastran.TABLE),
+        ("ANSYS", ansys.TABLE),
+    ):
+        mine = {"read": table.reads, **{f"not used: {why}": words_of(of) for why, of in table.harmless.items()}}
+        mine["of no effect"] = table.silents
+        rows = [(what, ", ".join(f"`{card}`" for card in sorted(of))) for what, of in mine.items()]
+        lines += [f"## {name}", "", *_table(("what becomes of it", "cards"), rows)]
     return "\n".join(lines)
 
 

@@ -10,6 +10,9 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.sparse import csr_matrix, eye_array, vstack
 
+from tribodyn.fem.elements import coordinates
+from tribodyn.geometry.sources.directions import Directions
+
 AXES = "xyz"
 
 
@@ -84,7 +87,7 @@ def free_dofs(n_dof: int, clamps: Iterable[Clamp], node_sets: Mapping[str, np.nd
 class Following:
     """DOFs (k,) that follow others: u[dofs] = map @ u with map (k, n_dof); what : which constraint, for errors.
 
-    equation : of one DOF, in whose place another of the equation may follow where this one is held or follows already
+    equation : each DOF is of an equation, and another of it may follow where this one is held or follows already
     """
 
     dofs: np.ndarray
@@ -97,6 +100,30 @@ class Constraint(Protocol):
     """A constraint that knows which DOFs follow which."""
 
     def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following: ...
+
+
+@dataclass(frozen=True)
+class ClampAlong:
+    """Hold a node set along directions of a local system. axes : which of its directions 0..2"""
+
+    nodes: str
+    system: Directions
+    axes: Sequence[int]
+
+    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following:
+        """The largest displacement along each direction in terms of the others."""
+        nodes, n = named(node_sets, self.nodes), 3 * mesh.doflocs.shape[1]
+        rows = self.system.at(coordinates(mesh)[nodes])[:, list(self.axes)]  # nodes, axes, 3
+        dofs = np.broadcast_to(3 * nodes[:, None, None] + np.arange(3), rows.shape).reshape(-1, 3)
+        rows = rows.reshape(-1, 3)
+        k = np.arange(len(rows))
+        pivot = np.abs(rows).argmax(axis=1)
+        factors = -rows / rows[k, pivot][:, None]
+        factors[k, pivot] = 0.0
+        factors[np.abs(factors) < 1e-12] = 0.0
+        matrix = csr_matrix((factors.ravel(), (np.repeat(k, 3), dofs.ravel())), shape=(len(k), n))
+        matrix.eliminate_zeros()
+        return Following(dofs[k, pivot], matrix, f"the support of '{self.nodes}'", equation=True)
 
 
 def restriction(n_dof: int, free: np.ndarray, constraints: Sequence[Following]) -> tuple[np.ndarray, csr_matrix]:
@@ -148,11 +175,10 @@ def _pivoted(constraints: Sequence[Following], held: np.ndarray) -> list[Followi
     if len(found) == len(constraints):
         return found
     row_of = {int(dof): (one.map, k) for one in found for k, dof in enumerate(one.dofs)}
-    for one in (one for one in constraints if one.equation):
-        first = int(one.dofs[0])
-        left = {first: -1.0}
+    rows = ((one, int(first), k) for one in constraints if one.equation for k, first in enumerate(one.dofs))
+    for one, first, k in rows:
         row: dict[int, float] = {}
-        waiting = [*left.items(), *_entries(one.map, 0)]
+        waiting = [(first, -1.0), *_entries(one.map, k)]
         while waiting:
             dof, factor = waiting.pop()
             if dof in row_of:
@@ -166,7 +192,8 @@ def _pivoted(constraints: Sequence[Following], held: np.ndarray) -> list[Followi
         pivot = first if first in row else max(row, key=lambda dof: abs(row[dof]))
         rest = {dof: -value / row[pivot] for dof, value in row.items() if dof != pivot}
         at = ([0] * len(rest), list(rest))
-        solved = Following(np.array([pivot]), csr_matrix((list(rest.values()), at), one.map.shape), one.what, True)
+        shape = (1, one.map.shape[1])
+        solved = Following(np.array([pivot]), csr_matrix((list(rest.values()), at), shape), one.what, True)
         row_of[pivot] = (solved.map, 0)
         found.append(solved)
     return found

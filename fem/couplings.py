@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 
 from tribodyn.fem.constraints import Following, named
 from tribodyn.fem.elements import coordinates
-from tribodyn.fem.mortar import MORTAR, common, side, tabulate
+from tribodyn.fem.mortar import MORTAR, Common, Side, common, side, tabulate
 from tribodyn.fem.mortar_contact import apart
 from tribodyn.fem.springs import shares
 
@@ -37,17 +37,22 @@ class Tie:
     second: str
     reach: float | None = None
 
-    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following:
-        """The nodes of the first face in terms of the others.
-
-        Raises  ValueError where a face is unknown, or the faces do not meet
-        """
+    def meeting(self, mesh: Any) -> tuple[Side, Side, Common]:
+        """Both faces and the surface that they share; raises ValueError as `build` does."""
         faces = mesh.boundaries or {}
         one, two = (side(mesh, named(faces, name, "face")) for name in (self.first, self.second))
         reach = MORTAR.reach * one.length if self.reach is None else self.reach
         shared = common(one, two, reach)
         if not len(shared.weight):
             raise ValueError(f"{self.what}: {apart(one, two, reach).replace('contact faces', 'tied faces')}")
+        return one, two, shared
+
+    def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following:
+        """The nodes of the first face in terms of the others.
+
+        Raises  ValueError where a face is unknown, or the faces do not meet
+        """
+        one, two, shared = self.meeting(mesh)
         gap = float(np.average(np.abs(shared.gap), weights=np.abs(shared.weight)))
         if self.reach is None and gap > MORTAR.apart * one.length:
             who = f"{self.first} and {self.second} are {1e3 * gap:.3g} mm apart on average"

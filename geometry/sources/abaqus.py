@@ -281,8 +281,8 @@ MESH_CARDS: dict[str, Callable[[Card, Scope], None]] = {
 }
 
 
-def raw_of(assembly: Assembly) -> tuple[RawMesh, dict[Node, int]]:
-    """Mesh, sets and surfaces of a deck, lengths as in the file, and the row of each node.
+def raw_of(assembly: Assembly) -> tuple[RawMesh, dict[Node, int], dict[Node, int]]:
+    """Mesh, sets and surfaces of a deck, lengths as in the file, the row of each node and the number of each solid.
 
     Raises  ValueError: an element that names a node that is not there
     """
@@ -320,7 +320,7 @@ def raw_of(assembly: Assembly) -> tuple[RawMesh, dict[Node, int]]:
         table = table[:, _HEXAHEDRON_27] if kind == "hexahedron27" else table
         blocks.append(Cells(kind, table, np.array([key[1] for key, _ in elements])))
     if not blocks:
-        return NOTHING, row
+        return NOTHING, row, number
     refused = {
         kind: f"{count} elements of type {kind}" for kind, count in other.items() if not kind.startswith(CARRIED)
     }
@@ -340,7 +340,7 @@ def raw_of(assembly: Assembly) -> tuple[RawMesh, dict[Node, int]]:
         unused=sets.unused,
         refused=refused,
     )
-    return raw, row
+    return raw, row, number
 
 
 @dataclass

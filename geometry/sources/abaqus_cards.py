@@ -56,10 +56,10 @@ TABLE = CardTable(
 def read(path: Path) -> RawMesh:
     """Read a deck. Raises ValueError: one sentence that names the card and the cure."""
     assembly = abaqus.load(path)
-    raw, row = abaqus.raw_of(assembly)
+    raw, row, number = abaqus.raw_of(assembly)
     if not raw.cells:
         return raw
-    reader = _Cards(assembly, raw, row)
+    reader = _Cards(assembly, raw, row, number)
     for card in sorted(assembly.cards, key=lambda card: card.name not in NAMING):  # the order is kept beyond that
         reader.take(card)
     return reader.finished()
@@ -72,8 +72,10 @@ class _Cards:
     assembly: Assembly
     raw: RawMesh
     row: dict[Node, int]
+    number: dict[Node, int]
     materials: dict[str, deck.DeckMaterial] = field(default_factory=dict)
     ties: list[deck.Tie] = field(default_factory=list)
+    contacts: list[deck.Tie] = field(default_factory=list)
     couplings: list[deck.Coupling] = field(default_factory=list)
     equations: list[deck.Equation] = field(default_factory=list)
     forces: list[deck.Force] = field(default_factory=list)
@@ -244,8 +246,8 @@ class _Cards:
 
     def _rigid_body(self, card: Card) -> None:
         face = card.option("NSET", "TIENSET", "PINNSET")
-        if not face or card.option("ELSET"):
-            self._refused(card, "ELSET")
+        if not face or card.option("ELSET") or card.option("ROTNODE"):
+            self._refused(card, "ROT NODE" if card.option("ROTNODE") else "ELSET")
             return
         point = self._reference(card.option("REFNODE"), card)
         name = f"rigid{len(self.couplings) + 1}"
@@ -308,6 +310,9 @@ class _Cards:
     def _contact_pair(self, card: Card) -> None:
         for line in card.data:
             self.unused.append(f"contact pair {' on '.join(line)}, which the scene gives as [contacts.NAME]")
+            if len(line) == 2:
+                slave, master = (self._place(name, card, face=True) for name in line)
+                self.contacts.append(deck.Tie(" on ".join(line), slave, master))
 
     def _initial_conditions(self, card: Card) -> None:
         if card.option("TYPE").upper() == "TEMPERATURE":
@@ -370,17 +375,14 @@ class _Cards:
         return name
 
     def _faces_of(self, text: str, face: int, card: Card) -> list[np.ndarray]:
-        numbers: list[np.ndarray] = []
-        for name, members in self.raw.volumes.items():
-            if name.upper() == text.upper():
-                numbers.append(members)
-        wanted = numbers[0] if numbers else np.empty(0, dtype=int)
+        try:
+            named = self.assembly.elements(text)
+        except KeyError:
+            named = []
+        wanted = np.array([self.number[key] for key in named if key in self.number], dtype=int)
         found, start = [], 0
         for block in self.raw.cells:
-            if not numbers and text.isdigit():
-                inside = np.flatnonzero(block.labels == int(text))
-            else:
-                inside = wanted[(wanted >= start) & (wanted < start + len(block.nodes))] - start
+            inside = wanted[(wanted >= start) & (wanted < start + len(block.nodes))] - start
             start += len(block.nodes)
             faces = abaqus.FACES[VOLUMES[block.kind][0].corners]
             if len(inside) and face <= len(faces):
@@ -397,6 +399,7 @@ class _Cards:
         made = deck.Deck(
             tuple(self._with_groups()),
             tuple(self.ties),
+            tuple(self.contacts),
             tuple(self.couplings),
             tuple(self.equations),
             tuple(self._springs()),
@@ -489,19 +492,19 @@ class _Cards:
     def _listed(self, card: Card, instance: str, turn: np.ndarray, own: np.ndarray) -> Listed:
         """Axes element by element; those that no line names have those of the first line."""
         centres = np.vstack([self.raw.points[block.nodes].mean(axis=1) for block in self.raw.cells])
-        number = {int(label): i for i, label in enumerate(np.concatenate([b.labels for b in self.raw.cells]))}
+        mine = [number for (where, _), number in self.number.items() if where == instance]  # labels are those of a part
         axes: list[np.ndarray] = []
         which = np.zeros(len(centres), dtype=int)
         for line in card.data:
             points = np.array(card.floats(line[1:], 6)).reshape(2, 3)
             if line[0]:
                 try:
-                    named = [label for _, label in self.assembly.elements(line[0], instance)]
+                    named = self.assembly.elements(line[0], instance)
                 except KeyError:
                     raise ValueError(f"{card.where} names the elements '{line[0]}', which the deck has not") from None
-                which[[number[label] for label in named if label in number]] = len(axes)
+                which[[self.number[key] for key in named if key in self.number]] = len(axes)
             axes.append(own @ orthogonal(*points) @ turn.T)
-        return Listed(centres, np.array(axes)[which])
+        return Listed(centres[mine], np.array(axes)[which[mine]])
 
     def _springs(self) -> Iterator[deck.Spring]:
         for instance, scope in {**self.assembly.instances, "": self.assembly.top}.items():
@@ -549,11 +552,8 @@ def engineering_constants(D: list[float]) -> tuple[float, ...]:
 
 def anisotropic(D: list[float]) -> tuple[tuple[float, ...], ...]:
     """The stiffness in our order of 21 values: columns of its upper triangle, stresses 11, 22, 33, 12, 13, 23."""
-    full = np.zeros((6, 6))
-    full.T[np.tril_indices(6)] = D
-    full = np.triu(full) + np.triu(full, 1).T
-    order = [0, 1, 2, 5, 4, 3]
-    return tuple(map(tuple, full[np.ix_(order, order)].tolist()))
+    by_rows = [D[j * (j + 1) // 2 + i] for i in range(6) for j in range(i, 6)]
+    return deck.stiffness(by_rows, (0, 1, 2, 5, 4, 3))
 
 
 def _normal_block(D: list[float]) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""ANSYS archives (.cdb): NBLOCK, EBLOCK, components, materials, supports and forces.
+"""ANSYS archives (.cdb): nodes, elements, components, materials, local systems, supports, forces, equations.
 
 Bricks with nodes that coincide are the tetrahedra, prisms and pyramids that they stand for.
 """
@@ -6,11 +6,16 @@ Bricks with nodes that coincide are the tetrahedra, prisms and pyramids that the
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from tribodyn.geometry.sources import deck
-from tribodyn.geometry.sources.raw import LabelledMesh, RawMesh
+from tribodyn.geometry.sources.card_table import CardTable, Met, words
+from tribodyn.geometry.sources.directions import Listed, System, turned
+from tribodyn.geometry.sources.raw import LabelledMesh, RawMesh, Terms
 
 # equal corners of a brick I..P -> (kind, its corners, its edge nodes) among the twenty nodes
 _TETRA = ("tetra", [0, 1, 2, 4], [8, 9, 11, 16, 17, 18])
@@ -18,111 +23,355 @@ _WEDGE = ("wedge", [0, 1, 2, 4, 5, 6], [8, 9, 11, 12, 13, 15, 16, 17, 18])
 _PYRAMID = ("pyramid", [0, 1, 2, 3, 4], [8, 9, 10, 11, 16, 17, 18, 19])
 _BRICK = ("hexahedron", list(range(8)), list(range(8, 20)))
 _SECOND = {"tetra": "tetra10", "wedge": "wedge15", "pyramid": "pyramid13", "hexahedron": "hexahedron20"}
-_MATERIAL = {"EX": "young", "NUXY": "poisson", "PRXY": "poisson", "DENS": "density", "ALPX": "expansion"}
-_AXES = {"UX": 0, "UY": 1, "UZ": 2, "FX": 0, "FY": 1, "FZ": 2}
+_AXES = {"UX": 0, "UY": 1, "UZ": 2, "ROTX": 3, "ROTY": 4, "ROTZ": 5}
+_FORCES = {"FX": 0, "FY": 1, "FZ": 2, "MX": 3, "MY": 4, "MZ": 5}
+_SYSTEMS = ("rectangular", "cylindrical", "spherical")
+_PAIRS = ("XY", "XZ", "YZ")
 SOLID_TYPES = {5, 45, 62, 64, 65, 69, 70, 72, 73, 87, 90, 92, 95, 96, 147, 148, 168, 185, 186, 187, 225, 226, 227}
 SOLID_TYPES |= {278, 279, 285, 291}
-SILENT = {
-    "FINISH", "NUMOFF", "DOF", "KEYOPT", "KEYOP", "MPTEMP", "EXTOPT", "ETBLOCK", "-1", "N", "MPDATA", "MP", "SHPP",
-}  # fmt: skip
+HARMLESS_TYPES = {154: "they carry loads", 169: "contact", 170: "contact", 200: "they only mesh"}
+CONTACT_TYPES = range(171, 179)
+LAYERED = (185, 186)  # by their option 3
+BONDED = {2: ("2",), 12: ("5", "6")}  # options of a contact that glues: constraint equations, bonded always or at first
 
 
 def read(path: Path) -> RawMesh:
     """Read an archive. Raises ValueError: one sentence that names the block and the cure."""
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    mesh = LabelledMesh()
-    constants: dict[int, dict[str, float]] = {}
-    types: dict[int, int] = {}
-    forces: list[deck.Force] = []
-    i = 0
-    while i < len(lines):
-        words = [word.strip() for word in lines[i].split(",")]
-        name = words[0].upper()
-        i += 1
-        if name == "NBLOCK":
-            i = _nblock(lines, i, mesh.points, path)
-        elif name == "EBLOCK" and len(words) > 2 and words[2].upper() == "SOLID":
-            i = _eblock(lines, i, mesh, types, path)
-        elif name == "CMBLOCK":
-            i, members = _cmblock(lines, i, int(words[3].split()[0]), path)
-            (mesh.node_sets if words[2].upper().startswith("NODE") else mesh.volumes)[words[1]] = members
-        elif name == "ET" and len(words) > 2:
-            types[int(words[1])] = int(re.sub(r"\D", "", words[2]) or 0)
-        elif name == "MPDATA" and len(words) > 6 and words[3] in _MATERIAL:
-            constants.setdefault(int(words[4]), {})[_MATERIAL[words[3]]] = float(words[6])
-        elif name == "MP" and len(words) > 3 and words[1].upper() in _MATERIAL:
-            constants.setdefault(int(words[2]), {})[_MATERIAL[words[1].upper()]] = float(words[3])
-        elif name == "D" and len(words) > 2 and words[1].isdigit() and words[2] in _AXES:
-            value = float(words[3]) if len(words) > 3 and words[3] else 0.0
-            mesh.held.setdefault((_AXES[words[2]], value), []).append(int(words[1]))
-        elif name == "F" and len(words) > 3 and words[1].isdigit() and words[2] in _AXES:
-            forces.append(deck.Force(mesh.at(int(words[1])), _AXES[words[2]], float(words[3])))
-        elif name and name not in SILENT and not name.startswith(("!", "(", "_", "/", "*")):
-            mesh.ignored[name] += 1
-    materials = tuple(
-        replace(
-            deck.DeckMaterial(f"material {number}", groups=tuple({f"material {number}"} & set(mesh.volumes))),
-            **given,  # type: ignore[arg-type]
-        )
-        for number, given in constants.items()
-    )
-    return mesh.raw(path, "commands", deck.Deck(materials=materials, forces=tuple(forces)))
+    return _Archive(path, lines, LabelledMesh(Met(TABLE))).taken()
 
 
-def _widths(line: str, path: Path) -> tuple[int, int, int]:
-    """Width of an integer, integers on a line, width of a number, from a line such as (3i9,6e21.13e3)."""
-    found = re.match(r"\((\d+)[iI](\d+)(?:,\s*\d+[eE](\d+))?", line.strip())
-    if found is None:
-        raise ValueError(f"'{path}' has a block with the format '{line.strip()}': expected one such as (3i9,6e21.13e3)")
-    return int(found[2]), int(found[1]), int(found[3] or 0)
+@dataclass
+class _Archive:
+    """A file that is read line by line.
 
+    i : the next line; types, options : of elements, by the number of their kind; constants : of materials by name
+    systems : local ones; of_solids : volume group -> its material and local system; turned : node -> its own axes
+    equations : by number, and the number of the last; alike : set of CP -> its first node
+    loads : on nodes, along axes that may be turned
+    """
 
-def _nblock(lines: list[str], i: int, points: dict[int, list[float]], path: Path) -> int:
-    width, count, wide = _widths(lines[i], path)
-    i += 1
-    while i < len(lines) and not lines[i].lstrip().startswith(("N,", "-1")):
-        line = lines[i]
-        try:
-            values = [line[width * count + k * wide : width * count + (k + 1) * wide] for k in range(3)]
-            points[int(line[:width])] = [float(value or 0) if value.strip() else 0.0 for value in values]
-        except ValueError:
-            raise ValueError(
-                f"'{path}' has a broken node at line {i + 1}: '{line.strip()[:40]}': write it again"
-            ) from None
-        i += 1
-    if i == len(lines):
-        raise ValueError(f"'{path}' ends inside its nodes (NBLOCK): the file is cut off")
-    return i + 1
+    path: Path
+    lines: list[str]
+    mesh: LabelledMesh
+    i: int = 0
+    types: dict[int, int] = field(default_factory=dict)
+    options: dict[int, dict[int, str]] = field(default_factory=dict)
+    constants: dict[int, dict[str, float]] = field(default_factory=dict)
+    systems: dict[int, System] = field(default_factory=dict)
+    of_solids: dict[str, tuple[int, int]] = field(default_factory=dict)
+    turned: dict[int, np.ndarray] = field(default_factory=dict)
+    equations: dict[str, Terms] = field(default_factory=dict)
+    equation: str = ""
+    alike: dict[str, int] = field(default_factory=dict)
+    loads: Terms = field(default_factory=list)
 
+    def taken(self) -> RawMesh:
+        """The mesh with everything that the commands give."""
+        while self.i < len(self.lines):
+            words = [word.strip() for word in self.lines[self.i].split(",")]
+            name = words[0].upper()
+            self.i += 1
+            if name in READ:
+                try:
+                    READ[name](self, words + [""] * 12)
+                except ValueError as trouble:
+                    raise ValueError(
+                        str(trouble)
+                        if str(self.path) in str(trouble)
+                        else f"'{self.path}' has a broken {name} at line {self.i}: {trouble}: write it again"
+                    ) from None
+            elif (name[:1].isalpha() and "=" not in name) or name.startswith(("/INPUT", "*")):
+                self.mesh.met.other(name)
+        for material, system in self.of_solids.values():
+            if system and system not in self.systems:
+                raise ValueError(f"'{self.path}' has elements in system {system}, which it has not: add its LOCAL")
+            self.constants.setdefault(material, {})
+        if self.turned:
+            places = np.array([self.mesh.points[label] for label in self.turned])
+            own = Listed(places, np.array(list(self.turned.values())))
+            self.mesh.frames = dict.fromkeys(self.turned, own)
+        for node, axis, value in self.loads:
+            self.mesh.force(node, axis, value)
+        return self.mesh.raw(self.path, tuple(self._material(number) for number in self.constants))
 
-def _eblock(lines: list[str], i: int, mesh: LabelledMesh, types: dict[int, int], path: Path) -> int:
-    width, _, _ = _widths(lines[i], path)
-    i += 1
+    def _material(self, number: int) -> deck.DeckMaterial:
+        """A material from its constants, isotropic where nothing tells directions apart."""
+        of = self.constants[number]
+        mine = [name for name, (material, _) in self.of_solids.items() if material == number]
+        at = {name: self.of_solids[name][1] for name in mine}
+        if len({of.get(name, of.get("ALPX")) for name in ("ALPX", "ALPY", "ALPZ")}) > 1:
+            self.mesh.met.refuse("MP, an expansion that depends on direction")
+        one = deck.DeckMaterial(
+            f"material {number}", density=of.get("DENS"), expansion=of.get("ALPX"), groups=tuple(mine),
+            directions={name: self.systems[system] for name, system in at.items() if system},
+        )  # fmt: skip
+        young = [of.get(name, of.get("EX")) for name in ("EX", "EY", "EZ")]
+        poisson = [of.get(f"PR{pair}", of.get("PRXY")) for pair in _PAIRS]
+        for k, (one_way, other) in enumerate(((0, 1), (0, 2), (1, 2))):
+            minor, first, second = of.get(f"NU{_PAIRS[k]}", of.get("NUXY")), young[one_way], young[other]
+            if poisson[k] is None and minor is not None and first and second:
+                poisson[k] = minor * first / second  # NU is the strain along the first when pulled along the second
+        if not {"EY", "EZ", *(f"G{pair}" for pair in _PAIRS)} & set(of):
+            return replace(one, young=young[0], poisson=poisson[0])
+        shear = [of.get(f"G{pair}") for pair in _PAIRS]
+        if None in (*young, *poisson, *shear):
+            self.mesh.met.refuse(f"MP, material {number} with some constants of an orthotropic one")
+            return one
+        return replace(one, engineering=(*young, *poisson, *shear))  # type: ignore[arg-type]
 
-    def numbers(line: str) -> list[int]:
-        line = line.rstrip()
+    # mesh
+
+    def nblock(self, words: list[str]) -> None:
+        """Nodes, and where they are turned their angles."""
+        width, count, wide = self._widths()
+        while self.i < len(self.lines) and not self.lines[self.i].lstrip().startswith(("N,", "-1")):
+            line = self.lines[self.i]
+            try:
+                starts = range(width * count, len(line.rstrip()), wide)
+                self._node(int(line[:width]), [float(line[k : k + wide].strip() or 0) for k in starts])
+            except ValueError:
+                raise ValueError(
+                    f"'{self.path}' has a broken node at line {self.i + 1}: '{line.strip()[:40]}': write it again"
+                ) from None
+            self.i += 1
+        if self.i == len(self.lines):
+            raise ValueError(f"'{self.path}' ends inside its nodes (NBLOCK): the file is cut off")
+        self.i += 1
+
+    def n(self, words: list[str]) -> None:
+        """A node by a command of its own."""
+        if words[1].isdigit():
+            self._node(int(words[1]), [float(word or 0) for word in words[2:8]])
+
+    def _node(self, label: int, values: list[float]) -> None:
+        x, y, z, *angles = (values + [0.0] * 6)[:6]
+        self.mesh.points[label] = [x, y, z]
+        if any(angles):
+            self.turned[label] = _turned(angles)
+
+    def eblock(self, words: list[str]) -> None:
+        """Elements."""
+        if words[2].upper() != "SOLID":
+            self.mesh.met.refuse(f"EBLOCK, {words[2]}")
+            return
+        width, _, _ = self._widths()
+        while self.i < len(self.lines) and self.lines[self.i].strip() != "-1":
+            head = self._numbers(width)
+            if len(head) < 11:
+                raise ValueError(f"'{self.path}' has a broken element at line {self.i}: the file is cut off")
+            nodes, count = head[11:], head[8]
+            while len(nodes) < count and self.i < len(self.lines):
+                nodes += self._numbers(width)
+            kind = self.types.get(head[1], head[1])
+            if head[1] in self.types and kind not in SOLID_TYPES:
+                self._no_solid(head[1], kind)
+                continue
+            if kind in LAYERED and self.options.get(head[1], {}).get(3) == "1":
+                self.mesh.met.refuse(f"layered elements of type {kind}")
+            shape, members = _solid(nodes[:count])
+            name = f"material {head[0]}" + (f" in system {head[4]}" if head[4] else "")
+            self.of_solids[name] = head[0], head[4]
+            self.mesh.solid(shape, head[10], members, name)
+        if self.i == len(self.lines):
+            raise ValueError(f"'{self.path}' ends inside its elements (EBLOCK): the file is cut off")
+        self.i += 1
+
+    def _no_solid(self, number: int, kind: int) -> None:
+        """An element that is none of a solid: of no effect here, or refused."""
+        options = self.options.get(number, {})
+        glued = any(options.get(key) in values for key, values in BONDED.items())
+        if kind in HARMLESS_TYPES or (kind in CONTACT_TYPES and not glued):
+            self.mesh.met.ignored[f"elements of type {kind}"] += 1
+        else:
+            self.mesh.met.refuse(f"elements of type {kind}{', bonded' if glued else ''}")
+
+    def cmblock(self, words: list[str]) -> None:
+        """A component; a negative number ends a range."""
+        width, _, _ = self._widths()
+        items: list[int] = []
+        while len(items) < int(words[3].split()[0]):
+            if self.i == len(self.lines):
+                raise ValueError(f"'{self.path}' ends inside a component (CMBLOCK): the file is cut off")
+            items += self._numbers(width)
+        members: list[int] = []
+        for item in items:
+            members += [item] if item > 0 else range(members[-1] + 1, -item + 1)
+        (self.mesh.node_sets if words[2].upper().startswith("NODE") else self.mesh.volumes)[words[1]] = members
+
+    def _widths(self) -> tuple[int, int, int]:
+        """Width of an integer, integers on a line, width of a number, from a line such as (3i9,6e21.13e3)."""
+        line = self.lines[self.i].strip() if self.i < len(self.lines) else ""
+        found = re.match(r"\((\d+)[iI](\d+)(?:,\s*\d+[eE](\d+))?", line)
+        if found is None:
+            raise ValueError(f"'{self.path}' has a block with the format '{line}': expected one as (3i9,6e21.13e3)")
+        self.i += 1
+        return int(found[2]), int(found[1]), int(found[3] or 0)
+
+    def _numbers(self, width: int) -> list[int]:
+        """Whole numbers of the next line."""
+        line = self.lines[self.i].rstrip()
+        self.i += 1
         try:
             return [int(line[k : k + width]) for k in range(0, len(line), width)]
         except ValueError:
-            raise ValueError(f"'{path}' has a broken element at line {i + 1}: the file is cut off") from None
+            raise ValueError(f"'{self.path}' has a broken element at line {self.i}: the file is cut off") from None
 
-    while i < len(lines) and lines[i].strip() != "-1":
-        head = numbers(lines[i])
-        i += 1
-        if len(head) < 11:
-            raise ValueError(f"'{path}' has a broken element at line {i}: the file is cut off")
-        nodes, count = head[11:], head[8]
-        while len(nodes) < count and i < len(lines):
-            nodes += numbers(lines[i])
-            i += 1
-        if types.get(head[1]) not in SOLID_TYPES and head[1] in types:
-            mesh.ignored[f"elements of type {types[head[1]]}, which are no solids"] += 1
-            continue
-        kind, members = _solid(nodes[:count])
-        mesh.solid(kind, head[10], members, f"material {head[0]}")
-    if i == len(lines):
-        raise ValueError(f"'{path}' ends inside its elements (EBLOCK): the file is cut off")
-    return i + 1
+    # types, materials, systems
+
+    def et(self, words: list[str]) -> None:
+        """Kind of elements of a number."""
+        self.types[int(words[1])] = int(re.sub(r"\D", "", words[2]) or 0)
+        self.options[int(words[1])] = {key: word for key, word in enumerate(words[3:9], 1) if word}
+
+    def keyopt(self, words: list[str]) -> None:
+        """An option of such a kind."""
+        self.options.setdefault(int(words[1]), {})[int(words[2])] = words[3]
+
+    def mp(self, words: list[str]) -> None:
+        """A constant of a material, or a table of it over the temperature, which has to be constant."""
+        if words[0].upper() == "MP":
+            label, number, values = words[1], words[2], words[3:]
+            alike = not any(float(value or 0) for value in values[1:])
+        else:
+            label, number, values = words[3], words[4], [value for value in words[6:] if value]
+            alike = len(set(map(float, values))) <= 1
+        label = label.upper()
+        if not alike:
+            self.mesh.met.refuse(f"MP, {label} that depends on the temperature")
+        elif label in CONSTANTS:
+            self.constants.setdefault(int(number), {})[label] = float(values[0])
+        else:
+            self.mesh.met.other(f"MP {label}")
+
+    def csys(self, words: list[str]) -> None:
+        """The system that places count in from here on."""
+        if words[1] not in ("", "0"):
+            self.mesh.met.refuse(f"CSYS, {words[1]}")
+
+    def local(self, words: list[str]) -> None:
+        """A local system: LOCAL, its number, kind, origin and angles; archives write these on lines of their own."""
+        if words[1].upper().startswith("R"):
+            part, words = words[2].upper(), words[2:]
+            number = int(words[1])
+            if part == "LOC":
+                self._system(number, words[2], words[3:6], [])
+            elif part == "ANG":
+                self.systems[number] = replace(self.systems[number], axes=_turned(_floats(words[2:5])))
+            elif any(value not in (0.0, 1.0) for value in _floats(words[2:4])):
+                self.mesh.met.refuse("LOCAL, an elliptic system")
+        else:
+            self._system(int(words[1]), words[2], words[3:6], words[6:9])
+
+    def _system(self, number: int, kind: str, origin: list[str], angles: list[str]) -> None:
+        which = int(kind or 0)
+        if which >= len(_SYSTEMS):
+            self.mesh.met.refuse("LOCAL, a toroidal system")
+            which = 0
+        self.systems[number] = System(_SYSTEMS[which], np.array(_floats(origin)), _turned(_floats(angles)))
+
+    # supports, loads, equations
+
+    def d(self, words: list[str]) -> None:
+        """A support of a node, of a component or of all nodes."""
+        label = words[2].upper()
+        axes = tuple(range(6)) if label == "ALL" else (_AXES[label],) if label in _AXES else ()
+        members = self._members(words[1])
+        if not axes or not members:
+            self.mesh.met.refuse(f"D, {label if members else words[1]}")
+        for node in members:
+            self.mesh.hold(node, axes, float(words[3] or 0))
+
+    def f(self, words: list[str]) -> None:
+        """A force or a moment on a node, of a component or of all nodes."""
+        label = words[2].upper()
+        members = self._members(words[1])
+        if label not in _FORCES or not members:
+            self.mesh.met.refuse(f"F, {label if members else words[1]}")
+        self.loads += [(node, _FORCES[label], float(words[3] or 0)) for node in members if label in _FORCES]
+
+    def _members(self, text: str) -> list[int]:
+        if text.upper() == "ALL":
+            return list(self.mesh.points)
+        return [int(text)] if text.isdigit() else self.mesh.node_sets.get(text, [])
+
+    def ce(self, words: list[str]) -> None:
+        """An equation, or more terms of it."""
+        if words[1].upper().startswith("R"):
+            number, constant = (words[4], words[5]) if words[2].upper() == "DEFI" else (self.equation, "")
+            terms = words[3:] if words[2].upper() == "NODE" else []
+        else:
+            number, constant, terms = words[1].upper(), words[2], words[3:]
+            if number in ("", "HIGH", "NEXT"):
+                number = f"{len(self.equations) + 1}" if number == "NEXT" else self.equation
+        self.equation = number
+        if number not in self.equations:
+            self.equations[number] = []
+            self.mesh.equations.append(self.equations[number])
+        if float(constant or 0):
+            self.mesh.met.refuse("CE, a constant term")
+        for node, label, factor in zip(terms[::3], terms[1::3], terms[2::3], strict=False):
+            if node and label.upper() not in _AXES:
+                self.mesh.met.refuse(f"CE, {label}")
+            elif node:
+                self.equations[number].append((int(node), _AXES[label.upper()], float(factor or 0)))
+
+    def cp(self, words: list[str]) -> None:
+        """Displacements that are alike."""
+        labels = _AXES if words[2].upper() == "ALL" else {words[2].upper(): 0}
+        nodes = [word for word in words[3:] if word]
+        if not set(labels) <= set(_AXES) or not all(word.isdigit() for word in (words[1], *nodes)):
+            self.mesh.met.refuse(f"CP, {words[1]}, {words[2]}")
+            return
+        for node in map(int, nodes):
+            first = self.alike.setdefault(words[1], node)  # a set may go on in a further command
+            self.mesh.equations += [
+                [(node, _AXES[label], 1.0), (first, _AXES[label], -1.0)] for label in labels if node != first
+            ]
+
+
+def _floats(words: list[str]) -> list[float]:
+    return [float(word or 0) for word in (words + [""] * 3)[:3]]
+
+
+def _turned(angles: list[float]) -> np.ndarray:
+    """Axes (3, 3), rows, turned by angles [degrees] about z, about the new x, and about the y after both."""
+    z, x, y = angles
+    return np.asarray(turned(1, y) @ turned(0, x) @ turned(2, z))
+
+
+CONSTANTS = words("EX, EY, EZ, DENS, ALPX, ALPY, ALPZ") | {f"{of}{at}" for of in ("NU", "PR", "G") for at in _PAIRS}
+READ: dict[str, Callable[[_Archive, list[str]], None]] = {
+    "NBLOCK": _Archive.nblock,
+    "N": _Archive.n,
+    "EBLOCK": _Archive.eblock,
+    "CMBLOCK": _Archive.cmblock,
+    "ET": _Archive.et,
+    **dict.fromkeys(("KEYOPT", "KEYOP"), _Archive.keyopt),
+    **dict.fromkeys(("MP", "MPDATA"), _Archive.mp),
+    "CSYS": _Archive.csys,
+    "LOCAL": _Archive.local,
+    "D": _Archive.d,
+    "F": _Archive.f,
+    "CE": _Archive.ce,
+    "CP": _Archive.cp,
+}
+TABLE = CardTable(
+    read=", ".join(READ),
+    silent="""FINISH, NUMOFF, DOF, MPTEMP, EXTOPT, ETBLOCK, SHPP, *IF, *ENDIF, *SET, *GET, *ELSE, ERESX, MAT, TYPE,
+        REAL, SECNUM, ESYS, ALLSEL, TREF, TOFFST""",
+    harmless={
+        "the step is the scene's": """ANTYPE, MODOPT, MXPAND, NSUBST, TIME, OUTRES, OUTPR, KBC, AUTOTS, DELTIM, EQSLV,
+            NLGEOM, LUMPM, PSTRES, SSTIF, NROPT, HARFRQ, HROPT, HROUT, TRNOPT, TINTP, CNVTOL, PRED, LNSRCH, NEQIT, NCNV,
+            SOLVE, SAVE, RESUME, RESCONTROL, TUNIF, CUTCONTROL, OPNCONTROL, SOLCONTROL, MONITOR, LSWRITE, ADAPT""",
+        "damping is the scene's": """ALPHAD, BETAD, DMPRAT, DMPSTR, MDAMP, MP ALPD, MP BETD, MP DMPR, MP DMPS, MP DAMP,
+            MP SDMP""",
+        "contact is the scene's": "MP MU",
+        "bodies are elastic": """MP KXX, MP KYY, MP KZZ, MP C, MP HF, MP EMIS, MP REFT, MP ENTH, MP RSVX, MP RSVY,
+            MP RSVZ, MP PERX, MP MURX, MP SONC, MP VISC""",
+        "real constants and sections of what is no solid": "R, RLBLOCK, RMODIF, SECTYPE, SECDATA, SECBLOCK, SECCONTROL",
+    },
+)
 
 
 def _solid(nodes: list[int]) -> tuple[str, list[int]]:
@@ -138,20 +387,3 @@ def _solid(nodes: list[int]) -> tuple[str, list[int]]:
     if len(nodes) > max(edges) and all(nodes[e] for e in edges):
         return _SECOND[kind], [nodes[c] for c in [*corners, *edges]]
     return kind, [nodes[c] for c in corners]
-
-
-def _cmblock(lines: list[str], i: int, count: int, path: Path) -> tuple[int, list[int]]:
-    """Members of a component; a negative number ends a range."""
-    width, _, _ = _widths(lines[i], path)
-    i += 1
-    items: list[int] = []
-    while len(items) < count:
-        if i == len(lines):
-            raise ValueError(f"'{path}' ends inside a component (CMBLOCK): the file is cut off")
-        line = lines[i].rstrip()
-        items += [int(line[k : k + width]) for k in range(0, len(line), width)]
-        i += 1
-    members: list[int] = []
-    for item in items:
-        members += [item] if item > 0 else range(members[-1] + 1, -item + 1)
-    return i, members

@@ -7,7 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from tribodyn.geometry.sources.raw import listed
+
+def listed(counts: Mapping[str, int]) -> str:
+    """Names with how often each was met, as a clause."""
+    return ", ".join(f"{name} ({count})" if count > 1 else name for name, count in counts.items())
 
 
 def words(text: str) -> frozenset[str]:
@@ -44,7 +47,7 @@ class CardTable:
 
 @dataclass
 class Met:
-    """Cards of a file that were met and not carried over. mark : what stands before a card's name"""
+    """Cards of a file that were met and not carried over. mark : what stands before a card's name in sentences"""
 
     table: CardTable
     mark: str = ""

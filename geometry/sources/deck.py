@@ -7,8 +7,10 @@ mm, t and s, as decks do.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from tribodyn.geometry.sources.directions import Directions
 
@@ -34,7 +36,7 @@ class DeckMaterial:
 
 @dataclass(frozen=True)
 class Tie:
-    """Two faces glued; slave and master as the deck calls them. tolerance [m], None where the deck leaves it."""
+    """Two faces glued, or that may touch, as the deck calls them. tolerance [m], None where the deck leaves it."""
 
     name: str
     slave: str
@@ -93,27 +95,49 @@ class FacePressure:
 
 @dataclass(frozen=True)
 class Support:
-    """A displacement [m] (axis 0..2) or rotation [rad] (axis 3..5) that is given, 0 for held."""
+    """A displacement [m] (axis 0..2) or rotation [rad] (axis 3..5) that is given, 0 for held.
+
+    system : along whose directions, None for x, y, z
+    """
 
     group: str
     axis: int
     value: float = 0.0
+    system: Directions | None = None
 
 
 @dataclass(frozen=True)
 class PointMass:
-    """A mass [kg] at a reference point or node set."""
+    """A mass [kg] at a reference point or node set; inertia of a point about x, y, z [kg m2]."""
 
     group: str
     value: float
+    inertia: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def times(self, mass: float, area: float = 1.0) -> PointMass:
+        """The same in other units."""
+        a, b, c = (mass * area * value for value in self.inertia)
+        return PointMass(self.group, mass * self.value, (a, b, c))
+
+
+def stiffness(upper: list[float], order: Sequence[int]) -> tuple[tuple[float, ...], ...]:
+    """(6, 6) of an anisotropic material from the 21 values of its upper triangle, row by row.
+
+    order : where each of our stresses 11, 22, 33, 23, 13, 12 stands among those of the file
+    """
+    full = np.zeros((6, 6))
+    full[np.triu_indices(6)] = upper
+    full += np.triu(full, 1).T
+    return tuple(map(tuple, full[np.ix_(order, order)].tolist()))
 
 
 @dataclass(frozen=True)
 class Deck:
-    """All of it; empty for files that hold a mesh alone."""
+    """All of it; empty for files that hold a mesh alone. contacts : pairs of faces, of which a scene makes contacts"""
 
     materials: tuple[DeckMaterial, ...] = ()
     ties: tuple[Tie, ...] = ()
+    contacts: tuple[Tie, ...] = ()
     couplings: tuple[Coupling, ...] = ()
     equations: tuple[Equation, ...] = ()
     springs: tuple[Spring, ...] = ()
@@ -157,6 +181,13 @@ def in_si(deck: Deck, metre: float, newton: float) -> Deck:
         ),
         forces=tuple(replace(one, value=one.value * newton * (1.0 if one.axis < 3 else metre)) for one in deck.forces),
         pressures=tuple(replace(one, value=one.value * newton / area) for one in deck.pressures),
-        supports=tuple(replace(one, value=one.value * (metre if one.axis < 3 else 1.0)) for one in deck.supports),
-        masses=tuple(replace(one, value=one.value * mass) for one in deck.masses),
+        supports=tuple(
+            replace(
+                one,
+                value=one.value * (metre if one.axis < 3 else 1.0),
+                system=one.system and one.system.scaled(metre),
+            )
+            for one in deck.supports
+        ),
+        masses=tuple(one.times(mass, area) for one in deck.masses),
     )

@@ -106,7 +106,7 @@ class System:
 
 @dataclass(frozen=True)
 class Listed:
-    """Directions that a file lists element by element; at a place those of the nearest centre hold.
+    """Directions that a file lists by element or node; at a place those of the nearest centre hold, or their mean.
 
     centres : (n, 3); rows : (n, 3, 3)
     """
@@ -116,7 +116,12 @@ class Listed:
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """(n, 3, 3) directions at points (n, 3), rows."""
-        return np.asarray(self.rows[cKDTree(self.centres).query(points)[1]])
+        apart, which = cKDTree(self.centres).query(points, k=range(1, min(4, len(self.centres)) + 1))
+        equally_near = apart <= 1.000001 * apart[:, :1]
+        mean = np.einsum("nk,nkij->nij", equally_near, self.rows[which])
+        return np.where(
+            (equally_near.sum(axis=1) > 1)[:, None, None], orthogonal(mean[:, 0], mean[:, 1]), self.rows[which[:, 0]]
+        )
 
     def scaled(self, metre: float) -> Listed:
         """The same where lengths are counted in another unit."""

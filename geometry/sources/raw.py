@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from tribodyn.geometry.sources.deck import Deck, Support
+from tribodyn.geometry.sources import deck
+from tribodyn.geometry.sources.card_table import Met
+from tribodyn.geometry.sources.directions import Directions
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class RawMesh:
     bodies: Sequence[str] = ()
     skins: frozenset[str] = frozenset()
     points_of_reference: Mapping[str, np.ndarray] = field(default_factory=dict)
-    deck: Deck = field(default_factory=Deck)
+    deck: deck.Deck = field(default_factory=deck.Deck)
     unused: Sequence[str] = ()
     notes: Sequence[str] = ()
     refused: Mapping[str, str] = field(default_factory=dict)
@@ -52,26 +53,32 @@ NOTHING = RawMesh(np.empty((0, 3)), np.empty(0, dtype=int), ())
 """Of a file without solids."""
 
 
-def listed(counts: Mapping[str, int]) -> str:
-    """Names with how often each was met, as a clause."""
-    return ", ".join(f"{name} ({count})" if count > 1 else name for name, count in counts.items())
+Terms = list[tuple[int, int, float]]
+"""Displacements that are summed: label of a node, axis 0..5, factor."""
 
 
 @dataclass
 class LabelledMesh:
     """Labelled nodes and elements of a file while it is read, for formats whose groups are lists of labels.
 
-    points : label -> (3,); solids : kind -> its elements, label and nodes by label
-    volumes, node_sets : groups by label; held : (axis, value) -> nodes that are held there
-    ignored : cards and elements that have no use here
+    met : its cards that are not read; points : label -> (3,); solids : kind -> its elements, label and nodes by label
+    volumes, node_sets : groups by label
+    frames : label -> the directions along which displacements of that node count, x, y, z for others
+    held : (axis, value) -> nodes that are held there; equations, springs : terms, and a stiffness
     """
 
+    met: Met
     points: dict[int, list[float]] = field(default_factory=dict)
     solids: dict[str, list[tuple[int, list[int]]]] = field(default_factory=dict)
     volumes: dict[str, list[int]] = field(default_factory=dict)
     node_sets: dict[str, list[int]] = field(default_factory=dict)
-    held: dict[tuple[int, float], list[int]] = field(default_factory=dict)
-    ignored: Counter[str] = field(default_factory=Counter)
+    frames: dict[int, Directions] = field(default_factory=dict)
+    held: dict[tuple[int, float], dict[int, None]] = field(default_factory=dict)
+    equations: list[Terms] = field(default_factory=list)
+    springs: list[tuple[Terms, float]] = field(default_factory=list)
+    forces: list[deck.Force] = field(default_factory=list)
+    couplings: list[deck.Coupling] = field(default_factory=list)
+    masses: list[deck.PointMass] = field(default_factory=list)
 
     def solid(self, kind: str, label: int, nodes: list[int], group: str) -> None:
         """An element and the volume group of its property."""
@@ -83,19 +90,75 @@ class LabelledMesh:
         self.node_sets[f"node {label}"] = [label]
         return f"node {label}"
 
-    def raw(self, path: Path, cards: str, deck: Deck) -> RawMesh:
-        """The mesh, with the deck and the nodes that are held. cards : what the format calls its cards
+    def hold(self, label: int, axes: Iterable[int], value: float = 0.0) -> None:
+        """A support of a node."""
+        for axis in axes:
+            self.held.setdefault((axis, value), {})[label] = None
 
-        Raises  ValueError: an element that names a node that is not there
+    def force(self, label: int, axis: int, value: float) -> None:
+        """A force, or a moment, along a displacement of a node."""
+        self.forces += [
+            deck.Force(place, own, value * factor) for place, own, factor in self._terms([(label, axis, 1.0)])
+        ]
+
+    def couple(self, card: str, kind: str, point: int, members: list[int], axes: Sequence[int] = range(6)) -> None:
+        """Nodes that a point carries, or that carry a point."""
+        group = f"{card} {len(self.couplings) + 1}"
+        self.node_sets[group] = members
+        self.couplings.append(deck.Coupling(group, kind, self.at(point), group, tuple(axes)))
+
+    def _terms(self, terms: Terms) -> tuple[tuple[str, int, float], ...]:
+        """Terms by groups, along x, y, z."""
+        found = []
+        for label, axis, factor in terms:
+            if label not in self.points:
+                raise ValueError(f"node {label} is named, which the file has not: it is cut off")
+            row = np.eye(3)[axis % 3]
+            if label in self.frames:
+                row = self.frames[label].at(np.array([self.points[label]]))[0][axis % 3]
+            kept = np.flatnonzero(np.abs(row) > 1e-12).tolist()
+            found += [(self.at(label), axis - axis % 3 + k, factor * float(row[k])) for k in kept]
+        return tuple(found)
+
+    def _supports(self, solid: set[int]) -> Iterator[deck.Support]:
+        """Supports of groups: nodes that are held alike are one, and what lies between them is held too."""
+        places: dict[tuple[int, ...], str] = {}
+        for (axis, value), labels in self.held.items():
+            alike: dict[int, tuple[Directions | None, list[int]]] = {}
+            first = axis - axis % 3
+            for label in labels:
+                frame = self.frames.get(label)
+                if not value and all(label in self.held.get((first + k, 0.0), ()) for k in range(3)):
+                    frame = None  # held along all of them
+                if label in solid:
+                    alike.setdefault(id(frame), (frame, []))[1].append(label)
+                else:
+                    yield deck.Support(self.at(label), axis, value, frame)
+            for frame, members in alike.values():
+                place = places.setdefault(tuple(sorted(members)), f"support {len(places) + 1}")
+                self.node_sets[place] = members
+                yield deck.Support(place, axis, value, frame)
+
+    def raw(self, path: Path, materials: tuple[deck.DeckMaterial, ...]) -> RawMesh:
+        """The mesh, with its materials and all else that was read.
+
+        Raises  ValueError: an element, or a constraint, that names a node that is not there
         """
         if not self.solids:
             return NOTHING
-        places: dict[tuple[int, ...], str] = {}
-        supports = []
-        for (axis, value), labels in self.held.items():
-            place = places.setdefault(tuple(sorted(labels)), f"support {len(places) + 1}")
-            self.node_sets[place] = labels
-            supports.append(Support(place, axis, value))
+        labels_of_solids = {node for elements in self.solids.values() for _, nodes in elements for node in nodes}
+        for one in self.couplings:
+            if not labels_of_solids.issuperset(self.node_sets[one.face]):
+                self.met.refuse(f"{one.name.split()[0]} of nodes that belong to no solid")
+        made = deck.Deck(
+            materials=materials,
+            couplings=tuple(self.couplings),
+            equations=tuple(deck.Equation(self._terms(terms)) for terms in self.equations),
+            springs=tuple(deck.Spring(self._terms(terms), value) for terms, value in self.springs),
+            forces=tuple(self.forces),
+            supports=tuple(self._supports(labels_of_solids)),
+            masses=tuple(self.masses),
+        )
         row = {label: i for i, label in enumerate(self.points)}
         cells: list[Cells] = []
         number: dict[int, int] = {}
@@ -115,7 +178,7 @@ class LabelledMesh:
         rows = {name: np.unique([row[at] for at in labels if at in row]) for name, labels in self.node_sets.items()}
         alone = {name for name, found in rows.items() if len(found) == 1 and not solid[found[0]]}
         volumes = {name: [number[at] for at in labels if at in number] for name, labels in self.volumes.items()}
-        unused = [f"{cards} {listed(self.ignored)}"] if self.ignored else []
+        unused = self.met.unused()
         for name, labels in self.node_sets.items():
             if missing := sum(label not in row for label in labels):
                 unused.append(f"{missing} nodes of group '{name}', which the file has not")
@@ -126,8 +189,9 @@ class LabelledMesh:
             {name: np.unique(members) for name, members in volumes.items() if members},
             {},
             {name: found for name, found in rows.items() if len(found) and name not in alone},
-            skins=frozenset(rows),
+            skins=frozenset(name for name, found in rows.items() if len(found) > 2),
             points_of_reference={name: where[rows[name][0]] for name in alone},
-            deck=replace(deck, supports=tuple(supports)),
+            deck=made,
             unused=unused,
+            refused=self.met.refused,
         )

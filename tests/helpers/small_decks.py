@@ -30,10 +30,10 @@ def straight(x: np.ndarray) -> np.ndarray:
     return x * [100.0, 20.0, 10.0]
 
 
-def bricks(counts: tuple[int, int, int], shape: Shape) -> str:
-    """Nodes and elements C3D20 of the unit cube, cut and mapped by a function of points; sets ALL, FOOT at x = 0.
+def cut(counts: tuple[int, int, int], shape: Shape) -> tuple[np.ndarray, list[list[int]], list[int]]:
+    """The unit cube in bricks of twenty nodes, mapped by a function of points, and the nodes, from 1, at x = 0.
 
-    Nodes that meet after mapping are one, so that a cube may be bent to a ring
+    Nodes that meet after mapping are one, so that a cube may be bent to a ring. Returns points, bricks, foot
     """
     local = 2 * REFERENCE_POINTS["hexahedron27"][:20]
     number: dict[tuple[float, ...], int] = {}
@@ -46,18 +46,53 @@ def bricks(counts: tuple[int, int, int], shape: Shape) -> str:
             if at[0] == 0:
                 foot.add(labels[-1])
         cells.append(labels)
-    lines = ["*NODE", *(f"{n}, {', '.join(f'{c:.9f}' for c in x)}" for x, n in number.items())]
+    return np.array(list(number)), cells, sorted(foot)
+
+
+def bricks(counts: tuple[int, int, int], shape: Shape) -> str:
+    """Nodes and elements C3D20 of Abaqus with the sets ALL and FOOT."""
+    points, cells, foot = cut(counts, shape)
+    lines = ["*NODE", *(f"{n}, {', '.join(f'{c:.9f}' for c in x)}" for n, x in enumerate(points, 1))]
     lines.append("*ELEMENT, TYPE=C3D20, ELSET=ALL")
     for e, labels in enumerate(cells, 1):
         row = [str(n) for n in labels]
         lines += [f"{e}, {', '.join(row[:12])},", ", ".join(row[12:])]
-    return "\n".join([*lines, "*NSET, NSET=FOOT", *map(str, sorted(foot)), ""])
+    return "\n".join([*lines, "*NSET, NSET=FOOT", *map(str, foot), ""])
 
 
-def frequencies(deck: str, count: int, folder: Path, unit: str = "mm") -> np.ndarray:
+def bulk(counts: tuple[int, int, int], shape: Shape, held: str = "", system: str = "") -> str:
+    """The same for Nastran: GRID, held at the foot by its PS field along a system, and CHEXA of property 1."""
+    points, cells, foot = cut(counts, shape)
+    lines = []
+    for n, (x, y, z) in enumerate(points, 1):
+        lines.append(f"GRID,{n},,{x:.9f},{y:.9f},{z:.9f},{system},{held if n in foot else ''}")
+    for e, c in enumerate(cells, 1):
+        row = [str(n) for n in [*c[:12], *c[16:], *c[12:16]]]
+        lines += [f"CHEXA,{e},1,{','.join(row[:6])}", f"+,{','.join(row[6:14])}", f"+,{','.join(row[14:])}"]
+    return "\n".join([*lines, ""])
+
+
+def archive(
+    counts: tuple[int, int, int], shape: Shape, angles: tuple[float, ...] = (), system: int = 0, held: str = "ALL"
+) -> str:
+    """The same for ANSYS: NBLOCK, whose nodes are turned by angles, EBLOCK in a local system, D at the foot."""
+    points, cells, foot = cut(counts, shape)
+    lines = ["/PREP7", "ET,1,186", f"NBLOCK,6,SOLID,{len(points)},{len(points)}", "(3i9,6e21.13e3)"]
+    for n, x in enumerate(points, 1):
+        lines.append(f"{n:9d}{0:9d}{0:9d}" + "".join(f"{value:21.13E}" for value in [*x, *angles]))
+    lines += ["N,R5.3,LOC,       -1,", f"EBLOCK,19,SOLID,{len(cells)},{len(cells)}", "(19i9)"]
+    for e, c in enumerate(cells, 1):
+        head = [1, 1, 1, 1, system, 0, 0, 0, 20, 0, e]
+        lines += ["".join(f"{n:9d}" for n in [*head, *c[:8]]), "".join(f"{n:9d}" for n in c[8:])]
+    lines.append("       -1")
+    return "\n".join([*lines, *(f"D,{n:8d},{held},  0.00000000" for n in foot if held), ""])
+
+
+def frequencies(deck: str, count: int, folder: Path, ending: str = "inp", unit: str = "mm") -> np.ndarray:
     """The lowest natural frequencies (count,) [Hz] of a deck as `inspect --modes` gives them."""
-    (folder / "own.inp").write_text(deck, encoding="utf-8")
-    return np.array(inspection.inspect(folder / "own.inp", unit=unit, modes=count).frequencies)
+    path = folder / f"own.{ending}"
+    path.write_text(deck, encoding="utf-8")
+    return np.array(inspection.inspect(path, unit=unit, modes=count).frequencies)
 
 
 def by_calculix(deck: str, count: int, folder: Path) -> np.ndarray:

@@ -78,3 +78,31 @@ def test_what_cannot_be_inspected_is_one_sentence(capsys, words, sentence):
     assert sentence in err
     assert err.count("\n") == 1
     assert out == ""
+
+
+@pytest.mark.parametrize(("off", "remarked"), [(0.0, False), (0.2, True), (1.0, True), (-0.3, True)])
+def test_how_the_faces_of_a_tie_meet_is_told(tmp_path, off, remarked):
+    place = "          0.,           0.,          10.\n          0.,"
+    path = tmp_path / "lap.inp"
+    path.write_text(
+        LAP.read_text().replace(place, f"0., -10., {10.0 + off}\n 0.,").replace("tolerance=0.5", "tolerance=2")
+    )
+    found = inspection.inspect(path, unit="mm")
+    (pair,) = found.pairs.values()
+    assert pair["area_m2"] == pytest.approx(2e-4)
+    assert pair["shared_m2"] == pytest.approx(1e-4, rel=1e-6)
+    assert pair["least_m"] == pytest.approx(1e-3 * off, abs=1e-9)
+    assert pair["largest_m"] == pytest.approx(1e-3 * off, abs=1e-9)
+    assert pair["angle_deg"] == pytest.approx(0.0, abs=1e-5)
+    assert any("the faces of tie" in remark for remark in found.remarks) is remarked
+    assert not found.refused
+
+
+def test_a_tie_that_shares_nothing_is_refused(tmp_path):
+    path = tmp_path / "lap.inp"
+    path.write_text(
+        LAP.read_text().replace("*Instance, name=Block-2, part=Block\n", "*Instance, name=Block-2, part=Block\n5., ")
+    )
+    found = inspection.inspect(path, unit="mm")
+    assert not found.pairs
+    assert any("glue" in sentence for sentence in found.refused)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from tribodyn.fem.assembly import Assembly, Body
-from tribodyn.fem.constraints import AXES, Clamp, Constraint
+from tribodyn.fem.constraints import AXES, Clamp, ClampAlong, Constraint
 from tribodyn.fem.couplings import DistributedCoupling, Equation, RigidCoupling, Tie
 from tribodyn.fem.loads import Load, Moment, NodalForce, Pressure, Sum
 from tribodyn.fem.material import Anisotropic, AnyMaterial, Material, Orthotropic
@@ -23,6 +23,7 @@ from tribodyn.fem.part import Part, build
 from tribodyn.fem.springs import ElongationSpring, Mass
 from tribodyn.geometry import refine
 from tribodyn.geometry.sources import deck, picking, read
+from tribodyn.geometry.sources.directions import Directions
 from tribodyn.workflows.scene.structure import EVERYTHING
 from tribodyn.workflows.scene.structure import DeckTable as Table
 
@@ -190,18 +191,30 @@ class _Carrying:
 
     def _masses(self, masses: Sequence[deck.PointMass]) -> None:
         for one in masses:
-            places = [one.group] if one.group in self.source.points else self._groups(one.group, "a mass")
+            point = one.group in self.source.points
+            places = [one.group] if point else self._groups(one.group, "a mass")
+            inertia = one.inertia if point else (0.0, 0.0, 0.0)  # a node of a solid has no rotation
             self._needs_coupling(one.group, "mass")
-            self.made.masses += [Mass(place, one.value / len(places)) for place in places]
+            self.made.masses += [Mass(place, one.value / len(places), inertia) for place in places]
 
     def _supports(self, supports: Sequence[deck.Support]) -> None:
         moved = [one for one in supports if one.value]
         if moved:
             self.notes.append(f"{self._what('supports', moved)} with a displacement: give it as [prescribed.NAME]")
         held: dict[str, set[int]] = {}
+        along: list[tuple[str, int, Directions]] = []
         for one in supports:
-            if not one.value:
+            if not one.value and one.system is None:
                 held.setdefault(one.group, set()).add(one.axis)
+            elif not one.value and one.system is not None:
+                along.append((one.group, one.axis, one.system))
+        for group, axis, system in along:
+            point = group in self.source.points
+            if point and (group in self.carried or group in self.axes_of):
+                places = [group if axis < 3 else f"{group}.turn"]
+            else:
+                places = self._groups(group, "a support") if axis < 3 and not point else []
+            self.made.constraints += [ClampAlong(place, system, (axis % 3,)) for place in places]
         for group, axes in held.items():
             if group in self.source.points:
                 if group not in self.carried and group not in self.axes_of:

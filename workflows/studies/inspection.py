@@ -4,26 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 import numpy as np
 
-from tribodyn.fem.assembly import Assembly
+from tribodyn.fem.assembly import Assembly, Body
+from tribodyn.fem.couplings import Tie
 from tribodyn.fem.elasticity import assemble, densities
 from tribodyn.fem.material import Material
 from tribodyn.fem.modes import modes
+from tribodyn.fem.part import Part
 from tribodyn.geometry.facts import area, facts
 from tribodyn.geometry.sources import read as sources
 from tribodyn.geometry.sources.deck import Deck
 from tribodyn.workflows.pictures import groups as group_pictures
 from tribodyn.workflows.result.columns import named_lines
 from tribodyn.workflows.run import decks, modelling, part_reduction, sanity_checks
+from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Pressure, quantity
 from tribodyn.workflows.scene.source import AnyPath, Overrides, read_scene
 from tribodyn.workflows.scene.structure import DeckTable
+
+APART = 0.005  # of the length of a face: an opening or overlap from which on a pair is remarked
 
 
 @dataclass(frozen=True)
@@ -61,6 +67,7 @@ class Inspection:
     unused: tuple[str, ...] = ()
     refused: tuple[str, ...] = ()
     said: tuple[str, ...] = ()
+    pairs: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     gaps: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     frequencies: tuple[float, ...] = ()
     remarks: tuple[str, ...] = ()
@@ -77,6 +84,7 @@ class Inspection:
             "unused": list(self.unused),
             "refused": list(self.refused),
             "worst_element": dict(self.worst),
+            "pairs": dict(self.pairs),
             "gaps": dict(self.gaps),
             "frequencies_hz": list(self.frequencies),
             "said": list(self.said),
@@ -100,13 +108,19 @@ class Inspection:
             lines.append(("group", f"{name}: {group['nodes']} nodes{wide}"))
         at = ", ".join(f"{1e3 * x:.4g}" for x in self.worst["centre_m"])
         lines.append(("worst element", f"scaled Jacobian {self.worst['scaled_jacobian']:.3g} at ({at}) mm"))
-        for name, gap in self.gaps.items():
-            lines.append(("gap", f"{name}: {1e6 * gap['least_m']:.4g} to {1e6 * gap['largest_m']:.4g} um"))
+        for name, pair in self.pairs.items():
+            shared, area = (1e6 * pair[key] for key in ("shared_m2", "area_m2"))
+            low, high = (1e3 * pair[key] for key in ("least_m", "largest_m"))
+            gap = f"opening {low:.3g} to {high:.3g} mm, overlap where negative"
+            turned = f"{pair['angle_deg']:.3g} degrees off face to face"
+            lines.append(("pair", f"{name}: {shared:.4g} of {area:.4g} mm2 shared, {gap}; {turned}"))
+        for name, between in self.gaps.items():
+            lines.append(("gap", f"{name}: {1e6 * between['least_m']:.4g} to {1e6 * between['largest_m']:.4g} um"))
         if self.frequencies:
             lines.append(("modes", ", ".join(f"{f:.5g}" for f in self.frequencies) + " Hz"))
         lines += [("done", sentence) for sentence in self.said]
         lines += [("not used", clause) for clause in self.unused]
-        lines += [("refused", f"{clause}, which a scene has to ignore by name") for clause in self.refused]
+        lines += [("refused", clause) for clause in self.refused]
         return named_lines(lines + [("warning", sentence) for sentence in self.remarks])
 
     def write(self, folder: Path) -> list[Path]:
@@ -126,6 +140,7 @@ def inspect(
     modes: int = 0,
     free: bool = False,
     overrides: Overrides = (),
+    progress: Progress | None = None,
 ) -> Inspection:
     """Show what a mesh, a deck, a CAD file or a scene holds: size, mass, bodies, groups, worst element, gaps, warnings.
 
@@ -144,14 +159,17 @@ def inspect(
         raise ValueError("--young and --density go together: give both or none")
     material = None if young is None or density is None else Material(young, poisson, density)
     if Path(what).suffix.lower() in sources.ENDINGS:
-        return _of_file(Path(what), unit, material, modes, free)
+        return _of_file(Path(what), unit, material, modes, free, progress or Progress())
     if unit != "m" or material is not None:
         raise ValueError("--unit, --young, --poisson and --density are for files: a scene has its own")
-    return _of_scene(read_scene(what, overrides), modes)
+    return _of_scene(read_scene(what, overrides), modes, progress or Progress())
 
 
-def _of_file(path: Path, unit: str, material: Material | None, n_modes: int, free: bool) -> Inspection:
-    source = sources.read(path, unit)
+def _of_file(
+    path: Path, unit: str, material: Material | None, n_modes: int, free: bool, progress: Progress
+) -> Inspection:
+    with progress.stage("reading"):
+        source = sources.read(path, unit)
     named = {"given": material} if material is not None else {}
     table = DeckTable(file=path.name, unit=sources.UNITS[unit][0], material=next(iter(named), None))
     solids = []
@@ -162,45 +180,101 @@ def _of_file(path: Path, unit: str, material: Material | None, n_modes: int, fre
             made = None
         solids.append(Solid(name, body.mesh, body.node_sets, made))
     found = measured(solids, (f"{sentence}" for sentence in source.notes), source.unused)
-    found = replace(found, refused=tuple(source.refused.values()))
+    pairs, apart, remarks = pairs_of(source)
+    ignored = (f"{clause}, which a scene has to ignore by name" for clause in source.refused.values())
+    found = replace(found, pairs=pairs, refused=(*ignored, *apart))
     if n_modes:
         if material is None and not any(one.groups for one in source.deck.materials):
             raise ValueError(f"{path} gives no material to compute modes with: give --young, --poisson and --density")
-        if free or source.deck == Deck(materials=source.deck.materials):
-            found = replace(found, frequencies=_free_frequencies(solids, n_modes))
+        if free or replace(source.deck, contacts=()) == Deck(materials=source.deck.materials):
+            found = replace(found, frequencies=_free_frequencies(solids, n_modes, progress))
         else:
-            part = decks.part(path.stem, table, named, path.parent)
-            found = replace(found, frequencies=_frequencies(part.system, n_modes))
+            with progress.stage("mass and stiffness"):
+                part = decks.part(path.stem, table, named, path.parent)
+            with progress.stage("modes"):
+                found = replace(found, frequencies=_frequencies(part, n_modes))
     hint = 'give --unit mm (in a scene: unit = "mm")'
-    remarks = sanity_checks.check_size(found.size, hint) + _check_materials(solids)
+    remarks += sanity_checks.check_size(found.size, hint) + _check_materials(solids)
     return replace(found, remarks=tuple(remarks))
 
 
-def _frequencies(system: Any, count: int) -> tuple[float, ...]:
-    """The lowest natural frequencies of a system [Hz]."""
-    omega, _ = modes(system.stiffness, system.mass, min(count, system.mass.shape[0]))
+def pairs_of(source: sources.Source) -> tuple[dict[str, dict[str, float]], list[str], list[str]]:
+    """How the faces of ties and contact pairs of a deck meet.
+
+    Returns for each pair the area that is shared and that of the first face [m2], the least and largest opening [m],
+        negative where they overlap, the angle between them [degrees]; sentences on pairs that share nothing; remarks
+        on those that are an opening apart
+    """
+    whole = Assembly([Body(name, body.mesh, body.node_sets, {}) for name, body in source.bodies.items()])
+    found: dict[str, dict[str, float]] = {}
+    refused, remarks = [], []
+    for kind, one in [*(("tie", tie) for tie in source.deck.ties), *(("contact", c) for c in source.deck.contacts)]:
+        name = f"{kind} '{one.name}'"
+        first, second = (
+            [face for body in source.bodies if (face := f"{body}.{group}") in whole.boundaries]
+            for group in (one.slave, one.master)
+        )
+        slaves = [of.mesh for of in source.bodies.values() if one.slave in (of.mesh.boundaries or {})]
+        met, trouble = [], f"{name}: its sets are no faces of elements: give surfaces"
+        for ends in product(first, second):
+            try:
+                met.append(Tie(name, *ends, one.tolerance).meeting(whole))
+            except ValueError as sentence:
+                trouble = str(sentence)
+        if not met:
+            refused.append(trouble)
+            continue
+        gaps = np.concatenate([shared.gap for *_, shared in met])
+        facing = [(a.normal[s.first] * b.normal[s.second]).sum(axis=1) @ s.weight for a, b, s in met]
+        shared = sum(float(of.weight.sum()) for *_, of in met)
+        low, high = float(gaps.min()), float(gaps.max())
+        found[name] = {
+            "shared_m2": shared,
+            "area_m2": sum(area(mesh, mesh.boundaries[one.slave]) for mesh in slaves),
+            "least_m": low,
+            "largest_m": high,
+            "angle_deg": float(np.degrees(np.arccos(np.clip(-sum(facing) / shared, -1.0, 1.0)))),
+        }
+        for far, how in ((high, "apart"), (-low, "inside each other")):
+            if far > APART * met[0][0].length:
+                remarks.append(f"the faces of {name} lie up to {1e3 * far:.3g} mm {how}: correct their places")
+    return found, refused, remarks
+
+
+def _frequencies(part: Part, count: int) -> tuple[float, ...]:
+    """The lowest natural frequencies of a part [Hz]; 0 where they are rounding."""
+    M, K = part.system.mass, part.system.stiffness
+    shift = 1e-9 * float(np.max(K.diagonal() / M.diagonal()))
+    along_x = np.tile([1.0, 0.0, 0.0], (len(part.points), 1))
+    along_x[[turn for _, turn in getattr(part.mesh, "points", {}).values()]] = 0.0
+    q = along_x.ravel()[part.free]
+    free = q @ (K @ q) < 1e-12 * (q**2 @ K.diagonal())  # then K is singular, and need not be factorised to know it
+    omega, _ = modes(K, M, min(count, M.shape[0]), sigma=-shift if free else None)
+    omega[omega**2 < 1e-5 * shift] = 0.0
     return tuple((omega / (2 * np.pi)).tolist())
 
 
-def _free_frequencies(solids: Sequence[Solid], count: int) -> tuple[float, ...]:
+def _free_frequencies(solids: Sequence[Solid], count: int, progress: Progress) -> tuple[float, ...]:
     """The lowest natural frequencies of bodies that nothing holds [Hz]; rigid motions are 0."""
     found: list[float] = []
     for solid in solids:
-        M, K = assemble(solid.mesh, solid.material)
-        omega, _ = modes(K, M, min(count, K.shape[0]))
+        with progress.stage(f"modes of {solid.name}"):
+            M, K = assemble(solid.mesh, solid.material)
+            omega, _ = modes(K, M, min(count, K.shape[0]))
         elastic = omega.copy()
         elastic[:6] = 0.0
         found += (elastic / (2 * np.pi)).tolist()
     return tuple(sorted(found)[:count])
 
 
-def _of_scene(file: scene_file.SceneFile, n_modes: int) -> Inspection:
-    with TemporaryDirectory() as folder:
+def _of_scene(file: scene_file.SceneFile, n_modes: int, progress: Progress) -> Inspection:
+    with TemporaryDirectory() as folder, progress.stage("mesh, mass and stiffness"):
         mesh, node_sets = modelling.make_mesh(file, Path(folder))
         part = modelling.make_part(file.mesh_scene, mesh, node_sets, file.folder)
     found = of_part(file, part)
     if n_modes:
-        found = replace(found, frequencies=_frequencies(part.system, n_modes))
+        with progress.stage("modes"):
+            found = replace(found, frequencies=_frequencies(part, n_modes))
     return found
 
 

@@ -1,0 +1,113 @@
+"""Decks in the style of those that come with CalculiX and Nastran: read as CalculiX solves them, or refused by name."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.helpers.small_decks import archive, bricks, bulk, by_calculix, cut, frequencies, straight
+from tribodyn.geometry.sources import read
+
+N = (12, 4, 2)
+STEEL = "*MATERIAL, NAME=EL\n*ELASTIC\n 210000.0, .3\n*DENSITY\n7.8E-9\n*SOLID SECTION, ELSET=ALL, MATERIAL=EL\n"
+FIX = "*BOUNDARY\nFOOT, 1\nFOOT, 2\nFOOT, 3\n"
+TIP = sorted(n for n, x in enumerate(cut(N, straight)[0], 1) if x[0] == 100.0)
+END = "*NSET, NSET=TIP\n" + "".join(f"{n},\n" for n in TIP)
+BEAM = bricks(N, straight) + END + STEEL
+LAP = cut((12, 4, 2), straight)[0]
+CLAMPED = BEAM + FIX
+SECOND = "\n".join(
+    ["*NODE", *(f"{n + 1000}, {x:.6f}, {y:.6f}, {z + 10:.6f}" for n, (x, y, z) in enumerate(LAP, 1))]
+    + ["*ELEMENT, TYPE=C3D20R, ELSET=UPPER"]
+    + [
+        f"{e + 1000}, {', '.join(str(n + 1000) for n in c[:10])},\n{', '.join(str(n + 1000) for n in c[10:])}"
+        for e, c in enumerate(cut((12, 4, 2), straight)[1], 1)
+    ]
+    + ["*SOLID SECTION, ELSET=UPPER, MATERIAL=EL", "*SURFACE, NAME=LOW"]
+    + [f"{e}, S2" for e in range(2, 97, 2)]
+    + ["*SURFACE, NAME=HIGH", *(f"{e}, S1" for e in range(1001, 1097, 2))]
+)
+DEMO = "ID DEMO,ONE\nSOL 103\nCEND\nTITLE = A BAR\nSPC = 1\nMETHOD = 10\nBEGIN BULK\nEIGRL,10,,,4\n"
+BULK_STEEL = "PSOLID,1,1\nMAT1,1,210000.,,.3,7.8-9\n"
+FOOT = ",".join(map(str, cut(N, straight)[2][:6]))
+# name -> (ending, deck, what is refused of it)
+DECKS = {
+    "cantilever": ("inp", CLAMPED, []),
+    "held at both ends": ("inp", CLAMPED + "*BOUNDARY\nTIP, 2, 3\n", []),
+    "equation": ("inp", CLAMPED + "".join(f"*EQUATION\n2\n{n}, 1, 1., {TIP[0]}, 1, -1.\n" for n in TIP[1:]), []),
+    "spring": ("inp", CLAMPED + f"*ELEMENT, TYPE=SPRING1, ELSET=SP\n900, {TIP[0]}\n*SPRING, ELSET=SP\n2\n800.\n", []),
+    "tie": ("inp", CLAMPED + SECOND + "\n*TIE, NAME=T1, POSITION TOLERANCE=1.\nHIGH, LOW\n", []),
+    "rigid body": (
+        "inp",
+        CLAMPED + "*NODE\n900, 130., 10., 5.\n901, 130., 10., 5.\n*RIGID BODY, NSET=TIP, REF NODE=900, ROT NODE=901\n",
+        ["*RIGID BODY, ROT NODE"],
+    ),
+    "turned supports": (
+        "inp",
+        BEAM + "*TRANSFORM, NSET=FOOT, TYPE=C\n0., 0., 0., 0., 0., 1.\n" + FIX,
+        ["*TRANSFORM"],
+    ),
+    "shell skin": (
+        "inp",
+        CLAMPED + "*ELEMENT, TYPE=S4, ELSET=SKIN\n900, 1, 2, 3, 4\n*SHELL SECTION, ELSET=SKIN, MATERIAL=EL\n1.\n",
+        ["S4", "*SHELL SECTION"],
+    ),
+    "sector": (
+        "inp",
+        CLAMPED + "*CYCLIC SYMMETRY MODEL, N=12, TIE=T1\n0., 0., 0., 1., 0., 0.\n",
+        ["*CYCLIC SYMMETRY MODEL"],
+    ),
+    "heated": (
+        "inp",
+        CLAMPED + "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nTIP, 20.\n*STEP\n*TEMPERATURE\nTIP, 90.\n*END STEP\n",
+        ["*TEMPERATURE"],
+    ),
+    "normal modes": ("bdf", DEMO + bulk(N, straight) + BULK_STEEL + f"SPC1,1,123,{FOOT}\nSPC1,2,123,{TIP[0]}\n", []),
+    "plates on a block": (
+        "bdf",
+        DEMO + bulk(N, straight) + BULK_STEEL + "CQUAD4,900,2,1,2,3,4\nPSHELL,2,1,1.\nSPC1,1,123,1,2\n",
+        ["CQUAD4", "PSHELL"],
+    ),
+    "archive": ("cdb", archive(N, straight) + "MP,EX,1,210000.\nMP,PRXY,1,.3\nMP,DENS,1,7.8E-9\nANTYPE,MODAL\n", []),
+    "archive with a pressure": (
+        "cdb",
+        archive(N, straight) + "MP,EX,1,210000.\nMP,PRXY,1,.3\nMP,DENS,1,7.8E-9\nSFE,1,3,PRES,0,R5.0\n  5.0,\n",
+        ["SFE"],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DECKS)
+def test_a_deck_is_read_or_refused_by_the_names_of_its_cards(name: str, tmp_path: Path) -> None:
+    ending, text, refused = DECKS[name]
+    (tmp_path / f"own.{ending}").write_text(text)
+    assert list(read.read(tmp_path / f"own.{ending}", "mm").refused) == refused
+    if refused:
+        with pytest.raises(ValueError, match="not carried over") as raised:
+            frequencies(text, 2, tmp_path, ending)
+        assert all(f'"{card}"' in str(raised.value) for card in refused)
+
+
+def test_a_set_of_supports_that_the_case_control_does_not_select_holds_nothing(tmp_path: Path) -> None:
+    ending, text, _ = DECKS["normal modes"]
+    (tmp_path / f"own.{ending}").write_text(text)
+    assert any("set SPC 2" in clause for clause in read.read(tmp_path / f"own.{ending}", "mm").unused)
+    first, *_ = text.rpartition("SPC1,2")
+    np.testing.assert_allclose(
+        frequencies(text, 2, tmp_path, ending), frequencies(first, 2, tmp_path, ending), rtol=1e-9
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+@pytest.mark.parametrize(
+    "name", [name for name, (ending, _, refused) in DECKS.items() if ending == "inp" and not refused]
+)
+def test_what_is_read_has_the_frequencies_of_calculix(name: str, tmp_path: Path) -> None:
+    text = DECKS[name][1]
+    np.testing.assert_allclose(
+        frequencies(text, 4, tmp_path), by_calculix(text, 4, tmp_path), rtol=1.5e-2
+    )  # 20 nodes there, 27 here
