@@ -189,7 +189,7 @@ class FreeVibration:
     def _reference(self, mode: int | None, apart: np.ndarray) -> tuple[np.ndarray, float, float]:
         """Modal shape (n,) of unit mass, frequency [rad/s] and damping ratio of the reference mode."""
         m = self.modes[self.first]
-        squares, shapes = self._at_rest(apart)
+        squares, shapes = self._still = self._at_rest(apart)
         if mode is not None and not 0 <= mode < self.n:
             raise ValueError(f"there is no mode {mode}: the model has modes 0 to {self.n - 1}")
         system, _ = self.balance.model.at_harmonic(1)
@@ -214,6 +214,17 @@ class FreeVibration:
         open_springs = m.UH[:, apart] @ (self.k[apart, None] * m.U[apart])
         squares, shapes = np.linalg.eigh(np.diag(m.lam) - open_springs)
         return squares, shapes
+
+    def about_rest(self) -> tuple[np.ndarray, np.ndarray]:
+        """Frequencies (k,) [rad/s] and damping ratios of all small vibrations about the static equilibrium.
+
+        Coriolis and circulatory forces are left out, and so are motions as a rigid body.
+        """
+        squares, shapes = self._still
+        rate = np.real(np.einsum("ij,ij->j", shapes.conj(), self.modes[self.first].damping @ shapes))
+        vibrates = squares > 1e-13 * squares[-1]
+        omega = np.sqrt(squares[vibrates])
+        return omega, rate[vibrates] / (2 * omega)
 
     def _static_state(self) -> tuple[np.ndarray, np.ndarray]:
         """x at rest, and which contacts are open there."""

@@ -17,6 +17,7 @@ from tribodyn.workflows.studies.many.lives import Lives, lives
 from tribodyn.workflows.studies.many.optimum import Optimum, optimise
 from tribodyn.workflows.studies.many.study import grid
 from tribodyn.workflows.studies.many.table import StudyTable
+from tribodyn.workflows.studies.measured.compare import Compared, compare
 from tribodyn.workflows.studies.supports import Supports, supports
 from tribodyn.workflows.studies.surfaces import FaceAsperities, asperities
 from tribodyn.workflows.studies.trades import Converged, Traded, converge, trade
@@ -25,6 +26,7 @@ from tribodyn.workflows.studies.verification import Comparison
 from tribodyn.workflows.studies.worn_states import WornStates, verify_states
 
 __all__ = [
+    "Compared",
     "Comparison",
     "Converged",
     "Decay",
@@ -46,6 +48,7 @@ __all__ = [
     "WornStates",
     "asperities",
     "backbone",
+    "compare",
     "converge",
     "folds",
     "forces",

@@ -8,10 +8,12 @@ import tomllib
 import numpy as np
 import pytest
 
+import tribodyn as td
 from tests.helpers.coarse_scenes import BLADE, RIG
 from tests.helpers.pages import ROOT, fences
 from tests.proof.problems import cycle_at
 from tribodyn.workflows.command import main as cli
+from tribodyn.workflows.result.columns import write_columns
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress
@@ -194,3 +196,22 @@ def test_the_file_that_comes_with_the_program_is_sound_and_the_command_prints(tm
     record = json.loads(capsys.readouterr().out)
     assert record["set"][0].startswith("damping.modal=")
     assert record["numbers"][0]["measured"] == 1e-3
+
+
+def test_friction_is_found_again_from_a_measured_curve(tmp_path):
+    """A response of the scene with other friction, seen as accelerations; and a file whose runs are others."""
+    base = ("beam_thesis", (*BEAM, "harmonics.kept=[0, 1]", "response.points=10", "response.frequency=[700, 1300]"))
+    true = td.run(base[0], overrides=(*base[1], "contact.friction=0.38", "wear=", "verdict.enabled=false")).response
+    w, x = true.omega, true.response[:, 0, 1] - 1j * true.response[:, 0, 2]
+    columns = {"frequency_Hz": w / (2 * np.pi), "acceleration_m_s2": w**2 * np.abs(x), "control": ["force"] * len(w)}
+    write_columns(columns, tmp_path / "sweep.csv")
+    friction = {"keys": ["contact.friction"], "low": 0.2, "high": 0.8}
+    task = {"parameters": {"mu": friction}, "curves": {"sweep": {"file": str(tmp_path / "sweep.csv"), "error": "5 %"}}}
+    found = td.studies.identify(base[0], task, overrides=base[1]).found
+    assert found.values == pytest.approx([0.38], rel=1e-3)
+    assert found.rms < 1e-3
+    assert len(found.measured) == len(w)
+    assert found.measured[0].weight == pytest.approx(0.2)
+    task["curves"]["sweep"]["control"] = "response"
+    with pytest.raises(td.SceneError, match=r"curves\.sweep: no run has control = response"):
+        td.studies.identify(base[0], task, overrides=base[1])

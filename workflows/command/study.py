@@ -10,6 +10,7 @@ from tribodyn.workflows.studies.forces import forces
 from tribodyn.workflows.studies.many.lives import lives
 from tribodyn.workflows.studies.many.optimum import optimise
 from tribodyn.workflows.studies.many.study import grid
+from tribodyn.workflows.studies.measured.compare import compare
 from tribodyn.workflows.studies.supports import supports
 from tribodyn.workflows.studies.trades import converge, trade
 from tribodyn.workflows.studies.variation import vary
@@ -25,3 +26,4 @@ app.command(word(converge, "study converge"))
 app.command(word(trade, "study trade"))
 app.command(word(supports, "study supports", into="beside"))
 app.command(word(forces, "study forces"))
+app.command(word(compare, "study compare"))

@@ -22,9 +22,9 @@ class Function(IntEnum):
 
 
 class DataKind(IntEnum):
-    """Kinds of data of dataset 58."""
+    """Kinds of data of datasets 58 and 55."""
 
-    PLAIN, DISPLACEMENT, FORCE, EXCITATION, TIME, FREQUENCY = 1, 8, 9, 13, 17, 18
+    PLAIN, DISPLACEMENT, FORCE, VELOCITY, ACCELERATION, EXCITATION, TIME, FREQUENCY = 1, 8, 9, 11, 12, 13, 17, 18
 
 
 def write_csv(result: Result, folder: Path) -> list[Path]:
@@ -103,7 +103,7 @@ def _spectra(result: Result) -> list[dict[str, Any]]:
             value, kind, text = a - 1j * b, Function.GENERAL, f"{output}, harmonic {h}"
             if h == 1 and force is not None:
                 value, kind, text = value / (force * frf.load_factor), Function.FRF, f"{output} over force, harmonic 1"
-            entry = _function(
+            entry = function(
                 kind, text, "frequency", DataKind.FREQUENCY, "Hz", frf.frequency, DataKind.DISPLACEMENT, "m", value
             )
             if kind == Function.FRF:
@@ -122,7 +122,7 @@ def _histories(result: Result) -> list[dict[str, Any]]:
         ("depth_largest_m", "m"), ("depth_mean_m", "m"), ("volume_m3", "m3"),
     )}  # fmt: skip
     return [
-        _function(
+        function(
             Function.GENERAL, name, "cycles", DataKind.PLAIN, "", table["cycles"], DataKind.PLAIN, unit, table[name]
         )
         for name, unit in wanted.items()
@@ -145,11 +145,11 @@ def _loops(result: Result) -> list[dict[str, Any]]:
             ):  # fmt: skip
                 text = f"state {row}, pair {pair}, {component}, {what}"
                 y = values[at, pair, c]
-                found.append(_function(Function.TIME, text, "phase", DataKind.TIME, "rad", phase, kind, unit, y, pair))
+                found.append(function(Function.TIME, text, "phase", DataKind.TIME, "rad", phase, kind, unit, y, pair))
     return found
 
 
-def _function(
+def function(
     kind: int, text: str, x_name: str, x_kind: int, x_unit: str, x: np.ndarray,
     y_kind: int, y_unit: str, y: np.ndarray, node: int = 0,
 ) -> dict[str, Any]:  # fmt: skip

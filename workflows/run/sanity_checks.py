@@ -144,7 +144,7 @@ def check_materials(materials: Mapping[str, Material]) -> list[str]:
 
 def check_speed(scene: MeshScene, line_error: float | None) -> list[str]:
     """Remarks on a speed that does not excite the frequencies of the response, and on stress between speeds."""
-    wheel, (low, high) = scene.wheel, scene.response.frequency
+    wheel, (low, high) = scene.wheel, scene.response.range
     if line_error is not None and line_error > USUAL.line_error:
         return [
             f"the stress of the wheel changes abruptly along its speeds: frequencies between those at which it was "

@@ -97,7 +97,7 @@ def along_speed(scene: MeshScene, part: Part) -> ReducedModel:
     foretell at the newest one are right to `LIMITS.speeds_apart`, at most seven of them
     Raises  ValueError where it cannot stand at one of them
     """
-    wheel, (lowest, highest) = scene.wheel, scene.response.frequency
+    wheel, (lowest, highest) = scene.wheel, scene.response.range
     assert wheel is not None
     worn = () if scene.wear is None else scene.wear.duties
     places = [lowest, highest, *(duty.at.frequency for duty in worn if duty.at.frequency)]

@@ -43,7 +43,8 @@ Angle = Annotated[float, quantity("rad")]
 Number = Annotated[float, quantity("")]
 
 
-def _direction(value: object) -> tuple[float, float, float]:
+def parsed_direction(value: object) -> tuple[float, float, float]:
+    """An axis by its name, or three numbers, as a unit vector; raises ValueError."""
     named = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
     if isinstance(value, str) and value.lstrip("+-") in named and len(value) <= 2:
         x, y, z = named[value[-1]]
@@ -55,7 +56,7 @@ def _direction(value: object) -> tuple[float, float, float]:
     raise ValueError(f'expected an axis such as "x" or "-z", or three numbers that are not all zero, got {value!r}')
 
 
-Direction = Annotated[tuple[float, float, float], BeforeValidator(_direction)]
+Direction = Annotated[tuple[float, float, float], BeforeValidator(parsed_direction)]
 
 
 def unknown_key(key: str, known: list[str]) -> str:

@@ -241,12 +241,17 @@ def backbone(
     return SceneBackbone(file.name, model.balance, found, published, changed)
 
 
-def along(file: SceneFile, balance: HarmonicBalance, asked: AmplitudeRange, progress: Progress) -> Backbone:
-    """The backbone of a scene whose balance is made already."""
+def along(
+    file: SceneFile,
+    balance: HarmonicBalance,
+    asked: AmplitudeRange,
+    progress: Progress,
+    output: str = settings.OUTPUT,
+) -> Backbone:
+    """The backbone of a scene whose balance is made already; output : whose motion is the amplitude."""
     with progress.stage("backbone"):
         options = BackboneOptions(asked.points, newton=settings.newton_options(file.scene))
-        output, modal = settings.OUTPUT, asked.modal
-        return nonlinear_modes.backbone(balance, asked.start, asked.stop, asked.mode, output, options, modal)
+        return nonlinear_modes.backbone(balance, asked.start, asked.stop, asked.mode, output, options, asked.modal)
 
 
 def _changed(

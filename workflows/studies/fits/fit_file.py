@@ -32,6 +32,7 @@ from tribodyn.workflows.scene.source import AnyPath, Overrides, Source, read_sce
 from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.wear import At, Place
 from tribodyn.workflows.studies.fits import posterior as posteriors
+from tribodyn.workflows.studies.fits.curve_target import Curve, CurveTarget
 from tribodyn.workflows.studies.fits.identification import Identification, Measured, Parameter, fit
 from tribodyn.workflows.studies.fits.posterior import Posterior
 from tribodyn.workflows.studies.many.distributions import Distribution, Marginal
@@ -107,17 +108,30 @@ class Known(Asked):
 
 
 class Task(Table):
-    """What is looked for, what is known, and what is to follow from it, by names of one's own."""
+    """What is looked for, what is known, and what is to follow from it, by names of one's own.
+
+    curves : measured curves, which may take the place of measured numbers
+    """
 
     parameters: Annotated[dict[str, Looked], Field(min_length=1)]
-    measured: Annotated[dict[str, Known], Field(min_length=1)]
+    measured: dict[str, Known]
+    curves: dict[str, Curve] = Field(default_factory=dict)
     predict: dict[str, Asked] = Field(default_factory=dict)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _numbers_or_curves(cls, table: Any) -> Any:
+        if isinstance(table, dict) and table.get("curves"):
+            return {"measured": {}, **table}
+        if isinstance(table, dict) and table.get("measured") == {}:
+            raise ValueError("measured: give numbers, or curves")
+        return table
 
 
 def read(task: AnyPath | Mapping[str, Any]) -> Task:
     """Read and check the file of a fit, or its tables; raises SceneError with one sentence."""
     if isinstance(task, Mapping):
-        return scene_file.checked(Task, dict(task), "fit")
+        return scene_file.checked(Task, dict(task), "fit", Path())
     path = Path(task)
     if not path.is_file():
         raise SceneError(f'there is no file of a fit "{path}"')
@@ -125,7 +139,7 @@ def read(task: AnyPath | Mapping[str, Any]) -> Task:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise SceneError(f"{path.name} is not valid TOML: {error}") from None
-    return scene_file.checked(Task, data, path.name)
+    return scene_file.checked(Task, data, path.name, path.parent)
 
 
 @dataclass(frozen=True)
@@ -166,7 +180,7 @@ def best(file: SceneFile, task: Task, progress: Progress) -> Fit:
     before = {name: value for name, value in own.items() if value is not None}
     with threadpool_limits(1):
         known = before if len(before) == len(looked.parameters) else None
-        found = fit(looked.parameters, looked.measured, lambda values: looked.trial(values, task.measured), known)
+        found = fit(looked.parameters, looked.measured, lambda values: looked.trial(values, looked.targets), known)
     return Fit(found, tuple(looked.changes(found.named(), digits=6)))
 
 
@@ -189,7 +203,7 @@ def posterior(
     """
     wanted = read(task)
     looked = _Looking(read_scene(scene, overrides), wanted, reporter(progress))
-    asked = {**wanted.measured, **wanted.predict}
+    asked = {**looked.targets, **wanted.predict}
     units = {name: MEASURED_IN[one.of] for name, one in wanted.predict.items()}
     priors = {name: looked.prior(name, one.prior) for name, one in wanted.parameters.items() if one.prior is not None}
     with threadpool_limits(1):
@@ -212,6 +226,9 @@ class _Looking:
                      MEASURED_IN[known.of], known.weight, known.error)
             for name, known in task.measured.items()
         ]  # fmt: skip
+        curves = {f"curves.{name}": CurveTarget.of(name, one, file) for name, one in task.curves.items()}
+        self.measured += [number for one in curves.values() for number in one.numbers()]
+        self.targets: Mapping[str, Asked | CurveTarget] = {**task.measured, **curves}
         self._bench, self._count = Bench(), 0
 
     def changes(self, values: Mapping[str, float], digits: int = 17) -> list[str]:
@@ -219,7 +236,7 @@ class _Looking:
         said = {p.name: f"{values[p.name]:.{digits}g} {p.unit}".rstrip() for p in self.parameters}
         return [f"{key}={text}" for name, text in said.items() for key in self._task.parameters[name].keys]
 
-    def trial(self, values: Mapping[str, float], asked: Mapping[str, Asked]) -> np.ndarray:
+    def trial(self, values: Mapping[str, float], asked: Mapping[str, Asked | CurveTarget]) -> np.ndarray:
         """What the scene says with values."""
         self._count += 1
         trial = self.file.changed(*self.changes(values))
@@ -281,10 +298,15 @@ def _si(key: str, value: Quantity, units: tuple[str, ...]) -> tuple[float, str]:
     raise SceneError(f"{key}: {problem}")
 
 
-def predict(bench: Bench, file: SceneFile, measured: Mapping[str, Asked]) -> np.ndarray:
-    """(n_measured,) what a scene says to each measured number."""
-    answers = Answers(file, bench.model(file))
-    return np.array([answers.to(name, known) for name, known in measured.items()])
+def predict(bench: Bench, file: SceneFile, measured: Mapping[str, Asked | CurveTarget]) -> np.ndarray:
+    """(n_measured,) what a scene says to each measured number, to a curve at each of its points."""
+    model = bench.model(file)
+    answers = Answers(file, model)
+    found = (
+        one.values(file, model) if isinstance(one, CurveTarget) else [answers.to(name, one)]
+        for name, one in measured.items()
+    )
+    return np.concatenate([np.asarray(part, float) for part in found])
 
 
 class Answers:

@@ -1,0 +1,102 @@
+"""Measured curves as numbers of a fit: every point of a response or backbone is one, weighted by its scatter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, PrivateAttr, StrictBool, ValidationInfo, model_validator
+
+from tribodyn.workflows.run import modelling
+from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.scene.fields import Number, Table
+from tribodyn.workflows.scene.own import folder_of
+from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
+from tribodyn.workflows.studies.fits.identification import Measured
+from tribodyn.workflows.studies.measured.beside import beside
+from tribodyn.workflows.studies.measured.measurement import Measurement, Run
+from tribodyn.workflows.studies.measured.reading import read
+from tribodyn.workflows.studies.measured.resonance import prepared
+
+FULL = 0.01  # relative standard deviation whose residual has the weight 1
+
+
+class Curve(Table):
+    """A measured curve.
+
+    file : beside the file of the fit; facts : what it does not say, as for `compare`
+    resonance : take each run of a response as a point of a backbone; control : the runs that are meant, all by default
+    error, frequency_error : relative standard deviations where the file has none, of damping or of a response's
+        amplitude, and of the frequency of a backbone
+    weight : of all its points together with the other numbers
+    """
+
+    file: str
+    facts: dict[str, str] = Field(default_factory=dict)
+    resonance: StrictBool = False
+    control: Literal["force", "response"] | None = None
+    error: Annotated[Number, Field(gt=0)] = 0.1
+    frequency_error: Annotated[Number, Field(gt=0)] = 1e-3
+    weight: Annotated[Number, Field(gt=0)] = 1.0
+
+    _folder: Path = PrivateAttr(Path())
+
+    @model_validator(mode="after")
+    def _remember_the_folder(self, info: ValidationInfo) -> Self:
+        self._folder = folder_of(info) or Path()
+        return self
+
+
+@dataclass(frozen=True)
+class CurveTarget:
+    """A measured curve in the directions of a scene, and how its points count."""
+
+    name: str
+    table: Curve
+    measured: Measurement
+
+    @classmethod
+    def of(cls, name: str, table: Curve, file: SceneFile) -> CurveTarget:
+        """Read a curve; raises SceneError where it does not fit the scene or has no such runs."""
+        try:
+            found = read(table._folder / table.file, table.facts)
+            kept = tuple(run for run in found.runs if table.control in (None, run.control))
+            if not kept:
+                raise ValueError(f"no run has control = {table.control}")
+            return cls(name, table, prepared(replace(found, runs=kept), file.scene, table.resonance))
+        except ValueError as trouble:
+            raise SceneError(f"curves.{name}: {trouble}") from None
+
+    def numbers(self) -> list[Measured]:
+        """Every point as a measured number, see `values`."""
+        found = []
+        for run in self.measured.runs:
+            errors = np.where(np.isfinite(run.errors), run.errors, [self.table.frequency_error, self.table.error])
+            for kind, (values, column, unit) in self._columns(run).items():
+                for x, value, error in zip(self._places(run), values, errors[:, column], strict=True):
+                    weight = self.table.weight * FULL / float(error)
+                    found.append(Measured(f"{self.name} {x} {kind}", float(value), unit, weight, float(error)))
+        return found
+
+    def _places(self, run: Run) -> list[str]:
+        if self.measured.kind == "backbone":
+            return [f"{1e6 * a:.3g} um" for a in run.amplitude]
+        return [f"{f:.5g} Hz" for f in run.frequency]
+
+    def _columns(self, run: Run) -> dict[str, tuple[np.ndarray, int, str]]:
+        if self.measured.kind == "response":
+            return {"amplitude": (run.amplitude, 1, "m")}
+        return {"frequency": (run.frequency, 0, "Hz"), "damping": (run.damping, 1, "")}
+
+    def values(self, file: SceneFile, model: modelling.Model) -> np.ndarray:
+        """(n,) what a scene says to the numbers; raises SolveFailed where it does not reach a point."""
+        pairs = beside(file, model, self.measured, Progress())
+        found = np.concatenate([v for one in pairs for v, *_ in self._columns(one.computed).values()])
+        if not np.isfinite(found).all():
+            raise SolveFailed(
+                f"curves.{self.name}: the scene does not reach {np.sum(~np.isfinite(found))} of its points"
+            )
+        return found

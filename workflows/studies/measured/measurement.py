@@ -1,0 +1,183 @@
+"""What was measured: curves of one place in one direction, in SI units, checked against an output of a scene.
+
+Three kinds: a response over frequency, a backbone (frequency and damping over amplitude; a free decay is read as one),
+and the modes at small amplitude.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from tribodyn.fem.part import Part
+from tribodyn.workflows.scene.loads import HarmonicLoad
+from tribodyn.workflows.scene.matrix_scene import MatrixScene
+from tribodyn.workflows.scene.schema import Scene
+
+OUTPUT = "response"  # name of the first output of a scene
+Kind = Literal["response", "backbone", "modes"]
+
+
+@dataclass(frozen=True)
+class Run:
+    """One measured curve; what was not measured is nan.
+
+    name : runs of one name repeat each other; control : what was held constant, "force", "response" or ""
+    frequency : (n,) [Hz]; displacement : (n,) complex amplitude of harmonic 1, exp(i w t) understood [m], or [m/N]
+    force : (n,) amplitude [N]; damping : (n,) ratio
+    errors : (n, 2) relative standard deviations of frequency and damping; of a response the second is of its amplitude
+    """
+
+    name: str
+    control: str
+    frequency: np.ndarray
+    displacement: np.ndarray
+    force: np.ndarray
+    damping: np.ndarray
+    errors: np.ndarray
+
+    @property
+    def amplitude(self) -> np.ndarray:
+        """(n,) [m], or [m/N]."""
+        return np.abs(self.displacement)
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Curves that were measured at one place in one direction.
+
+    source : file; output : of a scene that they belong to; order : of the measured derivative of the displacement
+    direction, force_direction : as in a scene, None where not said; position : (3,) [m] or None
+    per_force : displacement is [m/N]; phased : its phase was measured, against the force or, `timed`, against t = 0
+    decay : damping is a logarithmic decrement over 2 pi, of a free decay
+    """
+
+    kind: Kind
+    runs: tuple[Run, ...]
+    source: str = ""
+    output: str = OUTPUT
+    order: int = 0
+    direction: tuple[float, float, float] | None = None
+    force_direction: tuple[float, float, float] | None = None
+    position: tuple[float, float, float] | None = None
+    per_force: bool = False
+    phased: bool = False
+    timed: bool = False
+    decay: bool = False
+
+    def on(self, scene: Scene) -> Measurement:
+        """The measurement in the directions of a scene's output and force, in metres, its phase against the force.
+
+        Raises  ValueError: the scene has no such output, force or direction
+        """
+        outputs = outputs_of(scene)
+        if self.output not in outputs:
+            raise ValueError(f'output = "{self.output}": the scene has {", ".join(outputs)}; give output = NAME')
+        sign = 1.0
+        if not isinstance(scene, MatrixScene):
+            sign = _along(self.direction, outputs[self.output].direction, f"output {self.output}")
+        if self.kind != "response":
+            return self
+        load, force = driving_load(scene)
+        if load.direction is not None:
+            sign *= _along(self.force_direction, load.direction, "the force")
+        factor = sign * (abs(force) if self.per_force else 1.0) * (abs(force) / force if self.timed else 1.0)
+        runs = [
+            replace(
+                run,
+                displacement=factor * run.displacement,
+                force=np.where(np.isfinite(run.force), run.force, abs(force)),
+            )
+            for run in self.runs
+        ]
+        return replace(self, runs=tuple(runs), per_force=False, timed=False)
+
+    def force_at_output(self, scene: Scene) -> bool:
+        """Whether the one force of a scene acts where and along what the output observes."""
+        loads = [*scene.loads.harmonic.values()]
+        seen = outputs_of(scene)[self.output]
+        where = [one.model_dump(include={"group", "direction", "dof"}) for one in (seen, *loads)]
+        return len(where) == 2 and where[0] == where[1]
+
+    def near(self, scene: Scene, part: Part | None) -> None:
+        """Refuse a position farther from the scene's output than a twentieth of the part; raises ValueError."""
+        if self.position is None or part is None or isinstance(scene, MatrixScene):
+            return
+        group = outputs_of(scene)[self.output].group
+        nodes = part.node_sets.get(group)
+        if nodes is None:
+            return
+        away = float(np.linalg.norm(part.points[nodes] - np.array(self.position), axis=1).min())
+        if away > 0.05 * float(np.ptp(part.points, axis=0).max()):
+            raise ValueError(
+                f"position: measured {1e3 * away:.4g} mm from {group}, where the scene observes {self.output}: "
+                "observe the measured place in [response.others], or correct position"
+            )
+
+
+def _along(measured: tuple[float, float, float] | None, ours: tuple[float, float, float], what: str) -> float:
+    """1, or -1 for the opposite direction; raises ValueError for another one."""
+    if measured is None:
+        return 1.0
+    cosine = float(np.dot(measured, ours))
+    if abs(abs(cosine) - 1.0) > 1e-3:
+        raise ValueError(
+            f"direction: measured along {_said(measured)}, {what} of the scene is along {_said(ours)}: "
+            "give the output of that direction, or correct direction"
+        )
+    return float(np.sign(cosine))
+
+
+def _said(direction: tuple[float, float, float]) -> str:
+    for axis, name in enumerate("xyz"):
+        if abs(abs(direction[axis]) - 1.0) < 1e-6:
+            return name if direction[axis] > 0 else f"-{name}"
+    return str(tuple(round(c, 4) for c in direction))
+
+
+def outputs_of(scene: Scene) -> dict[str, Any]:
+    """The outputs of a scene by name, the first one under OUTPUT."""
+    return {OUTPUT: scene.response, **getattr(scene.response, "others", {})}
+
+
+def driving_load(scene: Scene) -> tuple[HarmonicLoad, complex]:
+    """The one force that drives a scene in harmonic 1, and its F exp(i phase) [N]; raises ValueError otherwise."""
+    loads = [load for load in scene.loads.harmonic.values() if load.harmonic == 1 and load.value]
+    if len(loads) != 1 or len(scene.loads.harmonic) != 1 or getattr(scene, "motion", None):
+        raise ValueError(
+            "loads.harmonic: a response is compared where one force in harmonic 1 drives the scene, and nothing else"
+        )
+    return loads[0], complex(loads[0].value * np.exp(1j * loads[0].phase))
+
+
+def merged(measured: Measurement) -> Measurement:
+    """Runs that repeat each other as their mean with their scatter, where all of them have points."""
+    named: dict[str, list[Run]] = {}
+    for run in measured.runs:
+        named.setdefault(run.name, []).append(run)
+    return replace(measured, runs=tuple(_mean(measured.kind, runs) for runs in named.values()))
+
+
+def _mean(kind: Kind, runs: list[Run]) -> Run:
+    """The mean of runs at the points of the first: of backbones by amplitude, of responses by frequency."""
+    first = runs[0]
+    if len(runs) == 1 or kind == "modes":
+        return first
+    over = [run.frequency if kind == "response" else run.amplitude for run in runs]
+    low, high = max(x.min() for x in over), min(x.max() for x in over)
+    at = over[0][(over[0] >= low) & (over[0] <= high)]
+
+    def of(name: str) -> np.ndarray:
+        orders = [np.argsort(x) for x in over]
+        return np.array([np.interp(at, x[o], getattr(r, name)[o]) for x, r, o in zip(over, runs, orders, strict=True)])
+
+    def spread(values: np.ndarray) -> np.ndarray:
+        return np.asarray(values.std(axis=0, ddof=1) / np.abs(values.mean(axis=0)))
+
+    hertz, x, damping = of("frequency"), of("displacement"), of("damping")
+    second = np.abs(x) if kind == "response" else damping
+    errors = np.stack([spread(hertz), spread(second)], axis=1)
+    hertz, x, force, damping = (values.mean(axis=0) for values in (hertz, x, of("force"), damping))
+    return Run(first.name, first.control, hertz, x, force, damping, errors)

@@ -1,0 +1,309 @@
+"""Read measured curves: columns of CSV files, MATLAB files and universal files (datasets 58 and 55).
+
+A column is named with its unit, `frequency_Hz`, `acceleration [m/s2]`, `phase_deg`. What columns do not say, such as
+the direction, is in a line `# direction = z` of a CSV file, in a text of that name in a MATLAB file, or given.
+Source  universal files: SDRC I-DEAS Test Data Analysis, datasets 55, 58 and 164, read by pyuff
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tribodyn.hbm.time.ring_down import from_decay
+from tribodyn.workflows.export.curves import DataKind, Function
+from tribodyn.workflows.export.library import library
+from tribodyn.workflows.scene.fields import parsed_direction, unknown_key
+from tribodyn.workflows.scene.units import parse_unit, to_si
+from tribodyn.workflows.studies.measured.measurement import OUTPUT, Kind, Measurement, Run
+
+FACTS = {
+    "output": "name of the scene's output that was measured",
+    "direction": "of the response, such as -z",
+    "force_direction": "of the force",
+    "position": "x, y, z of the sensor, each with its unit",
+    "phase": '"response over force", or "force over response"',
+    "control": '"force" or "response", what was held constant',
+    "node": "number of the measured node in a universal file",
+    "table": "name of the struct in a MATLAB file",
+}
+RESPONSES = ("acceleration", "velocity", "displacement", "response", "real", "amplitude")  # the first that is there
+COLUMNS = ("frequency", "time", "force", "phase", "damping", "frequency_error", "damping_error", "imag", *RESPONSES)
+
+Columns = dict[str, tuple[np.ndarray, str]]
+"""word -> values and their unit"""
+
+
+def read(path: str | Path, facts: Mapping[str, str] | None = None) -> Measurement:
+    """The measurement in a file .csv, .mat, .uff or .unv.
+
+    facts : what the file does not say, or says otherwise, see FACTS
+    Raises  ValueError: one sentence that names file, key and cure
+    """
+    path = Path(path)
+    readers = {".csv": _of_csv, ".mat": _of_mat, ".uff": _of_uff, ".unv": _of_uff}
+    if path.suffix.lower() not in readers:
+        raise ValueError(f"{path}: measurements are read from files {', '.join(readers)}")
+    if not path.is_file():
+        raise ValueError(f"there is no file of a measurement {path}")
+    try:
+        given = {name: str(text) for name, text in (facts or {}).items()}
+        for name in given:
+            if name not in FACTS:
+                raise ValueError(unknown_key(name, [*FACTS]))
+        said, raw = readers[path.suffix.lower()](path, given)
+        return _measurement(raw, {**said, **given}, path.name)
+    except (ValueError, KeyError, IndexError, OSError, UnicodeDecodeError) as trouble:
+        raise ValueError(f"{path.name}: {trouble}") from None
+
+
+def _of_csv(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
+    lines = path.read_text(encoding="utf-8").splitlines()
+    facts = {}
+    for line in lines:
+        if line.startswith("#") and (found := re.match(r"#\s*(\w+)\s*=\s*(.*?)\s*$", line)):
+            if found[1] not in FACTS:
+                raise ValueError(unknown_key(found[1], [*FACTS]))
+            facts[found[1]] = found[2].strip('"')
+    rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith("#")))
+    if len(rows) < 2 or any(len(row) != len(rows[0]) for row in rows):
+        raise ValueError("expected a line of column names and rows of as many values below it")
+    return facts, {
+        name.strip(): np.array(column) for name, column in zip(rows[0], zip(*rows[1:], strict=True), strict=True)
+    }
+
+
+def _of_mat(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
+    from scipy.io import loadmat
+
+    try:
+        content = loadmat(path, simplify_cells=True)
+    except NotImplementedError:
+        raise ValueError("MATLAB files of version 7.3 are not read: save it with -v7") from None
+    facts = {name: str(content[name]) for name in FACTS if isinstance(content.get(name), str)}
+    structs = {name: table for name, table in content.items() if isinstance(table, dict)}
+    if "table" in given:
+        if given["table"] not in structs:
+            raise ValueError(f"table = {given['table']}: there is {', '.join(structs) or 'no struct'}")
+        return facts, structs[given["table"]]
+    plain = {name: v for name, v in content.items() if isinstance(v, np.ndarray) and not name.startswith("__")}
+    tables = [
+        plain,
+        *(structs[name] for name in ("response", "backbone", "ring_down") if name in structs),
+        *structs.values(),
+    ]
+    words = [{word for word in (_word(name)[0] for name in table)} for table in tables]
+    for table, known in zip(tables, words, strict=True):
+        if known & {"frequency", "time"}:
+            return facts, table
+    raise ValueError(f"no struct has a column frequency or time: there is {', '.join([*plain, *structs])}")
+
+
+def _of_uff(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
+    sets = library("pyuff").UFF(str(path)).read_sets()
+    sets = sets if isinstance(sets, list) else [sets]
+    length = next((s["length"] for s in sets if s["type"] == 164), 1.0) or 1.0
+    units = {DataKind.DISPLACEMENT: "m", DataKind.VELOCITY: "m/s", DataKind.ACCELERATION: "m/s2"}
+    nodal = [s for s in sets if s["type"] == 55]
+    curves = [s for s in sets if s["type"] == 58 and s["ordinate_spec_data_type"] in units]
+    for wanted in (Function.FRF, Function.GENERAL, Function.TIME):
+        x = DataKind.TIME if wanted == Function.TIME else DataKind.FREQUENCY
+        chosen = [s for s in curves if s["func_type"] == wanted and s["abscissa_spec_data_type"] == x]
+        if chosen:
+            return _of_58(chosen, given, length, units)
+    if nodal:
+        return {}, _of_55(nodal, given, length, units)
+    raise ValueError(
+        "it has no response (dataset 58 over frequency or time, of displacement, velocity or acceleration)"
+    )
+
+
+def _of_58(
+    sets: list[dict[str, Any]], given: Mapping[str, str], length: float, units: Mapping[DataKind, str]
+) -> tuple[dict[str, str], dict[str, Any]]:
+    """Sets of one node and direction, as columns; those that name an output of ours are taken by its name."""
+    output = given.get("output", OUTPUT)
+    named = [s for s in sets if s["id1"].startswith((f"{output} over force", f"{output}, harmonic 1"))]
+    sets = named or [s for s in sets if "node" not in given or str(s["rsp_node"]) == given["node"]]
+    places = sorted({(s["rsp_node"], s["rsp_dir"]) for s in sets})
+    if len(places) != 1:
+        nodes = ", ".join(sorted({str(s["rsp_node"]) for s in sets})) or "no such"
+        raise ValueError(f"it has {len(places)} measured places, of {nodes} node: give node = NUMBER")
+    first = sets[0]
+    facts = {
+        name: f"{'-' if first[key] < 0 else ''}{'xyz'[abs(first[key]) - 1]}"
+        for name, key in (("direction", "rsp_dir"), ("force_direction", "ref_dir"))
+        if 1 <= abs(first[key]) <= 3
+    }
+    label = str(first["ordinate_axis_units_lab"]).strip()
+    unit = label if label not in ("", "NONE") else units[first["ordinate_spec_data_type"]]
+    scale = 1.0 if label not in ("", "NONE") else 1.0 / length
+    x = np.concatenate([s["x"] for s in sets])
+    data = scale * np.concatenate([s["data"] for s in sets])
+    run = np.concatenate([np.full(len(s["x"]), s["id1"]) for s in sets])
+    if first["func_type"] == Function.TIME:
+        return facts, {"time [s]": x, f"response [{unit}]": data.real, "run": run}
+    per = f"{unit}/N" if first["func_type"] == Function.FRF and not unit.endswith("/N") else unit
+    return facts, {"frequency [Hz]": x, f"real [{per}]": data.real, f"imag [{per}]": data.imag, "run": run}
+
+
+def _of_55(
+    sets: list[dict[str, Any]], given: Mapping[str, str], length: float, units: Mapping[DataKind, str]
+) -> dict[str, Any]:
+    """Modes of a set 55 each, or the points of a response at a node."""
+    normal, swept = ([s for s in sets if s["analysis_type"] in kinds] for kinds in ((2, 3), (5,)))
+    if normal:
+        eig = [s.get("eig", 2j * np.pi * s.get("freq", np.nan)) for s in normal]
+        damping = [
+            -e.real / abs(e) if s["analysis_type"] == 3 else s["modal_damp_vis"] + s["modal_damp_his"] / 2
+            for s, e in zip(normal, eig, strict=True)
+        ]
+        return {"frequency [Hz]": np.abs(eig) / (2 * np.pi), "damping": np.array(damping)}
+    if not swept or "node" not in given or "direction" not in given:
+        raise ValueError("a response in datasets 55 has many nodes: give node = NUMBER and direction = x, y or z")
+    axis = 1 + "xyz".index(given["direction"][-1])
+    sign = -1.0 if given["direction"].startswith("-") else 1.0
+    values = [s[f"r{axis}"][[str(int(n)) for n in s["node_nums"]].index(given["node"])] for s in swept]
+    data = sign * np.array(values, complex) / length
+    unit = units[swept[0]["spec_data_type"]]
+    return {
+        "frequency [Hz]": np.array([s["freq"] for s in swept]),
+        f"real [{unit}]": data.real,
+        f"imag [{unit}]": data.imag,
+    }
+
+
+def _word(name: str) -> tuple[str, str]:
+    """The word and the unit in the name of a column."""
+    for word in sorted(COLUMNS, key=len, reverse=True):
+        found = re.match(rf"{word}(?:\s*\[(.*)\]|_(.*))?$", name.strip(), re.IGNORECASE)
+        if found:
+            unit = found[1] if found[1] is not None else (found[2] or "").replace("_per_", "/").replace("_", "/")
+            return word, re.sub(r"\bhz\b", "Hz", unit)
+    return name, ""
+
+
+def _measurement(raw: Mapping[str, Any], facts: Mapping[str, str], source: str) -> Measurement:
+    """Columns as a measurement."""
+    output = facts.get("output", OUTPUT)
+    own = {name: raw.get(f"{output}_{name}_m") for name in ("a1", "b1")}
+    timed = all(column is not None for column in own.values())
+    if timed:  # an export of ours: x = a cos + b sin
+        kept = {name: column for name, column in raw.items() if _word(name)[0] == "frequency"}
+        raw = {**kept, "real [m]": own["a1"], "imag [m]": -np.asarray(own["b1"], float)}
+    found: Columns = {}
+    for name, column in raw.items():
+        word, unit = _word(name)
+        if word in COLUMNS and word not in found:
+            found[word] = np.atleast_1d(np.asarray(column)).astype(float), unit
+    what = next((word for word in RESPONSES if word in found), None)
+    if "frequency" not in found and "time" not in found:
+        raise ValueError(f"no column frequency or time among {', '.join(raw)}")
+    if what is None and "damping" not in found:
+        raise ValueError(f"no column {' or '.join(RESPONSES)}, with its unit, among {', '.join(raw)}")
+    n = len(found["frequency" if "frequency" in found else "time"][0])
+    frequency = _si(found, "frequency", "Hz", n)
+    order, factor, per_force = (0, 1.0, False) if what is None else _kind_of_response(what, found[what][1])
+    values = np.full(n, np.nan, complex) if what is None else factor * found[what][0].astype(complex)
+    phased = "imag" in found or "phase" in found
+    if "imag" in found:
+        values = values + 1j * factor * found["imag"][0]
+    elif "phase" in found:
+        values = np.abs(values) * np.exp(1j * _si(found, "phase", "rad", n))
+    reference = facts.get("phase", "response over force")
+    if reference not in ("response over force", "force over response"):
+        raise ValueError(f'phase = "{reference}": expected "response over force" or "force over response"')
+    if reference == "force over response":
+        values = values.conj()
+    damping, force = _si(found, "damping", "", n), np.abs(_si(found, "force", "N", n))
+    errors = np.stack([_si(found, f"{name}_error", "", n) for name in ("frequency", "damping")], axis=1)
+    kind: Kind = "modes" if what is None else "backbone" if "damping" in found else "response"
+    names, controls = (_texts(raw, key, n, facts.get(key, "")) for key in ("run", "control"))
+    labels, runs = list(zip(controls, names, _texts(raw, "repeat", n, ""), strict=True)), []
+    if "time" in found:
+        kind, time = "backbone", _si(found, "time", "s", n)
+    for label in dict.fromkeys(labels):
+        at = np.array([one == label for one in labels])
+        name = " ".join(word for word in label[:2] if word) or source
+        if "time" in found:
+            runs.append(_decayed(name, label[0], time[at], values[at].real, order))
+            continue
+        spin = 2j * np.pi * frequency[at]
+        x = np.abs(values[at]) / np.abs(spin) ** order if kind == "backbone" else values[at] / spin**order
+        runs.append(Run(name, label[0], frequency[at], x.astype(complex), force[at], damping[at], errors[at]))
+    known = [run.frequency for run in runs] if what is None else [run.frequency * run.amplitude for run in runs]
+    if not all(np.isfinite(k).all() and (k > 0).all() for k in known):
+        raise ValueError("frequency and response must be numbers above 0 in every row")
+    return Measurement(
+        kind, tuple(runs), source, output, order, _direction(facts, "direction"), _direction(facts, "force_direction"),
+        _position(facts), per_force, phased, timed, "time" in found,
+    )  # fmt: skip
+
+
+def _decayed(name: str, control: str, time: np.ndarray, values: np.ndarray, order: int) -> Run:
+    """A free decay as the backbone that it follows."""
+    step = np.diff(time)
+    if len(time) < 8 or np.ptp(step) > 1e-3 * abs(step.mean()):
+        raise ValueError("time: a free decay needs equal steps of time")
+    even = time[0] + step.mean() * np.arange(len(time))
+    spectrum = np.abs(np.fft.rfft((values - values.mean()) * np.hanning(len(values))))
+    guess = 2 * np.pi * max(int(spectrum.argmax()), 1) / (step.mean() * len(values))
+    found = from_decay(even, values, guess)
+    none = np.full((len(found.omega), 2), np.nan)
+    x = (found.amplitude / found.omega**order).astype(complex)
+    return Run(name, control, found.omega / (2 * np.pi), x, none[:, 0], found.damping, none)
+
+
+def _kind_of_response(word: str, unit: str) -> tuple[int, float, bool]:
+    """Order of the derivative, factor to SI units, and whether it is per force."""
+    if not unit:
+        raise ValueError(f"column {word}: give its unit, such as {word} [m/s2]")
+    given = parse_unit(unit)
+    for per_force in (False, True):
+        for order, base in enumerate(("m", "m/s", "m/s2")):
+            wanted = parse_unit(f"{base}/N" if per_force else base)
+            if given.dimension == wanted.dimension:
+                if word in RESPONSES[:3] and word != ("displacement", "velocity", "acceleration")[order]:
+                    raise ValueError(f"column {word}: {unit} is no unit of it")
+                return order, float(given.factor / wanted.factor), per_force
+    raise ValueError(f"column {word}: expected a displacement, velocity or acceleration, or one per force, not {unit}")
+
+
+def _si(found: Columns, word: str, unit: str, n: int) -> np.ndarray:
+    """A column in a unit; nan where it is not there."""
+    if word not in found:
+        return np.full(n, np.nan)
+    values, given = found[word]
+    try:
+        return values * to_si(f"1 {given}".strip(), unit)
+    except ValueError as trouble:
+        raise ValueError(f"column {word}: {trouble}") from None
+
+
+def _texts(raw: Mapping[str, Any], key: str, n: int, missing: str) -> list[str]:
+    return [str(one) for one in np.atleast_1d(raw[key])] if key in raw else [missing] * n
+
+
+def _direction(facts: Mapping[str, str], key: str) -> tuple[float, float, float] | None:
+    if key not in facts:
+        return None
+    text = facts[key].strip().strip("()[]")
+    try:
+        return parsed_direction(text if "," not in text else [float(c) for c in text.split(",")])
+    except ValueError as trouble:
+        raise ValueError(f"{key}: {trouble}") from None
+
+
+def _position(facts: Mapping[str, str]) -> tuple[float, float, float] | None:
+    if "position" not in facts:
+        return None
+    try:
+        x, y, z = (to_si(c.strip().strip('"'), "m") for c in facts["position"].strip("()[]").split(","))
+    except ValueError:
+        raise ValueError('position: expected three lengths such as "-0.3 m, 0 m, 6 mm"') from None
+    return x, y, z
