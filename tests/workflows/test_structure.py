@@ -273,7 +273,7 @@ def test_results_are_told_by_joint(tmp_path: Path) -> None:
         assert joint["volume_m3"] == pytest.approx(coefficient * joint["energy_J"], rel=1e-9)
     for total, part in (("energy_J", "energy_J"), ("volume_m3", "volume_m3")):
         assert found[total] == pytest.approx(sum(joint[part] for joint in found["joints"].values()), rel=1e-12)
-    assert "  near" in dict(in_words.lines(result))
+    assert "joints.near" in dict(in_words.lines(result))
 
 
 PULL = '[loads.static.pull]\ngroup = "b.x_max"\ndirection = "x"\nvalue = "2 kN"\n'

@@ -116,7 +116,7 @@ def plan(scene: str, *, overrides: Overrides = ()) -> None:
 
 
 def _print(result: Result, verbose: bool) -> None:
-    print(*text.brief(result), *(["", *named_lines(text.lines(result))] if verbose else []), sep="\n", flush=True)
+    print(*text.brief(result), *(["", *named_lines(text.lines(result), 38)] if verbose else []), sep="\n", flush=True)
 
 
 def show(result: Path, *, verbose: Verbose = False, as_json: Json = False) -> None:
