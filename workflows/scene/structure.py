@@ -14,7 +14,17 @@ from pydantic import BeforeValidator, Field, PrivateAttr, StrictInt, ValidationI
 from tribodyn.geometry.sources.picking import Rule
 from tribodyn.workflows.scene.body import Geometry, MaterialTable, gathered
 from tribodyn.workflows.scene.contact import FaceContact
-from tribodyn.workflows.scene.fields import Angle, Direction, Length, Number, Stiffness, Table, quantity, unknown_key
+from tribodyn.workflows.scene.fields import (
+    Angle,
+    Direction,
+    Length,
+    Number,
+    Stiffness,
+    Table,
+    quantity,
+    refuse_slips,
+    unknown_key,
+)
 from tribodyn.workflows.scene.own import folder_of, own_file
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene
 from tribodyn.workflows.scene.units import to_si
@@ -228,6 +238,7 @@ class NamedContact(FaceContact):
         if not isinstance(table, dict) or "group" in table:
             return table
         if "first" not in table or "second" not in table:
+            refuse_slips(table, ["first", "second"], ["first", "second", *cls.model_fields])
             missing = "first" if "first" not in table else "second"
             raise ValueError(f'{missing} is missing: give first = "body.face", and second the same or "{GROUND}"')
         rest = {key: value for key, value in table.items() if key not in ("first", "second")}
