@@ -66,7 +66,7 @@ DRIVEN = 'group = "upper.x_max"\ndirection = "y"\nvalue = "{} N"'
         ),
         (('material = "aluminium"', 'material = "gold"'), "bodies.upper: unknown key materials.gold"),
         (('translation = ["55 mm", "3 mm", "10 mm"]', 'translation = ["55 mm", "3 mm", "60 mm"]'), "do not meet"),
-        (('first = "upper.z_min"', 'firts = "upper.z_min"'), "first is missing"),
+        (('first = "upper.z_min"', 'firts = "upper.z_min"'), "did you mean first"),
         (('group = "upper.z_max"\npressure', 'group = "upper.block"\npressure'), "no face 'upper.block'"),
         (("n_width = 1\n", "n_witdh = 1\n"), r"unknown key n_witdh \(did you mean n_width\?\)"),
     ],

@@ -19,13 +19,14 @@ from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, console_progress
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies import inspection, scenes
+from tribodyn.workflows.studies import draft, inspection, scenes
 
 Formats = Annotated[tuple[str, ...], Parameter(name="--format", negative=(), consume_multiple=True)]
 Targets = Annotated[tuple[str, ...], Parameter(name="--to", negative=(), consume_multiple=True)]
 Verbose = Annotated[Flag, Parameter(name=("--verbose", "-v"))]
 Films = Annotated[tuple[Literal["wear", "cycle"], ...], Parameter(name="--film", negative=(), consume_multiple=True)]
 
+new = word(draft.draft, "new", into="here")
 inspect = word(inspection.inspect, "inspect", into="asked")
 
 

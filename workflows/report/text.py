@@ -40,14 +40,16 @@ def _model_in_brief(result: Result, found: dict[str, Any]) -> list[str]:
         pieces.append(f"{around.sectors} sectors, engine order {around.engine_order}")
     if found["harmonics"]:
         pieces.append(f"harmonics {', '.join(map(str, found['harmonics']))}")
-    free = ", ".join(rounded(hertz, 4) for hertz in found["free_hz"][:4])
+    lowest = found["free_hz"][:4]
+    free = ", ".join(rounded(hertz, 4) if hertz > 1e-4 * max(lowest) else "0" for hertz in lowest)
     return ["; ".join(pieces), *([f"modes with the contact open: {free} Hz"] if free else [])]
 
 
 def _of(judged: dict[str, Statement], name: str, default: int = 3) -> int:
     """Digits of a quantity by its error."""
     one = judged.get(name)
-    return default if one is None else digits(one.error, UNKNOWN if one.status == Status.NOT_KNOWN else default)
+    sought = one is not None and one.status == Status.NOT_KNOWN and name in ("depth", "life")
+    return default if one is None else digits(one.error, UNKNOWN if sought else default)
 
 
 def _response_in_brief(found: dict[str, Any], judged: dict[str, Statement]) -> list[str]:
@@ -103,7 +105,7 @@ def _errors_in_brief(judged: dict[str, Statement]) -> list[str]:
             shown.append(f"{label:15} {value:19} {error:8} {one.dominated_by or one.reason}")
             continue
         known = one.status == Status.NOT_KNOWN
-        value = measured(one.value, UNITS[name], UNKNOWN) if known else "not reported"
+        value = measured(one.value, UNITS[name], _of(judged, name)) if known else "not reported"
         error = "unknown" if known else ""
         shown.append(f"{label:15} {value:19} {error}".rstrip())
         why = one.reason if known else f"{one.status.removeprefix('not reported ').strip('()')}; {one.reason}"

@@ -80,7 +80,7 @@ class Progress:
     def say(self, text: str) -> None:
         """One line."""
         if self._console is not None:
-            self._console.print(text, highlight=False, soft_wrap=True)
+            self._console.print(text, highlight=False, soft_wrap=True, markup=False)
         if self._log is not None:
             self._write(text)
 

@@ -103,7 +103,7 @@ class MaterialTable(Table):
     """Young's modulus."""
     density: Annotated[float, quantity("kg/m3"), Field(gt=0)]
     """Density."""
-    poisson: Annotated[Number, Field(gt=-1, lt=0.5)]
+    poisson: Annotated[Number, Field(gt=-1, lt=0.5)] = 0.3
     """Poisson's ratio."""
     expansion: Annotated[float, quantity("1/K")] = 0.0
     """Coefficient of thermal expansion."""

@@ -20,6 +20,7 @@ from tribodyn.workflows.scene.fields import IN_UNIT
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.own import LawTable
 from tribodyn.workflows.scene.schema import PartScene
+from tribodyn.workflows.scene.solution import PartResponse
 from tribodyn.workflows.scene.structure import NamedContact, StructureScene
 
 OWN_FILE = r"\.py$"
@@ -69,6 +70,8 @@ class _Generator(GenerateJsonSchema):
             if name in keys:
                 unit = keys[name].get("description", "")
                 keys[name] = {**keys[name], "description": f"{' '.join(text.split())} {unit}".strip()}
+        if issubclass(kind, PartResponse):  # that of the first harmonic load
+            made["required"] = ["frequency"]
         if issubclass(kind, NamedContact):
             for name, other in (("first", "group"), ("second", "opposite")):
                 keys[name] = {"type": "string", "description": keys[other]["description"]}

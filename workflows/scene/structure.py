@@ -204,7 +204,7 @@ class SolidMaterial(Table):
 
     young: Modulus | tuple[Modulus, Modulus, Modulus]
     """Young's modulus; three along the axes of an orthotropic material."""
-    poisson: Annotated[Number, Field(gt=-1, lt=0.5)] | tuple[Number, Number, Number]
+    poisson: Annotated[Number, Field(gt=-1, lt=0.5)] | tuple[Number, Number, Number] = 0.3
     """Poisson's ratio; nu12, nu13, nu23 of an orthotropic material, the strain along the second axis when it is pulled
     along the first."""
     shear: tuple[Modulus, Modulus, Modulus] | None = None
