@@ -105,14 +105,14 @@ def campbell(
         top = 1.3 * float(found["stuck"][:, :, 0].max())
         for i, (order, color) in enumerate(zip(orders, shades(len(orders)), strict=True)):
             axes.plot(rpm, found["stuck"][:, i, 0], color=color, label=f"stuck, engine order {order}")
-            axes.plot(rpm, abs(order) * speeds, ":", color=color, lw=1)
+            axes.plot(rpm, abs(order) * speeds, ":", color=color)
             for speed in critical.get(order, ()):
                 axes.plot(60 * speed, abs(order) * speed, "o", color=RED, ms=6, zorder=4)
         axes.plot([], [], "o", color=RED, ms=6, label="critical speed")
         axes.set(xlabel="speed / rpm", ylabel="frequency / Hz", ylim=(0, top))
         axes.set_title(named(scene, "Campbell diagram, first mode"))
         axes.set_xlim(0, rpm[-1])
-        figure.legend(loc="outside right upper", fontsize=9)
+        figure.legend(loc="outside right upper")
     return figure
 
 
@@ -133,7 +133,7 @@ def safe(families: Families, n_sectors: int, slow: float, fast: float, scene: st
         for speed, style in ((slow, "-"), (fast, "--")):
             label = f"engine orders at {60 * speed:.5g} rpm"
             axes.plot(
-                places[there], orders[there] * speed, style, color=ORANGE, lw=1, label=label, zorder=1,
+                places[there], orders[there] * speed, style, color=ORANGE, label=label, zorder=1,
             )  # fmt: skip
         axes.vlines(places[there], orders[there] * slow, orders[there] * fast, color=ORANGE, lw=5, alpha=0.35, zorder=1)
         for state, values in families.items():
@@ -146,7 +146,7 @@ def safe(families: Families, n_sectors: int, slow: float, fast: float, scene: st
         for order, place in zip(orders[there], places[there], strict=True):
             if order * fast < top and order <= max(n_sectors // 2, 1):
                 axes.annotate(
-                    f"{order}", (place, order * fast), (-9, 3), textcoords="offset points", ha="center", fontsize=8,
+                    f"{order}", (place, order * fast), (-9, 3), textcoords="offset points", ha="center",
                     color=INK, bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
                 )  # fmt: skip
         axes.set(xlabel="nodal diameter", ylabel="frequency / Hz")
