@@ -1,6 +1,7 @@
 """A turbine wheel
 
-A sector with blade, disk and damper in five contacts. Here its parts and their masses; `tribodyn run turbine` computes it.
+A sector with blade, disk and damper in five contacts. Here its parts and their masses; `tribodyn run turbine`
+computes it.
 """
 
 from pathlib import Path
