@@ -14,6 +14,7 @@ sys.path.insert(0, str(HERE.parent / "src"))
 import docstrings  # noqa: E402
 import examples_pages  # noqa: E402
 import generated_pages  # noqa: E402
+import outputs  # noqa: E402
 from pygments.lexers.special import TextLexer  # noqa: E402
 from sphinx.application import Sphinx  # noqa: E402
 from sphinx.highlighting import lexers  # noqa: E402
@@ -53,4 +54,5 @@ def setup(app: Sphinx) -> None:
     """Make the generated pages before anything is read; docstrings are read in the form that this project has."""
     generated_pages.write(HERE / "generated")
     examples_pages.write(HERE / "examples" / "generated")
+    app.connect("source-read", outputs.add)
     app.connect("autodoc-process-docstring", docstrings.process)
