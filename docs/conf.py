@@ -12,7 +12,9 @@ os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE.parent / "src"), *filter(No
 sys.path.insert(0, str(HERE.parent / "src"))
 
 import docstrings  # noqa: E402
+import examples_pages  # noqa: E402
 import generated_pages  # noqa: E402
+import outputs  # noqa: E402
 from pygments.lexers.special import TextLexer  # noqa: E402
 from sphinx.application import Sphinx  # noqa: E402
 from sphinx.highlighting import lexers  # noqa: E402
@@ -24,6 +26,7 @@ version = release = generated_pages.version()
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx-mathjax-offline"]
 exclude_patterns = ["_build", "generated", "**/results"]
+html_extra_path = ["generated/scene.schema.json"]
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist", "colon_fence", "attrs_inline"]
 myst_heading_anchors = 3
 autodoc_member_order = "bysource"
@@ -50,4 +53,6 @@ html_copy_source = False
 def setup(app: Sphinx) -> None:
     """Make the generated pages before anything is read; docstrings are read in the form that this project has."""
     generated_pages.write(HERE / "generated")
+    examples_pages.write(HERE / "examples" / "generated")
+    app.connect("source-read", outputs.add)
     app.connect("autodoc-process-docstring", docstrings.process)

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import ast
 import dataclasses
-import functools
 import importlib
-import inspect
+import json
 import re
-import sys
 import textwrap
 import tomllib
 from collections.abc import Iterable, Iterator
-from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal, get_args, get_origin
@@ -30,6 +27,7 @@ from tribodyn.hbm.contact import law as contact_law
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.workflows.command.main import app
 from tribodyn.workflows.result import store
+from tribodyn.workflows.scene import json_schema
 from tribodyn.workflows.scene.fields import Direction, Quantity
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.schema import PartScene
@@ -62,6 +60,7 @@ def write(folder: Path) -> None:
         "folders": folders(),
         "lines": lines_by_folder(),
     }
+    (folder / "scene.schema.json").write_text(json.dumps(json_schema.json_schema(), indent=1))
     for name, text in pages.items():
         path = folder / f"{name}.md"
         if not path.exists() or path.read_text() != text:
@@ -78,7 +77,7 @@ def scene_keys(kind: type[BaseModel], without: type[BaseModel] | None = None) ->
         if without is not None and any(path == other and table is known for other, known in _tables(without, ())):
             continue
         lines += [f"## `[{'.'.join(path)}]`", "", _paragraph(table.__doc__), ""]
-        said = _below_keys(table)
+        said = json_schema.meanings(table)
         keys = [(name, field) for name, field in table.model_fields.items() if _is_key(name, field, path)]
         rows = [_row(name, field, said.get(name)) for name, field in keys]
         lines += _table(("key", "unit", "default", "meaning"), rows)
@@ -129,22 +128,6 @@ def _row(name: str, field: Any, meaning: str | None) -> tuple[str, ...]:
     choices = [repr(choice).replace("'", '"') for choice in _choices(field.annotation)]
     notes = [f"One of {', '.join(f'`{c}`' for c in choices)}." if choices else "", _bounds(bounds)]
     return f"`{name}`", unit, _default(field), " ".join(filter(None, [_paragraph(meaning), *notes]))
-
-
-@functools.cache
-def _below_keys(kind: type[BaseModel]) -> dict[str, str]:
-    """The text below every key of a table, from the source of its class and of those that it inherits from."""
-    meanings: dict[str, str] = {}
-    for table in reversed(kind.__mro__):
-        module = sys.modules[table.__module__]
-        if not module.__name__.startswith("tribodyn"):
-            continue
-        written = ast.walk(ast.parse(inspect.getsource(module)))
-        body = next((w.body for w in written if isinstance(w, ast.ClassDef) and w.name == table.__name__), [])
-        for key, text in pairwise(body):
-            if isinstance(key, ast.AnnAssign) and isinstance(key.target, ast.Name) and isinstance(text, ast.Expr):
-                meanings[key.target.id] = inspect.cleandoc(str(ast.literal_eval(text.value)))
-    return meanings
 
 
 def _bounds(bounds: list[str]) -> str:

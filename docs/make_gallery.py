@@ -13,6 +13,7 @@ import argparse
 import shutil
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -123,7 +124,48 @@ def of_scene(name: str, folder: Path) -> Iterator[Path]:
                 )  # fmt: skip
                 print(f"  film over {over}: {(time.process_time() - spent) / FILM_IMAGES:.2f} s of processor an image")
                 yield Path(shutil.copy(film, PICTURES / f"{name}_film_{over}.gif"))
+        if name == "beam":
+            story(result, HERE / "figures" / "beam_story.png", Path(place))
         yield from screenshots(name, folder / "result.h5", Path(place))
+
+
+def story(result: td.Result, path: Path, place: Path) -> Path:
+    """One picture of a wear run: the part in motion, its contact opened and worn, the response before and after."""
+    from tribodyn.workflows.pictures import plots, render
+
+    first, last = (result_at(result, row) for row in (0, len(result.fields.row) - 1))
+    panels = []
+    for number, make in enumerate(
+        (
+            lambda: render.figures(first)["part"](),
+            lambda: render.figures(last)["contact"](),
+            lambda: plots.response(result),
+        )
+    ):
+        file = place / f"panel_{number}.png"
+        make().savefig(file, dpi=DPI)
+        panel = Image.open(file).convert("RGB")
+        panels.append(panel.crop((0, 0, panel.width, int(panel.height * (0.37 if number == 1 else 1)))))
+    high = max(panel.height for panel in panels)
+    whole = Image.new("RGB", (sum(panel.width for panel in panels), high), "white")
+    left = 0
+    for panel in panels:
+        whole.paste(panel, (left, (high - panel.height) // 2))
+        left += panel.width
+    whole.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
+    return path
+
+
+def result_at(result: td.Result, at: int) -> td.Result:
+    """A result that shows one of its states only."""
+    fields, loops = result.fields, result.loops
+    return replace(
+        result,
+        fields=replace(fields, row=fields.row[[at]], displacement=fields.displacement[[at]]),
+        loops=None
+        if loops is None
+        else replace(loops, row=loops.row[[at]], displacement=loops.displacement[[at]], force=loops.force[[at]]),
+    )
 
 
 def screenshots(name: str, file: Path, place: Path) -> Iterator[Path]:

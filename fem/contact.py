@@ -40,7 +40,7 @@ class ContactFaces:
     """
 
     face: str
-    t1: Sequence[float]
+    t1: Sequence[float] | None
     opposite: str | None = None
     components: Sequence[str] = COMPONENTS
     gap: float | np.ndarray | None = None

@@ -56,11 +56,15 @@ def checked_components(components: Sequence[str]) -> tuple[str, ...]:
     return found
 
 
-def contact_frames(normals: np.ndarray, t1: Sequence[float]) -> np.ndarray:
+def contact_frames(normals: np.ndarray, t1: Sequence[float] | None) -> np.ndarray:
     """Right-handed frames (k, 3, 3), rows t1, t2, n, from unit normals (k, 3) and a direction that t1 follows.
+
+    t1 : where None the first of x, y, z that lies most along the face
 
     Raises  ValueError where the direction is along a normal
     """
+    if t1 is None:
+        t1 = np.eye(3)[int(np.argmin(np.round(np.abs(normals).max(axis=0), 3)))]
     direction = unit(t1, "the contact direction t1")
     along = direction - (normals @ direction)[:, None] * normals
     length = np.linalg.norm(along, axis=1, keepdims=True)

@@ -24,7 +24,12 @@ from tribodyn.fem.surface import NINE_NODE_QUADS, side_functions, side_polygons
 
 
 def mortar_halves(
-    one: Side, two: Side, t1: Sequence[float], components: Sequence[str], reach: float, vertices_only: bool = False
+    one: Side,
+    two: Side,
+    t1: Sequence[float] | None,
+    components: Sequence[str],
+    reach: float,
+    vertices_only: bool = False,
 ) -> tuple[ContactInterface, csr_matrix]:
     """Both halves of a contact, as `ContactFaces.halves` gives them, with the gap of the geometry.
 

@@ -311,7 +311,7 @@ def test_the_command_tells_the_verdict_with_the_distribution(
         '[study]\nscene = "beam"\ndesign = "sobol"\nruns = 8\nset = ["harmonics.kept=[0, 1]", "geometry.n_patch=3", '
         '"geometry.n_length=3", '
         '"geometry.n_height=1", "reduction.modes=4", "response.points=12", "wear=", '
-        '"response.frequency=[\'500 Hz\', \'2000 Hz\']"]\n'
+        "\"response.frequency=['500 Hz', '2000 Hz']\"]\n"
         f'[vary]\n{FRICTION} = {{ distribution = "uniform", low = 0.4, high = 0.6 }}\n'
         '[lives]\nnumber = "peak_m_first"\n'
     )

@@ -66,7 +66,7 @@ DRIVEN = 'group = "upper.x_max"\ndirection = "y"\nvalue = "{} N"'
         ),
         (('material = "aluminium"', 'material = "gold"'), "bodies.upper: unknown key materials.gold"),
         (('translation = ["55 mm", "3 mm", "10 mm"]', 'translation = ["55 mm", "3 mm", "60 mm"]'), "do not meet"),
-        (('first = "upper.z_min"', 'firts = "upper.z_min"'), "first is missing"),
+        (('first = "upper.z_min"', 'firts = "upper.z_min"'), "did you mean first"),
         (('group = "upper.z_max"\npressure', 'group = "upper.block"\npressure'), "no face 'upper.block'"),
         (("n_width = 1\n", "n_witdh = 1\n"), r"unknown key n_witdh \(did you mean n_width\?\)"),
     ],
@@ -273,7 +273,7 @@ def test_results_are_told_by_joint(tmp_path: Path) -> None:
         assert joint["volume_m3"] == pytest.approx(coefficient * joint["energy_J"], rel=1e-9)
     for total, part in (("energy_J", "energy_J"), ("volume_m3", "volume_m3")):
         assert found[total] == pytest.approx(sum(joint[part] for joint in found["joints"].values()), rel=1e-12)
-    assert "  near" in dict(in_words.lines(result))
+    assert "joints.near" in dict(in_words.lines(result))
 
 
 PULL = '[loads.static.pull]\ngroup = "b.x_max"\ndirection = "x"\nvalue = "2 kN"\n'

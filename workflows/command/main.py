@@ -12,6 +12,7 @@ from tribodyn.workflows.command import exits
 
 WORDS = {  # word -> where it is, its help on the page of all of them
     "cases": ("scenes:cases", "List the scenes that come with the program."),
+    "new": ("scenes:new", "Begin a scene from a mesh, a deck or a CAD file."),
     "run": ("scenes:run", "Run a scene and leave its result and pictures in a folder."),
     "inspect": ("scenes:inspect", "Show what a mesh, a deck, a CAD file or a scene holds."),
     "plan": ("scenes:plan", "Show what a scene will model, and what it will cost, before running it."),

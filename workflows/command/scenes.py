@@ -19,12 +19,14 @@ from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, console_progress
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies import inspection, scenes
+from tribodyn.workflows.studies import draft, inspection, scenes
 
 Formats = Annotated[tuple[str, ...], Parameter(name="--format", negative=(), consume_multiple=True)]
 Targets = Annotated[tuple[str, ...], Parameter(name="--to", negative=(), consume_multiple=True)]
+Verbose = Annotated[Flag, Parameter(name=("--verbose", "-v"))]
 Films = Annotated[tuple[Literal["wear", "cycle"], ...], Parameter(name="--film", negative=(), consume_multiple=True)]
 
+new = word(draft.draft, "new", into="here")
 inspect = word(inspection.inspect, "inspect", into="asked")
 
 
@@ -37,6 +39,7 @@ def run(
     resume: Flag = False,
     pictures: Annotated[bool, Parameter(negative="--no-pictures")] = True,
     quiet: QUIET = False,
+    verbose: Verbose = False,
     log: Path | None = None,
 ) -> None:
     """Run a scene and leave its result and pictures in a folder.
@@ -60,11 +63,13 @@ def run(
         Draw curves, maps and renders when done.
     quiet
         Print nothing but what goes wrong.
+    verbose
+        Print sizes, the seconds of each stage, every number and every file too.
     log
         File to which every line of progress is added, with its time.
     """
     make_room(out)
-    progress = console_progress(quiet, log)
+    progress = console_progress(quiet, log, verbose)
     file = scene_file.read(scene, overrides)
     folder = out or Path("results") / file.name
     path = folder / "result.h5"
@@ -78,10 +83,11 @@ def run(
     except SolveFailed as failure:
         raise SolveFailed(f"{failure}; what was computed before is kept in {path}") from None
     if not quiet:
-        print(*named_lines(text.lines(result)), sep="\n")
-    progress.say(f"result: {path}")
+        _print(result, verbose)
     if pictures:
-        _draw(result, folder / "pictures", report=progress.say)
+        _draw(result, folder / "pictures", report=progress.detail, complain=progress.say)
+        progress.say(f"pictures  {folder / 'pictures'}")
+    progress.say(f"next      tribodyn report {folder} makes one page of it, tribodyn show {folder} --verbose says all")
     if bound is not None and not bound.met:
         raise RuntimeError(f"{bound.sentence}; the result is kept in {path}")
 
@@ -110,18 +116,27 @@ def plan(scene: str, *, overrides: Overrides = ()) -> None:
     print(*named_lines(scenes.plan(scene, overrides).lines()), sep="\n")
 
 
-def show(result: Path, *, as_json: Json = False) -> None:
-    """Show what a result holds.
+def _print(result: Result, verbose: bool) -> None:
+    print(*text.brief(result), *(["", *named_lines(text.lines(result), 38)] if verbose else []), sep="\n", flush=True)
+
+
+def show(result: Path, *, verbose: Verbose = False, as_json: Json = False) -> None:
+    """Show what a result holds: its model, response, wear and errors, and what is to be doubted.
 
     Parameters
     ----------
     result
         Folder or file of a result.
+    verbose
+        Every number, and what each refinement changed.
     as_json
         Print JSON for machines.
     """
     loaded = store.load(result)
-    print(json.dumps(loaded.summary(), indent=2) if as_json else "\n".join(named_lines(text.lines(loaded))))
+    if as_json:
+        print(json.dumps(loaded.summary(), indent=2))
+    else:
+        _print(loaded, verbose)
 
 
 def draw(
@@ -172,10 +187,13 @@ def _draw(
     formats: Sequence[str] = ("png",),
     dpi: int | None = None,
     report: Callable[[str], None] = print,
+    complain: Callable[[str], None] = print,
 ) -> None:
     written, missing = scenes.draw(result, folder, formats, dpi)
-    for line in (*([missing] if missing else []), *map(str, written)):
-        report(line)
+    if missing:
+        complain(missing)
+    for path in written:
+        report(str(path))
 
 
 def verify(

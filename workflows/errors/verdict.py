@@ -32,7 +32,7 @@ def judge(file: SceneFile, model: Model, result: Result, progress: Progress, opt
     """Measure what refinements change in a finished result, and what its errors are."""
     clock = process_time()
     with progress.stage("errors"):
-        table = measure(file, model, result, progress.say, options)
+        table = measure(file, model, result, progress.detail, options)
     with progress.stage("time integration"):
         findings = in_time.check(file, model.balance, result, table.first, file.scene.verdict.in_time, options)
     values = values_of(table, result)

@@ -31,7 +31,7 @@ def axes_of(
 
 def heading(figure: Figure, result: Result, what: str) -> None:
     """A title over a figure of several axes."""
-    figure.suptitle(titled(result, what), x=0.01, ha="left", fontsize=12)
+    figure.suptitle(titled(result, what), x=0.01, ha="left")
 
 
 def titled(result: Result, what: str) -> str:
@@ -111,8 +111,7 @@ def scale_bar(figure: Figure, axes: Any, map_: str, low: float, high: float, lab
         high = low + (abs(low) or 1.0) * 1e-9
         label += f": {low:.3g} everywhere"
     bar = figure.colorbar(ScalarMappable(Normalize(low, high), map_), ax=axes, location="bottom", shrink=0.7, aspect=28)
-    bar.set_label(label, fontsize=10)
-    bar.ax.tick_params(labelsize=9)
+    bar.set_label(label)
     if label.endswith("everywhere"):
         bar.set_ticks([])
         return

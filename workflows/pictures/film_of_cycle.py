@@ -96,7 +96,7 @@ class CycleFilm:
         self._draw_status(right, result)
         hertz = "" if result.wear is None else f", {self.state.omega / (2 * np.pi):.4g} Hz"
         heading(self.figure, result, f"one cycle, {self.state.label}{hertz}")
-        self._clock = self.figure.text(0.99, 0.985, "", ha="right", va="top", fontsize=11)
+        self._clock = self.figure.text(0.99, 0.985, "", ha="right", va="top")
 
     def _start(self, figure: Any, views: list[str]) -> None:
         for axes, name, image in zip(self._panels, views, self._shots(0, 0), strict=True):
@@ -106,10 +106,10 @@ class CycleFilm:
                 unit, factor = length_unit(self._top)
                 label = f"distance from the mean position / {unit}"
                 scale_bar(figure, axes, MOTION_MAP, 0.0, factor * self._top, label)
-                axes.set_title(self._moving.factors(self._factor), fontsize=10)
+                axes.set_title(self._moving.factors(self._factor))
             elif self._contact is not None:
                 show(axes, shown, self._contact.camera, book.AXES, corner)
-                axes.set_title(f"opened {self._contact.sides}", fontsize=10)
+                axes.set_title(f"opened {self._contact.sides}")
 
     def _shots(self, number: int, sample: int) -> list[np.ndarray]:
         found = []
@@ -130,8 +130,8 @@ class CycleFilm:
         x, force = self._loop.displacement, self._loop.force
         axes.plot(np.append(x, x[0]), np.append(force, force[0]), color=BLUE)
         self._mark = axes.plot([], [], "o", color=RED, ms=7, zorder=5)[0]
-        axes.set_xlabel(self._loop.along, fontsize=10)
-        axes.set_ylabel(self._loop.label, fontsize=10)
+        axes.set_xlabel(self._loop.along)
+        axes.set_ylabel(self._loop.label)
         axes.locator_params(nbins=5)
 
     def _draw_status(self, axes: Any, result: Result) -> None:
@@ -144,10 +144,10 @@ class CycleFilm:
             self._status, aspect="auto", cmap=ListedColormap(colors), norm=norm, interpolation="nearest",
             extent=(0, 1, len(self._status) - 0.5, -0.5),
         )  # fmt: skip
-        self._now = axes.axvline(0, color=INK, lw=1.2)
+        self._now = axes.axvline(0, color=INK)
         axes.grid(False)
-        axes.set_xlabel("share of the period", fontsize=10)
-        axes.set_ylabel("contact pair", fontsize=10)
+        axes.set_xlabel("share of the period")
+        axes.set_ylabel("contact pair")
         present = [bits for bits in AT_ONCE if (self._status == bits).any()]
         swatches = [Swatch(facecolor=STATUS[b][1], label=status_name(b, patch.components)) for b in present]
-        axes.legend(handles=swatches, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
+        axes.legend(handles=swatches, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)

@@ -74,7 +74,7 @@ class WearFilm:
             image = np.full(axes.images[0].get_array().shape, 255, np.uint8)
             image[: LAYOUT.film_contact[1]] = self._shot(state, name)
             axes.images[0].set_data(image)
-        self._panels["depth"].set_title(state.label, fontsize=12)
+        self._panels["depth"].set_title(state.label)
         for mark, x, y in self._marks:
             mark.set_data(x[number : number + 1], y[number : number + 1])
 
@@ -82,7 +82,7 @@ class WearFilm:
         images, corner = with_room([self._shot(self.states[-1], name) for name in PANELS])
         for axes, image in zip(self._panels.values(), images, strict=True):
             show(axes, image, self.contact.camera, book.AXES, corner)
-            axes.set_title(" ", fontsize=12)
+            axes.set_title(" ")
 
     def _shot(self, state: State, name: str) -> np.ndarray:
         view = self.contact.view(state.depth, self.scale, self._paint(state, name))
@@ -124,8 +124,7 @@ def _pressure(state: State) -> np.ndarray:
 
 def _bar(figure: Any, axes: Any, norm: Normalize, map_: str, label: str) -> None:
     bar = figure.colorbar(ScalarMappable(norm, map_), ax=axes, location="bottom", shrink=0.8, aspect=28)
-    bar.set_label(label, fontsize=10)
-    bar.ax.tick_params(labelsize=9)
+    bar.set_label(label)
     bar.locator = MaxNLocator(4)
     bar.update_ticks()
 
@@ -145,8 +144,8 @@ def _curves(result: Result, panels: Any, rows: np.ndarray) -> list[tuple[Any, np
         strict=True,
     ):
         scale = cycle_axis(axes, wear)
-        axes.plot(scale * wear.cycles, values, color=color, lw=1.2)
-        axes.set_ylabel(label, fontsize=10)
+        axes.plot(scale * wear.cycles, values, color=color)
+        axes.set_ylabel(label)
         axes.locator_params(axis="x", nbins=5)
         mark = axes.plot([], [], "o", color=RED, ms=7, zorder=5)[0]
         found.append((mark, scale * wear.cycles[rows], values[rows]))

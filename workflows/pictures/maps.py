@@ -72,13 +72,13 @@ def status_maps(result: Result, count: int = 8) -> Figure:
         figure, grid = _grid(patch, -(-len(rows) // columns), columns)
         for axes, row in zip(grid.ravel(), rows, strict=False):
             draw_status(axes, patch, wear.status[row])
-            axes.set_title(state_of(result, int(row)).label, fontsize=10)
+            axes.set_title(state_of(result, int(row)).label)
         _label_axes(grid, patch)
         for axes in grid.ravel()[len(rows) :]:
             axes.axis("off")
         _name_contacts(grid[:, 0], result)
         status_legend(figure, {int(bits) for row in rows for bits in wear.status[row]}, patch.components)
-        figure.suptitle(titled(result, "contact status over wear"), x=0.01, ha="left", fontsize=12)
+        figure.suptitle(titled(result, "contact status over wear"), x=0.01, ha="left")
     return figure
 
 
@@ -195,12 +195,12 @@ def _drawn(patch: Patch, rows: Sequence[Row], titles: Sequence[str], title: str)
                 low, high = _limits(values)
                 _colour_bar(figure, axes, draw_field(axes, patch, values, colors, high, low), label, high, low)
         for axes, text in zip(grid[0], titles, strict=True):
-            axes.set_title(text, fontsize=11)
+            axes.set_title(text)
         _label_axes(grid, patch)
         present = {int(bits) for colors, row in rows if colors == "status" for _, own in row for bits in own}
         if present:
             status_legend(figure, present, patch.components)
-        figure.suptitle(title, x=0.01, ha="left", fontsize=12)
+        figure.suptitle(title, x=0.01, ha="left")
     return figure, grid
 
 
@@ -224,19 +224,17 @@ def _label_axes(grid: np.ndarray, patch: Patch) -> None:
     names = [name for name in ("t1", "t2") if name in patch.components] or ["t1", "t2"]
     for axes in grid.ravel():
         axes.locator_params(nbins=5)
-        axes.tick_params(labelsize=9)
         axes.label_outer(remove_inner_ticks=False)
     for axes in grid[-1]:
-        axes.set_xlabel(f"{names[0]} / mm", fontsize=10)
+        axes.set_xlabel(f"{names[0]} / mm")
     for axes in grid[:, 0]:
-        axes.set_ylabel(f"{names[-1]} / mm", fontsize=10)
+        axes.set_ylabel(f"{names[-1]} / mm")
 
 
 def _colour_bar(figure: Figure, axes: mpl.axes.Axes, shown: Any, name: str, high: float, low: float) -> None:
     """The scale below a map from `draw_field`; a single value is given in words."""
     bar = figure.colorbar(shown, ax=axes, location="bottom", shrink=0.85, aspect=26)
-    bar.set_label(name if high > low else f"{name}: {low:.3g} everywhere", fontsize=10)
-    bar.ax.tick_params(labelsize=9)
+    bar.set_label(name if high > low else f"{name}: {low:.3g} everywhere")
     bar.locator = MaxNLocator(4) if high > low else NullLocator()
     bar.update_ticks()
 

@@ -26,6 +26,7 @@ from tribodyn.workflows.pictures.loops import has_friction, loop_of, loop_size
 from tribodyn.workflows.pictures.style import BLUE, CYCLE, GREEN, GREY, INK, ORANGE, RED, STATUS, STYLE, WEAR_MAP
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import has_states, shown_cycles, state_of
+from tribodyn.workflows.result.summary import LARGEST_BEND, size_of
 
 BIFURCATIONS = {"fold": "o", "flip": "s", "Neimark-Sacker": "D"}  # markers
 
@@ -73,7 +74,7 @@ def response(result: Result) -> Figure:
             wear = result.wear
             hertz = wear.omega / (2 * np.pi)
             unit_cycles, scale_cycles = _cycles(shown_cycles(wear))
-            axes.plot(hertz, scale * wear.amplitude, color=ORANGE, lw=1.0, zorder=3)
+            axes.plot(*_with_gaps(wear, hertz, scale * wear.amplitude), color=ORANGE, zorder=3)
             dots = axes.scatter(
                 hertz, scale * wear.amplitude, 16, scale_cycles * wear.cycles, cmap=WEAR_MAP, zorder=4,
                 vmax=scale_cycles * shown_cycles(wear), label="cycle at each wear step",
@@ -82,11 +83,12 @@ def response(result: Result) -> Figure:
             if result.worn is not None:
                 colors = mpl.colormaps[WEAR_MAP](wear.cycles[result.worn.row] / shown_cycles(wear))
                 for omega, amplitude, color in zip(result.worn.omega, result.worn.amplitude, colors, strict=True):
-                    axes.plot(omega / (2 * np.pi), scale * amplitude, color=color, lw=1.2)
+                    axes.plot(omega / (2 * np.pi), scale * amplitude, color=color)
         drawn = np.concatenate([line.get_ydata() for line in axes.lines])
         log_axis(axes.yaxis, *_ends(drawn))
+        beyond(axes, result, scale)
         axes.set(xlabel="frequency / Hz", ylabel=f"amplitude / {unit}", title=titled(result, "frequency response"))
-        axes.legend(loc="best", fontsize=9)
+        figure.legend(loc="outside lower center", ncols=3)
     return figure
 
 
@@ -151,6 +153,7 @@ def amplitude_against_cycles(result: Result) -> Figure:
         scale_cycles = cycle_axis(lower, wear)
         unit, scale = length_unit(wear.amplitude.max())
         _course(upper, scale_cycles, wear, scale * wear.amplitude, BLUE)
+        beyond(upper, result, scale)
         upper.set(ylabel=f"amplitude / {unit}", title=titled(result, "response under wear"))
         _course(lower, scale_cycles, wear, wear.frequency, ORANGE)
         lower.set(ylabel="frequency / Hz")
@@ -183,7 +186,7 @@ def depth_against_cycles(result: Result) -> Figure:
         axes.plot(x, scale * mean, color=BLUE, label="mean over the area")
         axes.plot(x, scale * wear.depth.min(1), color=GREEN, label="smallest")
         axes.set(ylabel=f"total wear depth / {unit}", title=titled(result, "wear depth"))
-        axes.legend(loc="best", fontsize=9)
+        figure.legend(loc="outside lower center", ncols=3)
         axes.set_xlabel("")
         cycle_axis(below, wear)
         below.plot(x, 1e6 * worn_area(wear.depth, patch.area), color=ORANGE)
@@ -306,11 +309,11 @@ def hysteresis(result: Result, pairs: Sequence[int] | None = None) -> Figure:
                 axes.locator_params(nbins=5)
                 if not loop.force.any():
                     axes.set(ylim=(-1, 1), yticks=[0])
-                    axes.text(0.5, 0.6, "open all the cycle", transform=axes.transAxes, ha="center", fontsize=10)
-                axes.set_xlabel(loop.along, fontsize=10)
-                axes.set_ylabel(loop.label, fontsize=10)
+                    axes.text(0.5, 0.6, "open all the cycle", transform=axes.transAxes, ha="center")
+                axes.set_xlabel(loop.along)
+                axes.set_ylabel(loop.label)
         for axes, state in zip(grid[0], states, strict=True):
-            axes.set_title(state.label, fontsize=11)
+            axes.set_title(state.label)
         what = "hysteresis loops by pair" if has_friction(result) else "normal force over approach by pair"
         heading(figure, result, what)
     return figure
@@ -318,14 +321,30 @@ def hysteresis(result: Result, pairs: Sequence[int] | None = None) -> Figure:
 
 def _course(axes: Any, scale: float, wear: WearHistory, values: np.ndarray, color: str) -> None:
     """Values against cycles, with a gap where the response jumped; hollow where they are means of a motion in time."""
-    after = wear.jumps + 1
-    x, y = (np.insert(column, after, np.nan) for column in (scale * wear.cycles, values))
-    axes.plot(x, y, "-", color=color, zorder=2)
+    axes.plot(*_with_gaps(wear, scale * wear.cycles, values), "-", color=color, zorder=2)
     axes.plot(scale * wear.cycles, values, "o", color=color, ms=3)
     if wear.in_time.any():
         of_time = scale * wear.cycles[wear.in_time], values[wear.in_time]
         axes.plot(*of_time, "o", color=color, mfc="white", ms=3, label="mean of the motion in time")
-        axes.legend(loc="best", fontsize=9)
+        axes.legend(loc="best")
+
+
+def _with_gaps(wear: WearHistory, *columns: np.ndarray) -> list[np.ndarray]:
+    """Columns by wear step with a gap where the response jumped, so that no jump looks like a slope."""
+    return [np.insert(column, wear.jumps + 1, np.nan) for column in columns]
+
+
+def beyond(axes: Any, result: Result, scale: float) -> None:
+    """Shade the amplitudes that a linear model does not describe, where the axes reach them."""
+    low, high = axes.get_ylim()
+    limit = scale * LARGEST_BEND * size_of(result)
+    if low < limit < high:
+        axes.axhspan(limit, high, color=RED, alpha=0.08, lw=0)
+        axes.text(
+            0.99, limit, "beyond the linear model", transform=axes.get_yaxis_transform(), color=RED, ha="right",
+            va="bottom",
+        )  # fmt: skip
+        axes.set_ylim(low, high)
 
 
 def _wear(result: Result) -> WearHistory:

@@ -17,10 +17,11 @@ from tribodyn.workflows.pictures import opened as book
 from tribodyn.workflows.pictures import view as drawing
 from tribodyn.workflows.pictures.figures import heading, length_unit, pressure_unit, save, scale_bar, status_legend
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame, place, shoot, show, trimmed, with_room
-from tribodyn.workflows.pictures.style import LAYOUT, MOTION_MAP, PRESSURE_MAP, RED, STYLE, WEAR_MAP
+from tribodyn.workflows.pictures.style import INK, LAYOUT, MOTION_MAP, PRESSURE_MAP, RED, STYLE, WEAR_MAP
 from tribodyn.workflows.result.faces import Meeting, bodies, meetings_of, worn_off
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import State, has_states, shown_states
+from tribodyn.workflows.result.summary import LARGEST_BEND, size_of
 
 
 def draw(
@@ -83,7 +84,9 @@ def part_picture(result: Result, deformation: float | None = None, wear: float |
         columns = np.atleast_1d(figure.subplots(1, len(states)))
         for axes, state, image, scale, (most, label) in zip(columns, states, images, scales, bars, strict=True):
             show(axes, image, moving.camera, "xyz", corner)
-            axes.set_title(f"{state.label}\n{moving.factors(scale)}", fontsize=10)
+            far = float(moving.amplitude(state).max()) > LARGEST_BEND * size_of(result)
+            warned = "\nbeyond the linear model" if far else ""
+            axes.set_title(f"{state.label}\n{moving.factors(scale)}{warned}", color=RED if far else INK)
             scale_bar(figure, axes, MOTION_MAP, 0.0, most, label)
         heading(figure, result, "part at its largest swing, its contact outlined")
     return figure
@@ -111,7 +114,7 @@ def contact_picture(result: Result, contact: Meeting, wear: float | None = None)
             if bar is not None:
                 scale_bar(figure, axes, *bar)
         for axes, state in zip(grid[0], states, strict=True):
-            axes.set_title(state.label, fontsize=10)
+            axes.set_title(state.label)
         if "status" in rows:
             present = {int(bits) for s in known if s.status is not None for bits in s.status}
             status_legend(figure, present, opened.patch.components)

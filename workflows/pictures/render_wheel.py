@@ -109,7 +109,7 @@ def wheel_picture(result: Result, wheel: Wheel, deformation: float | None = None
                 layers.append(Layer(blade, values=values, map=MOTION_MAP, limits=(0.0, factor * largest), edges=False))
             (image,), corner = with_room([shoot(View(layers), camera, LAYOUT.wheel)])
             show(axes, image, camera, "xyz", corner)
-            axes.set_title(f"{state.label}\nvibration × {scale:g}", fontsize=10)
+            axes.set_title(f"{state.label}\nvibration × {scale:g}")
             scale_bar(figure, axes, MOTION_MAP, 0.0, factor * largest, f"vibration at one instant / {unit}")
         heading(figure, result, f"wheel of {wheel.n_sectors} sectors, engine order {wheel.engine_order}")
     return figure
@@ -189,7 +189,7 @@ class MistunedWheelFilm:
         for at, (state, (view, upper, lower)) in enumerate(zip(self._states, rows.T, strict=True)):
             view.imshow(self._shot(at, 0))
             view.axis("off")
-            view.set_title(f"{state.label}\nvibration × {self._scale:g}", fontsize=10)
+            view.set_title(f"{state.label}\nvibration × {self._scale:g}")
             scale_bar(self.figure, view, MOTION_MAP, 0.0, factor * self._largest, f"vibration at one instant / {unit}")
             upper.bar(blades, by_height * state.heights, color=BLUE, width=0.8)
             upper.axhline(by_height * state.heights.mean(), color=INK, lw=0.8, ls="--")
@@ -198,9 +198,7 @@ class MistunedWheelFilm:
             if at == 0:
                 upper.set_ylabel(f"amplitude\n/ {of_height}")
                 lower.set_ylabel("worn volume\n/ mm³")
-        self.figure.suptitle(
-            named(scene, f"wheel of {self._wheel.n_sectors} mistuned blades"), x=0.01, ha="left", fontsize=12
-        )
+        self.figure.suptitle(named(scene, f"wheel of {self._wheel.n_sectors} mistuned blades"), x=0.01, ha="left")
 
     def _shot(self, at: int, number: int) -> np.ndarray:
         import pyvista as pv

@@ -35,6 +35,7 @@ FORMATS = ("png", "pdf", "svg")
 class Layout:
     """Layout of pictures.
 
+    font, line : points of all text and of all curves
     dpi : dots per inch of figures, film_dpi : of films, report_dpi : of figures in a report
     narrowest : inches of a figure of maps, below which a legend of all states does not fit
     column, least : inches of a column of views, and of the narrowest figure of them
@@ -51,6 +52,8 @@ class Layout:
     """
 
     dpi: int = 200
+    font: float = 10.0
+    line: float = 1.3
     film_dpi: int = 100
     report_dpi: int = 110
     narrowest: float = 5.6
@@ -85,10 +88,11 @@ STYLE: dict[str, Any] = {
     "mathtext.fontset": "stix",
     "pdf.fonttype": 42,  # text stays text
     "svg.fonttype": "path",
-    "font.size": 11,
+    "font.size": LAYOUT.font,
     "axes.edgecolor": INK,
     "axes.labelcolor": INK,
-    "axes.titlesize": 12,
+    "axes.titlesize": LAYOUT.font,
+    "figure.titlesize": LAYOUT.font,
     "axes.titlelocation": "left",
     "axes.grid": True,
     "axes.spines.top": False,
@@ -96,9 +100,9 @@ STYLE: dict[str, Any] = {
     "axes.axisbelow": True,
     "grid.color": "#dfe2e6",
     "grid.linewidth": 0.6,
-    "lines.linewidth": 1.5,
+    "lines.linewidth": LAYOUT.line,
     "legend.frameon": False,
-    "legend.fontsize": 10,
+    "legend.fontsize": LAYOUT.font,
     "xtick.color": INK,
     "ytick.color": INK,
     "text.color": INK,

@@ -136,12 +136,12 @@ def campbell(
             own = found["stuck"][:, i]
             axes.plot(rpm, own, color=color, label=_first(f"stuck, wave {order}", own))
             if (other := found.get("stuck" + AGAINST)) is not None:
-                axes.plot(rpm, other[:, i], "--", color=color, lw=1, label=_first(f"stuck, wave {-order}", own))
-            axes.plot(rpm, abs(order) * speeds, ":", color=color, lw=1.2)
+                axes.plot(rpm, other[:, i], "--", color=color, label=_first(f"stuck, wave {-order}", own))
+            axes.plot(rpm, abs(order) * speeds, ":", color=color)
             end = min(1.0, top / (abs(order) * speeds[-1]))
             axes.annotate(
                 f"EO {abs(order)}", (end * rpm[-1], end * abs(order) * speeds[-1]), (-8, 3),
-                textcoords="offset points", ha="right", fontsize=9, color=color,
+                textcoords="offset points", ha="right", color=color,
             )  # fmt: skip
         at = [(60 * speed, abs(order) * speed) for order, all_of in critical.items() for speed in all_of]
         if at:
@@ -149,7 +149,7 @@ def campbell(
         axes.set(xlabel="speed / rpm", ylabel="frequency / Hz", ylim=(0, top))
         axes.set_title(named(scene, "Campbell diagram"))
         axes.set_xlim(0, rpm[-1])
-        figure.legend(loc="outside right upper", fontsize=9)
+        figure.legend(loc="outside right upper")
     return figure
 
 
@@ -175,7 +175,7 @@ def safe(families: Families, n_sectors: int, slow: float, fast: float, scene: st
         for speed, style in ((slow, "-"), (fast, "--")):
             label = f"engine orders to {orders[-1]} at {60 * speed:.5g} rpm"
             axes.plot(
-                places[there], orders[there] * speed, style, color=ORANGE, lw=1, label=label, zorder=1,
+                places[there], orders[there] * speed, style, color=ORANGE, label=label, zorder=1,
             )  # fmt: skip
         axes.vlines(places[there], orders[there] * slow, orders[there] * fast, color=ORANGE, lw=5, alpha=0.35, zorder=1)
         for state, values in families.items():
@@ -189,7 +189,7 @@ def safe(families: Families, n_sectors: int, slow: float, fast: float, scene: st
         for order, place in zip(orders[there], places[there], strict=True):
             if order * fast < top:
                 axes.annotate(
-                    f"{order}", (place, order * fast), (-9, 3), textcoords="offset points", ha="center", fontsize=8,
+                    f"{order}", (place, order * fast), (-9, 3), textcoords="offset points", ha="center",
                     color=INK, bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
                 )  # fmt: skip
         axes.set(xlabel="nodal diameter", ylabel="frequency / Hz")

@@ -16,8 +16,7 @@ from tribodyn.workflows.result.result import Result
 
 def shown(result: Result) -> str:
     """HTML of a result; the part stands in a frame of its own, which needs nothing from the notebook."""
-    rows = "".join(f"<tr><td>{escape(name)}</td><td>{escape(value)}</td></tr>" for name, value in text.lines(result))
-    parts = [f"<p><b>{escape(result.state)}</b></p><table>{rows}</table>"]
+    parts = [f"<pre>{escape(chr(10).join(text.brief(result)))}</pre>"]
     figures = plots.figures(result)
     if "frf" in figures:
         with mpl.rc_context(STYLE):

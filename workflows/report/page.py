@@ -144,7 +144,7 @@ def _verdict(result: Result) -> str:
             ))  # fmt: skip
         head = ("quantity", "value", "total error", "dominated by", "status", "why")
         html += _table(rows, head)
-    return html + _table(text.numbers(result))
+    return html + _table(text.lines(result))
 
 
 def _number(value: Any) -> str:

@@ -18,6 +18,6 @@ def write_columns(columns: Mapping[str, Any], path: Path) -> None:
         table.writerows(zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True))
 
 
-def named_lines(values: Iterable[tuple[str, str]]) -> list[str]:
+def named_lines(values: Iterable[tuple[str, str]], width: int = 14) -> list[str]:
     """Names and values in two columns."""
-    return [f"{name:14} {value}" for name, value in values]
+    return [f"{name:{width}} {value}" for name, value in values]

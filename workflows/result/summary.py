@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tribodyn.workflows.result.result import Result
 
 EVENT_SAMPLES = 256  # of a cycle, to see whether a pair opens
+LARGEST_BEND = 0.1  # amplitude over the size of the part that a linear model describes
 
 
 def summary(result: Result) -> dict[str, Any]:
@@ -60,6 +61,11 @@ def numbers(result: Result) -> dict[str, Any]:
     found["verdict"] = verdict.record(result.verdict)
     found["changes"] = verdict.table(result.verdict)
     return found
+
+
+def size_of(result: Result) -> float:
+    """Diagonal of the box round the part [m], infinite without a mesh."""
+    return float("inf") if result.part is None else float(np.linalg.norm(np.ptp(result.part.points, axis=0)))
 
 
 def by_joint(result: Result) -> dict[str, dict[str, Any]]:

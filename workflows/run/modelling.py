@@ -105,7 +105,7 @@ def build(file: SceneFile, folder: Path | None, progress: Progress, chosen: tupl
             remarks = [] if part is None else check_size(np.ptp(part.points, axis=0), "give its numbers a unit")
             raise ValueError("; ".join([str(singular), *remarks])) from None
     if model.choice is not None:
-        progress.say(model.choice.outcome)
+        progress.detail(model.choice.outcome)
     return model
 
 

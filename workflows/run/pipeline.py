@@ -56,7 +56,7 @@ def run(
             chosen = () if earlier is None else earlier.harmonics
             model = modelling.build(file, folder or Path(scratch), progress, chosen)
         for line in () if progress.silent else sanity_checks.lines(file, model):
-            progress.say(line)
+            (progress.say if line.startswith("warning: ") else progress.detail)(line)
         result = earlier or described(file, model.part, model.balance, model.choice)
         if scene.wears and result.patch is not None:
             # raises before anything long is begun

@@ -21,8 +21,8 @@ FORESEEN = 0.02  # share of the work from which on the time left is given: the f
 class Progress:
     """Reports stages and long work on a console, and in a log file; without both it reports nothing."""
 
-    def __init__(self, console: Console | None = None, log: Path | None = None):
-        self._console, self._log = console, log
+    def __init__(self, console: Console | None = None, log: Path | None = None, details: bool = True):
+        self._console, self._log, self._details = console, log, details
 
     @property
     def silent(self) -> bool:
@@ -34,7 +34,7 @@ class Progress:
         """A stage of unknown length."""
         start = time.perf_counter()
         yield
-        self.say(f"{name}: {time.perf_counter() - start:.1f} s")
+        self.detail(f"{name}: {time.perf_counter() - start:.1f} s")
 
     @contextmanager
     def track(self, name: str) -> Iterator[Callable[[float, str], None]]:
@@ -59,17 +59,18 @@ class Progress:
                 yield advance
         else:
             yield self._lines(name, start)
-        self.say(f"{name}: {time.perf_counter() - start:.1f} s")
+        self.detail(f"{name}: {time.perf_counter() - start:.1f} s")
 
     def _lines(self, name: str, start: float, on_console: bool = True) -> Callable[[float, str], None]:
-        """Lines from time to time; on_console : whether they go to the console too."""
-        last, before = start, compiled()
+        """Lines from time to time, without details at ever longer ones; on_console : whether they go there too."""
+        last, before, wait = start, compiled(), NOTE_EVERY
 
         def advance(share: float, note: str) -> None:
-            nonlocal last
+            nonlocal last, wait
             now, compiling = time.perf_counter(), compiled() - before
-            if now - last >= NOTE_EVERY and share > 0:
+            if now - last >= wait and share > 0:
                 last = now
+                wait *= 1 if self._details else 2
                 left = time_left(share, start, compiling)
                 line = f"{name}: {min(share, 1.0):.0%}{', ' if left else ''}{left}; {note}".rstrip("; ")
                 (self.say if on_console else self._write)(line)
@@ -79,8 +80,15 @@ class Progress:
     def say(self, text: str) -> None:
         """One line."""
         if self._console is not None:
-            self._console.print(text, highlight=False)
+            self._console.print(text, highlight=False, soft_wrap=True, markup=False)
         if self._log is not None:
+            self._write(text)
+
+    def detail(self, text: str) -> None:
+        """One line for who wants all of them; a log has it always."""
+        if self._details:
+            self.say(text)
+        elif self._log is not None:
             self._write(text)
 
     def _write(self, text: str) -> None:
@@ -150,9 +158,10 @@ def compiled() -> float:
 _timer: Any = None
 
 
-def console_progress(quiet: bool = False, log: Path | None = None) -> Progress:
+def console_progress(quiet: bool = False, log: Path | None = None, details: bool = True) -> Progress:
     """Progress on standard output, none of it where quiet; standard error is kept for what goes wrong.
 
+    details : with sizes and the seconds of each stage
     log : file to add every line to; raises ValueError where it cannot be written
     """
     if log is not None:
@@ -161,4 +170,4 @@ def console_progress(quiet: bool = False, log: Path | None = None) -> Progress:
             log.open("a").close()
         except OSError as error:
             raise ValueError(f"--log {log}: cannot be written, {str(error.strerror).lower()}") from None
-    return Progress(None if quiet else Console(), log)
+    return Progress(None if quiet else Console(), log, details)

@@ -21,6 +21,7 @@ from tribodyn.fem.system import SecondOrderSystem
 from tribodyn.geometry import mesh as mesh_reader
 from tribodyn.geometry.facts import facts
 from tribodyn.geometry.sources import cad
+from tribodyn.workflows.result.summary import LARGEST_BEND
 from tribodyn.workflows.run import bodies, matrix_model, part_reduction
 from tribodyn.workflows.scene.matrix_scene import MatrixScene
 from tribodyn.workflows.scene.scene_file import SceneFile
@@ -44,7 +45,7 @@ class Usual:
     size: tuple[float, float] = (1e-4, 20.0)
     density: tuple[float, float] = (50.0, 30_000.0)
     young: tuple[float, float] = (1e6, 2e12)
-    bent: float = 0.1
+    bent: float = LARGEST_BEND
     rigid: float = 1e-12
     modes: int = 6
     line_error: float = 1e-4

@@ -21,6 +21,7 @@ from tribodyn.workflows.scene.fields import (
     Number,
     Table,
     quantity,
+    refuse_slips,
 )
 from tribodyn.workflows.scene.own import beside, folder_of, is_file, numbers, own_file
 
@@ -71,19 +72,22 @@ def gathered(kind: type[Table], table: Any, folder: Path | None) -> Any:
     own = {key: value for key, value in table.items() if key in kind.model_fields}
     other = {key: value for key, value in table.items() if key not in kind.model_fields}
     if ("part" in own) == ("mesh" in own):
+        refuse_slips(other, ["part", "mesh"], list(kind.model_fields))
         raise ValueError('expected either part = "name" or mesh = "file.msh", and not both')
     if not isinstance(own.get("part"), str):
         return own | other  # a mesh file has no parameters: the other keys are unknown ones
-    return own | {"parameters": part_parameters(own["part"], other, folder)}
+    return own | {"parameters": part_parameters(own["part"], other, folder, kind)}
 
 
-def part_parameters(part: str, given: dict[str, Any], folder: Path | None = None) -> dict[str, int | float]:
+def part_parameters(
+    part: str, given: dict[str, Any], folder: Path | None = None, kind: type[Table] = Geometry
+) -> dict[str, int | float]:
     """Parameters of a part in SI units: all of them, or those given to a file of one's own, which is not run here.
 
-    given : key -> number or text with a unit; folder : of the scene
+    given : key -> number or text with a unit; folder : of the scene; kind : of the table, which has general keys too
     Raises  ValueError: no such part, unknown key, or a value that the part refuses
     """
-    general = [name for name in Geometry.model_fields if name != "parameters"]
+    general = [name for name in kind.model_fields if name != "parameters"]
     if is_file(part):
         if folder is None:
             raise ValueError(f'geometry.part: "{part}" is a file beside a scene, and this scene has no folder')
@@ -99,7 +103,7 @@ class MaterialTable(Table):
     """Young's modulus."""
     density: Annotated[float, quantity("kg/m3"), Field(gt=0)]
     """Density."""
-    poisson: Annotated[Number, Field(gt=-1, lt=0.5)]
+    poisson: Annotated[Number, Field(gt=-1, lt=0.5)] = 0.3
     """Poisson's ratio."""
     expansion: Annotated[float, quantity("1/K")] = 0.0
     """Coefficient of thermal expansion."""

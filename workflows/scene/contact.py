@@ -135,8 +135,9 @@ class FaceContact(ContactTable):
     """One face, or a list of faces."""
     opposite: str | None = None
     """Face that the group touches; the ground by default."""
-    t1: Direction
-    """Direction that the first tangential component follows."""
+    t1: Direction | None = None
+    """Direction that the first tangential component follows; by default the first of x, y, z that lies most along the
+    face."""
     vertices_only: StrictBool = False
     """Leave the mid-side nodes of the mesh out; without, faces of tetrahedra have their pairs at these alone."""
     gap: Length | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -10,6 +11,8 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict
 
 from tribodyn.workflows.scene.units import to_si
+
+IN_UNIT = "in_unit"  # attribute of the validator of a quantity
 
 
 class Table(BaseModel):
@@ -31,7 +34,12 @@ class Quantity(BeforeValidator):
 
 def quantity(unit: str) -> Quantity:
     """Validator that turns a text with a unit, or a bare number, into a float counted in `unit`."""
-    return Quantity(lambda value: to_si(value, unit), unit=unit)
+
+    def in_unit(value: object) -> float:
+        return to_si(value, unit)
+
+    setattr(in_unit, IN_UNIT, unit)  # pydantic keeps the function and no mark, and the JSON schema needs the unit
+    return Quantity(in_unit, unit=unit)
 
 
 Length = Annotated[float, quantity("m")]
@@ -65,3 +73,10 @@ def unknown_key(key: str, known: list[str]) -> str:
     close = difflib.get_close_matches(key.rpartition(".")[2], names, n=1)
     hint = f" (did you mean {close[0]}?)" if close else ""
     return f"unknown key {key}{hint}, known here: {', '.join(names)}"
+
+
+def refuse_slips(given: Iterable[str], needed: list[str], known: list[str]) -> None:
+    """Raise ValueError where one of the given keys is a slip of the pen for one that is needed."""
+    for key in given:
+        if key not in known and difflib.get_close_matches(key, needed, n=1):
+            raise ValueError(unknown_key(key, [*needed, *(name for name in known if name not in needed)]))

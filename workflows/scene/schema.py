@@ -41,13 +41,14 @@ from tribodyn.workflows.scene.solution import (
 from tribodyn.workflows.scene.wear import Wear
 
 CENTRIFUGAL = "centrifugal"
+MODES = 20  # of a scene that says nothing of its reduction
 
 
 class Heading(Table):
     """What the scene is and where its numbers come from."""
 
-    title: str
-    """What the scene is, in one line; `tribodyn cases` and every picture show it."""
+    title: str = ""
+    """What the scene is, in one line; `tribodyn cases` and the report show it, the name of the file by default."""
     source: str = ""
     """Where its numbers come from."""
     notes: str = ""
@@ -57,7 +58,7 @@ class Heading(Table):
 class Scene(Table, ABC):
     """What every scene has, whatever its model is made from; see PartScene, and MatrixScene in matrix_scene."""
 
-    scene: Heading
+    scene: Heading = Heading()
     """Title and source."""
     loads: Loads[Any, Any]
     """The loads."""
@@ -113,7 +114,7 @@ class MeshScene(Scene):
     """The loads."""
     response: PartResponse
     """The response that is computed."""
-    reduction: Reduction
+    reduction: Reduction = Reduction(modes=MODES)
     """The reduction."""
     wheel: WheelTable | None = None
     """The wheel of which the part is one sector."""
@@ -129,6 +130,17 @@ class MeshScene(Scene):
     @abstractmethod
     def joints(self) -> Mapping[str, FaceContact]:
         """The contacts by name."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _seen_where_it_is_shaken(cls, data: Any) -> Any:
+        """A response without group and direction is that of the first harmonic load."""
+        loads = data.get("loads") if isinstance(data, dict) else None
+        harmonic = loads.get("harmonic") if isinstance(loads, dict) else None
+        first = next(iter(harmonic.values()), None) if isinstance(harmonic, dict) else None
+        if not isinstance(first, dict) or not isinstance(response := data.get("response"), dict):
+            return data
+        return {**data, "response": {key: first[key] for key in ("group", "direction") if key in first} | response}
 
     @model_validator(mode="before")
     @classmethod

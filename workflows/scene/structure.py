@@ -14,7 +14,17 @@ from pydantic import BeforeValidator, Field, PrivateAttr, StrictInt, ValidationI
 from tribodyn.geometry.sources.picking import Rule
 from tribodyn.workflows.scene.body import Geometry, MaterialTable, gathered
 from tribodyn.workflows.scene.contact import FaceContact
-from tribodyn.workflows.scene.fields import Angle, Direction, Length, Number, Stiffness, Table, quantity, unknown_key
+from tribodyn.workflows.scene.fields import (
+    Angle,
+    Direction,
+    Length,
+    Number,
+    Stiffness,
+    Table,
+    quantity,
+    refuse_slips,
+    unknown_key,
+)
 from tribodyn.workflows.scene.own import folder_of, own_file
 from tribodyn.workflows.scene.schema import CENTRIFUGAL, MeshScene
 from tribodyn.workflows.scene.units import to_si
@@ -194,7 +204,7 @@ class SolidMaterial(Table):
 
     young: Modulus | tuple[Modulus, Modulus, Modulus]
     """Young's modulus; three along the axes of an orthotropic material."""
-    poisson: Annotated[Number, Field(gt=-1, lt=0.5)] | tuple[Number, Number, Number]
+    poisson: Annotated[Number, Field(gt=-1, lt=0.5)] | tuple[Number, Number, Number] = 0.3
     """Poisson's ratio; nu12, nu13, nu23 of an orthotropic material, the strain along the second axis when it is pulled
     along the first."""
     shear: tuple[Modulus, Modulus, Modulus] | None = None
@@ -233,6 +243,7 @@ class NamedContact(FaceContact):
         if not isinstance(table, dict) or "group" in table:
             return table
         if "first" not in table or "second" not in table:
+            refuse_slips(table, ["first", "second"], ["first", "second", *cls.model_fields])
             missing = "first" if "first" not in table else "second"
             raise ValueError(f'{missing} is missing: give first = "body.face", and second the same or "{GROUND}"')
         rest = {key: value for key, value in table.items() if key not in ("first", "second")}

@@ -174,10 +174,10 @@ class Comparison:
             unit, scale = length_unit(np.abs(theirs - mean).max())
             phase = angle / (2 * np.pi)
             left.plot(phase, scale * (theirs - mean), color=ORANGE, lw=3.0, alpha=0.6, label="time integration")
-            left.plot(phase, scale * (ours - mean), color=BLUE, lw=1.2, label="harmonic balance")
+            left.plot(phase, scale * (ours - mean), color=BLUE, label="harmonic balance")
             name = balance.compliance.output_names[0]
             left.set(xlabel="period", ylabel=f"{name} about its mean / {unit}", title=f"{self.hertz:.6g} Hz")
-            left.legend(loc="best", fontsize=9)
+            left.legend(loc="best")
             pair = int(np.argmax(np.abs(motion.energy)))
             component = int(np.argmax(np.abs(_loop_areas(motion.force[pair], motion.x[pair]))))
             x, force = balance.history(state)

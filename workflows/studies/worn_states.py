@@ -122,7 +122,7 @@ class WornStates:
                 heights, spreads = [s.energy for s in seen], [s.energy_spread for s in seen]
                 ax.errorbar(at, heights, spreads, fmt="s", color=GREEN, capsize=3, label="left alone, mean and spread")
             ax.set(xlabel="cycles / 1e6", ylabel="friction work per cycle / J", yscale="log")
-            ax.legend(loc="best", fontsize=9)
+            ax.legend(loc="best")
         return figure
 
 

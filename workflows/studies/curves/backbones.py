@@ -188,7 +188,7 @@ class SceneBackbone:
         amplitude = scale * mode.amplitude[good]
         with axes_of(7.2, 5.6, rows=2) as (figure, (upper, lower)):
             upper.plot(amplitude, mode.omega[good] / (2 * np.pi), ".-", color=BLUE, ms=4)
-            upper.axhline(mode.reference_omega / (2 * np.pi), color=GREY, ls="--", lw=1.2, label="at rest")
+            upper.axhline(mode.reference_omega / (2 * np.pi), color=GREY, ls="--", label="at rest")
             if published is not None:
                 reached = published.modal_amplitude <= mode.modal_amplitude[good].max()
                 of_mode = mode.amplitude[good][0] / mode.modal_amplitude[good][0]
@@ -197,7 +197,7 @@ class SceneBackbone:
                 upper.plot(there, published.frequency[reached], **kind)
                 lower.plot(there, 100 * published.damping[reached], **kind)
             upper.set(ylabel="frequency / Hz", title=named(self.name, "backbone"))
-            upper.legend(loc="best", fontsize=9)
+            upper.legend(loc="best")
             lower.plot(amplitude, 100 * mode.damping[good], ".-", color=ORANGE, ms=4)
             lower.set(xscale="log", xlabel=f"amplitude in the mode at rest / {unit}", ylabel="damping ratio / %")
             lower.set_ylim(bottom=0)

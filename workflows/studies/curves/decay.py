@@ -117,16 +117,16 @@ class Decay:
             upper.plot(scale * self.mode.first_harmonic, self.mode.frequency, color=BLUE, label="backbone")
             upper.plot(scale * d.amplitude, d.omega / (2 * np.pi), ".", color=ORANGE, ms=4, label="free decay")
             upper.set(ylabel="frequency / Hz")
-            upper.legend(fontsize=9)
+            upper.legend()
             lower.plot(scale * self.mode.first_harmonic, 100 * self.expected, color=BLUE, label="its decrement")
             given = 100 * self.mode.damping
-            lower.plot(scale * self.mode.first_harmonic, given, color=BLUE, ls="--", lw=1, label="its damping ratio")
+            lower.plot(scale * self.mode.first_harmonic, given, color=BLUE, ls="--", label="its damping ratio")
             lower.plot(scale * d.amplitude, 100 * d.damping, ".", color=ORANGE, ms=4)
             lower.set(xlabel=f"amplitude / {unit}", ylabel="damping ratio / %")
             lower.set_ylim(bottom=0)
             for axes in (upper, lower):
                 log_axis(axes.xaxis, self.mode.first_harmonic.min(), self.mode.first_harmonic.max())
-            lower.legend(fontsize=9)
+            lower.legend()
         return figure
 
 

@@ -76,12 +76,12 @@ class Mistuned:
             unit, scale = length_unit(float(self.heights.max()))
             for n, colour in enumerate(colours):
                 label = f"sector {n}: {100 * (self.stiffness[n] - 1):+.1f} %" if len(colours) <= 12 else None
-                axes.plot(self.branch.frequency, scale * self.heights[:, n], color=colour, lw=1.2, label=label)
+                axes.plot(self.branch.frequency, scale * self.heights[:, n], color=colour, label=label)
             alike = scale * self.alike.amplitude(OUTPUT)
             axes.plot(self.alike.frequency, alike, "--", color=INK, label="sectors alike")
             axes.set(yscale="log", xlabel="frequency / Hz", ylabel=f"amplitude / {unit}")
             axes.set_title("Sectors whose stiffnesses deviate")
-            axes.legend(fontsize=8, ncols=2)
+            axes.legend(ncols=2)
         return figure
 
 

@@ -317,7 +317,7 @@ class Patterns:
         with axes_of(7.6, 4.2) as (figure, axes):
             axes.hist(values, bins="auto" if len(values) > 20 else 10, color=BLUE, alpha=0.8)
             for name, colour in (("p50", INK), ("p95", ORANGE), ("p99", RED)):
-                axes.axvline(said[name], color=colour, lw=1.5, label=f"{name.upper()} {said[name]:.3f}")
+                axes.axvline(said[name], color=colour, label=f"{name.upper()} {said[name]:.3f}")
             bound = whitehead(self.n_sectors)
             shown = [bound] if bound < 1.5 * values.max() else []  # further out it would squeeze the distribution
             axes.vlines(
@@ -325,7 +325,7 @@ class Patterns:
             )
             axes.set(xlabel="largest amplitude of any blade over that of blades alike", ylabel="patterns")
             axes.set_title(f"{self.name}: {len(values)} patterns of {self.n_sectors} blades")
-            axes.legend(fontsize=9)
+            axes.legend()
         return figure
 
 

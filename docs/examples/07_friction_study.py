@@ -1,0 +1,24 @@
+"""What friction does
+
+The same scene with several coefficients of friction.
+"""
+
+import tribodyn as td
+
+COARSE = {
+    "geometry.n_patch": 3,
+    "geometry.n_length": 4,
+    "geometry.n_height": 1,
+    "reduction.modes": 4,
+    "harmonics.kept": [0, 1],
+    "verdict.enabled": False,
+}
+
+frictions, peaks = (0.2, 0.3, 0.4, 0.5, 0.6), []
+for friction in frictions:
+    result = td.run("beam", overrides=COARSE | {"wear": None, "contact.friction": friction})
+    peaks.append(1e3 * result.summary()["peak_m"][0])
+with td.plot.axes() as (figure, axes):
+    axes.plot(frictions, peaks, "o-")
+    axes.set(xlabel="coefficient of friction", ylabel="largest amplitude / mm", title="amplitude by friction")
+figure.savefig("friction.png")

@@ -1,0 +1,13 @@
+"""A turbine wheel
+
+A sector with blade, disk and damper in five contacts. Here its parts and their masses; `tribodyn run turbine`
+computes it.
+"""
+
+from pathlib import Path
+
+import tribodyn as td
+
+found = td.inspect("turbine")
+print(*found.lines()[:8], sep="\n")
+found.write(Path())

@@ -1,0 +1,69 @@
+"""What the commands of a tutorial print: they are run when the site is built, and their output stands below each.
+
+A page is followed as a reader does: named fences are files, Python is run, commands of tribodyn in this process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+FOLLOWED = ("tutorials/first_run", "tutorials/own_matrices", "howto/deck", "howto/step", "howto/inspect")
+FENCE = re.compile(r"^```([a-z]+)(?: ([\w.]+))?\n(.*?)^```\n", re.M | re.S)
+MOST = 30  # lines of an output
+
+
+def add(_: Any, name: str, source: list[str]) -> None:
+    """Put the output below each command of a page, for Sphinx's event source-read."""
+    if name in FOLLOWED:
+        source[0] = "".join(_followed(source[0]))
+
+
+def _followed(text: str) -> Iterator[str]:
+    back, at = Path.cwd(), 0
+    with TemporaryDirectory() as folder:
+        os.chdir(folder)
+        try:
+            for fence in FENCE.finditer(text):
+                language, word, code = fence.groups()
+                yield text[at : fence.end()]
+                at = fence.end()
+                if word and language != "sh":
+                    Path(word).write_text(code, encoding="utf-8")
+                elif language == "sh" and not word:
+                    said = "".join(map(_said, filter(None, code.splitlines())))
+                    shown = said.splitlines()
+                    more = ["..."] if len(shown) > MOST else []
+                    yield "\n".join(["", "```text", *shown[:MOST], *more, "```", ""])
+                elif language == "python":
+                    with contextlib.redirect_stdout(io.StringIO()):
+                        exec(compile(code, "page", "exec"), {"__name__": "__main__"})
+            yield text[at:]
+        finally:
+            os.chdir(back)
+
+
+def _said(command: str) -> str:
+    """What a command prints; raises RuntimeError where it fails."""
+    from tribodyn.workflows.command.main import main
+
+    words = shlex.split(command, comments=True)
+    if not words:
+        return ""
+    if words[0] != "./tribodyn":
+        raise RuntimeError(f"the build follows commands of tribodyn alone: {command}")
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        try:
+            main(words[1:])
+        except SystemExit as end:
+            if end.code:
+                raise RuntimeError(f"{command} ended with {end.code}") from None
+    return printed.getvalue()

@@ -1,0 +1,95 @@
+"""`tribodyn new`: the scene that it begins is read and planned as it stands, and names what touches."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import gmsh
+import pytest
+
+import tribodyn as td
+from tests.helpers.command import leave
+from tests.helpers.pages import ROOT
+from tribodyn.geometry.gmsh_session import session
+from tribodyn.workflows.scene import scene_file
+from tribodyn.workflows.studies.draft import draft
+
+SMALLEST = """
+material = { young = "210 GPa", density = "7860 kg/m3" }
+
+[geometry]
+part = "beam"
+fixed = ["clamp"]
+
+[contact]
+group = "contact"
+tangential_stiffness = "470 N/um"
+normal_stiffness = "583 N/um"
+friction = 0.5
+
+[loads.harmonic]
+shake = { group = "shaker", direction = "y", value = "10 kN" }
+
+[response]
+frequency = ["380 Hz", "1200 Hz"]
+"""
+
+
+def step(path: Path) -> Path:
+    """Two boxes in mm, one on the other but for 0.02 mm."""
+    with session() as model:
+        model.model.occ.addBox(0, 0, 0, 20, 10, 10)
+        model.model.occ.addBox(5, 0, 10.02, 20, 10, 10)
+        model.model.occ.synchronize()
+        gmsh.write(str(path))
+    return path
+
+
+def deck(path: Path) -> Path:
+    page = (ROOT / "docs/howto/deck.md").read_text(encoding="utf-8")
+    found = re.search(r"```text lap.inp\n(.*?)```", page, re.S)
+    assert found is not None
+    path.write_text(found.group(1))
+    return path
+
+
+@pytest.mark.parametrize(("make", "name", "pair", "apart"), [
+    (step, "boxes.step", ("solid 1.face 6", "solid 2.face 11"), 0.02e-3),
+    (deck, "lap.inp", ("Lower.Top", "Upper.Sole"), 0.0),
+])  # fmt: skip
+def test_a_scene_is_begun_from_a_file_and_is_one(
+    make, name: str, pair: tuple[str, str], apart: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = make(tmp_path / name)
+    code, said, _ = leave(["new", str(file)], capsys)
+    assert code == 0
+    assert "unit      mm: guessed" in said
+    written = file.with_suffix(".toml")
+    scene = scene_file.read(str(written)).scene
+    (joint,) = scene.joints.values()
+    assert (joint.group, joint.opposite) == pair
+    assert f"{1e3 * apart:.3g} mm apart" in said
+    assert len(td.build(written).part.interface.area) > 4
+    assert json.loads((tmp_path / "scene.schema.json").read_text())["$defs"]
+    code, _, why = leave(["new", str(file)], capsys)
+    assert code == 2
+    assert "is there already" in why
+    shutil.copy(file, tmp_path / f"far{file.suffix}")
+    assert draft(tmp_path / f"far{file.suffix}", unit="m").unit == "m"
+
+
+def test_what_is_no_file_of_a_mesh_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, why = leave(["new", "beam"], capsys)
+    assert code == 2
+    assert "no mesh, deck or CAD file" in why
+
+
+def test_the_smallest_scene_has_at_most_fifteen_lines() -> None:
+    assert len([line for line in SMALLEST.splitlines() if line]) <= 15
+    scene = scene_file.parse(SMALLEST, "small.toml", (), Path()).mesh_scene
+    assert (scene.response.group, scene.response.direction) == ("shaker", (0.0, 1.0, 0.0))
+    whole = f'{SMALLEST}group = "response"\ndirection = "x"\n'
+    assert scene_file.parse(whole, "small.toml", (), Path()).mesh_scene.response.group == "response"

@@ -1,0 +1,42 @@
+"""Numbers as a reader has them: in a unit with a prefix, with as many digits as their error allows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
+COUNTED = {9: " billion", 6: " million", 0: ""}
+UNKNOWN, USUAL, MOST = 2, 3, 6  # digits of a value whose error was looked for in vain, of one without, at the most
+
+
+def digits(error: float | None, default: int = USUAL) -> int:
+    """Significant digits of a value with a relative error: the last one is about as uncertain as the error says."""
+    if error is None or not np.isfinite(error):
+        return default
+    return MOST if error <= 0 else int(np.clip(1 + np.ceil(-np.log10(error)), UNKNOWN, MOST))
+
+
+def rounded(value: float, count: int = USUAL) -> str:
+    """A number with so many significant digits and no exponent; thousands apart from 10 000 on."""
+    if not np.isfinite(value) or value == 0:
+        return f"{value:g}"
+    places = count - 1 - int(np.floor(np.log10(float(f"{abs(value):.{count - 1}e}"))))
+    shown = round(value, places)
+    return f"{shown:,.{max(places, 0)}f}".replace(",", " " if abs(shown) >= 1e4 else "")
+
+
+def measured(value: float, unit: str, count: int = USUAL) -> str:
+    """A quantity in SI with a prefix: 0.951 mm, 796 Hz, 7.38 kN, 2240 mm³, 22 million cycles.
+
+    unit : m, m2 and m3 are given in mm, mm² and mm³, small lengths in µm; Hz without a prefix below 10 kHz
+    """
+    if unit == "cycles":
+        power = next((power for power in COUNTED if abs(value) >= 10.0**power), 0)
+        return f"{rounded(value / 10.0**power, count)}{COUNTED[power]} cycles"
+    if unit in ("m2", "m3"):
+        return f"{rounded(value * 1e3 ** int(unit[1]), count)} mm{'²' if unit == 'm2' else '³'}"
+    if unit == "m" and 1e-4 <= abs(value) < 10:
+        return f"{rounded(1e3 * value, count)} mm"
+    size = abs(value) / 10 if unit == "Hz" else abs(value)
+    power = next((power for power in PREFIXES if size >= 10.0**power), 0)
+    return f"{rounded(value / 10.0**power, count)} {PREFIXES[power]}{unit}"

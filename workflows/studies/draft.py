@@ -1,0 +1,217 @@
+"""A scene begun from a file: its bodies, its groups, faces that may touch, all that is guessed said so in a comment."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tribodyn.geometry.sources import cad
+from tribodyn.geometry.sources import read as sources
+from tribodyn.geometry.sources.picking import outline
+from tribodyn.workflows.scene.json_schema import json_schema
+from tribodyn.workflows.scene.source import AnyPath
+
+SCHEMA = "scene.schema.json"
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What is taken for a contact, and for a file in metres.
+
+    near : distance over the size of the whole; opposed : cosine of the normals; share : of the facets of a face
+    longest : of a part in metres [m], beyond which a file is taken to be in millimetres
+    """
+
+    near: float = 0.01
+    opposed: float = -0.7
+    share: float = 0.1
+    longest: float = 3.0
+
+
+LIMITS = Limits()
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Two faces that may touch: "body.face" of each, least distance [m], share of the smaller one that is near."""
+
+    first: str
+    second: str
+    distance: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Draft:
+    """text : of the scene; name : of its file; unit : of length in the file, and why; candidates : nearest first"""
+
+    text: str
+    name: str
+    unit: str
+    why: str
+    bodies: Mapping[str, Sequence[str]]
+    candidates: tuple[Candidate, ...]
+
+    def record(self) -> dict[str, Any]:
+        """For machines."""
+        pairs = [vars(one) for one in self.candidates]
+        return {"unit": self.unit, "bodies": dict(self.bodies), "candidates": pairs, "scene": self.text}
+
+    def lines(self) -> list[str]:
+        """For people."""
+        found = [f"unit      {self.unit}: {self.why}"]
+        found += [f"body      {name}: groups {', '.join(groups) or 'none'}" for name, groups in self.bodies.items()]
+        found += [f"contact   {_said(one)}" for one in self.candidates]
+        return found if self.candidates else [*found, "contact   no two faces of different bodies are near each other"]
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write the scene and, beside it, the schema by which editors complete and check its keys."""
+        scene, schema = folder / f"{self.name}.toml", folder / SCHEMA
+        if scene.exists():
+            raise ValueError(f"{scene} is there already: move it, or give another folder with --out")
+        folder.mkdir(parents=True, exist_ok=True)
+        scene.write_text(self.text, encoding="utf-8")
+        schema.write_text(json.dumps(json_schema(), indent=1), encoding="utf-8")
+        return [scene, schema]
+
+
+def draft(what: AnyPath, *, unit: str | None = None) -> Draft:
+    """Write a commented scene that begins from a mesh, a deck or a CAD file, and the schema of scenes for editors.
+
+    what : a file of a mesh, a deck or a CAD program
+    unit : unit of length of the file: m, mm, cm, um, in, ft; guessed and said by default
+    Raises  ValueError: the file cannot be read, one sentence
+    """
+    path = Path(what)
+    if path.suffix.lower() not in sources.ENDINGS:
+        raise ValueError(f'"{what}" is no mesh, deck or CAD file: its ending is none of {", ".join(sources.ENDINGS)}')
+    raw = sources.read(path, "m" if unit is None else unit)
+    why = "as given"
+    if unit is None:
+        unit, why = _guessed(raw, path)
+    source = raw if unit == "m" else sources.read(path, unit)
+    candidates = tuple(_candidates(source))
+    groups = {name: sorted(body.node_sets) for name, body in source.bodies.items()}
+    is_deck = bool(source.deck.materials or source.deck.supports)
+    text = "\n".join(_text(path, source, unit, why, candidates, is_deck)) + "\n"
+    return Draft(text, path.stem.replace(".", "_"), unit, why, groups, candidates)
+
+
+def _guessed(source: Any, path: Path) -> tuple[str, str]:
+    """The unit of length of a file and why, from its kind and its size."""
+    every = np.concatenate([body.mesh.doflocs for body in source.bodies.values()], axis=1)
+    longest = float(np.ptp(every, axis=1).max())
+    if path.suffix.lower() in cad.ENDINGS:
+        return "mm", f"guessed, as CAD files are in mm; the whole is then {longest:.4g} mm long"
+    if longest > LIMITS.longest:
+        return "mm", f"guessed: in metres the whole would be {longest:.4g} m long"
+    return "m", f"guessed: the whole is then {longest:.4g} m long"
+
+
+def _candidates(source: Any) -> Iterator[Candidate]:
+    """Pairs of named faces of different bodies that are near each other and look at each other, nearest first."""
+    every = np.concatenate([body.mesh.doflocs for body in source.bodies.values()], axis=1)
+    near = LIMITS.near * float(np.linalg.norm(np.ptp(every, axis=1)))
+    faces = []
+    for body, solid in source.bodies.items():
+        facets, centre, normal = outline(solid.mesh)
+        corners = solid.mesh.p[:, solid.mesh.facets[:, facets]]
+        wide = np.linalg.norm(np.ptp(corners, axis=1), axis=0)
+        for name, own in (solid.mesh.boundaries or {}).items():
+            of = np.isin(facets, own)
+            if of.sum() < len(facets):  # a group of the whole skin says nothing
+                faces.append((body, name, centre[of], normal[of], wide[of]))
+    pairs = (_near(one, two, near) for one, two in combinations(faces, 2) if one[0] != two[0])
+    best: dict[str, Candidate] = {}  # one for each face: of groups that overlap the one that is covered best
+    for pair in sorted(filter(None, pairs), key=lambda pair: (-round(pair.share, 2), pair.distance)):
+        if pair.first not in best and pair.second not in best:
+            best[pair.first] = best[pair.second] = pair
+    yield from dict.fromkeys(best.values())
+
+
+def _near(one: Any, two: Any, near: float) -> Candidate | None:
+    (body, face, centre, normal, wide), (other, opposite, places, normals, widths) = one, two
+    _, at = cKDTree(places).query(centre)
+    apart = places[at] - centre
+    gap = np.abs((apart * normal).sum(axis=1))
+    aside = np.linalg.norm(apart - (apart * normal).sum(axis=1)[:, None] * normal, axis=1)
+    good = ((normal * normals[at]).sum(axis=1) < LIMITS.opposed) & (gap < near) & (aside < np.maximum(wide, widths[at]))
+    share = good.sum() / min(len(centre), len(places))
+    if share < LIMITS.share:
+        return None
+    return Candidate(f"{body}.{face}", f"{other}.{opposite}", float(gap[good].min()), float(min(share, 1.0)))
+
+
+def _said(pair: Candidate) -> str:
+    return f"{pair.first} and {pair.second}: {1e3 * pair.distance:.3g} mm apart, {pair.share:.0%} of it near"
+
+
+def _text(
+    path: Path, source: Any, unit: str, why: str, candidates: Sequence[Candidate], is_deck: bool
+) -> Iterator[str]:
+    yield f"#:schema ./{SCHEMA}"
+    yield f"# Begun from {path.name} by tribodyn new. What is marked GUESS is a place holder: replace it by your own."
+    yield from ("", "[scene]", f"title = {json.dumps(path.stem)}", "")
+    if is_deck:
+        yield from (f"[decks.{_key(path.stem)}]", f"file = {json.dumps(path.name)}")
+        yield f'unit = "{unit}"  # {why}'
+        yield "# its bodies, materials, ties, supports and loads come along; groups are named as follows"
+    else:
+        yield from ("[materials.steel]  # GUESS", 'young = "210 GPa"', 'density = "7850 kg/m3"')
+    first_face = _far(source, candidates)
+    for at, (name, body) in enumerate(source.bodies.items()):
+        faces = sorted(body.mesh.boundaries or {}) or sorted(body.node_sets)
+        if is_deck:
+            yield f"# {name}: {', '.join(body.node_sets) or 'no group'}"
+            continue
+        yield from ("", f"[bodies.{_key(name)}]", f"mesh = {json.dumps(path.name)}")
+        if len(source.bodies) > 1:
+            yield f"volume = {json.dumps(name)}"
+        yield from (f'unit = "{unit}"  # {why}', 'material = "steel"')
+        if at == 0 and faces:
+            yield f"fixed = [{json.dumps(first_face[name])}]  # GUESS; its groups: {', '.join(body.node_sets)}"
+        else:
+            yield f"# its groups: {', '.join(body.node_sets) or 'none'}"
+    for number, pair in enumerate(candidates, 1):
+        yield from ("", f"[contacts.joint_{number}]  # {_said(pair)}")
+        yield from (f"first = {json.dumps(pair.first)}", f"second = {json.dumps(pair.second)}")
+        yield from ('tangential_stiffness = "100 N/um"  # GUESS', 'normal_stiffness = "100 N/um"  # GUESS')
+        yield "friction = 0.5  # GUESS"
+    moved = list(source.bodies)[-1]
+    face = json.dumps(f"{moved}.{first_face[moved]}")
+    yield from ("", "[loads.harmonic.drive]  # GUESS", f"group = {face}", 'direction = "x"', 'value = "10 N"')
+    yield from (
+        "",
+        "[response]",
+        'frequency = ["100 Hz", "1 kHz"]  # GUESS; inspect FILE --modes 6 shows modes',
+    )
+    yield from ("", "[damping]", 'modal = "1 %"  # GUESS', "", "# [wear]  # take the marks off to let it wear")
+    yield from ('# coefficient = "2e3 um3/J"', '# at = "peak"')
+
+
+def _key(name: str) -> str:
+    return name if name.replace("_", "").replace("-", "").isalnum() else json.dumps(name)
+
+
+def _far(source: Any, candidates: Sequence[Candidate]) -> dict[str, str]:
+    """Of each body the face that is farthest from what touches, to hold or to shake it."""
+    touching = {name for pair in candidates for name in (pair.first, pair.second)}
+    found = {}
+    for body, solid in source.bodies.items():
+        mesh, groups = solid.mesh, solid.node_sets
+        near = [mesh.doflocs[:, nodes] for name, nodes in groups.items() if f"{body}.{name}" in touching]
+        centre = np.concatenate(near, axis=1).mean(axis=1) if near else mesh.doflocs.mean(axis=1)
+        far = {
+            name: np.linalg.norm(mesh.doflocs[:, groups[name]].mean(axis=1) - centre)
+            for name in mesh.boundaries or groups
+            if f"{body}.{name}" not in touching and name in groups
+        }
+        found[body] = max(far, key=lambda name: far[name], default=next(iter(groups), "NAME"))
+    return found
