@@ -47,8 +47,7 @@ class Rules:
     adjoint: float = 1e-12  # relative residual of an adjoint, and of one that is no solution
     failed: float = 1e-7
     most_products: int = 400
-    along: float = 1e-3  # half widths of the resonance between the points of the gradient along the curve
-    stencil: tuple[tuple[int, float], ...] = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))
+    along: float = 2e-4  # half widths of the resonance from a peak to the two points of the gradient along the curve
     most_steps: int = 12  # to a peak, and the first of them over the frequency
     first_step: float = 1e-5
     at_peak: float = 1e-7  # half widths between a peak and where it is foreseen
@@ -151,12 +150,16 @@ class Posed:
 
 @dataclass(frozen=True)
 class Change:
-    """A parameter p of some name: the problem a step above and a step below it."""
+    """A parameter p of some name: the problem a step above and a step below it.
+
+    twice : the same by two steps, for a difference of order four, which a system near its own resonance needs
+    """
 
     name: str
     step: float
     above: Posed
     below: Posed
+    twice: tuple[Posed, Posed] | None = None
 
 
 @dataclass(frozen=True)
@@ -387,9 +390,11 @@ class Gradient:
         return x if base is None else x - balance.loaded(base), y
 
     def by(self, change: Change) -> tuple[np.ndarray, np.ndarray]:
-        """One-sided differences of the quantities above and below a parameter, both (n_quantity,)."""
-        up, down = (self.moves_to(side).sum(axis=1) + self.structure_to(side) for side in (change.above, change.below))
-        return up / change.step, -down / change.step
+        """One-sided derivatives of the quantities above and below a parameter, both (n_quantity,)."""
+        sides = (change.above, change.below, *(change.twice or ()))
+        up, down, *far = (self.moves_to(side).sum(axis=1) + self.structure_to(side) for side in sides)
+        more = (2 * (up - down) - (far[0] - far[1])) / 12 if far else 0.0
+        return (up + more) / change.step, (more - down) / change.step
 
     def by_pairs(self, change: Change) -> np.ndarray:
         """(n_quantity, n_pair) dq / dp of a parameter of the contact, were it changed at each pair alone."""
@@ -504,11 +509,12 @@ def at_peak(
     columns, above, below = _explicit(gradient, changes, by_pair)
     by_frequency = gradient.by_frequency()
     curvature, mixed = 0.0, np.zeros(columns.shape[1])
-    for place, weight in RULES.stencil:
-        omega = state.omega + place * RULES.along * width
+    step = RULES.along * width
+    for side in (-step, step):
+        omega = state.omega + side
         near_state = _solved(balance, omega, here.predict(omega), options)
         near = Gradient(balance, near_state, (quantities(balance, near_state, output)[0],))
-        size = near.quantities[0].value * weight / (RULES.along * width)
+        size = near.quantities[0].value / (2 * side)
         curvature += size * near.by_frequency()[0]
         mixed += size * _explicit(near, changes, by_pair)[0][0]
     if not curvature < 0:
@@ -519,7 +525,7 @@ def at_peak(
     values = np.array([state.omega / (2 * np.pi), *(q.value for q in gradient.quantities)])
     unknown = np.full((1, len(changes)), 0.0)
     sides = (np.concatenate([unknown, above]), np.concatenate([unknown, below]))
-    return _gathered(balance, gradient, changes, by_pair, names, values, columns, sides, solves + len(RULES.stencil))
+    return _gathered(balance, gradient, changes, by_pair, names, values, columns, sides, solves + 2)
 
 
 def _slope(balance: HarmonicBalance, state: State, output: str) -> Slope:
@@ -531,7 +537,8 @@ def _peak(
 ) -> tuple[Slope, float, int]:
     """The peak beside a state, by secants of the slope; half width of the resonance by its curvature, solves spent."""
     before = _slope(balance, _solved(balance, state.omega, state.x, options), output)
-    step = float(np.clip(before.distance, *(side * RULES.first_step * before.omega for side in (-1, 1))))
+    step = RULES.first_step * before.omega
+    step = float(np.clip(before.distance, -step, step))
     for solves in range(2, RULES.most_steps):
         omega = before.omega + step
         here = _slope(balance, _solved(balance, omega, before.predict(omega), options), output)

@@ -9,6 +9,7 @@ from tribodyn.workflows.studies.curves.backbones import SceneBackbone, backbone
 from tribodyn.workflows.studies.curves.decay import Decay, ring_down
 from tribodyn.workflows.studies.curves.folds import FoldsFound, folds
 from tribodyn.workflows.studies.curves.tracking import Track, track
+from tribodyn.workflows.studies.derivatives import ResponseDerivatives, derivatives
 from tribodyn.workflows.studies.fits.fit_file import Fit, identify, posterior
 from tribodyn.workflows.studies.fits.posterior import Posterior
 from tribodyn.workflows.studies.forces import Forces, forces
@@ -37,6 +38,7 @@ __all__ = [
     "Lives",
     "Optimum",
     "Posterior",
+    "ResponseDerivatives",
     "SceneBackbone",
     "StudyTable",
     "Supports",
@@ -47,6 +49,7 @@ __all__ = [
     "asperities",
     "backbone",
     "converge",
+    "derivatives",
     "folds",
     "forces",
     "grid",
