@@ -393,8 +393,10 @@ class Gradient:
         """One-sided derivatives of the quantities above and below a parameter, both (n_quantity,)."""
         sides = (change.above, change.below, *(change.twice or ()))
         up, down, *far = (self.moves_to(side).sum(axis=1) + self.structure_to(side) for side in sides)
-        more = (2 * (up - down) - (far[0] - far[1])) / 12 if far else 0.0
-        return (up + more) / change.step, (more - down) / change.step
+        if far:  # no corner is looked for within so long a step
+            up = (8 * (up - down) - (far[0] - far[1])) / 12
+            down = -up
+        return up / change.step, -down / change.step
 
     def by_pairs(self, change: Change) -> np.ndarray:
         """(n_quantity, n_pair) dq / dp of a parameter of the contact, were it changed at each pair alone."""
@@ -409,6 +411,7 @@ class Derivatives:
     slopes : (n_quantity, n_parameter) dq / dp; corner : (n_parameter,) whether p is at a corner of the contact forces,
         such as grazing or first slip: one-sided derivatives differ, and `slopes` is their mean
     above, below : (n_quantity, n_parameter) one-sided derivatives at a fixed frequency
+    by_frequency : (n_quantity,) dq / d omega at fixed parameters [1/(rad/s)], zero along a peak
     pairs : parameter -> (n_quantity, n_pair) dq / dp were it changed at each pair alone; "gap" among them [1/m]
     state : the solution; solves : of the balance that were spent
     """
@@ -420,6 +423,7 @@ class Derivatives:
     corner: np.ndarray
     above: np.ndarray
     below: np.ndarray
+    by_frequency: np.ndarray
     pairs: Mapping[str, np.ndarray]
     state: State
     solves: int
@@ -443,6 +447,7 @@ def _gathered(
     values: np.ndarray,
     columns: np.ndarray,
     sides: tuple[np.ndarray, np.ndarray],
+    by_frequency: np.ndarray,
     solves: int,
 ) -> Derivatives:
     n, n_pair = len(changes), balance.contact.n_pair
@@ -454,8 +459,8 @@ def _gathered(
     seen = np.maximum(moved, RULES.seen * moved.max(axis=1, initial=0.0, keepdims=True))
     corner = (2 * np.abs(above - below) * steps > RULES.corner * seen).any(axis=0)
     return Derivatives(
-        tuple(names), values, tuple(change.name for change in changes), columns[:, :n], corner, above, below, pairs,
-        gradient.state, solves,
+        tuple(names), values, tuple(change.name for change in changes), columns[:, :n], corner, above, below,
+        by_frequency, pairs, gradient.state, solves,
     )  # fmt: skip
 
 
@@ -486,7 +491,18 @@ def at_frequency(
     gradient = Gradient(balance, state, tuple(quantities(balance, state, output, worn)))
     columns, *sides = _explicit(gradient, changes, by_pair)
     names, values = zip(*((q.name, q.value) for q in gradient.quantities), strict=True)
-    return _gathered(balance, gradient, changes, by_pair, names, np.array(values), columns, (sides[0], sides[1]), 1)
+    return _gathered(
+        balance,
+        gradient,
+        changes,
+        by_pair,
+        names,
+        np.array(values),
+        columns,
+        (sides[0], sides[1]),
+        gradient.by_frequency(),
+        1,
+    )
 
 
 @single
@@ -525,7 +541,9 @@ def at_peak(
     values = np.array([state.omega / (2 * np.pi), *(q.value for q in gradient.quantities)])
     unknown = np.full((1, len(changes)), 0.0)
     sides = (np.concatenate([unknown, above]), np.concatenate([unknown, below]))
-    return _gathered(balance, gradient, changes, by_pair, names, values, columns, sides, solves + 2)
+    return _gathered(
+        balance, gradient, changes, by_pair, names, values, columns, sides, np.zeros(len(names)), solves + 2
+    )
 
 
 def _slope(balance: HarmonicBalance, state: State, output: str) -> Slope:
