@@ -9,6 +9,7 @@ from tribodyn.workflows.studies.curves.backbones import SceneBackbone, backbone
 from tribodyn.workflows.studies.curves.decay import Decay, ring_down
 from tribodyn.workflows.studies.curves.folds import FoldsFound, folds
 from tribodyn.workflows.studies.curves.tracking import Track, track
+from tribodyn.workflows.studies.derivatives import ResponseDerivatives, derivatives
 from tribodyn.workflows.studies.fits.fit_file import Fit, identify, posterior
 from tribodyn.workflows.studies.fits.posterior import Posterior
 from tribodyn.workflows.studies.forces import Forces, forces
@@ -39,6 +40,7 @@ __all__ = [
     "Lives",
     "Optimum",
     "Posterior",
+    "ResponseDerivatives",
     "SceneBackbone",
     "StudyTable",
     "Supports",
@@ -50,6 +52,7 @@ __all__ = [
     "backbone",
     "compare",
     "converge",
+    "derivatives",
     "folds",
     "forces",
     "grid",

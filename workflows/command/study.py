@@ -5,6 +5,7 @@ from __future__ import annotations
 from cyclopts import App
 
 from tribodyn.workflows.command.word import word
+from tribodyn.workflows.studies.derivatives import derivatives
 from tribodyn.workflows.studies.fits.fit_file import identify, posterior
 from tribodyn.workflows.studies.forces import forces
 from tribodyn.workflows.studies.many.lives import lives
@@ -22,6 +23,7 @@ app.command(word(optimise, "study optimise"))
 app.command(word(identify, "study identify"))
 app.command(word(posterior, "study posterior", into="asked"))
 app.command(word(vary, "study vary"))
+app.command(word(derivatives, "study derivatives"))
 app.command(word(converge, "study converge"))
 app.command(word(trade, "study trade"))
 app.command(word(supports, "study supports", into="beside"))

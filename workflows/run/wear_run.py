@@ -99,6 +99,15 @@ def wear_problem(
     return WearProblem(balance, _mission(scene, balance), wear, area, vibrating, resting, any_joint)
 
 
+def coefficients(scene: Scene) -> dict[str, float]:
+    """Wear coefficient [m3/J] of every joint whose volume goes with the friction work; none where a scene wears not."""
+    if scene.wear is None:
+        return {}
+    own = {name: c.wear for name, c in scene.joints.items() if isinstance(c, NamedContact) and c.wear is not None}
+    tables = dict.fromkeys(scene.joints, scene.wear) | own
+    return {name: table.numbers["coefficient"] for name, table in tables.items() if table.law == "energy"}
+
+
 def _mission(scene: Scene, balance: HarmonicBalance) -> tuple[Duty, ...]:
     """The duties of a scene, those at another speed of the wheel with the problem there."""
     assert scene.wear is not None

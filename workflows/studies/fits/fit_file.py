@@ -7,8 +7,10 @@ their values. A scene is built anew for every trial, as far as the trial changes
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -16,14 +18,16 @@ import numpy as np
 from pydantic import Field, StrictBool, StrictInt, model_validator
 from threadpoolctl import threadpool_limits
 
-from tribodyn.hbm import newton
+from tribodyn.hbm import derivatives, newton
+from tribodyn.hbm.balance import State
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
+from tribodyn.hbm.derivatives import Change, NoDerivative, Posed
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.workflows.run import joints, modelling, settings, wear_run
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.progress import Progress, Report, reporter
-from tribodyn.workflows.run.reuse import Bench
+from tribodyn.workflows.run.reuse import Bench, early_of
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.scene.fields import Number, Table
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
@@ -33,7 +37,7 @@ from tribodyn.workflows.scene.units import to_si
 from tribodyn.workflows.scene.wear import At, Place
 from tribodyn.workflows.studies.fits import posterior as posteriors
 from tribodyn.workflows.studies.fits.curve_target import Curve, CurveTarget
-from tribodyn.workflows.studies.fits.identification import Identification, Measured, Parameter, fit
+from tribodyn.workflows.studies.fits.identification import DIFFERENCE, Identification, Measured, Parameter, fit
 from tribodyn.workflows.studies.fits.posterior import Posterior
 from tribodyn.workflows.studies.many.distributions import Distribution, Marginal
 
@@ -178,9 +182,15 @@ def best(file: SceneFile, task: Task, progress: Progress) -> Fit:
     looked = _Looking(file, task, progress)
     own = {name: value_of(file.part_scene, one.keys[0]) for name, one in task.parameters.items()}
     before = {name: value for name, value in own.items() if value is not None}
+    known = before if len(before) == len(looked.parameters) else None
     with threadpool_limits(1):
-        known = before if len(before) == len(looked.parameters) else None
-        found = fit(looked.parameters, looked.measured, lambda values: looked.trial(values, looked.targets), known)
+        found = fit(
+            looked.parameters,
+            looked.measured,
+            lambda values: looked.trial(values, looked.targets, nearby=True),
+            known,
+            lambda values: looked.slopes(values, looked.targets),
+        )
     return Fit(found, tuple(looked.changes(found.named(), digits=6)))
 
 
@@ -230,21 +240,51 @@ class _Looking:
         self.measured += [number for one in curves.values() for number in one.numbers()]
         self.targets: Mapping[str, Asked | CurveTarget] = {**task.measured, **curves}
         self._bench, self._count = Bench(), 0
+        self._last: Answers | None = None
 
     def changes(self, values: Mapping[str, float], digits: int = 17) -> list[str]:
         """Overrides that put values into the scene."""
         said = {p.name: f"{values[p.name]:.{digits}g} {p.unit}".rstrip() for p in self.parameters}
         return [f"{key}={text}" for name, text in said.items() for key in self._task.parameters[name].keys]
 
-    def trial(self, values: Mapping[str, float], asked: Mapping[str, Asked | CurveTarget]) -> np.ndarray:
-        """What the scene says with values."""
+    def trial(
+        self, values: Mapping[str, float], asked: Mapping[str, Asked | CurveTarget], nearby: bool = False
+    ) -> np.ndarray:
+        """What the scene says with values; nearby : its cycles are found from those of the trial before."""
         self._count += 1
         trial = self.file.changed(*self.changes(values))
-        found = predict(self._bench, trial, asked)
+        self._last = Answers(trial, self._bench.model(trial), self._last if nearby else None)
+        found = self._last.all_to(asked)
         self._progress.say(
             f"trial {self._count}: " + ", ".join(f"{name} {value:.6g}" for name, value in values.items())
         )
         return found
+
+    def slopes(self, values: Mapping[str, float], asked: Mapping[str, Asked | CurveTarget]) -> np.ndarray:
+        """(n_measured, n_parameter) derivatives of what the last trial said; values : its own."""
+        here = self._last
+        assert here is not None
+        sides: list[Side] = []
+        for p in self.parameters:
+            step = DIFFERENCE * (values[p.name] if p.ratio else p.high - p.low)
+            middle = float(np.clip(values[p.name], p.low + step, p.high - step))
+            above, below = (self._beside({**values, p.name: middle + s}) for s in (step, -step))
+            sides.append((p.name, step, above, below))
+        rows: list[Sequence[float]] = []
+        for name, known in asked.items():
+            with suppress(NoDerivative):
+                if not isinstance(known, CurveTarget):
+                    rows.append(here.slopes(known, sides))
+                    continue
+            beside = [[there.nearby(here).all_to({name: known}) for there in both] for _, _, *both in sides]
+            rows += list(np.transpose([(up - down) / (2 * s[1]) for (up, down), s in zip(beside, sides, strict=True)]))
+        return np.array(rows)
+
+    def _beside(self, values: Mapping[str, float]) -> Answers:
+        """The scene with other values, of which nothing is solved yet."""
+        file = self.file.changed(*self.changes(values))
+        same = early_of(file.part_scene) == self._bench.early
+        return Answers(file, (self._bench if same else Bench()).model(file))
 
     @staticmethod
     def prior(name: str, table: Distribution) -> Marginal:
@@ -300,22 +340,71 @@ def _si(key: str, value: Quantity, units: tuple[str, ...]) -> tuple[float, str]:
 
 def predict(bench: Bench, file: SceneFile, measured: Mapping[str, Asked | CurveTarget]) -> np.ndarray:
     """(n_measured,) what a scene says to each measured number, to a curve at each of its points."""
-    model = bench.model(file)
-    answers = Answers(file, model)
-    found = (
-        one.values(file, model) if isinstance(one, CurveTarget) else [answers.to(name, one)]
-        for name, one in measured.items()
-    )
-    return np.concatenate([np.asarray(part, float) for part in found])
+    return Answers(file, bench.model(file)).all_to(measured)
+
+
+Side = tuple[str, float, "Answers", "Answers"]
 
 
 class Answers:
-    """What one scene says; cycles and wear runs that several numbers share are solved once."""
+    """What one scene says; cycles and wear runs that several numbers share are solved once.
 
-    def __init__(self, file: SceneFile, model: modelling.Model):
-        self.file, self.model = file, model
+    near : a scene that differs little, from whose cycles those of this one are found
+    """
+
+    def __init__(self, file: SceneFile, model: modelling.Model, near: Answers | None = None):
+        self.file, self.model, self._near = file, model, {} if near is None else near._points
         self._points: dict[tuple[Place, float], OperatingPoint] = {}
         self._runs: dict[float, WearHistory] = {}
+
+    def all_to(self, asked: Mapping[str, Asked | CurveTarget]) -> np.ndarray:
+        """(n_measured,) its numbers, of a curve one for each point."""
+        found = (
+            one.values(self.file, self.model) if isinstance(one, CurveTarget) else [self.to(name, one)]
+            for name, one in asked.items()
+        )
+        return np.concatenate([np.asarray(part, float) for part in found])
+
+    def nearby(self, other: Answers) -> Answers:
+        """The same, its cycles found from those of a scene that differs little."""
+        return Answers(self.file, self.model, other)
+
+    def slopes(self, known: Asked, sides: Sequence[Side]) -> Sequence[float]:
+        """Derivatives of a number by parameters.
+
+        sides : name of each, step, and the scene a step above and a step below
+        Raises  NoDerivative where a number has none, or none but by running again
+        """
+        if known.mode is not None:
+            both = [[there._frequency(known.of == "stuck frequency", known.mode) for there in s[2:]] for s in sides]
+            return [(up - down) / (2 * side[1]) for (up, down), side in zip(both, sides, strict=True)]
+        if known.of in ("life", "work"):
+            raise NoDerivative("a life is followed again")
+        balance, place = self.model.balance.with_load(known.load), known.at
+        changes = [
+            Change(name, step, Posed.of(above.model.balance), Posed.of(below.model.balance))
+            for name, step, above, below in sides
+        ]
+        options = settings.newton_options(self.file.scene)
+        if known.of == "preload" and place is None:
+            balance, state = balance.with_load(0.0), self._rest
+            found = derivatives.at_frequency(balance, state, settings.OUTPUT, changes, options=options)
+        else:
+            place = place or Place(peak=1.0)
+            state = self._point(place, known.load).state
+            share, take = place.peak, derivatives.at_frequency
+            if share == 1.0:
+                take = derivatives.at_peak
+            found = take(balance, state, settings.OUTPUT, changes, options=options)
+            if share is not None and share != 1.0:  # rides beside the peak
+                peak = self._point(Place(peak=1.0), known.load).state
+                moves = derivatives.at_peak(balance, peak, settings.OUTPUT, changes, options=options).slopes[0]
+                ride = np.outer(found.by_frequency, 2 * np.pi * share * moves)
+                found = replace(found, slopes=found.slopes + ride)
+        wanted = "frequency" if known.of == "peak frequency" else known.of
+        if wanted not in found.names:
+            return [0.0] * len(sides)
+        return [float(slope) for slope in found.slopes[found.names.index(wanted)]]
 
     def to(self, name: str, known: Asked) -> float:
         """The scene's number beside a measured one; raises SolveFailed, naming it, where there is none."""
@@ -345,16 +434,24 @@ class Answers:
         return float(linear_modes(reduced, springs, mode)[0][mode - 1])
 
     def _at_rest(self) -> float:
+        return self.model.balance.preload(self._rest)
+
+    @cached_property
+    def _rest(self) -> State:
         still = self.model.balance.with_load(0.0)
         found = newton.solve_from_rest(still, still.omega_max, settings.newton_options(self.file.scene))
         if not found.converged:
             raise SolveFailed(f"the contact at rest: {found.outcome}")
-        return still.preload(found.state)
+        return found.state
 
     def _point(self, where: Place, load: float) -> OperatingPoint:
         if (where, load) not in self._points:
             site = settings.site_of(self.file.scene, where)
-            point = site.first(self.model.balance.with_load(load))
+            balance, known, point = self.model.balance.with_load(load), self._near.get((where, load)), None
+            if known is not None and known.state.x.shape == (balance.contact.n_pair, *known.state.x.shape[1:]):
+                point = site.next(balance, known.state.omega, known.state.x)
+            if point is None or not point.solution.converged:
+                point = site.first(balance)
             if not point.solution.converged:
                 raise SolveFailed(point.solution.outcome)
             self._points[where, load] = point

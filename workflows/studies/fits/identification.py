@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 AT_BOUND = 1e-3  # of the width of the bounds: nearer than this counts as at the bound
-DIFFERENCE = 1e-3  # step of the derivatives, in the scaled unknowns
+DIFFERENCE = 1e-3  # step of differences where no derivatives are known, in the scaled unknowns
 OPEN = 0.3  # relative standard error beyond which a parameter counts as not determined
 
 Prediction = Callable[[Mapping[str, float]], np.ndarray]
@@ -151,10 +151,13 @@ def fit(
     measured: Sequence[Measured],
     predict: Prediction,
     before: Mapping[str, float] | None = None,
+    slopes: Prediction | None = None,
 ) -> Identification:
     """Least squares of logarithmic residuals, from every combination of starts; the best is kept.
 
     predict : parameters by name -> (n_measured,) predictions, above 0
+    slopes : parameters by name -> (n_measured, n_parameter) derivatives of the predictions made last; differences of
+        predictions by default
     before : the parameters as they were, for the report; the first starts by default
     Raises  ValueError where a prediction at a start is not a positive number, or a measured number is not
     Source  bounded trust region: Branch, Coleman, Li 1999, as in scipy.optimize.least_squares
@@ -165,11 +168,13 @@ def fit(
         raise ValueError("an identification needs measured numbers above 0")
     count = 0
 
+    def named(unknowns: np.ndarray) -> dict[str, float]:
+        return {p.name: p.value(float(u)) for p, u in zip(parameters, unknowns, strict=True)}
+
     def predicted(unknowns: np.ndarray) -> np.ndarray:
         nonlocal count
         count += 1
-        values = {p.name: p.value(float(u)) for p, u in zip(parameters, unknowns, strict=True)}
-        found = np.asarray(predict(values), dtype=float)
+        found = np.asarray(predict(named(unknowns)), dtype=float)
         if found.shape != target.shape or not (found > 0).all():
             raise ValueError(
                 f"the model predicts {found.tolist()} instead of {len(target)} numbers above 0: narrow the bounds"
@@ -184,31 +189,35 @@ def fit(
             last = unknowns.copy(), predicted(unknowns)
         return weight * np.log(last[1] / target)
 
-    def derivative(unknowns: np.ndarray) -> np.ndarray:
-        here, steps = residual(unknowns), _inward(unknowns, high)
-        there = [weight * np.log(predicted(unknowns + step) / target) for step in steps]
-        return np.stack([(r - here) / step.sum() for r, step in zip(there, steps, strict=True)], axis=1)
+    def slope(unknowns: np.ndarray) -> np.ndarray:
+        """d ln(predicted) / d unknown (n_measured, n_parameter)."""
+        if slopes is None:
+            return _slope(predicted, unknowns, low, high)
+        residual(unknowns)
+        scale = [
+            value if p.ratio else p.high - p.low for p, value in zip(parameters, named(unknowns).values(), strict=True)
+        ]
+        return np.asarray(slopes(named(unknowns)) * scale / last[1][:, None])
 
     low, high = np.array([p.scaled(p.low) for p in parameters]), np.array([p.scaled(p.high) for p in parameters])
     best = None
     for start in product(*(p.starts for p in parameters)):
         first = np.array([p.scaled(v) for p, v in zip(parameters, start, strict=True)])
         inside = np.clip(first, low + 1e-6 * (high - low), high - 1e-6 * (high - low))
-        found = least_squares(residual, inside, jac=derivative, bounds=(low, high))
+        found = least_squares(residual, inside, jac=lambda u: weight[:, None] * slope(u), bounds=(low, high), xtol=1e-6)
         if best is None or found.cost < best.cost:
             best = found
     assert best is not None
     first_values = {p.name: p.starts[0] for p in parameters} if before is None else before
     origin = np.array([p.scaled(first_values[p.name]) for p in parameters])
-    slope = _slope(predicted, best.x, low, high)
     return Identification(
         parameters,
         measured,
-        np.array([p.value(float(u)) for p, u in zip(parameters, best.x, strict=True)]),
+        np.array(list(named(best.x).values())),
         predicted(origin),
-        predicted(best.x),
-        slope,
-        _deviation(weight[:, None] * slope, float(np.sum(best.fun**2))),
+        target * np.exp(best.fun / weight),
+        best.jac / weight[:, None],
+        _deviation(best.jac, float(np.sum(best.fun**2))),
         count,
         np.array([first_values[p.name] for p in parameters]),
     )
@@ -216,11 +225,6 @@ def fit(
 
 def _values(measured: Sequence[Measured]) -> np.ndarray:
     return np.array([m.value for m in measured])
-
-
-def _inward(at: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """One step of DIFFERENCE along each unknown (k, k), down where up is beyond its upper bound."""
-    return np.diag(np.where(at + DIFFERENCE <= high, DIFFERENCE, -DIFFERENCE))
 
 
 def _slope(

@@ -1,0 +1,199 @@
+"""What every number of a scene's response depends on: exact derivatives by every number of the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tribodyn.hbm import derivatives as exact
+from tribodyn.hbm.derivatives import Derivatives, NoDerivative
+from tribodyn.hbm.threads import limited
+from tribodyn.workflows.pictures.figures import axes_of, named
+from tribodyn.workflows.pictures.style import CYCLE, GREY
+from tribodyn.workflows.run import curve, pipeline, settings, wear_run
+from tribodyn.workflows.run.failure import SolveFailed
+from tribodyn.workflows.run.progress import Report, reporter
+from tribodyn.workflows.run.varying import Varying, keys
+from tribodyn.workflows.scene.fields import Frequency
+from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
+from tribodyn.workflows.scene.source import Overrides, Source, read_scene
+from tribodyn.workflows.studies.files import write_files
+
+SHOWN = 12  # parameters in the picture
+UNITS = {"frequency": "Hz", "amplitude": "m", "phase": "rad", "energy": "J", "preload": "N", "wear": "m3"}
+MICROMETRE = 1e-6
+
+
+@dataclass(frozen=True)
+class ResponseDerivatives:
+    """Derivatives of a scene's response at one point of it.
+
+    found : by key of the scene; at : the values of the keys, SI units; joints : joint -> its pairs
+    response_seconds, seconds : of one processor, of the response and of the derivatives; anew : keys with which the
+        model is reduced anew, which takes most of the time
+    """
+
+    name: str
+    found: Derivatives
+    at: Mapping[str, float]
+    joints: Mapping[str, np.ndarray]
+    response_seconds: float
+    seconds: float
+    anew: tuple[str, ...]
+
+    @property
+    def elasticities(self) -> dict[str, np.ndarray]:
+        """Key -> (n_quantity,) d ln q / d ln p; of the phase d q / d ln p [rad]; the strongest on the amplitude first.
+
+        The gap of a joint, which is zero for most, counts by the micrometre: d ln q / d gap [1/um]
+        """
+        f, size = self.found, self._size
+        rows = {key: f.slopes[:, i] * value / size for i, (key, value) in enumerate(self.at.items())}
+        for joint, pairs in self.joints.items():
+            if f.pairs["gap"][:, pairs].any():
+                rows[f"gap of {joint}, by um"] = f.pairs["gap"][:, pairs].sum(axis=1) * MICROMETRE / size
+        first = f.names.index("amplitude")
+        return dict(sorted(rows.items(), key=lambda row: -abs(row[1][first])))
+
+    @property
+    def _size(self) -> np.ndarray:
+        f = self.found
+        return np.where([name == "phase" for name in f.names], 1.0, f.values)
+
+    @property
+    def corners(self) -> tuple[str, ...]:
+        """Keys at a corner of the contact forces."""
+        return tuple(key for key, corner in zip(self.found.parameters, self.found.corner, strict=True) if corner)
+
+    def record(self) -> dict[str, Any]:
+        """For machines, SI units."""
+        f = self.found
+        return {
+            "quantities": dict(zip(f.names, f.values.tolist(), strict=True)),
+            "parameters": dict(self.at),
+            "derivatives": {
+                key: dict(zip(f.names, f.slopes[:, i].tolist(), strict=True)) for i, key in enumerate(f.parameters)
+            },
+            "elasticities": {
+                key: dict(zip(f.names, row.tolist(), strict=True)) for key, row in self.elasticities.items()
+            },
+            "corners": list(self.corners),
+            "seconds": self.seconds,
+            "response_seconds": self.response_seconds,
+        }
+
+    def lines(self) -> list[str]:
+        """Elasticities, the strongest on the amplitude first."""
+        f = self.found
+        names = ["phase [rad]" if name == "phase" else name for name in f.names]
+        width = [max(12, len(name) + 2) for name in names]
+        values = (f"{name} {value:.6g} {UNITS[name.split()[0]]}" for name, value in zip(f.names, f.values, strict=True))
+        lines = [", ".join(values), "per cent of each for one per cent of:"]
+        lines.append("".join(f"{name:>{w}}" for name, w in zip(names, width, strict=True)))
+        for key, row in self.elasticities.items():
+            lines.append("".join(f"{value:>+{w}.4f}" for value, w in zip(row, width, strict=True)) + f"  {key}")
+        for key in self.corners:
+            i = f.parameters.index(key)
+            first = f.names.index("amplitude")
+            above, below = (side[first, i] * self.at[key] / f.values[first] for side in (f.above, f.below))
+            lines.append(
+                f"warning: {key} is at a corner of the contact forces, such as grazing or first slip: the amplitude "
+                f"has {above:+.4g} above it and {below:+.4g} below at a fixed frequency, and the table their mean"
+            )
+        share = 100 * self.seconds / self.response_seconds
+        lines.append(f"{self.seconds:.3g} s, {share:.2g} % of the {self.response_seconds:.3g} s of the response")
+        if self.anew:
+            lines.append(f"most of them for {len(self.anew)} keys with which the model is reduced anew")
+        return lines
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write derivatives.csv, derivatives.png."""
+        rows = self.elasticities
+        table = {"parameter": list(rows)}
+        columns = {name: [float(row[i]) for row in rows.values()] for i, name in enumerate(self.found.names)}
+        return write_files(folder, {"derivatives": {**table, **columns}}, {"derivatives": self.plot()})
+
+    def plot(self) -> Figure:
+        """Bars of the elasticities of frequency, amplitude, energy and preload."""
+        rows = dict(list(self.elasticities.items())[:SHOWN])
+        shown = [name for name in self.found.names if name in ("frequency", "amplitude", "energy", "preload")]
+        columns = len(shown)
+        with axes_of(2.6 + 2.2 * columns, 1.4 + 0.28 * len(rows), columns=columns) as (figure, panes):
+            for i, (axes, name) in enumerate(zip(np.atleast_1d(panes), shown, strict=True)):
+                values = [row[self.found.names.index(name)] for row in rows.values()]
+                axes.barh(range(len(rows)), values, color=CYCLE[i])
+                axes.axvline(0.0, color=GREY, lw=0.8)
+                axes.set(title=name, yticks=range(len(rows)), yticklabels=list(rows) if i == 0 else [])
+                axes.invert_yaxis()
+            figure.supxlabel("change in % by 1 % of each parameter", fontsize=10)
+            figure.suptitle(named(self.name, "what the response depends on"), x=0.01, ha="left", fontsize=12)
+        return figure
+
+
+def derivatives(
+    scene: Source,
+    *,
+    at: Frequency | None = None,
+    only: tuple[str, ...] = (),
+    overrides: Overrides = (),
+    progress: Report = None,
+) -> ResponseDerivatives:
+    """Show what peak, energy and preload of a response depend on: exact derivatives by every number of the scene.
+
+    The response is solved once: an adjoint gives the derivatives by all numbers together. Numbers with which the model
+    is reduced anew, such as the stiffness of one body of several, take four reductions each.
+
+    scene : name of a scene or a .toml file
+    at : frequency of the cycle; the highest peak of the response by default, whose own frequency moves too
+    only : keys of the scene to look at, such as contact.friction; all by default
+    Raises  SceneError for a key that is no such number; SolveFailed where there is no derivative, as at a fold
+    """
+    file = read_scene(scene, overrides)
+    with limited(file.scene.solver.threads):
+        return of_scene(file, at, only, reporter(progress))
+
+
+def of_scene(file: SceneFile, at: float | None, only: tuple[str, ...], report: Any) -> ResponseDerivatives:
+    """The derivatives of a scene that was read."""
+    known = keys(file.scene)
+    unknown = [key for key in only if key not in known]
+    if unknown:
+        raise SceneError(f"{unknown[0]} is no number that a response depends on: these are {', '.join(known)}")
+    wanted = {key: value for key, value in known.items() if not only or key in only}
+    varying = Varying(file, report)
+    balance, options = varying.model.balance, settings.newton_options(file.scene)
+    clock = process_time()
+    with report.track("frequency response") as advance:
+        branch = curve.follow_response(file.scene, balance, advance)
+    pipeline.check_branch(branch)
+    solved = process_time()
+    height = np.where(branch.converged, branch.amplitude(settings.OUTPUT), -1.0)
+    near = int(np.argmax(height)) if at is None else int(np.argmin(np.abs(branch.frequency - at)))
+    x = branch.contact[near].reshape(balance.contact.n_pair, -1, balance.basis.n_coeff)
+    state = balance.evaluate(branch.omega[near] if at is None else 2 * np.pi * at, x)
+    with report.track("derivatives") as advance:
+        changes = []
+        for i, (key, value) in enumerate(wanted.items()):
+            advance(i / (len(wanted) + 1), key)
+            changes.append(varying.change(key, value))
+        take = exact.at_peak if at is None else exact.at_frequency
+        worn = wear_run.coefficients(file.scene)
+        try:
+            found = take(balance, state, settings.OUTPUT, changes, (), worn, options)
+        except NoDerivative as reason:
+            raise SolveFailed(f"{file.name} has no derivatives here: {reason}") from None
+    return ResponseDerivatives(
+        file.name,
+        found,
+        wanted,
+        {joint.name: joint.rows for joint in balance.contact.joints},
+        solved - clock,
+        process_time() - solved,
+        tuple(key for key in wanted if varying.anew(key)),
+    )
