@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.workflows.export.library import library
+from tribodyn.extras import package
 from tribodyn.workflows.export.tables import tables, terms
 from tribodyn.workflows.result import verdict
 from tribodyn.workflows.result.columns import write_columns
@@ -40,7 +40,7 @@ def write_csv(result: Result, folder: Path) -> list[Path]:
 
 def write_parquet(result: Result, folder: Path) -> list[Path]:
     """One file for each table. Raises ValueError where pyarrow is missing."""
-    arrow, parquet = library("pyarrow"), library("pyarrow.parquet")
+    arrow, parquet = package("pyarrow"), package("pyarrow.parquet")
     written = []
     for name, table in tables(result).items():
         path = folder / f"{name}.parquet"
@@ -78,7 +78,7 @@ def write_uff(result: Result, folder: Path) -> list[Path]:
     The format has abscissas in single precision.
     Raises  ValueError where pyuff is missing
     """
-    pyuff = library("pyuff")
+    pyuff = package("pyuff")
     path = folder / "result.uff"
     path.unlink(missing_ok=True)
     file = pyuff.UFF(str(path))

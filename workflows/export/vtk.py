@@ -13,6 +13,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from tribodyn.extras import package
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.workflows.pictures.view import grid_of
 from tribodyn.workflows.result.faces import meetings_of, worn_off
@@ -118,7 +119,7 @@ def part_grid(result: Result, state: State) -> Any:
 
 def contact_surface(result: Result, state: State) -> Any:
     """Body 1's face of the contact as a pyvista surface: fields at its pairs and their means on its faces."""
-    import pyvista as pv
+    pv = package("pyvista")
 
     patch = result.patch
     assert patch is not None

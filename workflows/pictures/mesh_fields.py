@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tribodyn.extras import package
 from tribodyn.workflows.pictures import view
 from tribodyn.workflows.result.result import Result
 
@@ -52,7 +53,7 @@ def patch_fields(result: Result, row: int = -1) -> pv.PolyData:
     energy [J] friction work of one cycle, status (bits of hbm.contact.law: 1 sticks, 2 slips, 4 separates)
     Raises  ValueError where the result has no worn patch with faces
     """
-    import pyvista as pv
+    pv = package("pyvista")
 
     patch, wear = result.patch, result.wear
     if patch is None or wear is None or not len(wear.cycles) or not len(patch.faces):

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from tribodyn.extras import package
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.workflows.pictures.style import LAYOUT
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
@@ -56,7 +57,7 @@ def nice(value: float) -> float:
 
 def grid_of(part: PartMesh, points: np.ndarray | None = None, cells: np.ndarray | None = None) -> Any:
     """The mesh of a part as a pyvista grid, or some of its cells; points : (n_node, 3) of its nodes as drawn [m]."""
-    import pyvista as pv
+    pv = package("pyvista")
 
     kind = int(getattr(pv.CellType, part.kind.upper()))
     return pv.UnstructuredGrid(
