@@ -145,7 +145,7 @@ def _histories(result: Result) -> list[dict[str, Any]]:
 def _loops(result: Result) -> list[dict[str, Any]]:
     """Displacement and force over a period of the pair that moves most, in each kept state and component."""
     kept, patch = result.loops, result.patch
-    if kept is None or patch is None:
+    if kept is None:
         return []
     found = []
     phase = 2 * np.pi * np.arange(kept.force.shape[-1]) / kept.force.shape[-1]

@@ -28,7 +28,7 @@ def write_vtk(result: Result, folder: Path) -> list[Path]:
 
     Raises  ValueError where the result has neither faces of its contact nor a mesh
     """
-    if result.patch is None or (not len(result.patch.faces) and result.part is None):
+    if not len(result.patch.faces) and result.part is None:
         raise ValueError(
             "vtk: the contact of this result has no faces and its part no mesh; nothing can be drawn of it"
         )
@@ -47,7 +47,6 @@ def write_vtk(result: Result, folder: Path) -> list[Path]:
 
 
 def _has(result: Result, name: str) -> bool:
-    assert result.patch is not None
     return result.part is not None if name == "part" else len(result.patch.faces) > 0
 
 
@@ -86,7 +85,6 @@ def _cycle(result: Result, state: State, folder: Path) -> list[Path]:
 
 def _vectors(result: Result, components: np.ndarray) -> np.ndarray:
     """Components (n_pair, n_component) along t1, t2, n as vectors (n_pair, 3) along x, y, z."""
-    assert result.patch is not None
     names = ("t1", "t2", "n")
     axes = result.patch.frames[:, [names.index(name) for name in result.patch.components]]
     return np.asarray(np.einsum("pc,pcx->px", components, axes))
@@ -122,7 +120,6 @@ def contact_surface(result: Result, state: State) -> Any:
     pv = package("pyvista")
 
     patch = result.patch
-    assert patch is not None
     faces = np.column_stack([np.full(len(patch.faces), patch.faces.shape[1]), patch.faces]).ravel()
     split = result.facts.share_of_body_1
     surface = pv.PolyData(patch.points - split * state.depth[:, None] * patch.frames[:, 2], faces)

@@ -39,7 +39,7 @@ def mesh_fields(result: Result, row: int | None = None) -> pv.UnstructuredGrid:
     grid.point_data["static"] = view.at_rest(displacement, result.harmonics)
     grid.point_data["vibration"] = view.swing(displacement, result.harmonics)
     grid.point_data["amplitude"] = np.linalg.norm(vibration, axis=1).max(axis=1)
-    if result.patch is not None and result.wear is not None:
+    if result.wear is not None:
         depth = np.full(len(part.points), np.nan)
         depth[result.patch.nodes] = result.wear.depth[row]
         grid.point_data["wear_depth"] = depth
@@ -56,7 +56,7 @@ def patch_fields(result: Result, row: int = -1) -> pv.PolyData:
     pv = package("pyvista")
 
     patch, wear = result.patch, result.wear
-    if patch is None or wear is None or not len(wear.cycles) or not len(patch.faces):
+    if wear is None or not len(wear.cycles) or not len(patch.faces):
         raise ValueError("the result holds no worn patch with faces")
     if not -len(wear.cycles) <= row < len(wear.cycles):
         raise ValueError(f"the result has no wear row {row}: it has 0 to {len(wear.cycles) - 1}")

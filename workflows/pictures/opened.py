@@ -155,7 +155,7 @@ def _quadrangles(corners: np.ndarray) -> Any:
 def contacts(result: Result) -> tuple[Meeting, ...]:
     """The contacts of a result that can be opened: those whose faces look one way, alone where there is one patch."""
     patch = result.patch
-    if patch is None or not len(patch.faces):
+    if not len(patch.faces):
         return ()
     found = meetings_of(result) or (Meeting("", slice(0, len(patch.area)), patch, ()),)
     return tuple(one for one in found if one.patch.in_one_plane)

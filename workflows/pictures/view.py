@@ -77,7 +77,6 @@ def polygons(faces: np.ndarray) -> np.ndarray:
 def looking(result: Result) -> tuple[np.ndarray, np.ndarray]:
     """Where to look from, and what is up: a little aside of the face of body 1, a sector with its outside upwards."""
     part, patch, around = result.part, result.patch, result.facts.around
-    assert patch is not None
     points = patch.points if part is None else part.points
     normal = patch.frames[:, 2].mean(axis=0)
     if around is not None:
