@@ -51,7 +51,9 @@ def factorise(K: Any, definite: bool = True, solver: str | None = None, shapes: 
     elif solver not in SOLVERS:
         raise ValueError(f"no solver '{solver}': there are {', '.join(SOLVERS)}")
     elif solver == "single_precision" and not pardiso_available():
-        raise ValueError("the solver single_precision needs the packages pypardiso and mkl: install them with pip")
+        raise ValueError(
+            'the solver single_precision needs the package pypardiso: install it with pip install "tribodyn[mkl]"'
+        )
     try:
         factor: Factor
         if solver == "multigrid":

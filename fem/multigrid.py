@@ -12,6 +12,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import cg
 
+from tribodyn.extras import package
+
 
 class Multigrid:
     """Conjugate gradients preconditioned by smoothed aggregation.
@@ -28,7 +30,7 @@ class Multigrid:
     tolerance = 1e-9  # that eigenvalues from its solutions can have
 
     def __init__(self, K: csr_matrix, shapes: np.ndarray | None = None) -> None:
-        pyamg = _library()
+        pyamg = package("pyamg")
         self._K = K
         self.iterations = 0
         levels = pyamg.smoothed_aggregation_solver(
@@ -65,13 +67,3 @@ def rigid_motions(points: np.ndarray) -> np.ndarray:
         found[:, axis, axis] = 1.0
         found[:, a, 3 + axis], found[:, b, 3 + axis] = -x[:, b], x[:, a]
     return found.reshape(-1, 6)
-
-
-def _library() -> Any:
-    try:
-        import pyamg
-    except ImportError:
-        raise ValueError(
-            'the solver multigrid needs pyamg: install it with pip install "tribodyn[multigrid]"'
-        ) from None
-    return pyamg

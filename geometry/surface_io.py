@@ -7,11 +7,11 @@ others:  .sur .plu .plux .al3d .x3p .vk4 .opd ... through the package surfalize 
 
 from __future__ import annotations
 
-import importlib
 from pathlib import Path
 
 import numpy as np
 
+from tribodyn.extras import package
 from tribodyn.geometry import surface_sdf
 from tribodyn.geometry.surface import HeightMap
 
@@ -112,13 +112,7 @@ def _gridded(table: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray, np.n
 
 
 def _through_surfalize(path: Path) -> HeightMap:
-    try:
-        surfalize = importlib.import_module("surfalize")
-    except ImportError:
-        raise ValueError(
-            f"{path.name} is neither text nor SDF: install the optional reader with pip install 'tribodyn[surfaces]', "
-            "or export the map as SDF (ISO 25178-71)"
-        ) from None
+    surfalize = package("surfalize")
     try:
         surface = surfalize.Surface.load(path)
     except Exception as problem:  # the readers raise what they meet

@@ -7,14 +7,16 @@ import signal
 import sys
 import warnings
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import current_process, get_context
-from multiprocessing.connection import Connection
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from tribodyn.hbm import threads
 
 T = TypeVar("T")
+
+_work: Callable[[int], Any]  # of the fork that this process is
 
 FORKS = hasattr(os, "fork") and sys.platform != "darwin"  # whose BLAS does not bear a fork
 
@@ -22,41 +24,6 @@ FORKS = hasattr(os, "fork") and sys.platform != "darwin"  # whose BLAS does not 
 def two() -> bool:
     """Whether two processes may work here: so many threads are asked for, and this process may have one of its own."""
     return threads.asked() > 1 and FORKS and not current_process().daemon
-
-
-@contextmanager
-def forked(body: Callable[[Connection], None]) -> Iterator[Connection]:
-    """A fork of this process that calls `body` with a connection to write to, and ends with it or with the context.
-
-    Yields the connection to read from: EOFError means that the fork has ended, or that there was no room for one
-    """
-    context = get_context("fork")
-    reader, writer = context.Pipe(duplex=False)
-    process = context.Process(target=_alone, args=(body, reader, writer), daemon=True)
-    try:
-        try:
-            with warnings.catch_warnings():  # threads that draw a bar or compute: this fork needs none of them
-                warnings.simplefilter("ignore", DeprecationWarning)
-                process.start()
-        except OSError:  # this process goes on alone
-            pass
-        finally:
-            writer.close()
-        yield reader
-    finally:
-        if process.pid is not None:
-            process.kill()
-            process.join()
-        reader.close()
-
-
-def _alone(body: Callable[[Connection], None], reader: Connection, writer: Connection) -> None:
-    try:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started it ends it
-        reader.close()
-        body(writer)
-    finally:
-        os._exit(0)  # whatever went wrong: the other process does without, and meets it too
 
 
 def shared(work: Callable[[int], T], count: int, on_item: Callable[[int], None] | None = None) -> list[T]:
@@ -71,25 +38,39 @@ def shared(work: Callable[[int], T], count: int, on_item: Callable[[int], None] 
         if on_item is not None:
             on_item(len(found))
 
-    def send(writer: Connection) -> None:
-        for i in range(1, count, 2):
-            writer.send((i, work(i)))
-
-    if two() and count > 1:
-        with forked(send) as reader:
-            for i in range(0, count, 2):
+    with _forked(work, range(1, count, 2) if two() else ()) as others:
+        for i in range(count):
+            if i not in others:
                 take(i, work(i))
-                _drain(reader, take, wait=False)
-            _drain(reader, take, wait=True)
-    for i in range(count):  # without another process, or what it has not done
-        if i not in found:
-            take(i, work(i))
+        for i, other in others.items():  # whatever went wrong there is met here, too
+            take(i, work(i) if other.exception() else other.result())
     return [found[i] for i in range(count)]
 
 
-def _drain(reader: Connection, take: Callable[[int, T], None], wait: bool) -> None:
-    try:
-        while wait or reader.poll():
-            take(*reader.recv())
-    except EOFError:
+@contextmanager
+def _forked(work: Callable[[int], T], items: Any) -> Iterator[dict[int, Future[T]]]:
+    """Items that a fork of this process works at; none where there is no room for one."""
+    if not len(items):
+        yield {}
         return
+    pool = ProcessPoolExecutor(1, get_context("fork"), _begin, (work,))
+    try:
+        with warnings.catch_warnings():  # threads that draw a bar or compute: this fork needs none of them
+            warnings.simplefilter("ignore", DeprecationWarning)
+            futures = {i: pool.submit(_do, i) for i in items}
+    except OSError:  # this process goes on alone
+        futures = {}
+    try:
+        yield futures
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _begin(work: Callable[[int], Any]) -> None:
+    global _work
+    _work = work
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started it ends it
+
+
+def _do(i: int) -> Any:
+    return _work(i)

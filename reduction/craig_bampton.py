@@ -29,7 +29,6 @@ def craig_bampton(
     n_modes: int | None = None,
     cutoff: float | None = None,
     extra_masters: Sequence[int] | np.ndarray = (),
-    contact_stiffness: np.ndarray | None = None,
     solver: str | None = None,
     attached: Sequence[str] = (),
     shapes: np.ndarray | None = None,
@@ -39,13 +38,12 @@ def craig_bampton(
     system : sparse, n_full DOFs; interface : B over the same DOFs
     n_modes : fixed-interface modes kept, or cutoff : all of them up to this frequency [Hz]; give one of the two
     extra_masters : DOFs of the system to keep besides those of the contact and of point loads and outputs
-    contact_stiffness : (n_pair, n_component) [N/m], for an estimate of the stuck state too; solver : see fem.factor
+    solver : see fem.factor
     attached : loads whose static response with the masters held joins the modes, so that statics under them are exact
     shapes : (n_full, k) motions that the system hardly resists, for the solver multigrid
     Returns the model; coordinates are the masters in ascending order, then the modes; loads and outputs are projected.
         info: masters (DOFs of the system), n_full, n_masters, n_modes, factorisation, first_omitted_frequency [Hz],
-        free_frequency [Hz] of the first ten modes and free_frequency_error, their estimated relative error by
-        truncation; stuck_frequency and stuck_frequency_error likewise where contact_stiffness is given
+        free_frequency [Hz] of the first ten modes
     Raises  ValueError where n_modes and cutoff are both or neither given, too many modes are asked, or a body can move
         rigidly with its masters held
     """
@@ -92,21 +90,11 @@ def craig_bampton(
         factorisation=factor.name,
         first_omitted_frequency=omitted / (2 * np.pi),
     )
-    for springs in (None,) if contact_stiffness is None else (None, contact_stiffness):
-        try:
-            frequency, q = linear_modes(model, springs, min(LIMITS.reported_modes, reduced.n_dof))
-        except StaticDivergence:
-            if not interface.n_pair:
-                raise
-            continue  # rotation carries away what only the contact holds
-        w = 2 * np.pi * frequency
-        # K R q vanishes at the slaves but for the modal part, as K_ss psi + K_sm = 0; springs act on masters only
-        residual = K_ss @ (phi @ q[n_m:]) - (M @ (basis @ q))[s] * w**2
-        error = frequency_error(factor, residual, w, omitted)
-        if springs is None:
-            info = replace(info, free_frequency=frequency, free_frequency_error=error)
-        else:
-            info = replace(info, stuck_frequency=frequency, stuck_frequency_error=error)
+    try:
+        info = replace(info, free_frequency=linear_modes(model, None, min(LIMITS.reported_modes, reduced.n_dof))[0])
+    except StaticDivergence:  # rotation carries away what only the contact holds
+        if not interface.n_pair:
+            raise
     return replace(model, info=info)
 
 
@@ -190,28 +178,6 @@ def with_static_shapes(
         squares, turn = np.linalg.eigh((coupling + coupling.T) / 2)
         omega, phi = np.sqrt(squares), phi @ turn
     return omega, phi
-
-
-def frequency_error(factor: Factor, residual: np.ndarray, omega: np.ndarray, omitted: float) -> np.ndarray:
-    """Estimated relative error of reduced frequencies, always too high ones.
-
-    The residual of a reduced mode lies in the omitted fixed-interface modes. One step of exact dynamic condensation
-    would lower its eigenvalue by r^T (K_ss - lambda M_ss)^-1 r, which is at most r^T K_ss^-1 r / (1 - lambda/lambda_o).
-    Springs between masters, such as a stuck contact, leave the residual at the slaves as it is.
-
-    factor : of K_ss; residual : (n_slave, k) of mass-normalised reduced modes; omega : (k,) [rad/s]
-    omitted : first fixed-interface frequency left out [rad/s]
-    Returns (k,); 0 for rigid-body modes, inf for modes above the first omitted one
-    Source  first-order perturbation of Leung's exact condensation (1978)
-    """
-    flexible = np.einsum("sk,sk->k", residual, factor.solve(residual)) / 2
-    room = 1 - (omega / omitted) ** 2
-    error = np.full(len(omega), np.inf)
-    elastic = omega > 1e-6 * omega.max()
-    error[~elastic] = 0.0
-    safe = elastic & (room > 0)
-    error[safe] = flexible[safe] / (omega[safe] ** 2 * room[safe])
-    return error
 
 
 def _congruent(basis: np.ndarray, matrix: Any, sign: float = 1.0) -> np.ndarray:

@@ -96,20 +96,16 @@ def nodal_diameters(
     return np.array(found)
 
 
-def travelling_wave(
-    reduced: ReducedSector, engine_order: int, cutoff: float | None = None, springs: np.ndarray | None = None
-) -> ReducedModel:
+def travelling_wave(reduced: ReducedSector, engine_order: int, springs: np.ndarray | None = None) -> ReducedModel:
     """The model of one sector under a wave of this engine order: harmonic h sees the index h EO modulo N.
 
-    cutoff : highest frequency [Hz] of the modes that then stand for seam, left shroud and fixed-interface modes (3.20);
-        None keeps all these coordinates
     springs : (n_pair, n_component) contact springs [N/m]; where they are given, more than `LIMITS.many` coordinates are
         replaced by those of `stuck_ritz`
     Returns the model whose system and interface are those of harmonic 1; coordinates, but for those of `stuck_ritz`,
         are the relative displacements, then accessories, then the rest; `reconstruct` takes the harmonic. One object
         serves all harmonics of one index
     """
-    model = wave_of(reduced, engine_order, WaveIndices(reduced, cutoff, springs))
+    model = wave_of(reduced, engine_order, WaveIndices(reduced, springs))
     try:
         system = model.system
         omega, _ = hermitian_modes(system.stiffness, system.mass, min(LIMITS.reported_modes, system.n_dof))
@@ -140,22 +136,14 @@ def wheel_model(reduced: ReducedSector, stiffness: Sequence[float] | None = None
 
 def _shared_info(reduced: ReducedSector) -> ModelInfo:
     """Facts that hold for any model of the wheel; frequencies of a sector that is joined to nothing do not."""
-    return replace(
-        reduced.info,
-        n_sectors=reduced.sector.n_sectors,
-        free_frequency=None,
-        free_frequency_error=None,
-        stuck_frequency=None,
-        stuck_frequency_error=None,
-    )
+    return replace(reduced.info, n_sectors=reduced.sector.n_sectors, free_frequency=None)
 
 
 class WaveIndices:
     """Small system, contact map and way back T (q = T z) of each harmonic index, each made once."""
 
-    def __init__(self, reduced: ReducedSector, cutoff: float | None, springs: np.ndarray | None = None):
+    def __init__(self, reduced: ReducedSector, springs: np.ndarray | None = None):
         self._sector = reduced.sector
-        self._cutoff = cutoff
         self._springs = springs
         self._made: dict[int, tuple[SecondOrderSystem, np.ndarray, np.ndarray]] = {}
 
@@ -165,13 +153,11 @@ class WaveIndices:
         return self._made[index]
 
     def _whole(self, index: int) -> tuple[SecondOrderSystem, np.ndarray, np.ndarray]:
-        """The same with all coordinates of the sector, or with those of (3.20) where a cutoff is given."""
+        """The same with all coordinates of the sector."""
         once, of_row = distinct(self._sector)
-        if self._cutoff is None and not node_to_node(once):
+        if not node_to_node(once):
             return *at_index(self._sector, index), seam_map(self._sector, index).toarray()
-        T, n_masters = relative_map(once, index)
-        if self._cutoff is not None:
-            T = T @ condensation(projected(self._sector.system, T), n_masters, self._cutoff)
+        T = relative_map(once, index)[0]
         system = projected(self._sector.system, T)
         return system, np.eye(len(once.left), system.n_dof)[of_row], T
 
@@ -281,23 +267,3 @@ def stuck_ritz(system: SecondOrderSystem, B: np.ndarray, springs: np.ndarray, n_
     energy, turn = sla.eigh(shapes.conj().T @ (K @ shapes))
     kept = energy > LIMITS.dependent
     return np.concatenate([phi / np.sqrt(nu), (shapes @ turn[:, kept]) / np.sqrt(energy[kept])], axis=1)
-
-
-def condensation(system: SecondOrderSystem, n_masters: int, cutoff: float) -> np.ndarray:
-    """Basis (n, n_masters + k): the first coordinates stay, modes with these held up to a cutoff [Hz] replace the rest.
-
-    Raises  ValueError where the rest can move rigidly with the masters held
-    """
-    m, s = slice(0, n_masters), slice(n_masters, None)
-    K, M = system.stiffness, system.mass
-    try:
-        psi = -sla.solve(K[s, s], K[s, m], assume_a="pos")
-    except np.linalg.LinAlgError:
-        raise ValueError("the sector can move rigidly with its shrouds closed: clamp it") from None
-    omega, phi = sla.eigh(K[s, s], M[s, s])
-    phi = phi[:, omega <= (2 * np.pi * cutoff) ** 2]
-    basis = np.zeros((system.n_dof, n_masters + phi.shape[1]), dtype=phi.dtype)
-    basis[m, m] = np.eye(n_masters)
-    basis[s, m] = psi
-    basis[s, n_masters:] = phi
-    return basis

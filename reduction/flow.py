@@ -20,9 +20,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.linalg as sla
 
-from tribodyn.fem.cyclic import at_index, seam_map, seam_parts
 from tribodyn.fem.system import SecondOrderSystem
-from tribodyn.reduction.cyclic import ReducedSector
 from tribodyn.reduction.linear import stuck_stiffness
 from tribodyn.reduction.model import ReducedModel
 
@@ -62,31 +60,12 @@ def with_flow(wave: ReducedModel, springs: np.ndarray, flow: Flow) -> ReducedMod
         if index % n not in made:
             system, B = any_wave(index)
             _, omega, shape = family(system, np.asarray(B), springs, flow.mode)
-            parts = _parts(flow, index, n, omega)
+            parts = parts_of(flow, index, n, omega)
             force = np.asarray(system.mass) @ shape
-            made[index % n] = _added(system, *(part * np.outer(force, force.conj()) for part in parts)), B
+            made[index % n] = added(system, *(part * np.outer(force, force.conj()) for part in parts)), B
         return made[index % n]
 
     return replace(wave, system=per_index(order)[0], per_index=per_index, per_harmonic=lambda h: per_index(h * order))
-
-
-def wheel_with_flow(reduced: ReducedSector, wheel: ReducedModel, springs: np.ndarray, flow: Flow) -> ReducedModel:
-    """All sectors of a wheel, alike or not, with the forces of a flow on the modes of the wheel of sectors alike.
-
-    wheel : of `cyclic.wheel_model`, damped or not; springs : (n_pair, n_component) of one sector
-    """
-    sector, n = reduced.sector, reduced.sector.n_sectors
-    own = seam_parts(sector)[0].T  # a sector's own coordinates from all of them
-    total = [np.zeros((wheel.system.n_dof, wheel.system.n_dof), complex) for _ in range(4)]
-    for index in range(n):
-        system, B = at_index(sector, index)
-        _, omega, shape = family(system, np.asarray(B), springs, flow.mode)
-        there = own @ (seam_map(sector, index) @ shape)
-        turns = np.exp(-2j * np.pi * (index * np.arange(n) % n) / n) / np.sqrt(n)
-        force = np.asarray(wheel.system.mass) @ np.kron(turns, there)
-        for matrix, part in zip(total, _parts(flow, index, n, omega), strict=True):
-            matrix += part * np.outer(force, force.conj())
-    return replace(wheel, system=_added(wheel.system, *(matrix.real for matrix in total)))
 
 
 def family(
@@ -124,7 +103,7 @@ def aeroelastic(wave: ReducedModel, springs: np.ndarray, flow: Flow, few: int = 
     return found
 
 
-def _parts(flow: Flow, index: int, n_sectors: int, omega: float) -> tuple[complex, complex, complex, complex]:
+def parts_of(flow: Flow, index: int, n_sectors: int, omega: float) -> tuple[complex, complex, complex, complex]:
     """Stiffness, damping, gyroscopic and circulatory coefficient of a wave of an index."""
     here = flow.of_index(index, n_sectors)
     if 2 * index % n_sectors == 0:  # its own mirror: all is even, and real
@@ -134,7 +113,7 @@ def _parts(flow: Flow, index: int, n_sectors: int, omega: float) -> tuple[comple
     return omega**2 * even.real, omega * even.imag, -1j * omega * odd.real, 1j * omega**2 * odd.imag
 
 
-def _added(
+def added(
     system: SecondOrderSystem, stiffness: np.ndarray, damping: np.ndarray, swirl: np.ndarray, flow: np.ndarray
 ) -> SecondOrderSystem:
     def total(present: np.ndarray | None, more: np.ndarray) -> np.ndarray:

@@ -25,8 +25,7 @@ class ModelInfo:
     masters : (n_masters,) DOFs of the full system that stay coordinates, ascending; n_modes : other coordinates
     n_full : DOFs of the full system; factorisation : name of its solver; source : of matrices that came as they are
     first_omitted_frequency : of the fixed-interface modes, inf where all are kept [Hz]
-    free_frequency, stuck_frequency : (n,) of the model with contacts open, and closed and sticking [Hz]
-    free_frequency_error, stuck_frequency_error : (n,) their estimated relative errors by truncation
+    free_frequency : (n,) of the model with contacts open [Hz]
     n_interface_modes, interface_omitted_frequency : modes of the boundary, and the first one left out [Hz]
     n_sectors, engine_order : of a wheel
     prestress_residual, prestress_rotation : of a wheel that turns, see fem.prestress.Prestress
@@ -42,9 +41,6 @@ class ModelInfo:
     source: str | None = None
     first_omitted_frequency: float | None = None
     free_frequency: np.ndarray | None = None
-    free_frequency_error: np.ndarray | None = None
-    stuck_frequency: np.ndarray | None = None
-    stuck_frequency_error: np.ndarray | None = None
     n_interface_modes: int | None = None
     interface_omitted_frequency: float | None = None
     n_sectors: int | None = None
@@ -112,10 +108,7 @@ class ReducedModel:
         return np.tensordot(basis, q, axes=1)
 
     def projected(self, basis: np.ndarray) -> ReducedModel:
-        """The model in coordinates p, q = basis @ p, with basis (n, n_p) real; matrices are made symmetric to rounding.
-
-        Its info keeps the free frequencies alone
-        """
+        """The model in coordinates p, q = basis @ p, basis (n, n_p) real; matrices are made symmetric to rounding."""
 
         def congruent(matrix: np.ndarray) -> np.ndarray:
             product = basis.T @ matrix @ basis
@@ -131,8 +124,7 @@ class ReducedModel:
         )
         interface = replace(self.interface, B=np.asarray(self.interface.B) @ basis)
         full = None if self.basis is None else self.basis @ basis
-        info = replace(self.info, free_frequency_error=None, stuck_frequency=None, stuck_frequency_error=None)
-        return replace(self, system=system, interface=interface, basis=full, info=info)
+        return replace(self, system=system, interface=interface, basis=full)
 
     def with_damping(self, make: Damping) -> ReducedModel:
         """The same model with another damping: `make` gives the matrix of every system that a harmonic sees.

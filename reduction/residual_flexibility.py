@@ -134,7 +134,7 @@ def residual_flexibility(
         kept, or cutoff : all of them up to this frequency [Hz]; give one of the two
     clusters : of pairs, whose tractions give Ritz vectors; solver : see fem.factor
     Returns the model; its coordinates are modal, mass = 1; info: n_full, n_modes, factorisation,
-        first_omitted_frequency [Hz], of the stuck modes that were asked for, free_frequency and stuck_frequency [Hz]
+        first_omitted_frequency [Hz], of the stuck modes that were asked for, free_frequency [Hz]
     Raises  ValueError where the structure can move rigidly with all contacts stuck
     """
     k = np.ravel(np.asarray(stiffness, float))
@@ -163,7 +163,6 @@ def residual_flexibility(
         n_modes=len(squares),
         factorisation=factor.name,
         first_omitted_frequency=omitted / (2 * np.pi),
-        stuck_frequency=np.sqrt(squares[: LIMITS.reported_modes]) / (2 * np.pi),
     )
     rest = ResidualFlexibility(k, K, B, V, squares, M, solver)
     rest.__dict__["factor"] = factor

@@ -92,7 +92,7 @@ class SpeedLine:
     def at_index(self, index: int) -> tuple[tuple[SecondOrderSystem, ...], np.ndarray, np.ndarray]:
         """Systems at all speeds, contact map and way back of a harmonic index, in few coordinates."""
         if index not in self.made:
-            each = [WaveIndices(one, None)(index) for one in self.reduced]
+            each = [WaveIndices(one)(index) for one in self.reduced]
             _, B, T = each[0]
             systems = tuple(system for system, _, _ in each)
             if systems[0].n_dof > LIMITS.many_along:

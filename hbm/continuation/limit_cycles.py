@@ -8,7 +8,6 @@ Source  Krack 2015, section 2 (a nonlinear mode with zero damping is a limit cyc
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -76,31 +75,6 @@ def limit_cycles(
         reached = points[-1].a * problem.per_amplitude if points else 0.0
         raise ValueError(f"the damping was followed up to {reached:.3g} m only: the backbone {end}")
     return sorted(found, key=lambda cycle: cycle.amplitude)
-
-
-@single
-def follow(
-    make: Callable[[float], HarmonicBalance],
-    values: Iterable[float],
-    first: LimitCycle,
-    mode: int | None = None,
-    output: str | None = None,
-    options: BackboneOptions | None = None,
-) -> list[tuple[float, LimitCycle]]:
-    """A limit cycle followed while the problem changes, such as with the density of the gas; ends where it is lost.
-
-    make : the problem at a value of the parameter; values : one after the other, beside that of `first`
-    """
-    options, found = options or BackboneOptions(), list[tuple[float, LimitCycle]]()
-    here = first.point.coordinates
-    for value in values:
-        problem = FreeVibration(make(value), mode, output)
-        cycle = _without_damping(problem, here, found[-1][1].attracts if found else first.attracts, options)
-        if cycle is None:
-            break
-        here = cycle.point.coordinates
-        found.append((value, cycle))
-    return found
 
 
 def _without_damping(

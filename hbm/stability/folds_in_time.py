@@ -25,7 +25,6 @@ from tribodyn.hbm.time.time_integration import PeriodicMotion
 
 SEARCH_OPTIONS = Options(steps=512, tolerance=1e-7, max_periods=400)
 MARCH_OPTIONS = replace(SEARCH_OPTIONS, accelerate=False, max_periods=800, patience=800)
-DEPARTURE = 0.3  # relative change of amplitude that means that a motion has left its branch; on it a few per cent
 POINTS_BESIDE = 2  # from the fold, where stability says which side is the stable one: at the fold both are neutral
 
 
@@ -50,22 +49,6 @@ class FoldInTime:
     def found(self) -> bool:
         """Whether the end of the branch in time was found within the bracket."""
         return self.outcome.kind is SolveEnd.CONVERGED
-
-
-@dataclass(frozen=True)
-class Coexisting:
-    """A solution that shares its frequency with others, and a plain march in time that began there.
-
-    amplitude : by harmonic balance; in_time : after the march of `periods` [m]; stays : whether it ended where it began
-    growth : largest real part of Hill's exponents [1/s]
-    """
-
-    amplitude: float
-    stable: bool
-    growth: float
-    in_time: float
-    periods: int
-    stays: bool
 
 
 def amplitude_in_time(balance: HarmonicBalance, motion: PeriodicMotion, output: str) -> float:
@@ -141,32 +124,6 @@ def fold_in_time(
     elif not left:
         outcome = SolveEnd.STAYS_ON_BRANCH.say(f" {100 * bracket:g} % beyond its fold at {hertz:.6g} Hz")
     return FoldInTime(fold, float(branch.omega[fold]), inside, last, 2 * bracket / 2**bisections, outcome)
-
-
-@single
-def coexisting(
-    balance: HarmonicBalance, branch: Branch, low: float, high: float, output: str, frequencies: int = 24
-) -> tuple[float, list[Coexisting]]:
-    """The first frequency between two folds that two stable solutions and an unstable one share, each marched in time.
-
-    low, high : [rad/s]; frequencies : tried between them
-    Returns the frequency [rad/s] and the solutions; nan and none where there are no such three
-    """
-    row = balance.compliance.output_names.index(output)
-    for omega in np.linspace(low, high, frequencies)[1:-1]:
-        states = solutions_at(balance, branch, omega)
-        hill = [exponents.stability(balance, state) for state in states]
-        if [one.stable for one in hill] != [True, False, True]:
-            continue
-        found = []
-        for state, one in zip(states, hill, strict=True):
-            motion = march(balance, state, omega)
-            ours = float(np.linalg.norm(balance.outputs(state)[row, balance.basis.order > 0]))
-            theirs = amplitude_in_time(balance, motion, output)
-            growth, stays = float(one.exponents.real.max()), abs(theirs / ours - 1) < DEPARTURE
-            found.append(Coexisting(ours, one.stable, growth, theirs, motion.periods, stays))
-        return float(omega), found
-    return float("nan"), []
 
 
 def _shaped(balance: HarmonicBalance, x: np.ndarray) -> np.ndarray:

@@ -65,7 +65,7 @@ def test_environment_is_made_once_and_handed_over_to(tmp_path):
 
     first = start()
     assert f"-m venv {home}/.venv" in first
-    assert f"-m pip install --no-compile --editable {home}\n" in first
+    assert f"-m pip install --no-compile --editable {home}[all]\n" in first
     assert "import gmsh" in first
     assert "import pyvista" in first
     assert start() == "-c \n"  # it only makes sure that this Python still runs

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from tribodyn.hbm.contact.stiffness import ElasticPair, RoundedPunch, SphereContact, rectangular_punch
+from tests.proof.hertz import SphereContact
+from tests.proof.rounded import RoundedPunch
+from tribodyn.hbm.contact.stiffness import ElasticPair, rectangular_punch
 
 STEEL = (210e9, 0.3, 210e9, 0.3)
 MIXED = ElasticPair(210e9, 0.3, 70e9, 0.33)

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.helpers import tiny_wheel as tiny
+from tribodyn.fem.cyclic import at_index, seam_map, seam_parts
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
 from tribodyn.hbm.contact.law import ContactParameters
-from tribodyn.hbm.continuation.limit_cycles import follow, limit_cycles
+from tribodyn.hbm.continuation.limit_cycles import limit_cycles
 from tribodyn.hbm.continuation.nonlinear_modes import BackboneOptions
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.stability.exponents import stability
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.time.time_integration import leave_alone
-from tribodyn.reduction.cyclic import travelling_wave, wheel_model
+from tribodyn.reduction.cyclic import ReducedSector, travelling_wave, wheel_model
 from tribodyn.reduction.damping import modal_damping
-from tribodyn.reduction.flow import Flow, aeroelastic, wheel_with_flow, with_flow
+from tribodyn.reduction.flow import Flow, added, aeroelastic, family, parts_of, with_flow
+from tribodyn.reduction.model import ReducedModel
 
 FLOW = Flow({1: 0.012 + 0.002j, -1: -0.012 + 0.002j, 0: 0.004j})
 SPRINGS = np.array([[4e3, 6e3]])
@@ -41,6 +45,25 @@ def wave(factor=1.0):
     """The wave of one nodal diameter that runs with the rotation, in a flow."""
     reduced = tiny.sector(("t1", "n"), TURNING)
     return balance_of(with_flow(damped(travelling_wave(reduced, ORDER)), SPRINGS, FLOW.scaled(factor)), 1)
+
+
+def wheel_with_flow(reduced: ReducedSector, wheel: ReducedModel, springs: np.ndarray, flow: Flow) -> ReducedModel:
+    """All sectors of a wheel, alike or not, with the forces of a flow on the modes of the wheel of sectors alike.
+
+    wheel : of `cyclic.wheel_model`, damped or not; springs : (n_pair, n_component) of one sector
+    """
+    sector, n = reduced.sector, reduced.sector.n_sectors
+    own = seam_parts(sector)[0].T  # a sector's own coordinates from all of them
+    total = [np.zeros((wheel.system.n_dof, wheel.system.n_dof), complex) for _ in range(4)]
+    for index in range(n):
+        system, B = at_index(sector, index)
+        _, omega, shape = family(system, np.asarray(B), springs, flow.mode)
+        there = own @ (seam_map(sector, index) @ shape)
+        turns = np.exp(-2j * np.pi * (index * np.arange(n) % n) / n) / np.sqrt(n)
+        force = np.asarray(wheel.system.mass) @ np.kron(turns, there)
+        for matrix, part in zip(total, parts_of(flow, index, n, omega), strict=True):
+            matrix += part * np.outer(force, force.conj())
+    return replace(wheel, system=added(wheel.system, *(matrix.real for matrix in total)))
 
 
 def whole(stiffness=None):
@@ -102,17 +125,6 @@ def test_a_limit_cycle_has_a_neutral_exponent_and_leaves_its_own_wave_stable(cyc
     neutral = np.argmin(np.abs(own))
     assert abs(own[neutral]) < 2e-3 * cycle.omega
     assert np.delete(own, neutral).real.max() < 0
-
-
-def test_a_limit_cycle_is_followed_with_the_density_of_the_gas(cycle):
-    """More flow, more amplitude; each one is found afresh by itself."""
-    path = follow(wave, [1.05, 1.1, 1.15], cycle, output="tip")
-    assert [value for value, _ in path] == [1.05, 1.1, 1.15]
-    heights = [one.amplitude for _, one in path]
-    assert cycle.amplitude < heights[0] < heights[1] < heights[2]
-    again = limit_cycles(wave(1.15), 1e-5, 2e-2, output="tip", options=BackboneOptions(n_points=30))[0]
-    assert again.amplitude == pytest.approx(heights[2], rel=1e-5)
-    assert again.frequency == pytest.approx(path[2][1].frequency, rel=1e-6)
 
 
 def test_the_limit_cycle_of_a_mistuned_wheel_is_what_time_integration_comes_to():

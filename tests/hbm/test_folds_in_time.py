@@ -7,10 +7,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tests.helpers.continuation_models import Duffing
+from tests.proof.coexisting import coexisting
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.methods import arc_length
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.stability.folds_in_time import coexisting, fold_in_time, solutions_at
+from tribodyn.hbm.stability.folds_in_time import fold_in_time, solutions_at
 from tribodyn.hbm.time.stepper import Options
 
 QUICK = Options(steps=256, tolerance=1e-6, max_periods=400)

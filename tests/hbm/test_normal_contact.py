@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.verification_models import floating_beam
+from tests.proof.chatter import chatter, sign_changes
 from tribodyn.hbm import newton
 from tribodyn.hbm.balance import HarmonicBalance
 from tribodyn.hbm.contact.joint import Joint
@@ -15,7 +16,6 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.expansion import SingularStuckSystem
 from tribodyn.hbm.newton import NewtonOptions
 from tribodyn.hbm.outcome import CONVERGED
-from tribodyn.hbm.stability.chatter import chatter, sign_changes
 from tribodyn.hbm.time import time_integration
 from tribodyn.hbm.time.stepper import Options
 from tribodyn.hbm.wear.law import Exposure

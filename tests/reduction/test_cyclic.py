@@ -15,7 +15,6 @@ from tribodyn.reduction import cyclic as waves
 from tribodyn.reduction.damping import modal_damping
 from tribodyn.reduction.limits import ReductionLimits
 from tribodyn.reduction.linear import linear_modes, stuck_stiffness, system_modes
-from tribodyn.reduction.store import load, save
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.wheels import wheel as wheels
 
@@ -121,22 +120,6 @@ def test_model_of_a_wave(reduced):
     assert stuck == pytest.approx(waves.nodal_diameters(reduced.sector, [3], 2, k)[0], rel=1e-8)
 
 
-def test_condensed_coordinates_keep_statics_exact_and_frequencies_near(reduced):
-    fine = waves.travelling_wave(reduced, 1)
-    coarse = waves.travelling_wave(reduced, 1, cutoff=20e3)
-    for h in (0, 1):
-        (a, B), (b, B_small) = fine.at_harmonic(h), coarse.at_harmonic(h)
-        assert b.n_dof < a.n_dof
-        row, small_row = a.outputs["tip"], b.outputs["tip"]
-        for name in small.LOADS:
-            full_answer = np.linalg.solve(a.stiffness, a.loads[name])
-            small_answer = np.linalg.solve(b.stiffness, b.loads[name])
-            assert row @ full_answer == pytest.approx(small_row @ small_answer, rel=1e-9)
-            assert B @ full_answer == pytest.approx(B_small @ small_answer, rel=1e-6, abs=1e-15)
-        exact = hermitian_modes(a.stiffness, a.mass, 3)[0]
-        assert hermitian_modes(b.stiffness, b.mass, 3)[0] == pytest.approx(exact, rel=5e-3)
-
-
 def test_stuck_ritz_shapes_keep_statics_exact_and_the_contact_near(reduced, monkeypatch):
     """Contacts, loads and outputs of a wave in few coordinates, against all of them; above the first mode, too."""
     k = reduced.sector.interface.stiffness(*small.STIFFNESS)
@@ -168,27 +151,3 @@ def test_shared_nodes_of_contact_and_seam_are_one_sentence(reduced):
     broken = replace(reduced.sector, left=np.asarray(reduced.sector.interface.B))
     with pytest.raises(ValueError, match="the right contact face of a cyclic part must be of master nodes"):
         waves.relative_map(broken, 1)
-
-
-def test_wave_survives_its_file(reduced, tmp_path):
-    """Stored harmonic by harmonic: the same matrices, shared where they were, the same way back to the full field."""
-    model = waves.travelling_wave(reduced, 4).with_damping(lambda system, B: modal_damping(system, 0.01))
-    path = tmp_path / "wave.h5"
-    with pytest.raises(ValueError, match="give the harmonics to store"):
-        save(model, path)
-    save(model, path, harmonics=(0, 1, 2, 3))
-    back = load(path)
-    for h in (0, 1, 2, 3):
-        (one, B), (other, B_back) = model.at_harmonic(h), back.at_harmonic(h)
-        assert np.array_equal(B, B_back)
-        for name in ("mass", "stiffness", "damping"):
-            assert np.array_equal(getattr(one, name), getattr(other, name))
-        assert np.array_equal(one.loads["couple"], other.loads["couple"])
-        assert np.array_equal(one.outputs["tip"], other.outputs["tip"])
-        q = np.random.default_rng(h).normal(size=model.at_harmonic(h)[0].n_dof)
-        assert np.array_equal(model.reconstruct(q, h), back.reconstruct(q, h))
-    assert back.at_harmonic(0)[0] is back.at_harmonic(2)[0]  # engine order 4 of 8: even harmonics are in phase
-    assert back.at_harmonic(1)[0] is back.at_harmonic(3)[0]
-    assert back.info.engine_order == 4
-    with pytest.raises(ValueError, match="harmonic 5 of this model is not in its file, which holds 0, 1, 2, 3"):
-        back.at_harmonic(5)

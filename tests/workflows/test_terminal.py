@@ -28,16 +28,6 @@ def test_an_unknown_command_is_answered_with_all_of_them(capsys: pytest.CaptureF
         assert re.search(rf"\b{name}\b", said), name
 
 
-@pytest.mark.parametrize("old", cli.SUCCESSORS)
-def test_a_former_word_is_answered_with_its_successor(old: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as stop:
-        cli.main([old, "beam"])
-    said = capsys.readouterr().err
-    assert stop.value.code == 2
-    assert said.count("\n") == 1
-    assert f"tribodyn {cli.SUCCESSORS[old]}" in said
-
-
 def test_quiet_prints_nothing_and_the_log_has_every_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

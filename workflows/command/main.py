@@ -26,39 +26,6 @@ WORDS = {  # word -> where it is, its help on the page of all of them
     "study": ("study:app", "Studies: grid, lives, optimise, identify, vary, converge, trade, supports, forces."),
     "geometry": ("geometry:app", "Geometry: mesh a drawing, find the asperities of measured faces."),
 }  # fmt: skip
-SUCCESSORS = {
-    "animate": "draw RESULT --film wear",
-    "asperities": "geometry asperities",
-    "backbone": "curve backbone",
-    "bench": "prove bench",
-    "blade": "prove blade",
-    "branches": "prove branches",
-    "converge": "study converge",
-    "extremes": "prove extremes",
-    "faults": "prove faults",
-    "flutter": "wheel flutter",
-    "folds": "curve folds",
-    "forces": "study forces",
-    "fuzz": "prove fuzz",
-    "identify": "study identify",
-    "leaf": "prove leaf",
-    "list": "cases",
-    "lives": "study lives",
-    "mesh": "geometry mesh",
-    "mistuned": "wheel mistuned",
-    "mistuning": "wheel patterns, wheel pattern-motion or wheel pattern-wear",
-    "optimise": "study optimise",
-    "render": "draw",
-    "rig": "prove rig",
-    "ring-down": "curve ring-down",
-    "scoreboard": "prove scoreboard",
-    "study": "study grid",
-    "supports": "study supports",
-    "track": "curve track",
-    "trade": "study trade",
-    "vary": "study vary",
-    "wheel": "wheel modes",
-}
 
 app = cyclopts.App(
     name="tribodyn",
@@ -81,10 +48,6 @@ def _run(arguments: Sequence[str] | None) -> None:
     try:
         app(given, exit_on_error=False, print_error=False)
     except cyclopts.UnknownCommandError as error:
-        successor = SUCCESSORS.get(given[0])
-        if successor is not None:
-            asked = " ".join(given[:2]) if given[0] in WORDS else given[0]
-            raise ValueError(f"there is no tribodyn {asked}: its successor is tribodyn {successor}") from None
         said = str(error).partition(" Available commands:")[0].rstrip(". ")
         raise ValueError(f"{said}{'' if said.endswith('?') else '.'} Available commands: {', '.join(WORDS)}") from None
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tribodyn.workflows.export.library import library
+from tribodyn.extras import package
 from tribodyn.workflows.export.tables import tables, terms
 from tribodyn.workflows.result import verdict
 from tribodyn.workflows.result.columns import write_columns
@@ -39,7 +39,7 @@ def write_csv(result: Result, folder: Path) -> list[Path]:
 
 def write_parquet(result: Result, folder: Path) -> list[Path]:
     """One file for each table. Raises ValueError where pyarrow is missing."""
-    arrow, parquet = library("pyarrow"), library("pyarrow.parquet")
+    arrow, parquet = package("pyarrow"), package("pyarrow.parquet")
     written = []
     for name, table in tables(result).items():
         path = folder / f"{name}.parquet"
@@ -77,7 +77,7 @@ def write_uff(result: Result, folder: Path) -> list[Path]:
     The format has abscissas in single precision.
     Raises  ValueError where pyuff is missing
     """
-    pyuff = library("pyuff")
+    pyuff = package("pyuff")
     path = folder / "result.uff"
     path.unlink(missing_ok=True)
     file = pyuff.UFF(str(path))
@@ -132,7 +132,7 @@ def _histories(result: Result) -> list[dict[str, Any]]:
 def _loops(result: Result) -> list[dict[str, Any]]:
     """Displacement and force over a period of the pair that moves most, in each kept state and component."""
     kept, patch = result.loops, result.patch
-    if kept is None or patch is None:
+    if kept is None:
         return []
     found = []
     phase = 2 * np.pi * np.arange(kept.force.shape[-1]) / kept.force.shape[-1]

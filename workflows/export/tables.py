@@ -27,8 +27,7 @@ def tables(result: Result) -> dict[str, Table]:
             "position": s.position,
             "kind": np.array(s.kinds, dtype=str),
         }
-    if result.patch is not None:
-        found["pairs"] = pairs(result)
+    found["pairs"] = pairs(result)
     if result.wear is not None and len(result.wear.cycles):
         found["wear"] = wear(result)
         found["wear_of_pairs"] = wear_of_pairs(result)
@@ -41,7 +40,7 @@ def tables(result: Result) -> dict[str, Table]:
         }
         there = np.isfinite(flat["frequency_Hz"])
         found["worn_responses"] = {name: column[there] for name, column in flat.items()}
-    if result.loops is not None and result.patch is not None:
+    if result.loops is not None:
         found["loops"] = loops(result)
     return found
 
@@ -87,7 +86,6 @@ def terms(harmonics: tuple[int, ...]) -> list[str]:
 def pairs(result: Result) -> Table:
     """The contact pairs: where they are, their area, gap and normal."""
     patch = result.patch
-    assert patch is not None
     columns = {"pair": np.arange(len(patch.area)), "node": patch.nodes}
     for axis, name in enumerate("xyz"):
         columns[f"{name}_m"] = patch.points[:, axis]
@@ -100,7 +98,6 @@ def wear(result: Result) -> Table:
     """The wear history row by row, each row the state that a wear step starts from."""
     history, patch = result.wear, result.patch
     assert history is not None
-    assert patch is not None
     columns = {
         "row": np.arange(len(history.cycles)),
         "cycles": history.cycles,
@@ -128,7 +125,6 @@ def wear_of_pairs(result: Result) -> Table:
     """The wear history pair by pair, one line for each row and pair."""
     history, patch = result.wear, result.patch
     assert history is not None
-    assert patch is not None
     n_row, n_pair = history.depth.shape
     return {
         "row": np.repeat(np.arange(n_row), n_pair),
@@ -147,7 +143,6 @@ def loops(result: Result) -> Table:
     """Hysteresis loops, one line for each kept state, pair, component and instant."""
     kept, patch = result.loops, result.patch
     assert kept is not None
-    assert patch is not None
     shape = kept.displacement.shape
     at, pair, component, sample = (index.ravel() for index in np.indices(shape))
     return {

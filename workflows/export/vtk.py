@@ -13,6 +13,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from tribodyn.extras import package
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.workflows.pictures.view import grid_of
 from tribodyn.workflows.result.faces import meetings_of, worn_off
@@ -27,7 +28,7 @@ def write_vtk(result: Result, folder: Path) -> list[Path]:
 
     Raises  ValueError where the result has neither faces of its contact nor a mesh
     """
-    if result.patch is None or (not len(result.patch.faces) and result.part is None):
+    if not len(result.patch.faces) and result.part is None:
         raise ValueError(
             "vtk: the contact of this result has no faces and its part no mesh; nothing can be drawn of it"
         )
@@ -46,7 +47,6 @@ def write_vtk(result: Result, folder: Path) -> list[Path]:
 
 
 def _has(result: Result, name: str) -> bool:
-    assert result.patch is not None
     return result.part is not None if name == "part" else len(result.patch.faces) > 0
 
 
@@ -85,7 +85,6 @@ def _cycle(result: Result, state: State, folder: Path) -> list[Path]:
 
 def _vectors(result: Result, components: np.ndarray) -> np.ndarray:
     """Components (n_pair, n_component) along t1, t2, n as vectors (n_pair, 3) along x, y, z."""
-    assert result.patch is not None
     names = ("t1", "t2", "n")
     axes = result.patch.frames[:, [names.index(name) for name in result.patch.components]]
     return np.asarray(np.einsum("pc,pcx->px", components, axes))
@@ -118,10 +117,9 @@ def part_grid(result: Result, state: State) -> Any:
 
 def contact_surface(result: Result, state: State) -> Any:
     """Body 1's face of the contact as a pyvista surface: fields at its pairs and their means on its faces."""
-    import pyvista as pv
+    pv = package("pyvista")
 
     patch = result.patch
-    assert patch is not None
     faces = np.column_stack([np.full(len(patch.faces), patch.faces.shape[1]), patch.faces]).ravel()
     split = result.facts.share_of_body_1
     surface = pv.PolyData(patch.points - split * state.depth[:, None] * patch.frames[:, 2], faces)

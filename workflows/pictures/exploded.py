@@ -115,9 +115,8 @@ def _touching(first: Any, second: Any) -> tuple[np.ndarray, float]:
 
 def exploded_picture(result: Result) -> Figure:
     """All bodies apart, from two sides; the contacts are coloured by wear depth, or by pressure where nothing wears."""
-    part, patch = result.part, result.patch
+    part = result.part
     assert part is not None
-    assert patch is not None
     state, offset, body = shown_states(result)[-1], apart(result), bodies(part)
     points = (part.points + offset)[body >= 0]
     pressure = np.zeros(len(state.depth)) if state.pressure is None else state.pressure

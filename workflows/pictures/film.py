@@ -19,6 +19,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
+from tribodyn.extras import package
 from tribodyn.workflows.pictures.film_of_cycle import CycleFilm
 from tribodyn.workflows.pictures.film_of_wear import WearFilm
 from tribodyn.workflows.pictures.offscreen import check
@@ -121,14 +122,8 @@ def _even(images: Iterable[np.ndarray]) -> Iterator[np.ndarray]:
 
 def _encoder(path: Path, first: np.ndarray, rate: float, stack: ExitStack) -> Any:
     """What takes the images of an MP4, closed with the stack."""
-    try:
-        import imageio_ffmpeg
-    except ImportError:
-        raise ValueError(
-            'mp4 needs the package imageio-ffmpeg: install it with pip install "imageio-ffmpeg", or take gif'
-        ) from None
     height, width = first.shape[:2]
-    writer = imageio_ffmpeg.write_frames(
+    writer = package("imageio_ffmpeg").write_frames(
         str(path), (width, height), fps=rate, codec="libx264", quality=None, macro_block_size=2,
         output_params=["-crf", "20", "-movflags", "+faststart"],
     )  # fmt: skip

@@ -36,7 +36,7 @@ class CycleFilm:
         self, result: Result, row: int | None, count: int, deformation: float | None = None, wear: float | None = None
     ):
         loops, patch = result.loops, result.patch
-        if loops is None or patch is None:
+        if loops is None:
             raise ValueError("the result keeps no cycle of a contact: its scene needs pictures.plots = true")
         states = {state.number: state for state in shown_states(result) if state.number in loops.row.tolist()}
         if row is None:
@@ -82,7 +82,6 @@ class CycleFilm:
         self._clock.set_text(f"{share:.2f} of the period")
 
     def _draw(self, result: Result) -> None:
-        assert result.patch is not None
         views = [name for name, there in (("part", self._moving), ("contact", self._contact)) if there is not None]
         if views:
             halves: Any = self.figure.subfigures(2, 1, height_ratios=[1.9, 1])
@@ -137,7 +136,6 @@ class CycleFilm:
     def _draw_status(self, axes: Any, result: Result) -> None:
         """Status of every pair over the period, pairs in the order of their contact."""
         patch = result.patch
-        assert patch is not None
         colors = [STATUS[bits][1] for bits in AT_ONCE]
         norm = BoundaryNorm([0.5, 1.5, 3.0, 5.0], 3)
         axes.imshow(

@@ -35,7 +35,7 @@ class WearFilm:
 
     def __init__(self, result: Result, images: int, wear: float | None = None):
         patch, history = result.patch, result.wear
-        if patch is None or history is None or not result.wear_steps or not book.contacts(result):
+        if history is None or not result.wear_steps or not book.contacts(result):
             raise ValueError("the result holds no worn contact with faces: there is no film over wear")
         last = int(np.flatnonzero(history.cycles <= shown_cycles(history))[-1])
         rows = np.unique(np.linspace(0, last, images).round().astype(int))
@@ -112,7 +112,6 @@ class WearFilm:
 def _most_worn(result: Result, rows: np.ndarray) -> Meeting:
     """The contact that has lost most volume in the last of some rows."""
     patch, wear = result.patch, result.wear
-    assert patch is not None
     assert wear is not None
     volume = wear.depth[rows[-1]] * patch.area
     return max(book.contacts(result), key=lambda one: float(volume[one.pairs].sum()))

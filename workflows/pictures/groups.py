@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from tribodyn.extras import package
 from tribodyn.workflows.pictures import offscreen
 from tribodyn.workflows.pictures.shots import SHADE
 from tribodyn.workflows.pictures.style import BODY, INK, LAYOUT, PAPER
@@ -27,7 +28,7 @@ class Solid(Protocol):
 def draw(solids: Sequence[Solid], path: Path, most: int = 20) -> Path:
     """Draw the first face groups of some bodies, each in a colour of its own. Raises RenderingUnavailable"""
     offscreen.check()
-    import pyvista as pv
+    pv = package("pyvista")
 
     view = pv.Plotter(off_screen=True, shape=(1, 3), col_weights=[3, 3, 1.6], window_size=LAYOUT.groups, border=False)
     named = [(solid, name, ids) for solid in solids for name, ids in (solid.mesh.boundaries or {}).items()]

@@ -22,7 +22,7 @@ class Loop:
 
 def has_friction(result: Result) -> bool:
     """Whether the contact has a tangential component, so that it can have hysteresis."""
-    return result.patch is not None and any(name != "n" for name in result.patch.components)
+    return any(name != "n" for name in result.patch.components)
 
 
 def loop_size(result: Result) -> np.ndarray:
@@ -32,7 +32,6 @@ def loop_size(result: Result) -> np.ndarray:
     """
     loops, patch = result.loops, result.patch
     assert loops is not None
-    assert patch is not None
     if not has_friction(result):
         return np.asarray(np.ptp(loops.force, axis=-1))
     x = loops.displacement
@@ -44,7 +43,6 @@ def loop_of(result: Result, at: int, pair: int, component: int) -> Loop:
     """One loop; its static offset is no part of it. at : which of result.loops"""
     loops, patch = result.loops, result.patch
     assert loops is not None
-    assert patch is not None
     x, force = loops.displacement[at, pair, component], loops.force[at, pair, component]
     x = x - (x.max() + x.min()) / 2
     (unit_x, scale_x), (unit_f, scale_f) = length_unit(float(x.max())), force_unit(float(np.abs(force).max()))

@@ -214,7 +214,7 @@ def _grid(patch: Patch, n_row: int, n_column: int) -> tuple[Figure, np.ndarray]:
 
 
 def _with_faces(result: Result) -> Patch:
-    if result.patch is None or not len(result.patch.faces):
+    if not len(result.patch.faces):
         raise ValueError("the result holds no patch with faces to draw a map on")
     return result.patch
 
@@ -242,7 +242,6 @@ def _colour_bar(figure: Figure, axes: mpl.axes.Axes, shown: Any, name: str, high
 def _name_contacts(columns: np.ndarray, result: Result) -> None:
     """Names of the contacts beside their faces, where several are drawn one above the other."""
     patch, joints = result.patch, result.facts.pairs_of_joints
-    assert patch is not None
     if len(joints) < 2 or patch.in_one_plane:
         return
     height = 1e3 * patch.flat[:, 1]

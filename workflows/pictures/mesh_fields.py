@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tribodyn.extras import package
 from tribodyn.workflows.pictures import view
 from tribodyn.workflows.result.result import Result
 
@@ -38,7 +39,7 @@ def mesh_fields(result: Result, row: int | None = None) -> pv.UnstructuredGrid:
     grid.point_data["static"] = view.at_rest(displacement, result.harmonics)
     grid.point_data["vibration"] = view.swing(displacement, result.harmonics)
     grid.point_data["amplitude"] = np.linalg.norm(vibration, axis=1).max(axis=1)
-    if result.patch is not None and result.wear is not None:
+    if result.wear is not None:
         depth = np.full(len(part.points), np.nan)
         depth[result.patch.nodes] = result.wear.depth[row]
         grid.point_data["wear_depth"] = depth
@@ -52,10 +53,10 @@ def patch_fields(result: Result, row: int = -1) -> pv.PolyData:
     energy [J] friction work of one cycle, status (bits of hbm.contact.law: 1 sticks, 2 slips, 4 separates)
     Raises  ValueError where the result has no worn patch with faces
     """
-    import pyvista as pv
+    pv = package("pyvista")
 
     patch, wear = result.patch, result.wear
-    if patch is None or wear is None or not len(wear.cycles) or not len(patch.faces):
+    if wear is None or not len(wear.cycles) or not len(patch.faces):
         raise ValueError("the result holds no worn patch with faces")
     if not -len(wear.cycles) <= row < len(wear.cycles):
         raise ValueError(f"the result has no wear row {row}: it has 0 to {len(wear.cycles) - 1}")

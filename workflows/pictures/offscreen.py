@@ -11,6 +11,8 @@ import time
 from functools import cache
 from importlib import import_module
 
+from tribodyn.extras import package
+
 SYSTEM_LIBRARIES = "libgl1 libegl1 libgomp1"
 PROBE = "import pyvista as pv; view = pv.Plotter(off_screen=True); view.add_mesh(pv.Sphere()); view.screenshot()"
 
@@ -24,8 +26,12 @@ def check() -> None:
 
     On Linux that process is a child which need not load pyvista again; this one draws with it next, anyway.
 
-    Raises  RenderingUnavailable
+    Raises  RenderingUnavailable, also where pyvista is not installed
     """
+    try:
+        package("pyvista")
+    except ValueError as missing:
+        raise RenderingUnavailable(str(missing)) from None
     if sys.platform.startswith("linux"):
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     if not _works(PROBE):

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from tribodyn.extras import package
 from tribodyn.workflows.pictures.shots import Camera, Layer, View, frame
 from tribodyn.workflows.pictures.style import BODY, BODY_2, EDGE, LAYOUT, STATUS
 from tribodyn.workflows.pictures.view import grid_of, polygons
@@ -80,7 +81,7 @@ class Opened:
 
     def _block(self, face: Face | None, below: bool, depth: np.ndarray) -> Any:
         """The elements near a face in the axes of the patch, worn, or a plate where no body is meshed."""
-        import pyvista as pv
+        pv = package("pyvista")
 
         patch, part = self.patch, self.part
         sign = -1.0 if below else 1.0
@@ -130,7 +131,7 @@ class Status:
     status: np.ndarray
 
     def __call__(self, patch: Patch, points: np.ndarray) -> list[Layer]:
-        import pyvista as pv
+        pv = package("pyvista")
 
         corners, pair = patch.shares(points)
         layers = []
@@ -146,7 +147,7 @@ class Status:
 
 def _quadrangles(corners: np.ndarray) -> Any:
     """A surface of quadrangles, four points (4 n, 3) each."""
-    import pyvista as pv
+    pv = package("pyvista")
 
     return pv.PolyData(corners, polygons(np.arange(len(corners)).reshape(-1, 4)))
 
@@ -154,7 +155,7 @@ def _quadrangles(corners: np.ndarray) -> Any:
 def contacts(result: Result) -> tuple[Meeting, ...]:
     """The contacts of a result that can be opened: those whose faces look one way, alone where there is one patch."""
     patch = result.patch
-    if patch is None or not len(patch.faces):
+    if not len(patch.faces):
         return ()
     found = meetings_of(result) or (Meeting("", slice(0, len(patch.area)), patch, ()),)
     return tuple(one for one in found if one.patch.in_one_plane)

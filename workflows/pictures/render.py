@@ -47,7 +47,7 @@ def figures(
     result: Result, deformation: float | None = None, wear: float | None = None
 ) -> dict[str, Callable[[], Figure]]:
     """The pictures that a result has data for, by name; see `draw`."""
-    if result.patch is None or not has_states(result):
+    if not has_states(result):
         return {}
     found: dict[str, Callable[[], Figure]] = {}
     if result.part is not None and result.fields is not None:
@@ -150,7 +150,6 @@ class Moving:
     def __init__(self, result: Result, deformation: float | None = None, wear: float | None = None):
         part, patch, fields = result.part, result.patch, result.fields
         assert part is not None
-        assert patch is not None
         assert fields is not None
         self.result, self.part, self.patch, self.deformation = result, part, patch, deformation
         self.size = float(np.ptp(part.points, axis=0).max())

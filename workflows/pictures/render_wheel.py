@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.spatial import cKDTree
 
+from tribodyn.extras import package
 from tribodyn.geometry.placing import rotation
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.linear.travelling_wave import at_sector
@@ -72,7 +73,7 @@ class Shell:
 
     def at(self, points: np.ndarray) -> Any:
         """The surface where the nodes of the part are at points (n_node, 3) [m]."""
-        import pyvista as pv
+        pv = package("pyvista")
 
         return pv.PolyData(points[self.nodes], self.faces)
 
@@ -201,7 +202,7 @@ class MistunedWheelFilm:
         self.figure.suptitle(named(scene, f"wheel of {self._wheel.n_sectors} mistuned blades"), x=0.01, ha="left")
 
     def _shot(self, at: int, number: int) -> np.ndarray:
-        import pyvista as pv
+        pv = package("pyvista")
 
         instants = self._swings[at].shape[-1]
         moved = self._swings[at][..., (self._first + number * instants // self.count) % instants]

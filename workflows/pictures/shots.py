@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from tribodyn.extras import package
 from tribodyn.workflows.pictures.style import BLUE, BODY, EDGE, GREEN, LAYOUT, PAPER, RED
 
 SHADE = {"ambient": 0.45, "diffuse": 0.6, "specular": 0.0}
@@ -58,7 +59,7 @@ class View:
 
 def shoot(view: View, camera: Camera, size: tuple[int, int] = (960, 720)) -> np.ndarray:
     """(height, width, 3) image of a view, 8 bits a colour."""
-    import pyvista as pv
+    pv = package("pyvista")
 
     plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="none")
     plotter.set_background(PAPER)

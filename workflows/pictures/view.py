@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from tribodyn.extras import package
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.workflows.pictures.style import LAYOUT
 from tribodyn.workflows.result.result import PartMesh, Patch, Result
@@ -56,7 +57,7 @@ def nice(value: float) -> float:
 
 def grid_of(part: PartMesh, points: np.ndarray | None = None, cells: np.ndarray | None = None) -> Any:
     """The mesh of a part as a pyvista grid, or some of its cells; points : (n_node, 3) of its nodes as drawn [m]."""
-    import pyvista as pv
+    pv = package("pyvista")
 
     kind = int(getattr(pv.CellType, part.kind.upper()))
     return pv.UnstructuredGrid(
@@ -76,7 +77,6 @@ def polygons(faces: np.ndarray) -> np.ndarray:
 def looking(result: Result) -> tuple[np.ndarray, np.ndarray]:
     """Where to look from, and what is up: a little aside of the face of body 1, a sector with its outside upwards."""
     part, patch, around = result.part, result.patch, result.facts.around
-    assert patch is not None
     points = patch.points if part is None else part.points
     normal = patch.frames[:, 2].mean(axis=0)
     if around is not None:

@@ -106,7 +106,7 @@ def _loops(results: Sequence[tuple[str, Result]]) -> Chart:
     data = []
     for name, result in results:
         loops, patch = result.loops, result.patch
-        if loops is None or patch is None:
+        if loops is None:
             continue
         size = loop_size(result)
         busiest = int(np.argmax(size.sum(axis=(1, 2))))

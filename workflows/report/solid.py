@@ -28,7 +28,7 @@ def solid(result: Result) -> dict[str, Any] | None:
     states : label, for each state moved vertices of the body, positions of the sides, and fields of the pairs
     """
     patch, part = result.patch, result.part
-    if patch is None or not len(patch.faces):
+    if not len(patch.faces):
         return None
     states = _states(result)
     meetings = meetings_of(result)
@@ -89,7 +89,6 @@ def _states(result: Result) -> list[State]:
 
 
 def _fields(result: Result, state: State) -> dict[str, list[Any]]:
-    assert result.patch is not None
     found: dict[str, list[Any]] = {}
     if result.wear is not None or state.pressure is None:
         found["total wear depth / µm"] = plain(1e6 * state.depth, 5)

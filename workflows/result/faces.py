@@ -85,7 +85,7 @@ class Meeting:
 def meetings_of(result: Result) -> tuple[Meeting, ...]:
     """Every contact with the faces that the mesh of a result has; none without a mesh or without faces."""
     part, patch = result.part, result.patch
-    if part is None or patch is None or not len(patch.faces):
+    if part is None or not len(patch.faces):
         return ()
     named = result.facts.pairs_of_joints or {"": slice(0, len(patch.area))}
     found = []

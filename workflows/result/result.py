@@ -223,7 +223,7 @@ class Result:
     provenance: Mapping[str, str]
     facts: Facts
     stage: Stage
-    patch: Patch | None = None
+    patch: Patch
     part: PartMesh | None = None
     references: References | None = None
     response: Branch | None = None

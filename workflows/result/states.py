@@ -55,7 +55,6 @@ def has_states(result: Result) -> bool:
 def state_of(result: Result, number: int) -> State:
     """The state of a wear row, or of a point of the response curve where nothing wears."""
     patch = result.patch
-    assert patch is not None
     held = [] if result.fields is None else result.fields.row.tolist()
     field = held.index(number) if number in held else None
     if result.wear is not None and len(result.wear.cycles):
@@ -104,7 +103,6 @@ def counted(number: float) -> str:
 
 def friction_of(result: Result) -> np.ndarray:
     """(n_pair,) friction coefficient that the scene gives each pair's contact, nan where it gives none."""
-    assert result.patch is not None
     scene = json.loads(result.provenance["scene"])
     found = np.full(len(result.patch.area), np.nan)
     pairs_of_joints = result.facts.pairs_of_joints
@@ -122,7 +120,6 @@ def instant_status(result: Result, at: int) -> np.ndarray:
     """
     loops, patch = result.loops, result.patch
     assert loops is not None
-    assert patch is not None
     force = loops.force[at]
     status = np.full(force[:, 0].shape, STICKS)
     mu = friction_of(result)

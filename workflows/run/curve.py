@@ -139,7 +139,6 @@ def worn_responses(
     balance : of the unworn contact; follow : what makes a curve of a balance
     """
     assert result.wear is not None
-    assert result.patch is not None
     wear, patch = result.wear, result.patch
     volume = wear.depth @ patch.area
     wanted = volume[-1] * np.arange(1, count + 1) / count

@@ -29,15 +29,6 @@ def peak() -> float:
         return float(unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
 
-def own(pid: int) -> float:
-    """Memory that a process has written and shares with no other one [bytes]; nan where the system cannot count it."""
-    try:
-        lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
-    except OSError:
-        return float("nan")
-    return 1024.0 * sum(int(line.split()[1]) for line in lines if line.startswith("Private_Dirty"))
-
-
 def check(n_dof: int, solver: str = "direct") -> None:
     """Raise ValueError where the factorisation of a model of so many DOFs does not fit into this machine's memory."""
     if solver in ("multigrid", "mumps"):  # none, or perhaps on other hosts

@@ -18,7 +18,7 @@ from tribodyn.fem.part import Part
 from tribodyn.fem.springs import Spring
 from tribodyn.reduction.craig_bampton import craig_bampton
 from tribodyn.reduction.interface_modes import interface_modes
-from tribodyn.reduction.model import ReducedModel, StaticReaction
+from tribodyn.reduction.model import ReducedModel
 from tribodyn.reduction.prescribed import prescribe
 from tribodyn.reduction.relative import body_1_dofs, relative
 from tribodyn.reduction.residual_flexibility import residual_flexibility
@@ -144,9 +144,3 @@ def with_prescribed(scene: MeshScene, part: Part, reduced: ReducedModel) -> Redu
         masters = np.searchsorted(reduced.info.master_dofs, dofs)
         reduced = prescribe(reduced, masters, name, support=support)
     return reduced
-
-
-def reaction_of(reduced: ReducedModel) -> StaticReaction:
-    """What gives the static force at the prescribed nodes of a model that `with_prescribed` made."""
-    assert reduced.info.reaction is not None
-    return reduced.info.reaction

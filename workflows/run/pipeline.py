@@ -58,7 +58,7 @@ def run(
         for line in () if progress.silent else sanity_checks.lines(file, model):
             (progress.say if line.startswith("warning: ") else progress.detail)(line)
         result = earlier or described(file, model.part, model.balance, model.choice)
-        if scene.wears and result.patch is not None:
+        if scene.wears:
             # raises before anything long is begun
             settings.step_limit(scene, result.patch.free_deflection, result.patch.area)
         previous = None if earlier or keep.path is None else store.set_aside(keep.path)

@@ -14,7 +14,6 @@ import numpy as np
 from filelock import FileLock
 
 from tribodyn.fem.part import Part
-from tribodyn.hbm.balance import State
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.workflows.run import modelling, part_reduction
 from tribodyn.workflows.run.contact_surfaces import surface_gap
@@ -105,10 +104,3 @@ def _made(file: SceneFile) -> tuple[Part, ReducedModel]:
         mesh, node_sets = modelling.make_mesh(file, Path(folder))
     part = modelling.make_part(scene, mesh, node_sets, file.folder)
     return part, modelling.plain_model(scene, part)
-
-
-def reaction(file: SceneFile, model: modelling.Model, state: State) -> float:
-    """Static force at the prescribed nodes of a scene in a solved state of its model [N]."""
-    given = next(iter(file.part_scene.prescribed.values()))
-    found = part_reduction.reaction_of(model.balance.model)
-    return float(found.force(given.displacement, state.cycle.force[:, :, 0]).sum())

@@ -36,7 +36,6 @@ def wear_down(
     """Wear until contact is lost; every step is kept as soon as it is done."""
     scene = file.scene
     assert scene.wear is not None
-    assert result.patch is not None
     patch, wear = result.patch, scene.wear
     rows = rows_to_resume(result.wear)
     to_wear = float(patch.area @ patch.free_deflection)

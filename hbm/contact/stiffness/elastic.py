@@ -46,11 +46,3 @@ def require_positive(**lengths: float) -> None:
     for name, value in lengths.items():
         if not (value > 0 and isfinite(value)):
             raise ValueError(f"{name} is {value:g}: it must be a positive finite number (SI units)")
-
-
-def require_shear_within(load: float, shear: float, friction: float) -> None:
-    """Raise ValueError unless 0 <= shear <= friction * load."""
-    if not 0 <= shear <= friction * load:
-        raise ValueError(
-            f"shear force {shear:g} is outside 0 .. {friction * load:g}: beyond friction times load the contact slides"
-        )

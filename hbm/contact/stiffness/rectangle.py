@@ -17,12 +17,12 @@ No reference depth enters: displacements vanish far from the patch. An extruded 
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isfinite, pi, sqrt
+from math import acos, cos, isfinite, pi, sin, sqrt
 
 import numpy as np
+from scipy.optimize import brentq
 
 from tribodyn.hbm.contact.stiffness.elastic import ElasticPair, require_positive
-from tribodyn.hbm.contact.stiffness.rounded import RoundedPunch
 
 N_STRIPS = 5
 """Strips over half of the shorter side on the coarse mesh; the fine mesh has twice as many."""
@@ -77,12 +77,44 @@ def contact_sides(a: float, b: float, load: float, edge_radius: float, pair: Ela
     for _ in range(100):
         old = sides
         sides = (
-            2 * RoundedPunch(a / 2, edge_radius, pair).half_contact(load / old[1]),
-            2 * RoundedPunch(b / 2, edge_radius, pair).half_contact(load / old[0]),
+            2 * half_contact(a / 2, edge_radius, load / old[1], pair),
+            2 * half_contact(b / 2, edge_radius, load / old[0], pair),
         )
         if np.allclose(sides, old, rtol=1e-10, atol=0):
             break
     return sides
+
+
+def half_contact(flat: float, edge_radius: float, load: float, pair: ElasticPair) -> float:
+    """Half-width b of the contact [m] of a punch with rounded edges in plane strain under a load per length [N/m].
+
+    flat : half-width a of the flat [m], 0 for a cylinder (Hertz); edge_radius : R [m], 0 for a sharp punch
+    2 P R / (E* a^2) = (pi - 2 p0) / (2 sin^2 p0) - cot p0 with sin p0 = a/b, solved for psi = pi/2 - p0
+    Source  Ciavarella, Hills and Monno, Proc. IMechE C 212 (1998) 319-328; here 1/E* = sum (1 - nu^2)/E
+    """
+    require_positive(load=load)
+    if edge_radius == 0:
+        return flat
+    if flat == 0:
+        return sqrt(4 * load * edge_radius / (pi * pair.modulus))
+    wanted = 4 * load * edge_radius / (pair.modulus * flat**2)
+    grown = sqrt(1 + 4 * wanted)  # the contact is never wider than that many a
+
+    def excess(psi: float) -> float:
+        return arc_excess(psi) / (wanted * cos(psi) ** 2) - 1
+
+    low = min((0.1 * wanted) ** (1 / 3), 0.5)
+    while excess(low) > 0:
+        low /= 2
+    return flat / cos(brentq(excess, low, acos(1 / (2 * grown)), xtol=1e-300, rtol=1e-14))
+
+
+def arc_excess(psi: float) -> float:
+    """2 psi - sin 2 psi, without cancellation where psi is small."""
+    if psi > 0.05:
+        return 2 * psi - sin(2 * psi)
+    square = (2 * psi) ** 2
+    return (2 * psi) ** 3 / 6 * (1 - square / 20 * (1 - square / 42 * (1 - square / 72)))
 
 
 def flat_rectangle(a: float, b: float, pair: ElasticPair) -> tuple[float, float]:

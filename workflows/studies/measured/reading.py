@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from tribodyn.extras import package
 from tribodyn.hbm.time.ring_down import from_decay
 from tribodyn.workflows.export.curves import DataKind, Function
-from tribodyn.workflows.export.library import library
 from tribodyn.workflows.scene.fields import parsed_direction, unknown_key
 from tribodyn.workflows.scene.units import parse_unit, to_si
 from tribodyn.workflows.studies.measured.measurement import OUTPUT, Kind, Measurement, Run
@@ -105,7 +105,7 @@ def _of_mat(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[
 
 
 def _of_uff(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
-    sets = library("pyuff").UFF(str(path)).read_sets()
+    sets = package("pyuff").UFF(str(path)).read_sets()
     sets = sets if isinstance(sets, list) else [sets]
     length = next((s["length"] for s in sets if s["type"] == 164), 1.0) or 1.0
     units = {DataKind.DISPLACEMENT: "m", DataKind.VELOCITY: "m/s", DataKind.ACCELERATION: "m/s2"}

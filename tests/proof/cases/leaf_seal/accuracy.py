@@ -18,7 +18,8 @@ from threadpoolctl import threadpool_limits
 
 from tests.proof.cases.leaf_seal.figures import MICRO, draw_curve
 from tests.proof.cases.leaf_seal.response import LINER_NODE, LeafResponse, respond
-from tribodyn.hbm.stability.folds_in_time import Coexisting, FoldInTime, coexisting, fold_in_time
+from tests.proof.coexisting import Coexisting, coexisting
+from tribodyn.hbm.stability.folds_in_time import FoldInTime, fold_in_time
 from tribodyn.style import BLUE, GREEN, INK, ORANGE, RED, STYLE
 from tribodyn.workflows.scene.source import read_scene
 

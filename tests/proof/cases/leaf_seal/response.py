@@ -8,12 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
+from tests.proof.chatter import Chatter, chatter
 from tests.proof.problems import follow_response, impact_work, state_at
 from tribodyn.fem.part import Part
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.law import SEPARATES, STICKS
 from tribodyn.hbm.continuation.branch import Branch
-from tribodyn.hbm.stability.chatter import Chatter, chatter
 from tribodyn.hbm.stability.exponents import BranchStability
 from tribodyn.hbm.stability.exponents import mark as mark_stability
 from tribodyn.workflows.run.failure import SolveFailed

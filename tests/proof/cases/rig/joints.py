@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tests.proof.cases.rig.published import OPEN, STUCK
-from tribodyn.reduction.mode_matching import match_kinds
+from tests.proof.mode_matching import match_kinds
 from tribodyn.workflows.scene.scene_file import SceneFile
 from tribodyn.workflows.studies.fits.joint_springs import JointSprings, joint_springs
 

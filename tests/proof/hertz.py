@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import pi
 
-from tribodyn.hbm.contact.stiffness.elastic import ElasticPair, require_positive, require_shear_within
+from tribodyn.hbm.contact.stiffness.elastic import ElasticPair, require_positive
 
 
 @dataclass(frozen=True)
@@ -55,3 +55,11 @@ class SphereContact:
     def _shear_compliance(self) -> float:
         """Sum of (2 - nu)/G over the bodies [1/Pa]."""
         return sum((2 - nu) * 2 * (1 + nu) / young for young, nu in self.pair.bodies)
+
+
+def require_shear_within(load: float, shear: float, friction: float) -> None:
+    """Raise ValueError unless 0 <= shear <= friction * load."""
+    if not 0 <= shear <= friction * load:
+        raise ValueError(
+            f"shear force {shear:g} is outside 0 .. {friction * load:g}: beyond friction times load the contact slides"
+        )

@@ -6,20 +6,21 @@ sums of flat punches. Partial slip is the difference of two normal problems (Jae
 
 A half-plane has no absolute stiffness: every displacement here is taken relative to the point at `depth` under the
 middle of the contact, in both bodies. For two equal bodies of nu = 0.3 a depth of four half-widths gives a square flat
-punch its three-dimensional stiffness; use `rectangle` where the length of the contact is known.
+punch its three-dimensional stiffness; the product has `rectangle` where the length of the contact is known.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import acos, cos, isfinite, log, pi, sin, sqrt
+from math import acos, isfinite, log, pi
 
 import numpy as np
 from scipy.integrate import quad
-from scipy.optimize import brentq
 from scipy.special import xlogy
 
-from tribodyn.hbm.contact.stiffness.elastic import ElasticPair, require_positive, require_shear_within
+from tests.proof.hertz import require_shear_within
+from tribodyn.hbm.contact.stiffness.elastic import ElasticPair, require_positive
+from tribodyn.hbm.contact.stiffness.rectangle import arc_excess, half_contact
 
 
 @dataclass(frozen=True)
@@ -49,29 +50,11 @@ class RoundedPunch:
         """Load per length [N/m] that brings the contact to half-width b [m], for an edge radius above zero."""
         require_positive(edge_radius=self.edge_radius)
         psi = acos(self.half_width / half_contact)
-        return self.pair.modulus * half_contact**2 / (4 * self.edge_radius) * _arc_excess(psi)
+        return self.pair.modulus * half_contact**2 / (4 * self.edge_radius) * arc_excess(psi)
 
     def half_contact(self, load: float) -> float:
-        """Half-width b of the contact [m] under a load per length [N/m].
-
-        2 P R / (E* a^2) = (pi - 2 p0) / (2 sin^2 p0) - cot p0 with sin p0 = a/b, solved for psi = pi/2 - p0.
-        """
-        require_positive(load=load)
-        a, radius = self.half_width, self.edge_radius
-        if radius == 0:
-            return a
-        if a == 0:
-            return sqrt(4 * load * radius / (pi * self.pair.modulus))
-        wanted = 4 * load * radius / (self.pair.modulus * a**2)
-        grown = sqrt(1 + 4 * wanted)  # the contact is never wider than that many a
-
-        def excess(psi: float) -> float:
-            return _arc_excess(psi) / (wanted * cos(psi) ** 2) - 1
-
-        low = min((0.1 * wanted) ** (1 / 3), 0.5)
-        while excess(low) > 0:
-            low /= 2
-        return a / cos(brentq(excess, low, acos(1 / (2 * grown)), xtol=1e-300, rtol=1e-14))
+        """Half-width b of the contact [m] under a load per length [N/m], as the product has it."""
+        return half_contact(self.half_width, self.edge_radius, load, self.pair)
 
     def pressure(self, x: np.ndarray, load: float) -> np.ndarray:
         """Contact pressure [Pa] at positions x [m] from the middle under a load per length [N/m]; zero outside."""
@@ -145,14 +128,6 @@ class RoundedPunch:
             return self._compliance(width, depth, sign) * width * acos(a / width)
 
         return self.pair.modulus / self.edge_radius * quad(rate, a, b, epsabs=0, epsrel=1e-10)[0]
-
-
-def _arc_excess(psi: float) -> float:
-    """2 psi - sin 2 psi, without cancellation where psi is small."""
-    if psi > 0.05:
-        return 2 * psi - sin(2 * psi)
-    square = (2 * psi) ** 2
-    return (2 * psi) ** 3 / 6 * (1 - square / 20 * (1 - square / 42 * (1 - square / 72)))
 
 
 def _edge_logarithm(phi: np.ndarray, p0: float) -> np.ndarray:

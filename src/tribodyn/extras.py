@@ -1,0 +1,28 @@
+"""Packages that only some abilities need, and the extra of the installation that brings each."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+EXTRA = {
+    "imageio_ffmpeg": "pictures",
+    "pyvista": "pictures",
+    "pyarrow": "exports",
+    "pyuff": "exports",
+    "pyamg": "multigrid",
+    "pypardiso": "mkl",
+    "surfalize": "surfaces",
+}
+
+
+def package(name: str) -> Any:
+    """A module of such a package; raises ValueError that says how to install it."""
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        root = name.partition(".")[0]
+        raise ValueError(
+            f"this needs the package {root.replace('_', '-')}: install it with "
+            f'pip install "tribodyn[{EXTRA[root]}]", or all that there is with pip install "tribodyn[all]"'
+        ) from None
