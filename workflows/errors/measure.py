@@ -78,15 +78,20 @@ def measure(
 
 
 def refined(file: SceneFile, first: State, result: Result, options: Options) -> tuple[SceneFile | None, float, str]:
-    """The scene with more elements and modes as far as the limits allow, its ratio, and why there is none."""
+    """The scene with more elements and modes as far as the limits allow, its ratio, and why there is none.
+
+    Where no finer mesh is allowed, one coarser than the scene's own stands in for it, with a ratio below 1
+    """
     contact = first.balance.contact.stiffness.size
     coefficients = 2 * top_of(first, options) + 1
     why = ""
-    for ratio in options.ratios:
+    for ratio in (*options.ratios, 1 / options.coarser):
         try:
             finer, actual = refine.mesh(file, ratio)
         except refine.NoMesh as refusal:
             return None, 1.0, str(refusal)
+        if ratio < 1 <= actual:
+            break  # a given mesh can only be cut
         dofs, unknowns = actual**3 * result.facts.full_dofs, actual**2 * contact * coefficients
         if dofs > options.max_dofs:
             why = f"the refined mesh has some {dofs:.2g} DOFs, above the limit of {options.max_dofs:g}"
@@ -216,8 +221,7 @@ def _worn(file: SceneFile, finer: SceneFile | None, why: str, table: Table, resu
     periods = 0 if wear.periods is None else wear.periods.sum()  # one costs about as much as a solve
     work = float(wear.solves.sum() + periods) * own.balance.contact.stiffness.size * (2 * top + 1)
     ratio = table.ratio or options.ratios[0]
-    steps = options.wear_steps
-    if finer is None or work * ratio**2 > options.max_wear:
+    if finer is None or (ratio > 1 and work * ratio**2 > options.max_wear):
         try:
             finer, ratio = refine.mesh(file, 1 / options.coarser)
         except refine.NoMesh as refusal:
@@ -225,7 +229,8 @@ def _worn(file: SceneFile, finer: SceneFile | None, why: str, table: Table, resu
         if finer is None or ratio >= 1:
             table.refuse(Refinement.COMBINED, why or "the mesh is given and can only be cut", OF_WEAR)
             return
-        finer, steps = refine.modes(finer, options.modes) or finer, 1.0
+        finer = refine.modes(finer, options.modes) or finer
+    steps = options.wear_steps if ratio > 1 else 1.0
     other = refine.wear(refine.harmonics(finer, top), steps)
     how = f"{ratio:.3g} times the elements along every edge, more modes, harmonics 0 to {top}"
     how += f", {steps:g} times the wear steps" if steps > 1 else ""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class Options:
     """Limits count DOFs, unknowns and solves, never seconds: the same scene has the same errors on every machine.
 
-    ratios : elements along every edge over those of the scene; the first that the limits allow is taken
+    ratios : elements along every edge over those of the scene; the first that the limits allow is taken, else `coarser`
     modes : retained modes, or their cutoff, over those of the scene
     harmonics : highest harmonic of the refined balance, at the least; else two more than the scene's highest
     max_dofs : of the refined mesh; some 20 s to reduce on one core
