@@ -11,6 +11,7 @@ import pytest
 import tribodyn as td
 from tests.helpers.command import leave
 from tests.helpers.matrix_scene import matrix_folder
+from tribodyn.workflows import cases
 from tribodyn.workflows.export import formats
 from tribodyn.workflows.pictures import plots
 
@@ -91,8 +92,11 @@ def test_a_blow_rings_down_and_says_what_rings_along(tmp_path: Path, capsys: pyt
 
 def test_a_scene_without_a_frequency_is_inspected_and_does_not_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     path = matrix_folder(tmp_path) / "own.toml"
-    text = path.read_text().replace('frequency = ["35 Hz", "120 Hz"]\n', "")
-    path.write_text(text)
+    path.write_text(path.read_text().replace('frequency = ["35 Hz", "120 Hz"]\n', ""))
     code, _, err = leave(["run", str(path)], capsys)
     assert code == 2
     assert 'response.frequency is missing: give its range, such as ["100 Hz", "200 Hz"]' in err
+    text = (Path(cases.__path__[0]) / "beam" / "beam.toml").read_text()
+    path.write_text(text.replace('frequency = ["380 Hz", "1200 Hz"]', ""))
+    found = td.inspect(path, overrides=["geometry.n_patch=3", "geometry.n_length=2", "geometry.n_height=1"])
+    assert found.record()["mass_kg"] == pytest.approx(0.2 * 0.02**2 * 7860)

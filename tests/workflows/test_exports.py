@@ -22,7 +22,7 @@ from tests.helpers.synthetic_result import LENGTH, WIDTH, block, result
 from tribodyn.reduction import foreign
 from tribodyn.reduction.nastran_matrix import read_op4
 from tribodyn.workflows.command import main as cli
-from tribodyn.workflows.export import curves, formats, matrix_file, tables, vtk
+from tribodyn.workflows.export import formats, matrix_file, tables, vtk
 from tribodyn.workflows.pictures import exploded
 from tribodyn.workflows.result import faces, states, store
 from tribodyn.workflows.result.result import Result
@@ -105,8 +105,8 @@ def test_two_forces_are_no_frequency_response_function() -> None:
     given = result()
     scene = json.loads(given.provenance["scene"])
     scene["loads"]["harmonic"]["more"] = scene["loads"]["harmonic"]["shake"]
-    assert curves.driving_force(given) == pytest.approx(1e4)
-    assert curves.driving_force(replace(given, provenance={**given.provenance, "scene": json.dumps(scene)})) is None
+    assert given.driving_force == pytest.approx(1e4)
+    assert replace(given, provenance={**given.provenance, "scene": json.dumps(scene)}).driving_force is None
 
 
 def test_paraview_reader_opens_the_series(series: Path) -> None:

@@ -141,6 +141,21 @@ def test_factors_are_round(value: float, nice: float) -> None:
     assert view.nice(value) == nice
 
 
+def test_bodies_that_slide_at_rest_are_drawn_into_each_other_by_a_tenth_of_the_thinnest():
+    """A beam of 1 m that bends by 1 mm, and a bolt of 10 mm that is pulled 20 um along it."""
+    cube = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
+    beam, bolt = cube * [1.0, 0.02, 0.02], cube * [0.01, 0.01, 0.05]
+    points, body = np.concatenate([beam, bolt]), np.repeat([0, 1], 8)
+    static = np.zeros((1, 16, 3))
+    static[0, beam[:, 0].argmax(), 2], static[0, beam[:, 0].argmin(), 2] = 1e-3, -1e-3
+    assert view.rest_scale(static, points, body) == view.deformation_scale(static, 1.0) == 50.0
+    static[0, 8:, 2] = -20e-6
+    assert view.rest_scale(static, points, body) == 50.0  # 1 mm, a tenth of the bolt
+    static[0, 8:, 2] = -200e-6
+    assert view.rest_scale(static, points, body) == 5.0
+    assert view.rest_scale(static[:, :8], beam, body[:8]) == 50.0  # one body
+
+
 @pytest.mark.parametrize("over", ["wear", "cycle"])
 def test_a_film_is_written_whole(over: Literal["wear", "cycle"], tmp_path: Path) -> None:
     paths = {path.suffix: path for path in film.film(result(), tmp_path, over, formats=("mp4", "gif"), images=3)}

@@ -155,7 +155,7 @@ class Moving:
         self.size = float(np.ptp(part.points, axis=0).max())
         self.meetings = meetings_of(result)
         static = drawing.at_rest(fields.displacement, result.harmonics)
-        self.rest_scale = deformation or self._rest_scale(static)
+        self.rest_scale = deformation or drawing.rest_scale(static, part.points, bodies(part))
         depth = np.stack([state.depth for state in shown_states(result)])
         self.wear = wear or drawing.wear_scale(patch, depth)
         self.shell = drawing.surface(drawing.grid_of(part))
@@ -164,20 +164,6 @@ class Moving:
         for s in (drawing.swing(d, result.harmonics) for d in fields.displacement):
             reach += [part.points + self.vibration_scale(s) * s, part.points - self.vibration_scale(s) * s]
         self.camera: Camera = frame(np.concatenate(reach), *drawing.looking(result), LAYOUT.view[0] / LAYOUT.view[1])
-
-    def _rest_scale(self, static: np.ndarray) -> float:
-        """The factor that displacements at rest (n_state, n_node, 3) are drawn with: by it no body enters another one.
-
-        Bodies that slide along each other, as a bolt through its nut, do so by no more than a share of the smallest
-        """
-        scale, body = drawing.deformation_scale(static, self.size), bodies(self.part)
-        each = [body == b for b in range(int(body.max()) + 1)]
-        if len(each) == 1:
-            return scale
-        means = np.stack([static[:, own].mean(axis=1) for own in each])
-        apart = float(np.linalg.norm(means[:, None] - means[None], axis=-1).max())
-        least = min(float(np.ptp(self.part.points[own], axis=0).min()) for own in each)
-        return min(scale, drawing.nice(LAYOUT.sunk * least / apart)) if apart > 0 else scale
 
     def vibration_scale(self, vibration: np.ndarray) -> float:
         """The factor that a vibration (n_node, 3) is drawn with."""

@@ -43,6 +43,19 @@ def deformation_scale(displacement: np.ndarray, size: float) -> float:
     return nice(size / 12 / largest) if largest > 0 else 1.0
 
 
+def rest_scale(static: np.ndarray, points: np.ndarray, body: np.ndarray) -> float:
+    """Factor that draws displacements at rest (n_state, n_node, 3), by which bodies hardly enter each other.
+
+    Bodies (n_node,) that slide along each other at points (n_node, 3), as a bolt through its nut, do so by no more than
+    a share of the thinnest
+    """
+    scale, each = deformation_scale(static, float(np.ptp(points, axis=0).max())), range(int(body.max()) + 1)
+    means = np.stack([static[:, body == b].mean(axis=1) for b in each])
+    apart = float(np.linalg.norm(means[:, None] - means[None], axis=-1).max())
+    least = min(float(np.ptp(points[body == b], axis=0).min()) for b in each)
+    return min(scale, nice(LAYOUT.sunk * least / apart)) if apart > 0 else scale
+
+
 def wear_scale(patch: Patch, depth: np.ndarray) -> float:
     """Factor, at least 1, that draws the largest depth on one body as a tenth of the patch."""
     wanted = 0.1 * float(np.sqrt(patch.area.sum()))
