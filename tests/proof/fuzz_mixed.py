@@ -1,4 +1,4 @@
-"""Damage of several kinds at once: two and three keys, tables gone and doubled, files of studies and fits, decks, matrices.
+"""Damage of several kinds at once: keys two and three together, tables, files of studies and fits, decks, matrices.
 
 Each case is a text that something reads: a scene with its changes, a study, a search for an optimum, a fit, a deck of
 three programs, or matrices. It is read, a deck inspected besides, and a scene planned. It ends well, is refused with
