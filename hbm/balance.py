@@ -11,10 +11,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import scipy.linalg as sla
+from scipy.sparse import issparse
 
 from tribodyn.hbm.contact.joint import Contact, Joint
 from tribodyn.hbm.contact.law import STICKS, ContactCycle
@@ -92,6 +93,7 @@ class HarmonicBalance:
     ) -> HarmonicBalance:
         """The balance of a model with one or several joints; their springs become the stuck reference springs.
 
+        Springs of few contacts that are far stiffer than the body get a softer reference: the body would be lost.
         memory : zeros by default: the contact is closed without shear, and a pair that never slips keeps the shear that
             the loads put on it
         Raises  ValueError where joints, loads or frequency do not fit the model
@@ -101,7 +103,8 @@ class HarmonicBalance:
         contact = Contact.of(model, joints)
         if memory is None:
             memory = np.zeros((contact.n_pair, contact.n_state))
-        springs = contact.stiffness if model.residual is None else model.residual.stiffness
+        held = model.residual
+        springs = _reference(contact.stiffness, model, basis, omega_max) if held is None else held.stiffness
         compliance = compliance_of(model, springs, basis, excitation, omega_max)
         return cls(model, contact, basis, excitation, omega_max, memory, compliance)
 
@@ -454,3 +457,41 @@ class Linearisation:
             block[:, s::2] -= cosine * pushed[s::2] - sine * pushed[s + 1 :: 2]
             block[:, s + 1 :: 2] -= sine * pushed[s::2] + cosine * pushed[s + 1 :: 2]
         return full
+
+
+def body_stiffness(model: ReducedModel, basis: HarmonicBasis) -> np.ndarray:
+    """(n_pair, n_component) stiffness of the body against a contact displacement with all others held [N/m]."""
+    system, b = model.at_harmonic(basis.harmonics[-1])
+    return _against(system.stiffness, b).reshape(model.interface.n_pair, -1)
+
+
+def _against(matrix: Any, b: Any) -> np.ndarray:
+    """(n_contact,) what a matrix of the body (n, n) has against each row of the contact map b (n_contact, n)."""
+    matrix, b = (np.asarray(m.toarray() if issparse(m) else m) for m in (matrix, b))
+    length = (np.abs(b) ** 2).sum(axis=1) ** 2  # zero for a component that a pair has not
+    against: np.ndarray = ((b @ matrix) * b.conj()).sum(axis=1).real / np.where(length > 0, length, 1.0)
+    return against
+
+
+def _reference(
+    springs: np.ndarray,
+    model: ReducedModel,
+    basis: HarmonicBasis,
+    omega_max: float,
+    hard: float = 1e5,
+    cut: float = 1e2,
+    most: int = 3000,
+) -> np.ndarray:
+    """Springs (n_pair, n_component) [N/m], those harder than `hard` times the body cut to `cut` times it.
+
+    Where body and springs are both zero, as of a mass on a cubic spring, the reference is the inertia at omega_max. All
+    that of few contacts only (`most` unknowns): where many stick, all would depart from a reference not their own
+    """
+    if springs.size * basis.n_coeff > most:
+        return springs
+    body = body_stiffness(model, basis)
+    if not (springs + body).all():
+        system, b = model.at_harmonic(basis.harmonics[-1])
+        inertia = omega_max**2 * _against(system.mass, b).reshape(springs.shape)
+        springs = np.where((springs == 0) & (body == 0), inertia, springs)
+    return np.where((springs > hard * body) & (body > 0), cut * body, springs)

@@ -40,8 +40,9 @@ def read(path: Path) -> tuple[sp.csr_matrix, Labels | None]:
         raise ValueError(f"{path.name} has lines that are not numbers or not equally many: export it again") from None
     if table.shape[1] not in (3, 5):
         raise ValueError(f"{path.name} has {table.shape[1]} columns: node, dof, node, dof, value or row, column, value")
-    index = table[:, :-1].astype(np.int64)
-    if (index != table[:, :-1]).any():
+    whole = (np.abs(table[:, :-1]) < 2**53) & (table[:, :-1] == np.round(table[:, :-1]))
+    index = np.where(whole, table[:, :-1], 0).astype(np.int64)
+    if not whole.all():
         raise ValueError(f"{path.name} has node, dof or row numbers that are not whole: is the last column the value?")
     labels = None
     if table.shape[1] == 5:

@@ -255,12 +255,13 @@ class ForeignMatrices:
 def from_arrays(mass: Any, stiffness: Any, damping: Any = None, labels: Labels | None = None) -> ForeignMatrices:
     """Matrices that are at hand, dense or sparse, with the checks of `read_matrices`.
 
-    mass, stiffness, damping : (n, n) symmetric [kg], [N/m], [N s/m]; damping None or zero where there is none
+    mass, stiffness, damping : (n, n) symmetric [kg], [N/m], [N s/m]; damping None or zero where there is none, and a
+        stiffness of zero for what its contacts alone hold
     Raises  ValueError: not square, not symmetric, not finite, sizes that differ
     """
     given = {"mass": mass, "stiffness": stiffness, "damping": damping}
     matrices = {part: matrix_files.real(value, f"{part} matrix") for part, value in given.items() if value is not None}
-    return _checked(matrices, labels)
+    return _checked(matrices, labels, floats=True)
 
 
 def read_matrices(
@@ -318,10 +319,13 @@ def read_matrices(
     return _checked(read, rows)
 
 
-def _checked(read: dict[str, sp.csr_matrix], rows: Labels | None) -> ForeignMatrices:
-    """The matrices of one structure, each symmetric and all of one size; a damping of zero is none."""
+def _checked(read: dict[str, sp.csr_matrix], rows: Labels | None, floats: bool = False) -> ForeignMatrices:
+    """The matrices of one structure, each symmetric and all of one size; a damping of zero is none.
+
+    floats : whether a stiffness of zero is meant, as of a mass that only its contacts hold
+    """
     made = {
-        part: _symmetric(matrix, f"{part} matrix")
+        part: _symmetric(matrix, f"{part} matrix", zero=floats and part == "stiffness")
         for part, matrix in read.items()
         if part != "damping" or abs(matrix).max() > 0 or matrix.shape[0] != matrix.shape[1]
     }
@@ -376,7 +380,7 @@ def _without_constrained(matrices: ForeignMatrices, penalty: float = 1e30) -> Fo
     )
 
 
-def _symmetric(matrix: sp.csr_matrix, name: str, rounding: float = 1e-8) -> sp.csr_matrix:
+def _symmetric(matrix: sp.csr_matrix, name: str, rounding: float = 1e-8, zero: bool = False) -> sp.csr_matrix:
     """The matrix, made exactly symmetric, or a ValueError that shows the worst entry.
 
     rounding : largest asymmetry, over the largest entry, that is rounding of the file
@@ -384,7 +388,7 @@ def _symmetric(matrix: sp.csr_matrix, name: str, rounding: float = 1e-8) -> sp.c
     if matrix.shape[0] != matrix.shape[1]:
         raise ValueError(f"the {name} is {matrix.shape[0]} x {matrix.shape[1]}: it must be square")
     largest = abs(matrix).max()
-    if largest == 0:
+    if largest == 0 and not zero:
         raise ValueError(f"the {name} is zero: is it the right variable?")
     difference = abs(matrix - matrix.T).tocoo()
     if difference.nnz and difference.data.max() > rounding * largest:

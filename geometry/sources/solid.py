@@ -82,6 +82,9 @@ def _pieces(raw: RawMesh) -> np.ndarray:
 
 def build(raw: RawMesh, elements: np.ndarray | None = None) -> SolidBody:
     """One body out of elements of a file, all of them by default."""
+    far = np.abs(raw.points).max(initial=0.0)
+    if not far < 1e12:
+        raise ValueError(f"a node lies at {far:g}: correct its coordinates, or the unit of the file")
     cells, number = _chosen(raw, elements)
     fulls = [split.full(block, raw.points) for block in cells]
     kinds = {id(VOLUMES[block.kind][0]) for block in cells}

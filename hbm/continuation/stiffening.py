@@ -20,7 +20,7 @@ import numpy as np
 import scipy.linalg as sla
 
 from tribodyn.hbm import newton
-from tribodyn.hbm.balance import HarmonicBalance, State
+from tribodyn.hbm.balance import HarmonicBalance, State, body_stiffness
 from tribodyn.hbm.homotopy import DECADES, lead
 from tribodyn.hbm.linear.speed_line import compliance_of
 from tribodyn.hbm.newton import NewtonOptions, Solution
@@ -113,19 +113,12 @@ def _softened(balance: HarmonicBalance, level: float, other: HarmonicBalance | N
     most = float(balance.contact.stiffness.max()) * 10.0**level
     contact = balance.contact.with_parameters(lambda p: replace(p, stiffness=np.minimum(p.stiffness, most)))
     residual = balance.model.residual  # made with springs of its own
-    reference = np.minimum(contact.stiffness, _of_the_body(balance)) if residual is None else residual.stiffness
+    own = np.minimum(contact.stiffness, body_stiffness(balance.model, balance.basis))
+    reference = own if residual is None else residual.stiffness
     if other is not None and np.array_equal(other.reference_stiffness, reference.ravel()):
         return other.with_contact(contact)
     compliance = compliance_of(balance.model, reference, balance.basis, balance.excitation, balance.omega_max)
     return replace(balance, contact=contact, compliance=compliance, at_rest=None)
-
-
-def _of_the_body(balance: HarmonicBalance) -> np.ndarray:
-    """(n_pair, n_component) stiffness of the body against a contact displacement with all others held [N/m]."""
-    system, b = balance.model.at_harmonic(balance.basis.harmonics[-1])
-    b = np.asarray(b)
-    against: np.ndarray = np.einsum("ij,jk,ik->i", b, np.asarray(system.stiffness), b.conj(), optimize=True).real
-    return (against / (np.abs(b) ** 2).sum(axis=1) ** 2).reshape(balance.contact.stiffness.shape)
 
 
 def _damped(

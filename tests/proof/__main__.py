@@ -192,6 +192,28 @@ def fuzz(
         raise RuntimeError(f"{len(wrong)} of {sum(not one.like for one in tried)} values did not end as they may")
 
 
+def damage(*, cases: int = 1000, seed: int = 0, seconds: float = 10.0) -> None:
+    """Damage scenes in several keys and tables at once, files of studies, optima and fits, decks and matrices.
+
+    Each is read, a deck inspected and a scene planned besides; exit code 3 where one does not end well or refused.
+
+    Parameters
+    ----------
+    cases
+        How many, drawn at random; half of them are scenes.
+    seed
+        Of the draws.
+    seconds
+        Processor seconds that a case may take.
+    """
+    from tests.proof import fuzz_mixed
+
+    tried = fuzz_mixed.tries(cases, seed, seconds, aside)
+    print(fuzz_mixed.as_table(tried))
+    if wrong := sum(not one.good for one in tried):
+        raise RuntimeError(f"{wrong} of {cases} cases did not end as they may")
+
+
 def branches(*, problems: int = 20, first: int = 0, as_json: Json = False) -> None:
     """Follow response curves of random friction problems, with lift-off and impacts, from both ends.
 
@@ -316,7 +338,21 @@ def wear_steps(scene: str, *, overrides: Overrides = (), out: Path | None = None
 
 
 app = cyclopts.App(name="prove", help="Proofs of tribodyn: speed, extremes, faults, errors of unseen scenes.")
-for word in (bench, extremes, faults, scoreboard, branches, ablations, fuzz, motion, wear_steps, blade, leaf, rig):
+for word in (
+    bench,
+    extremes,
+    faults,
+    scoreboard,
+    branches,
+    ablations,
+    fuzz,
+    damage,
+    motion,
+    wear_steps,
+    blade,
+    leaf,
+    rig,
+):
     app.command(word)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.proof import fuzz, fuzz_result, fuzz_runs
+from tests.proof import fuzz, fuzz_mixed, fuzz_result, fuzz_runs
 from tribodyn.workflows.command import main as cli
 from tribodyn.workflows.result import store
 from tribodyn.workflows.result.verdict import Statement, Verdict
@@ -108,3 +108,18 @@ def test_a_wrong_number_in_a_result_is_seen(tmp_path: Path, monkeypatch: pytest.
     assert verdict(value=-1.0) == "verdict: depth is negative"
     assert verdict(error=float("inf")) == "verdict: depth has an error that is no number"
     assert verdict(error=0.6) == "verdict: depth is stated with an error above 50%"
+
+
+def test_damage_of_several_kinds_at_once_ends_as_it_may() -> None:
+    tried = fuzz_mixed.tries(60, seed=3)
+    assert [one for one in tried if not one.good] == []
+    assert {one.end for one in tried} == {fuzz_mixed.READ, fuzz_mixed.REFUSED}
+    assert len({one.what for one in tried}) > 10
+
+
+def test_a_wrong_end_of_a_damaged_file_is_seen() -> None:
+    def bad() -> object:
+        return {}["key"]
+
+    assert fuzz_mixed._try("scene", "", bad, 10.0).end == "traceback"
+    assert fuzz_mixed._try("scene", "", lambda: np.loadtxt(["x"]), 10.0).good is False

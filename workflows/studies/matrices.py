@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from tribodyn.fem.interface import COMPONENTS, ContactInterface
-from tribodyn.hbm import continuation, newton
+from tribodyn.hbm import continuation
 from tribodyn.hbm.balance import HarmonicBalance, State
 from tribodyn.hbm.contact.joint import Joint, joint_transitions
 from tribodyn.hbm.contact.law import ContactParameters
@@ -21,6 +21,7 @@ from tribodyn.hbm.continuation import nonlinear_modes as modes
 from tribodyn.hbm.continuation.branch import Branch
 from tribodyn.hbm.continuation.branch import amplitude as vibration
 from tribodyn.hbm.continuation.control import constant_response, driven, phase_resonance
+from tribodyn.hbm.continuation.methods.arc_length import solve_along_load
 from tribodyn.hbm.continuation.operating_point import AtFrequency, AtPeak
 from tribodyn.hbm.excitation import Excitation
 from tribodyn.hbm.harmonics import HarmonicBasis
@@ -207,7 +208,7 @@ class Balance:
 
     def solve(self, frequency: float) -> Cycle:
         """The vibration at one frequency [Hz], looked for from rest."""
-        found = newton.solve_from_rest(self.problem, HZ * frequency, self.newton)
+        found = solve_along_load(self.problem, HZ * frequency, self.newton)
         return Cycle(self.problem, found.state, found.outcome)
 
     def peak(self, start: float, stop: float, output: str | None = None) -> Cycle:

@@ -150,18 +150,22 @@ def solve_along_load(balance: HarmonicBalance, omega: float, options: NewtonOpti
     """Solve at one frequency [rad/s] without a neighbouring solution, also where the curve in the load has folds.
 
     Newton from rest and its load ramp are tried first; else the curve of solutions over the load is followed, which
-    leads where a rising load would; where that ends too, friction falls from where all closed pairs stick, and then the
-    contact is stiffened from soft springs
+    leads where a rising load would, or, where it turns back, through no load to the opposite one, whose solution is
+    that of half a period later if all loads have odd harmonics; where that ends too, friction falls from where all
+    closed pairs stick, and then the contact is stiffened from soft springs
     Returns a Solution; its outcome is the one from rest where no way leads to the load
     """
     options = options or NewtonOptions()
     first = newton.solve_from_rest(balance, omega, options)
     if first.converged:
         return first
-    ramp_options = Options(newton=options, patience=Rules.ramp_patience)
-    ramp = follow(parameter.load(balance, omega), 0.0, balance.load_factor, ramp_options)
-    if ramp.parameter[-1] == balance.load_factor:
-        last = newton.solve(balance, omega, ramp.contact[-1].reshape(first.state.x.shape), options)
+    full, loads = balance.load_factor, balance.excitation
+    odd = loads.base is None and all(h % 2 or h == 0 for h, _ in loads.loads)
+    ramp_options = Options(newton=options, patience=Rules.ramp_patience, bounds=(-full, full) if odd else (0.0, full))
+    ramp = follow(parameter.load(balance, omega), 0.0, full, ramp_options)
+    if abs(ramp.parameter[-1]) == full:
+        half_later = (-1.0) ** balance.basis.order if ramp.parameter[-1] < 0 else 1.0
+        last = newton.solve(balance, omega, half_later * ramp.contact[-1].reshape(first.state.x.shape), options)
         if last.converged:
             return last
     found = solve_along_friction(balance, omega, options) or solve_along_stiffness(balance, omega, options)
