@@ -7,7 +7,7 @@ from typing import Any
 
 from tribodyn.hbm.wear.history import LIFE_SHARE
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.summary import first_lost
+from tribodyn.workflows.result.summary import first_lost, order_of_line
 from tribodyn.workflows.result.verdict import NAMES, UNITS, Change, Refinement, Status, Verdict, loaded
 
 Lines = list[tuple[str, str]]
@@ -24,7 +24,7 @@ def numbers(result: Result) -> Lines:
     threads = result.provenance.get("threads", "1")
     return [
         *_model(result, found),
-        *_response(found),
+        *_response(found, order_of_line(result)),
         *(_wear(result, found) if found["depth_max_m"] is not None else ()),
         *((f"  {name}", _joint(joint)) for name, joint in found["joints"].items()),
         ("computing", f"{found['seconds']:.1f} s on {threads} thread{'s' if threads != '1' else ''}"),
@@ -48,10 +48,12 @@ def _model(result: Result, found: dict[str, Any]) -> Lines:
     return shown
 
 
-def _response(found: dict[str, Any]) -> Lines:
+def _response(found: dict[str, Any], order: int | None) -> Lines:
     shown: Lines = []
     if found["peak_hz"] is not None:
         shown.append(("frequency", _course(found, "peak_hz", 1, "Hz")))
+        if order is not None:
+            shown.append(("speed", _course(found, "peak_hz", 60 / order, "rpm")))
         shown.append(("amplitude", _course(found, "peak_m", 1e3, "mm")))
     if found["peak_at_end"]:
         shown.append(("", "no peak: the response is highest at an end of response.frequency, widen it"))
@@ -89,7 +91,7 @@ def _wear(result: Result, found: dict[str, Any]) -> Lines:
     deepest, mean = 1e3 * found["depth_max_m"], 1e3 * found["depth_mean_m"]
     return [
         *((name, f"after {count:.4g} cycles") for name, count in events if count is not None),
-        ("preload", _course(found, "preload_N", 1, "N")),
+        ("preload", _course(found, "preload_N", 1, "N") + ", mean of a cycle"),
         ("cycles", f"{found['cycles']:.4g} ({life})"),
         ("wear depth", f"{deepest:.4f} mm largest, {mean:.4f} mm mean"),
         ("worn volume", f"{1e9 * found['volume_m3']:.5g} mm3: {part:.4g} of body 1, {other:.4g} of the other side"),
@@ -102,7 +104,7 @@ def _joint(joint: dict[str, Any]) -> str:
     shown = f"{joint['pairs']} pairs on {1e6 * joint['area_m2']:.5g} mm2"
     if "preload_N" in joint:
         first, last = joint["preload_N"]
-        shown += f", preload {first:.5g} -> {last:.5g} N, largest depth {1e6 * joint['depth_max_m']:.4g} um, "
+        shown += f", mean preload {first:.5g} -> {last:.5g} N, largest depth {1e6 * joint['depth_max_m']:.4g} um, "
         shown += f"{1e9 * joint['volume_m3']:.4g} mm3, {joint['energy_J']:.4g} J"
         if joint["life_cycles"] is not None:
             shown += f", life {joint['life_cycles']:.4g} cycles"
