@@ -162,9 +162,7 @@ def widened(balance: HarmonicBalance, highest: int, error: float | None = None) 
     excitation = balance.excitation
     if excitation.base is not None:
         excitation = replace(excitation, base=balance.basis.transfer(excitation.base, basis))
-    own, springs = balance.compliance, balance.contact.stiffness.ravel()
-    if balance.model.residual is not None:
-        springs = own.k
+    own, springs = balance.compliance, balance.reference_stiffness
     known = _WIDE.get(own)
     serves = known is not None and known.basis.harmonics[-1] >= top and (known.wanted or 0.0) <= (error or 0.0)
     if known is None or not serves or not np.array_equal(known.k, springs):

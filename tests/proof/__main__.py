@@ -44,8 +44,8 @@ def bench(
         One way of --fe alone: "product", "by hand", "multigrid", "single precision" (a factor of half the size),
         "flexibility" (no contact DOFs in the model) or "single flexibility" (both); can be repeated.
     contact
-        Set-up, memory and seconds of one response at 0+3 on "500", "3k", "12k" or "48k" contact DOFs instead, with
-        residual flexibility and, up to 3k, beside the dense compliance; can be repeated.
+        Set-up, memory and seconds of one response at 0+3 on "500", "1500", "3k", "12k" or "48k" contact DOFs instead,
+        with residual flexibility and, up to 3k, beside the dense compliance; can be repeated.
     out
         File of the plot of --scaling.
     as_json

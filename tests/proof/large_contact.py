@@ -26,8 +26,9 @@ from tribodyn.reduction.residual_flexibility import ResidualFlexibility
 from tribodyn.workflows.run import memory, modelling, settings
 from tribodyn.workflows.scene import scene_file
 
-SIZES = {"500": (13, 200), "3k": (31, 200), "12k": (65, 200), "48k": (127, 6)}  # name -> nodes along a side, points
-DENSE = ("500", "3k")  # sizes at which Craig-Bampton is measured too
+# name -> nodes along a side, points
+SIZES = {"500": (13, 200), "1500": (23, 200), "3k": (31, 200), "12k": (65, 200), "48k": (127, 6)}
+DENSE = ("500", "1500", "3k")  # sizes at which Craig-Bampton is measured too
 WAYS = {"craig_bampton": 60, "residual_flexibility": 24}  # and its modes
 RANGE, HARMONICS, SAMPLES = 200, [0, 1, 2, 3], 100  # points of the scene's range; fewer are taken about its middle
 PROBE_HZ, PROBES = 3000.0, 3  # the highest harmonic at the upper end of the range

@@ -34,6 +34,15 @@ def test_known_parameters_are_found_from_exact_numbers():
     assert "as many numbers as parameters" in found.report()
 
 
+def test_columns_of_long_names_do_not_run_together():
+    long = "contacts.shroud_of_the_next_blade.tangential_stiffness"
+    found = fit([Parameter(long, 1.0, 1e3, (10.0,))], [Measured(long, 4.0, "N/um")], lambda v: np.array([v[long]]))
+    rows = [line.split() for line in found.report().splitlines() if line.startswith(long)]
+    assert [row[0] for row in rows] == [long, long]
+    assert float(rows[0][1]) == 10.0
+    assert [float(value) for value in rows[1][2:5]] == [4.0, 10.0, pytest.approx(4.0)]
+
+
 def test_sensitivities_are_those_of_the_closed_form():
     found = fit(
         [Parameter("k", 1.0, 1e3, (10.0,)), Parameter("m", 0.1, 10.0, (3.0,))],

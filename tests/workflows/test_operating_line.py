@@ -15,6 +15,7 @@ from tribodyn.hbm.continuation.operating_point import AtPeak
 from tribodyn.hbm.linear import travelling_wave as waves
 from tribodyn.workflows.run import modelling
 from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.references import linear_references
 from tribodyn.workflows.run.sanity_checks import check_speed
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.wheels import wheel
@@ -71,6 +72,11 @@ def test_the_peak_of_a_line_is_where_it_meets_a_mode():
     there = wheel.build(scene(5, *LINE[1:], f'wheel.speed="{omega / (4 * np.pi)} Hz"'))
     free, stuck = (float(there.diagram([-2], 1, state)[0, 0]) for state in (False, True))
     assert 2 * np.pi * free < omega < 2 * np.pi * stuck
+    ends = 2 * np.pi * 240, 2 * np.pi * 280
+    along, still = (linear_references(b, "response", *ends) for b in (one, there.wave(-2, (240, 280))))
+    i = int(np.argmin(np.abs(along.omega - omega)))
+    assert along.free[i] == pytest.approx(still.free[i], rel=2e-3)  # between speeds it is interpolated
+    assert along.stuck[i] == pytest.approx(still.stuck[i], rel=2e-3)
 
 
 def test_speeds_and_frequencies_of_a_scene_belong_together():

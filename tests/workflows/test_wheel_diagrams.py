@@ -37,6 +37,27 @@ def test_meetings_are_modes_on_lines_of_engine_orders() -> None:
         assert m.engine_order * m.speed == pytest.approx(frequency[m.diameter, m.family])
 
 
+def test_orders_in_space_excite_waves_against_the_rotation_up_to_half_the_sectors() -> None:
+    """Of four sectors order 1 is the wave -1, and order 3, through the sectors, the wave 1."""
+    with_it, against = np.array([[100.0], [120.0], [150.0]]), np.array([[100.0], [126.0], [150.0]])
+    families = {"stuck": with_it, "stuck, against": against}
+    found = wheel_diagrams.meetings(families, 4, 20.0, 200.0)
+    assert list(found) == ["stuck"]
+    met = {m.engine_order: m.frequency for m in found["stuck"]}
+    assert met == {1: 126.0, 2: 150.0, 3: 120.0, 4: 100.0}  # none above the number of sectors
+
+
+def test_a_campbell_diagram_has_no_entry_without_a_curve() -> None:
+    speeds = np.array([0.0, 50.0, 100.0])
+    stuck = np.full((3, 1, 2), [150.0, 300.0])
+    waves = {"free": np.full_like(stuck, np.nan), "stuck": stuck}
+    figure = wheel_diagrams.campbell(speeds, waves, (-2,), {-2: [75.0]})
+    shown = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert shown == ["stuck, wave -2", "critical speed"]
+    figure = wheel_diagrams.campbell(speeds, {**waves, "free": stuck / 2}, (-2,), {})
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["free", "stuck, wave -2"]
+
+
 def test_the_command_draws_the_modes_of_a_wheel(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     changes = [word for text in (*FEW_SECTORS, "geometry.n_span=3") for word in ("--set", text)]
     speeds = ["--from", "3000rpm", "--to", "9000rpm", "--speeds", "2", "--families", "2", "--order", "1", "2"]

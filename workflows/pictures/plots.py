@@ -26,7 +26,7 @@ from tribodyn.workflows.pictures.loops import has_friction, loop_of, loop_size
 from tribodyn.workflows.pictures.style import BLUE, CYCLE, GREEN, GREY, INK, ORANGE, RED, STATUS, STYLE, WEAR_MAP
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import has_states, shown_cycles, state_of
-from tribodyn.workflows.result.summary import LARGEST_BEND, size_of
+from tribodyn.workflows.result.summary import LARGEST_BEND, order_of_line, size_of
 
 BIFURCATIONS = {"fold": "o", "flip": "s", "Neimark-Sacker": "D"}  # markers
 
@@ -87,6 +87,10 @@ def response(result: Result) -> Figure:
         drawn = np.concatenate([line.get_ydata() for line in axes.lines])
         log_axis(axes.yaxis, *_ends(drawn))
         beyond(axes, result, scale)
+        if (order := order_of_line(result)) is not None:
+            axes.secondary_xaxis("top", functions=(lambda f: 60 * f / order, lambda n: order * n / 60)).set_xlabel(
+                f"speed / rpm (engine order {order})"
+            )
         axes.set(xlabel="frequency / Hz", ylabel=f"amplitude / {unit}", title=titled(result, "frequency response"))
         figure.legend(loc="outside lower center", ncols=3)
     return figure

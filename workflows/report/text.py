@@ -9,7 +9,7 @@ from tribodyn.hbm.wear.history import LIFE_SHARE
 from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.readable import UNKNOWN, digits, measured, rounded
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.summary import LARGEST_BEND, first_lost, size_of
+from tribodyn.workflows.result.summary import LARGEST_BEND, first_lost, order_of_line, size_of
 from tribodyn.workflows.result.verdict import NAMES, UNITS, Statement, Status, loaded
 
 Lines = list[tuple[str, str]]
@@ -63,6 +63,9 @@ def _response_in_brief(result: Result, found: dict[str, Any], judged: dict[str, 
     shown = [f"peak      {peaks[0]}{', unworn' if found['wear_steps'] else ''}"]
     if found["wear_steps"]:
         shown.append(f"          {peaks[1]}, at the end of wear")
+    if (order := order_of_line(result)) is not None:
+        speeds = [f"{60 * hertz / order:.{count[0]}g} rpm" for hertz in found["peak_hz"]]
+        shown.append(f"speed     {speeds[0]}" + (f", {speeds[1]} at the end of wear" if found["wear_steps"] else ""))
     if found["load_factor"] is not None:
         ends = [abs(result.driving_force or 1.0) * factor for factor in found["load_factor"]]
         force = [f"{end:.3g} times the loads" if result.driving_force is None else measured(end, "N") for end in ends]
@@ -87,7 +90,7 @@ def _wear_in_brief(result: Result, found: dict[str, Any], judged: dict[str, Stat
     first, last = (measured(force, "N", _of(judged, "preload")) for force in found["preload_N"])
     work = measured(found["energy_J"], "J", UNKNOWN)
     shown.append(f"depth     {deepest} at most, {mean} on average")
-    shown.append(f"preload   {first} at first, {last} in the end")
+    shown.append(f"preload   {first} at first, {last} in the end, means of a cycle")
     shown.append(f"worn      {measured(found['volume_m3'], 'm3', count)} by {work} of friction work")
     for name, joint in list(found["joints"].items())[:MOST_JOINTS]:
         if "depth_max_m" in joint:

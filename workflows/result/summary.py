@@ -114,6 +114,12 @@ def _lives(result: Result) -> dict[str, float]:
     return {name: life for name, life in lives.items() if life is not None}
 
 
+def order_of_line(result: Result) -> int | None:
+    """Engine order of an operating line, along which the frequency is that many times the speed; None for no line."""
+    wheel = json.loads(result.provenance.get("scene", "{}")).get("wheel") or {}
+    return abs(wheel["engine_order"]) if wheel.get("sweep") == "speed" else None
+
+
 def _wear_table(result: Result) -> dict[str, Any]:
     return dict(json.loads(result.provenance.get("scene", "{}")).get("wear") or {})
 

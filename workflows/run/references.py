@@ -20,12 +20,14 @@ class LinearOptions:
     """How linear amplitudes are computed.
 
     points : frequencies of a curve; between : beside the resonances themselves, to find the largest amplitude
+    speeds : of an operating line at which they are computed, linear between
     modes : that are summed; block : frequencies solved at once
     rigid : of the square of the mean frequency, below which an eigenvalue is that of a motion as a rigid body
     """
 
     points: int = 401
     between: int = 41
+    speeds: int = 9
     modes: int = 100
     block: int = 32
     rigid: float = 1e-6
@@ -37,12 +39,15 @@ LINEAR = LinearOptions()
 def linear_references(balance: HarmonicBalance, output: str, start: float, stop: float) -> References:
     """Amplitudes of an output, free and stuck, between two frequencies [rad/s], under the loads of the balance."""
     omega = np.linspace(start, stop, LINEAR.points)
-    stuck = _amplitudes(balance, balance.contact.stiffness, output, omega)
-    return References(omega, _amplitudes(balance, None, output, omega), stuck)
+    stuck = _on_line(balance, balance.contact.stiffness, output, omega)
+    return References(omega, _on_line(balance, None, output, omega), stuck)
 
 
 def highest_linear(balance: HarmonicBalance, output: str, start: float, stop: float) -> float:
     """Largest amplitude of an output between two frequencies [rad/s], free or stuck [m]; infinite if unconstrained."""
+    if balance.model.along is not None:  # at each of its speeds: more than on the line itself
+        speeds = [balance.standing(float(omega)) for omega in np.linspace(start, stop, LINEAR.speeds)]
+        return max(highest_linear(one, output, start, stop) for one in speeds)
     states = (None, balance.contact.stiffness)
     found = np.concatenate([_resonances(balance, springs) for springs in states])
     if (found < np.sqrt(LINEAR.rigid) * (start + stop) / 2).any():
@@ -74,6 +79,18 @@ def _resonances(balance: HarmonicBalance, springs: np.ndarray | None) -> np.ndar
         lam = sla.eigvalsh(stiffness, system.mass, subset_by_index=(0, min(LINEAR.modes, system.n_dof) - 1))
         found.append(np.sqrt(np.maximum(lam, 0.0)) / h)
     return np.concatenate(found)
+
+
+def _on_line(balance: HarmonicBalance, springs: np.ndarray | None, output: str, omega: np.ndarray) -> np.ndarray:
+    """As `_amplitudes`, where the speed of a wheel goes with the frequency at that speed."""
+    if balance.model.along is None:
+        return _amplitudes(balance, springs, output, omega)
+    speeds, found = np.linspace(omega[0], omega[-1], LINEAR.speeds), np.zeros(len(omega))
+    for own in speeds:
+        weight = np.maximum(1 - np.abs(omega - own) / (speeds[1] - speeds[0]), 0.0)
+        near = weight > 0
+        found[near] += weight[near] * _amplitudes(balance.standing(float(own)), springs, output, omega[near])
+    return found
 
 
 def _amplitudes(balance: HarmonicBalance, springs: np.ndarray | None, output: str, omega: np.ndarray) -> np.ndarray:

@@ -128,20 +128,22 @@ class Identification:
 
     def report(self) -> str:
         """Tables of parameters, of numbers before and after, and of sensitivities."""
-        lines = [f"{'parameter':24}{'before':>12}{'found':>12}  {'unit':8}verdict"]
+        wide = max(24, *(len(p.name) + 2 for p in self.parameters))
+        lines = [f"{'parameter':{wide}}{'before':>12}{'found':>12}  {'unit':8} verdict"]
         for i, p in enumerate(self.parameters):
-            lines.append(f"{p.name:24}{self.origin[i]:12.4g}{self.values[i]:12.4g}  {p.unit:8}{self.verdict(i)}")
+            lines.append(f"{p.name:{wide}}{self.origin[i]:12.4g}{self.values[i]:12.4g}  {p.unit:8} {self.verdict(i)}")
         names = "".join(f"{p.name:>{max(14, len(p.name) + 2)}}" for p in self.parameters)
-        lines += ["", f"{'number':30}{'measured':>10}{'before':>10}{'after':>10}{'error':>9}   sensitivity to{names}"]
+        called = [f"{m.name} [{m.unit}]" if m.unit else m.name for m in self.measured]
+        wide = max(30, *(len(name) + 2 for name in called))
+        head = "".join(f"{name:>11}" for name in ("measured", "before", "after"))
+        lines += ["", f"{'number':{wide}}{head}{'error':>10}   sensitivity to{names}"]
         for i, m in enumerate(self.measured):
             error = f"{100 * (self.after[i] / m.value - 1):+.1f} %"
             slopes = "".join(
                 f"{self.sensitivity[i, j]:{max(14, len(p.name) + 2)}.3f}" for j, p in enumerate(self.parameters)
             )
-            name = f"{m.name} [{m.unit}]" if m.unit else m.name
-            lines.append(
-                f"{name:30}{m.value:10.4g}{self.before[i]:10.4g}{self.after[i]:10.4g}{error:>9}   {'':14}{slopes}"
-            )
+            numbers = "".join(f"{value:11.4g}" for value in (m.value, self.before[i], self.after[i]))
+            lines.append(f"{called[i]:{wide}}{numbers}{error:>10}   {'':14}{slopes}")
         lines.append(f"root mean square of the errors: {100 * self.rms:.2f} %; {self.evaluations} evaluations")
         return "\n".join(lines)
 
