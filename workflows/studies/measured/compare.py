@@ -209,7 +209,7 @@ def compare(
     scene: Source,
     measurement: AnyPath,
     *,
-    facts: Sequence[str] | Mapping[str, str] = (),
+    facts: Sequence[str] = (),
     resonance: bool = False,
     band: Sequence[str] = (),
     overrides: Overrides = (),
@@ -226,8 +226,7 @@ def compare(
     Raises  ValueError for a measurement that cannot be read or does not belong to the scene; SolveFailed
     """
     report = reporter(progress)
-    given = facts if isinstance(facts, Mapping) else dict(_named(text) for text in facts)
-    measured = read(Path(measurement), given)
+    measured = read(Path(measurement), dict(_named(text) for text in facts))
     files = changed(scene, overrides, band)
     own = files[""]
     try:
