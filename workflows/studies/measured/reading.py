@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from tribodyn.hbm.time.ring_down import from_decay
+from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.workflows.export.curves import DataKind, Function
 from tribodyn.workflows.export.library import library
 from tribodyn.workflows.scene.fields import parsed_direction, unknown_key
@@ -240,7 +241,10 @@ def _decayed(name: str, control: str, time: np.ndarray, values: np.ndarray, orde
     even = time[0] + step.mean() * np.arange(len(time))
     spectrum = np.abs(np.fft.rfft((values - values.mean()) * np.hanning(len(values))))
     guess = 2 * np.pi * max(int(spectrum.argmax()), 1) / (step.mean() * len(values))
-    found = from_decay(even, values, guess)
+    try:
+        found = from_decay(even, values, guess)
+    except IntegrationFailed as several:
+        raise ValueError(str(several)) from None
     none = np.full((len(found.omega), 2), np.nan)
     x = (found.amplitude / found.omega**order).astype(complex)
     return Run(name, control, found.omega / (2 * np.pi), x, none[:, 0], found.damping, none)
