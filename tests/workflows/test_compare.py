@@ -121,6 +121,21 @@ def test_a_decay_is_read_as_the_backbone_that_it_follows(tmp_path: Path) -> None
     assert run.amplitude.max() == pytest.approx(1e-4, rel=0.06)
 
 
+def test_a_small_decay_at_the_frequency_and_damping_at_rest_is_that_of_the_scene(tmp_path: Path) -> None:
+    """Stuck, the beam is linear: a decay of its own frequency and damping has the decrement that is computed."""
+    overrides = (*SMALL, "contact.friction=100", "backbone.modal_amplitude=[1e-6, 1e-5]", "backbone.points=8")
+    at_rest = td.studies.backbone("beam_thesis", overrides=overrides).record()
+    w, zeta = 2 * np.pi * at_rest["reference_hz"], at_rest["damping"][0]
+    time = np.arange(0.0, 24 * 2 * np.pi / w, 2 * np.pi / w / 64)
+    size = 0.5 * at_rest["amplitude_m"][-1]
+    write_columns(
+        {"time_s": time, "displacement_m": size * np.exp(-zeta * w * time) * np.cos(w * time)}, tmp_path / "decay.csv"
+    )
+    off = td.studies.compare("beam_thesis", tmp_path / "decay.csv", overrides=overrides).largest()
+    assert off["frequency_hz_difference"] < 1e-4
+    assert off["damping_difference"] < 0.01
+
+
 def test_repeated_runs_are_their_mean_with_their_scatter() -> None:
     hertz = np.linspace(1.0, 2.0, 5)
     none = np.full((5, 2), np.nan)

@@ -75,7 +75,7 @@ def _at_amplitude(found: Run, run: Run) -> Run:
     for end in (a[0], a[-1]):
         at = np.where(np.abs(at - end) < SAME, end, at)
     hertz, damping, force = (
-        np.exp(PchipInterpolator(a, np.log(values[order]), extrapolate=False)(at))
+        PchipInterpolator(a, values[order], extrapolate=False)(at)
         if np.isfinite(values).all()
         else np.full(len(at), np.nan)
         for values in (found.frequency, found.damping, found.force)

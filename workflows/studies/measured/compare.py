@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,13 +24,29 @@ from tribodyn.workflows.studies.measured.reading import read
 from tribodyn.workflows.studies.measured.resonance import prepared
 from tribodyn.workflows.studies.variation import changed
 
-WHAT = {
-    "frequency_hz": "frequency",
-    "damping": "damping",
-    "force_N": "force",
-    "amplitude_m": "amplitude",
-    "phase_deg": "phase",
-}
+
+@dataclass(frozen=True)
+class Shown:
+    """How a quantity is printed and drawn: its word, unit, factor from SI, and whether its axis is logarithmic."""
+
+    word: str
+    unit: str
+    factor: float = 1.0
+    log: bool = False
+
+    @property
+    def label(self) -> str:
+        """Of an axis."""
+        return f"{self.word} / {self.unit}" if self.unit else self.word
+
+    def value(self, x: float) -> str:
+        """With its unit."""
+        return f"{self.factor * x:.5g} {self.unit}" if np.isfinite(x) else "-"
+
+    def off(self, x: float, sign: str = "+") -> str:
+        """A difference: relative, of a phase in degrees."""
+        relative = self.word != "phase"
+        return f"{(100 if relative else 1) * x:{sign}.3g} {'%' if relative else 'deg'}" if np.isfinite(x) else "-"
 
 
 @dataclass(frozen=True)
@@ -46,49 +62,49 @@ class Compared:
     runs: tuple[Beside, ...]
     band: Mapping[str, tuple[Beside, ...]]
 
+    @property
+    def along(self) -> str:
+        """Column over which the others are compared."""
+        return {"response": "frequency_hz", "backbone": "amplitude_m", "modes": "number"}[self.measured.kind]
+
     def rows(self) -> list[dict[str, Any]]:
         """A row for each measured point; `X` measured, `computed_X`, `X_difference` (relative, of a phase absolute)."""
         found = []
         for k, one in enumerate(self.runs):
-            others = [changed_runs[k] for changed_runs in self.band.values()]
-            measured, computed = (self._quantities(run) for run in (one.measured, one.computed))
-            least, most = (
-                {name: limit([self._quantities(b.computed)[name] for b in (one, *others)], axis=0) for name in computed}
-                for limit in (np.min, np.max)
-            )
-            for i in range(len(one.measured.frequency)):
-                row: dict[str, Any] = {"run": one.measured.name}
-                if self.measured.kind == "response":
-                    row["frequency_hz"] = float(one.measured.frequency[i])
-                if self.measured.kind == "backbone":
-                    row["amplitude_m"] = float(one.measured.amplitude[i])
-                for name, values in measured.items():
-                    ours, theirs = float(computed[name][i]), float(values[i])
-                    row |= {name: theirs, f"computed_{name}": ours, f"{name}_difference": _apart(name, theirs, ours)}
-                    if others:
-                        row |= {f"least_{name}": float(least[name][i]), f"most_{name}": float(most[name][i])}
-                for name, errors in zip(self._scattered(), one.measured.errors[i], strict=True):
-                    if np.isfinite(errors) and name in measured:
-                        row[f"{name}_scatter"] = float(errors)
-                found.append(row)
+            measured, computed = self._columns(one.measured), self._columns(one.computed)
+            columns: dict[str, np.ndarray] = {self.along: measured.pop(self.along)}
+            for name, values in measured.items():
+                columns |= {name: values, f"computed_{name}": computed[name]}
+                columns[f"{name}_difference"] = _apart(name, values, computed[name])
+                if self.band:
+                    every = [computed[name], *(self._columns(b[k].computed)[name] for b in self.band.values())]
+                    columns |= {f"least_{name}": np.min(every, axis=0), f"most_{name}": np.max(every, axis=0)}
+            for name, errors in self._errors(one.measured).items():
+                columns[f"{name}_scatter"] = errors
+            rows = np.array([*columns.values()]).T
+            found += [{"run": one.measured.name, **dict(zip(columns, map(float, row), strict=True))} for row in rows]
         return found
 
-    def _quantities(self, run: Run) -> dict[str, np.ndarray]:
-        """What is compared at the points of a run."""
-        if self.measured.kind != "response":
-            found = {"frequency_hz": run.frequency, "damping": run.damping}
-            return found | ({"force_N": run.force} if self.measured.kind == "backbone" else {})
-        phase = {"phase_deg": np.degrees(np.angle(run.displacement))} if self.measured.phased else {}
-        return {"amplitude_m": run.amplitude, **phase}
+    def _columns(self, run: Run) -> dict[str, np.ndarray]:
+        """What is compared, and over what."""
+        if self.measured.kind == "response":
+            phase = {"phase_deg": np.degrees(np.angle(run.displacement))} if self.measured.phased else {}
+            return {"frequency_hz": run.frequency, "amplitude_m": run.amplitude, **phase}
+        found = {"frequency_hz": run.frequency, "damping": run.damping}
+        if self.measured.kind == "modes":
+            return {"number": np.arange(1.0, 1 + len(run.frequency)), **found}
+        return {"amplitude_m": run.amplitude, **found, "force_N": run.force}
 
-    def _scattered(self) -> tuple[str, str]:
-        return "frequency_hz", "amplitude_m" if self.measured.kind == "response" else "damping"
+    def _errors(self, run: Run) -> dict[str, np.ndarray]:
+        """Relative scatter of what has one."""
+        names = ("", "amplitude_m") if self.measured.kind == "response" else ("frequency_hz", "damping")
+        return {n: e for n, e in zip(names, run.errors.T, strict=True) if n and np.isfinite(e).any()}
 
     def largest(self) -> dict[str, float | None]:
         """Largest difference of every quantity over all points that the scene reaches, None where there is none."""
         rows, found = self.rows(), {}
-        for name in dict.fromkeys(n for row in rows for n in row if n.endswith("_difference")):
-            sizes = [abs(row[name]) for row in rows if np.isfinite(row.get(name, np.nan))]
+        for name in (n for n in rows[0] if n.endswith("_difference")):
+            sizes = [abs(row[name]) for row in rows if np.isfinite(row[name])]
             found[name] = max(sizes) if sizes else None
         return found
 
@@ -96,15 +112,14 @@ class Compared:
         """Of every run of a response: frequency and amplitude of the highest point, measured and computed."""
         found = []
         for one in self.runs if self.measured.kind == "response" else ():
+            tops = [(r.frequency[i], r.amplitude[i]) for r in (one.measured, one.curve) for i in [r.amplitude.argmax()]]
             row: dict[str, Any] = {"run": one.measured.name, "force_N": float(one.computed.force[0])}
-            for name, run in (("", one.measured), ("computed_", one.curve)):
-                top = int(run.amplitude.argmax())
+            for name, ours, theirs in zip(("frequency_hz", "amplitude_m"), tops[1], tops[0], strict=True):
                 row |= {
-                    f"{name}frequency_hz": float(run.frequency[top]),
-                    f"{name}amplitude_m": float(run.amplitude[top]),
+                    name: float(theirs),
+                    f"computed_{name}": float(ours),
+                    f"{name}_difference": float(ours / theirs - 1),
                 }
-            for name in ("frequency_hz", "amplitude_m"):
-                row[f"{name}_difference"] = row[f"computed_{name}"] / row[name] - 1
             found.append(row)
         return found
 
@@ -118,104 +133,83 @@ class Compared:
 
     def _outside(self) -> int:
         """Points that the scene does not reach."""
-        key = "computed_amplitude_m" if self.measured.kind == "response" else "computed_frequency_hz"
-        return sum(not np.isfinite(row[key]) for row in self.rows())
+        first = "amplitude_m" if self.measured.kind == "response" else "frequency_hz"
+        return sum(not np.isfinite(row[f"computed_{first}"]) for row in self.rows())
+
+    def _shown(self) -> dict[str, Shown]:
+        unit, scale = length_unit(max(float(np.nan_to_num(one.measured.amplitude).max()) for one in self.runs))
+        return {
+            "number": Shown("mode", ""),
+            "frequency_hz": Shown("frequency", "Hz"),
+            "damping": Shown("damping", "%", 100.0, log=True),
+            "amplitude_m": Shown("amplitude", unit, scale, log=True),
+            "phase_deg": Shown("phase", "deg"),
+            "force_N": Shown("force", "N", log=True),
+        }
 
     def lines(self) -> list[str]:
-        """For people: peaks or points, measured, computed and the difference."""
-        told = {
-            f"largest {name.removesuffix('_difference')}": "nothing to compare" if v is None else _difference(name, v)
-            for name, v in self.largest().items()
-        }
-        if outside := self._outside():
-            told["outside"] = f"{outside} points are beyond what the scene computes"
-        return [*self._table(), *named_lines((name.split("_")[0] + " off", text) for name, text in told.items())]
-
-    def _table(self) -> Iterator[str]:
-        rows = self.peaks() or self.rows()
-        names = [n for n in WHAT if f"computed_{n}" in rows[0] and any(np.isfinite(row[n]) for row in rows)]
-        first = "amplitude_m" if self.measured.kind == "backbone" else "run"
-        yield (
-            f"{'run':24}"
-            + (f"{'amplitude':>12}" if first != "run" else "")
-            + "".join(f"{WHAT[n]:>12}{'computed':>12}{'':>10}" for n in names)
-        )
+        """For people: peaks or points, measured, computed and the difference; the largest of all points below."""
+        rows, shown = self.peaks() or self.rows(), self._shown()
+        names = [n for n in shown if f"{n}_difference" in rows[0] and any(np.isfinite(row[n]) for row in rows)]
+        first = [] if self.measured.kind == "response" else [self.along]
+        heads = [shown[n].word for n in first] + [w for n in names for w in (shown[n].word, "computed", "")]
+        table = [f"{'run':20}" + "".join(f"{head:>13}" for head in heads)]
         for row in rows:
-            cells = "".join(
-                f"{_shown(n, row[n]):>12}{_shown(n, row[f'computed_{n}']):>12}"
-                f"{_difference(n, row[f'{n}_difference'], True):>10}"
-                for n in names
-            )
-            yield f"{row['run'][:23]:24}" + (f"{_shown(first, row[first]):>12}" if first != "run" else "") + cells
+            cells = [shown[n].value(row[n]) for n in first]
+            for n in names:
+                cells += [
+                    shown[n].value(row[n]),
+                    shown[n].value(row[f"computed_{n}"]),
+                    shown[n].off(row[f"{n}_difference"]),
+                ]
+            table.append(f"{row['run'][:20]:20}" + "".join(f"{cell:>13}" for cell in cells))
+        off = {n.removesuffix("_difference"): v for n, v in self.largest().items() if v is not None}
+        table += named_lines((f"{shown[n].word} off", f"{shown[n].off(v, '')} at most") for n, v in off.items())
+        outside = self._outside()
+        return [*table, *named_lines([("outside", f"{outside} points, not reached")] if outside else [])]
 
     def write(self, folder: Path) -> list[Path]:
         """Write compare.csv and compare.png."""
         rows = self.rows()
-        names = list(dict.fromkeys(name for row in rows for name in row))
-        columns = {name: [row.get(name, "") for row in rows] for name in names}
-        return write_files(folder, {"compare": columns}, {"compare": self.plot()})
+        return write_files(
+            folder, {"compare": {n: [row[n] for row in rows] for n in rows[0]}}, {"compare": self.plot()}
+        )
 
     def plot(self) -> Figure:
         """Amplitude, phase and force over frequency, or frequency, damping and force over amplitude."""
-        first = self._quantities(self.runs[0].measured)
-        known = [n for n in first if any(np.isfinite(self._quantities(one.measured)[n]).any() for one in self.runs)]
-        names = [*known, *(["force_N"] if self.measured.kind == "response" else [])]
-        unit, scale = length_unit(
-            max(float(one.measured.amplitude.max()) for one in self.runs) if self.measured.kind != "modes" else 1.0
-        )
+        shown, place = self._shown(), self.along
+        columns = [self._columns(one.measured) for one in self.runs]
+        names = [n for n in columns[0] if n != place and any(np.isfinite(c[n]).any() for c in columns)]
+        names += ["force_N"] if self.measured.kind == "response" else []
         with axes_of(7.2, 1.0 + 2.4 * len(names), rows=len(names)) as (figure, found):
-            for axes, name in zip(np.atleast_1d(found), names, strict=True):
+            every = np.atleast_1d(found)
+            for axes, name in zip(every, names, strict=True):
                 for k, one in enumerate(self.runs):
-                    self._draw(axes, name, k, one, scale)
-                axes.set_ylabel(
-                    {
-                        "amplitude_m": f"amplitude / {unit}",
-                        "frequency_hz": "frequency / Hz",
-                        "damping": "damping ratio / %",
-                        "force_N": "force / N",
-                        "phase_deg": "phase / deg",
-                    }[name]
-                )
-                if name in ("amplitude_m", "damping", "force_N") and self.measured.kind != "modes":
-                    axes.set_yscale("log")
-            along = {"response": "frequency / Hz", "backbone": f"amplitude / {unit}", "modes": "frequency / Hz"}
-            axes.set_xlabel(along[self.measured.kind])
-            if self.measured.kind == "backbone":
-                axes.set_xscale("log")
-            top = np.atleast_1d(found)[0]
-            top.set_title(named(self.name, f"beside {self.measured.source}"))
-            top.legend(fontsize=9)
+                    once = "" if not k else "_"  # in the legend
+                    for other in self.band.values():
+                        self._draw(axes, name, other[k].curve, fmt="-", color=GREY, label=f"{once}changed")
+                    look = {"fmt": "os^dv"[k % 5], "color": ORANGE, "ms": 3.5, "mfc": "none"}
+                    self._draw(axes, name, one.measured, label=f"measured, {one.measured.name}", **look)
+                    curve, mark = (one.computed, "x") if self.measured.kind == "modes" else (one.curve, "-")
+                    self._draw(axes, name, curve, fmt=mark, color=BLUE, label=f"{once}computed")
+                axes.set(ylabel=shown[name].label, yscale="log" if shown[name].log else "linear")
+            every[-1].set(xlabel=shown[place].label, xscale="log" if shown[place].log else "linear")
+            every[0].set_title(named(self.name, f"beside {self.measured.source}"))
+            every[0].legend(fontsize=9)
         return figure
 
-    def _draw(self, axes: Any, name: str, k: int, one: Beside, scale: float) -> None:
-        def place(run: Run) -> np.ndarray:
-            return scale * run.amplitude if self.measured.kind == "backbone" else run.frequency
-
-        def height(run: Run) -> np.ndarray:
-            factor = {"damping": 100.0, "amplitude_m": scale}.get(name, 1.0)
-            return factor * (run.force if name == "force_N" else self._quantities(run)[name])
-
-        for other in self.band.values():
-            axes.plot(
-                place(other[k].curve), height(other[k].curve), color=GREY, lw=0.8, label="changed" if not k else None
-            )
-        marks = {"color": ORANGE, "marker": "os^dv"[k % 5], "ms": 3.5, "ls": "", "mfc": "none"}
-        errors = dict(zip(self._scattered(), one.measured.errors.T, strict=True)).get(name)
-        x, y = place(one.measured), height(one.measured)
-        if errors is not None and np.isfinite(errors).any():
-            axes.errorbar(x, y, yerr=y * np.nan_to_num(errors), color=ORANGE, lw=0.8, ls="")
-        axes.plot(x, y, label=f"measured, {one.measured.name}", **marks)
-        if self.measured.kind == "modes":
-            axes.plot(place(one.computed), height(one.computed), "x", color=BLUE, label="computed")
-        else:
-            axes.plot(place(one.curve), height(one.curve), color=BLUE, lw=1.2, label="computed" if not k else None)
+    def _draw(self, axes: Any, name: str, run: Run, **look: Any) -> None:
+        """A quantity of a run, with its scatter."""
+        shown, own, error = self._shown(), {**self._columns(run), "force_N": run.force}, self._errors(run).get(name)
+        x, y = (shown[n].factor * own[n] for n in (self.along, name))
+        axes.errorbar(x, y, None if error is None else np.nan_to_num(error) * y, lw=1.1, **look)
 
 
 def compare(
     scene: Source,
     measurement: AnyPath,
     *,
-    facts: Sequence[str] | Mapping[str, str] = (),
+    facts: Sequence[str] = (),
     resonance: bool = False,
     band: Sequence[str] = (),
     overrides: Overrides = (),
@@ -232,8 +226,7 @@ def compare(
     Raises  ValueError for a measurement that cannot be read or does not belong to the scene; SolveFailed
     """
     report = reporter(progress)
-    given = facts if isinstance(facts, Mapping) else dict(_named(text) for text in facts)
-    measured = read(Path(measurement), given)
+    measured = read(Path(measurement), dict(_named(text) for text in facts))
     files = changed(scene, overrides, band)
     own = files[""]
     try:
@@ -257,25 +250,8 @@ def _named(text: str) -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
-def _apart(name: str, measured: float, computed: float) -> float:
+def _apart(name: str, measured: np.ndarray, computed: np.ndarray) -> np.ndarray:
     """Relative difference; of a phase in degrees, the shorter way round."""
     if name == "phase_deg":
-        return float((computed - measured + 180) % 360 - 180)
-    return computed / measured - 1 if measured else np.nan
-
-
-def _difference(name: str, value: float, signed: bool = False) -> str:
-    if value != value:
-        return "-"
-    number = f"{value if name.startswith('phase') else 100 * value:{'+' if signed else ''}.3g}"
-    return f"{number} {'deg' if name.startswith('phase') else '%'}"
-
-
-def _shown(name: str, value: float) -> str:
-    if value != value:
-        return "-"
-    if name == "amplitude_m":
-        unit, scale = length_unit(value)
-        return f"{scale * value:.4g} {unit}"
-    unit, scale = {"damping": ("%", 100.0), "force_N": ("N", 1.0), "frequency_hz": ("Hz", 1.0)}.get(name, ("deg", 1.0))
-    return f"{scale * value:.5g} {unit}"
+        return np.asarray((computed - measured + 180) % 360 - 180)
+    return np.asarray(computed / measured - 1)

@@ -17,6 +17,7 @@ import numpy as np
 
 from tribodyn.extras import package
 from tribodyn.hbm.time.ring_down import from_decay
+from tribodyn.hbm.time.stepper import IntegrationFailed
 from tribodyn.workflows.export.curves import DataKind, Function
 from tribodyn.workflows.scene.fields import parsed_direction, unknown_key
 from tribodyn.workflows.scene.units import parse_unit, to_si
@@ -117,7 +118,7 @@ def _of_uff(path: Path, given: Mapping[str, str]) -> tuple[dict[str, str], dict[
         if chosen:
             return _of_58(chosen, given, length, units)
     if nodal:
-        return {}, _of_55(nodal, given, length, units)
+        return {}, _of_55(nodal)
     raise ValueError(
         "it has no response (dataset 58 over frequency or time, of displacement, velocity or acceleration)"
     )
@@ -152,30 +153,17 @@ def _of_58(
     return facts, {"frequency [Hz]": x, f"real [{per}]": data.real, f"imag [{per}]": data.imag, "run": run}
 
 
-def _of_55(
-    sets: list[dict[str, Any]], given: Mapping[str, str], length: float, units: Mapping[DataKind, str]
-) -> dict[str, Any]:
-    """Modes of a set 55 each, or the points of a response at a node."""
-    normal, swept = ([s for s in sets if s["analysis_type"] in kinds] for kinds in ((2, 3), (5,)))
-    if normal:
-        eig = [s.get("eig", 2j * np.pi * s.get("freq", np.nan)) for s in normal]
-        damping = [
-            -e.real / abs(e) if s["analysis_type"] == 3 else s["modal_damp_vis"] + s["modal_damp_his"] / 2
-            for s, e in zip(normal, eig, strict=True)
-        ]
-        return {"frequency [Hz]": np.abs(eig) / (2 * np.pi), "damping": np.array(damping)}
-    if not swept or "node" not in given or "direction" not in given:
-        raise ValueError("a response in datasets 55 has many nodes: give node = NUMBER and direction = x, y or z")
-    axis = 1 + "xyz".index(given["direction"][-1])
-    sign = -1.0 if given["direction"].startswith("-") else 1.0
-    values = [s[f"r{axis}"][[str(int(n)) for n in s["node_nums"]].index(given["node"])] for s in swept]
-    data = sign * np.array(values, complex) / length
-    unit = units[swept[0]["spec_data_type"]]
-    return {
-        "frequency [Hz]": np.array([s["freq"] for s in swept]),
-        f"real [{unit}]": data.real,
-        f"imag [{unit}]": data.imag,
-    }
+def _of_55(sets: list[dict[str, Any]]) -> dict[str, Any]:
+    """Natural frequencies and damping of modes, real or complex, one in each set."""
+    modes = [s for s in sets if s["analysis_type"] in (2, 3)]
+    if not modes:
+        raise ValueError("its datasets 55 hold no modes")
+    eig = [s["eig"] if s["analysis_type"] == 3 else 2j * np.pi * s["freq"] for s in modes]
+    damping = [
+        -e.real / abs(e) if s["analysis_type"] == 3 else s["modal_damp_vis"] + s["modal_damp_his"] / 2
+        for s, e in zip(modes, eig, strict=True)
+    ]
+    return {"frequency [Hz]": np.abs(eig) / (2 * np.pi), "damping": np.array(damping)}
 
 
 def _word(name: str) -> tuple[str, str]:
@@ -253,7 +241,10 @@ def _decayed(name: str, control: str, time: np.ndarray, values: np.ndarray, orde
     even = time[0] + step.mean() * np.arange(len(time))
     spectrum = np.abs(np.fft.rfft((values - values.mean()) * np.hanning(len(values))))
     guess = 2 * np.pi * max(int(spectrum.argmax()), 1) / (step.mean() * len(values))
-    found = from_decay(even, values, guess)
+    try:
+        found = from_decay(even, values, guess)
+    except IntegrationFailed as several:
+        raise ValueError(str(several)) from None
     none = np.full((len(found.omega), 2), np.nan)
     x = (found.amplitude / found.omega**order).astype(complex)
     return Run(name, control, found.omega / (2 * np.pi), x, none[:, 0], found.damping, none)

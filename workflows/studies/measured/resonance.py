@@ -30,7 +30,7 @@ def prepared(measured: Measurement, scene: Scene, resonance: bool) -> Measuremen
 
 
 def resonances(measured: Measurement) -> Measurement:
-    """Each run of a response as a point of a backbone, at its largest amplitude; runs of one control become one.
+    """Each run of a response as a point of a backbone; runs of one control become one, by amplitude.
 
     Raises  ValueError where a run has no force or no phase, or no resonance
     """
@@ -51,7 +51,7 @@ def _joined(control: str, points: list[Run]) -> Run:
 
 
 def resonance(run: Run) -> Run:
-    """The point of a run at its largest amplitude; the force is that of phase resonance there.
+    """The point of a run at its largest amplitude, at resonance where that is constant; its force is that of resonance.
 
     Raises  ValueError where no resonance is within the run
     """
@@ -79,5 +79,7 @@ def resonance(run: Run) -> Run:
     )
     slopes = np.array([[-0.5, 0.5, 0.0], [-0.5, -0.5, 1.0]]) / solved[which]  # of the logarithms of w_0 and zeta
     errors = np.sqrt(np.einsum("ij,jk,ik->i", slopes, covariance, slopes))
-    hertz, top, damping = (np.array([v]) for v in (natural / (2 * np.pi), a.max(), rate / mass / (2 * natural)))
+    order = np.argsort(omega)
+    size = a.max() if bent else np.interp(natural, omega[order], a[order])  # held constant, as an acceleration perhaps
+    hertz, top, damping = (np.array([v]) for v in (natural / (2 * np.pi), size, rate / mass / (2 * natural)))
     return Run(run.name, run.control, hertz, top.astype(complex), abs(rate) * natural * top, damping, errors[None])
