@@ -169,7 +169,7 @@ def _of_file(
     path: Path, unit: str, material: Material | None, n_modes: int, free: bool, progress: Progress
 ) -> Inspection:
     with progress.stage("reading"):
-        source = sources.read(path, unit)
+        source = decks.source(path, unit)
     named = {"given": material} if material is not None else {}
     table = DeckTable(file=path.name, unit=sources.UNITS[unit][0], material=next(iter(named), None))
     solids, lacking = [], ""
