@@ -209,7 +209,8 @@ def pairs_of(source: sources.Source) -> tuple[dict[str, dict[str, float]], list[
     """
     whole = Assembly([Body(name, body.mesh, body.node_sets, {}) for name, body in source.bodies.items()])
     found: dict[str, dict[str, float]] = {}
-    refused, remarks = [], []
+    refused: list[str] = []
+    remarks: list[str] = []
     for kind, one in [*(("tie", tie) for tie in source.deck.ties), *(("contact", c) for c in source.deck.contacts)]:
         name = f"{kind} '{one.name}'"
         first, second = (
@@ -224,7 +225,7 @@ def pairs_of(source: sources.Source) -> tuple[dict[str, dict[str, float]], list[
             except ValueError as sentence:
                 trouble = str(sentence)
         if not met:
-            refused.append(trouble)
+            (refused if kind == "tie" else remarks).append(trouble)
             continue
         gaps = np.concatenate([shared.gap for *_, shared in met])
         facing = [(a.normal[s.first] * b.normal[s.second]).sum(axis=1) @ s.weight for a, b, s in met]
