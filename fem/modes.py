@@ -141,10 +141,15 @@ def frequencies(values: np.ndarray, K: Any, M: Any) -> np.ndarray:
 
     Raises  StaticDivergence where one is negative
     """
-    stiffest = float(np.max(np.abs(K.diagonal()) / np.abs(M.diagonal())))
-    if values.min() < -EIGEN.negative * stiffest:
+    if values.min() < -EIGEN.negative * stiffest(K, M):
         raise StaticDivergence(f"{UNSTABLE}, omega^2 = {values.min():.3g} rad2/s2: {CURE}")
     return np.sqrt(np.clip(values, 0, None))
+
+
+def stiffest(K: Any, M: Any) -> float:
+    """Largest squared frequency of a single DOF [rad2/s2], of those that have a mass."""
+    mass = np.abs(M.diagonal())
+    return float(np.max(np.abs(K.diagonal())[mass > 0] / mass[mass > 0]))
 
 
 def _factorise_shifted(K: Any, M: Any, sigma: float | None) -> tuple[Factor, float]:
@@ -154,7 +159,7 @@ def _factorise_shifted(K: Any, M: Any, sigma: float | None) -> tuple[Factor, flo
     try:
         return factorise(K), 0.0
     except ValueError:
-        sigma = -1e-9 * float(np.max(K.diagonal() / M.diagonal()))
+        sigma = -1e-9 * stiffest(K, M)
     try:
         return factorise(K - sigma * M), sigma
     except ValueError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -310,7 +311,7 @@ class _Cards:
     def _contact_pair(self, card: Card) -> None:
         for line in card.data:
             self.unused.append(f"contact pair {' on '.join(line)}, which the scene gives as [contacts.NAME]")
-            if len(line) == 2:
+            with suppress(ValueError):  # of faces of what is no solid
                 slave, master = (self._place(name, card, face=True) for name in line)
                 self.contacts.append(deck.Tie(" on ".join(line), slave, master))
 

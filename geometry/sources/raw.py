@@ -132,8 +132,10 @@ class LabelledMesh:
                     frame = None  # held along all of them
                 if label in solid:
                     alike.setdefault(id(frame), (frame, []))[1].append(label)
-                else:
+                elif label in self.points:
                     yield deck.Support(self.at(label), axis, value, frame)
+                else:
+                    self.met.ignored["supports of nodes that the file has not"] += 1
             for frame, members in alike.values():
                 place = places.setdefault(tuple(sorted(members)), f"support {len(places) + 1}")
                 self.node_sets[place] = members

@@ -61,11 +61,15 @@ def structure(name: str, table: Table, materials: Mapping[str, AnyMaterial], fol
     if table.unit not in UNITS:
         raise ValueError(f"decks.{name}.unit: expected one of {', '.join(read.UNITS)}")
     try:
-        stamp = path.stat().st_mtime_ns if path.is_file() else 0
-        return _Carrying(name, table, materials, _read(path, UNITS[table.unit], stamp)).done()
+        return _Carrying(name, table, materials, source(path, UNITS[table.unit])).done()
     except ValueError as trouble:
         clause = str(trouble)
         raise ValueError(clause if clause.startswith("decks.") else f"decks.{name}: {clause}") from None
+
+
+def source(path: Path, unit: str) -> read.Source:
+    """What a file holds, read once as long as it does not change; raises ValueError as `read.read` does."""
+    return _read(path, unit, path.stat().st_mtime_ns if path.is_file() else 0)
 
 
 @lru_cache(maxsize=4)

@@ -15,7 +15,7 @@ from tribodyn.fem.assembly import Assembly, Body
 from tribodyn.fem.couplings import Tie
 from tribodyn.fem.elasticity import assemble, densities
 from tribodyn.fem.material import Material
-from tribodyn.fem.modes import modes
+from tribodyn.fem.modes import modes, stiffest
 from tribodyn.fem.part import Part
 from tribodyn.geometry.facts import area, facts
 from tribodyn.geometry.sources import read as sources
@@ -169,15 +169,15 @@ def _of_file(
     path: Path, unit: str, material: Material | None, n_modes: int, free: bool, progress: Progress
 ) -> Inspection:
     with progress.stage("reading"):
-        source = sources.read(path, unit)
+        source = decks.source(path, unit)
     named = {"given": material} if material is not None else {}
     table = DeckTable(file=path.name, unit=sources.UNITS[unit][0], material=next(iter(named), None))
-    solids = []
+    solids, lacking = [], ""
     for name, body in source.bodies.items():
         try:
             made = decks.material(source.deck, name, body.mesh, table, named)
-        except ValueError:  # no or no whole material
-            made = None
+        except ValueError as sentence:  # no or no whole material
+            made, lacking = None, str(sentence)
         solids.append(Solid(name, body.mesh, body.node_sets, made))
     found = measured(solids, (f"{sentence}" for sentence in source.notes), source.unused)
     pairs, apart, remarks = pairs_of(source)
@@ -186,6 +186,8 @@ def _of_file(
     if n_modes:
         if material is None and not any(one.groups for one in source.deck.materials):
             raise ValueError(f"{path} gives no material to compute modes with: give --young, --poisson and --density")
+        if lacking:
+            raise ValueError(f"{path}: {lacking}")
         if free or replace(source.deck, contacts=()) == Deck(materials=source.deck.materials):
             found = replace(found, frequencies=_free_frequencies(solids, n_modes, progress))
         else:
@@ -207,7 +209,8 @@ def pairs_of(source: sources.Source) -> tuple[dict[str, dict[str, float]], list[
     """
     whole = Assembly([Body(name, body.mesh, body.node_sets, {}) for name, body in source.bodies.items()])
     found: dict[str, dict[str, float]] = {}
-    refused, remarks = [], []
+    refused: list[str] = []
+    remarks: list[str] = []
     for kind, one in [*(("tie", tie) for tie in source.deck.ties), *(("contact", c) for c in source.deck.contacts)]:
         name = f"{kind} '{one.name}'"
         first, second = (
@@ -222,7 +225,7 @@ def pairs_of(source: sources.Source) -> tuple[dict[str, dict[str, float]], list[
             except ValueError as sentence:
                 trouble = str(sentence)
         if not met:
-            refused.append(trouble)
+            (refused if kind == "tie" else remarks).append(trouble)
             continue
         gaps = np.concatenate([shared.gap for *_, shared in met])
         facing = [(a.normal[s.first] * b.normal[s.second]).sum(axis=1) @ s.weight for a, b, s in met]
@@ -244,7 +247,7 @@ def pairs_of(source: sources.Source) -> tuple[dict[str, dict[str, float]], list[
 def _frequencies(part: Part, count: int) -> tuple[float, ...]:
     """The lowest natural frequencies of a part [Hz]; 0 where they are rounding."""
     M, K = part.system.mass, part.system.stiffness
-    shift = 1e-9 * float(np.max(K.diagonal() / M.diagonal()))
+    shift = 1e-9 * stiffest(K, M)
     along_x = np.tile([1.0, 0.0, 0.0], (len(part.points), 1))
     along_x[[turn for _, turn in getattr(part.mesh, "points", {}).values()]] = 0.0
     q = along_x.ravel()[part.free]
