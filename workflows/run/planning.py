@@ -110,12 +110,13 @@ def plan(file: SceneFile) -> Plan:
         full = reduced.info.n_full or masters
         modes: int | None = 0
     else:
-        part = file.part_scene.geometry.part
-        if part is not None and is_file(part):
-            raise ValueError(f'geometry.part: "{part}" is a file of your own, which a plan does not run: run the scene')
+        built = file.mesh_scene
+        tables = [built.geometry] if isinstance(built, PartScene) else getattr(built, "bodies", {}).values()
+        for part in (table.part for table in tables):
+            if part is not None and is_file(part):
+                raise ValueError(f'part = "{part}" is a file of your own, which a plan does not run: run the scene')
         with tempfile.TemporaryDirectory() as folder:
             mesh, node_sets = make_mesh(file, Path(folder))
-        built = file.mesh_scene
         elements, nodes = int(mesh.nelements), mesh.doflocs.shape[1]
         free = free_dofs(3 * nodes, clamps(built, file.folder), node_sets)
         full = len(free)
