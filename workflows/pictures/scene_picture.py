@@ -52,7 +52,7 @@ def draw(scene: MeshScene, part: Part, path: Path) -> Path:
             view.add_mesh(arrow, color=colour)
             legend.append((f"{kind} load {name}", colour))
     for number, (label, colour) in enumerate(legend, 1):
-        view.add_text(label, (16, LAYOUT.apart[1] - 26 * number), font_size=9, color=colour)
+        view.add_text(label, position=(16, LAYOUT.apart[1] - 26 * number), font_size=9, color=colour)
     view.add_axes(color=INK)
     view.view_isometric()
     view.screenshot(str(path))
