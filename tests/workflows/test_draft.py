@@ -8,12 +8,16 @@ import shutil
 from pathlib import Path
 
 import gmsh
+import numpy as np
 import pytest
+from PIL import Image
 
 import tribodyn as td
 from tests.helpers.command import leave
 from tests.helpers.pages import ROOT
 from tribodyn.geometry.gmsh_session import session
+from tribodyn.workflows.pictures import offscreen
+from tribodyn.workflows.pictures.style import BLUE, RED
 from tribodyn.workflows.scene import scene_file
 from tribodyn.workflows.studies.draft import draft
 
@@ -93,3 +97,21 @@ def test_the_smallest_scene_has_at_most_fifteen_lines() -> None:
     assert (scene.response.group, scene.response.direction) == ("shaker", (0.0, 1.0, 0.0))
     whole = f'{SMALLEST}group = "response"\ndirection = "x"\n'
     assert scene_file.parse(whole, "small.toml", (), Path()).mesh_scene.response.group == "response"
+
+
+def test_a_plan_draws_the_scene_with_its_contact_supports_and_loads(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    try:
+        offscreen.check()
+    except offscreen.RenderingUnavailable:
+        pytest.skip("nothing can be rendered here")
+    coarse = [word for key in ("n_patch=3", "n_length=3", "n_height=1") for word in ("--set", f"geometry.{key}")]
+    code, said, _ = leave(["plan", "beam", *coarse, "--picture", str(tmp_path / "beam.png")], capsys)
+    assert code == 0
+    assert "beam.png" in said
+    with Image.open(tmp_path / "beam.png") as image:
+        colours = np.asarray(image.convert("RGB"), int).reshape(-1, 3)
+    for colour in (BLUE, RED):  # the contact and the harmonic load
+        wanted = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+        assert (np.abs(colours / 255 - np.array(wanted) / 255).max(axis=1) < 0.25).sum() > 100

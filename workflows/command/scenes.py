@@ -105,15 +105,20 @@ def cases() -> None:
         print(f"{name:12} {scene_file.title(name)}")
 
 
-def plan(scene: str, *, overrides: Overrides = ()) -> None:
+def plan(scene: str, *, overrides: Overrides = (), picture: Path | None = None) -> None:
     """Show what a scene will model, and what it will cost, before running it.
 
     Parameters
     ----------
     scene
         Name of a scene (see `tribodyn cases`) or a .toml file.
+    picture
+        A .png file to draw the scene in: bodies, contacts in colour, what is held, loads as arrows.
     """
+    make_room(picture, (".png",))
     print(*named_lines(scenes.plan(scene, overrides).lines()), sep="\n")
+    if picture is not None:
+        print(scenes.picture(scene, picture, overrides))
 
 
 def _print(result: Result, verbose: bool) -> None:

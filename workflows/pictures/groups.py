@@ -40,9 +40,9 @@ def draw(solids: Sequence[Solid], path: Path, most: int = 20) -> Path:
             covered = np.concatenate([np.asarray(i) for s, _, i in named[:most] if s is solid] or [np.empty(0, int)])
             rest = np.setdiff1d(outer, covered)
             if len(rest):
-                view.add_mesh(_surface(pv, solid.mesh, rest), color=BODY, show_edges=True, **SHADE)
+                view.add_mesh(surface_of(pv, solid.mesh, rest), color=BODY, show_edges=True, **SHADE)
         for i, (solid, _, ids) in enumerate(named[:most]):
-            face = _surface(pv, solid.mesh, np.asarray(ids))
+            face = surface_of(pv, solid.mesh, np.asarray(ids))
             view.add_mesh(face, color=COLOURS[i % len(COLOURS)], show_edges=True, **SHADE)
         view.view_isometric()
         if side:
@@ -64,7 +64,8 @@ def draw(solids: Sequence[Solid], path: Path, most: int = 20) -> Path:
     return path
 
 
-def _surface(pv: Any, mesh: Any, facets: np.ndarray) -> Any:
+def surface_of(pv: Any, mesh: Any, facets: np.ndarray) -> Any:
+    """Some facets of a mesh as pyvista has them."""
     corners = mesh.facets[:, facets].T
     faces = np.hstack([np.full((len(corners), 1), corners.shape[1]), corners])
     return pv.PolyData(mesh.p.T, faces.ravel())

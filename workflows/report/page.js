@@ -74,5 +74,9 @@ function viewer(holder) {
   for (const control of [field, open]) if (control) control.addEventListener("change", draw);
 }
 
-document.querySelectorAll("[data-solid]").forEach(viewer);
+const webgl = document.createElement("canvas").getContext("webgl") !== null;
+document.querySelectorAll("[data-solid]").forEach((holder) => {
+  if (webgl) viewer(holder);
+  else holder.textContent = "This browser has no WebGL: the pictures of the part are among the figures below.";
+});
 window.reportReady = true;

@@ -22,7 +22,6 @@ from tribodyn.workflows.report import text
 from tribodyn.workflows.report.charts import charts
 from tribodyn.workflows.report.solid import solid
 from tribodyn.workflows.result.result import Result
-from tribodyn.workflows.result.verdict import UNITS
 
 DPI = 110  # of the figures on the page
 LARGEST = 15e6  # bytes of a page
@@ -48,12 +47,13 @@ def page(results: Sequence[tuple[str, Result, Path | None]]) -> str:
         parts.append(_section("Side by side", _comparison(named), "compare"))
     for number, (name, result, path) in enumerate(results):
         more = f"{name}: " if len(named) > 1 else ""
-        parts.append(_section(f"{more}errors", _verdict(result), f"verdict-{number}"))
+        parts.append(_section(f"{more}summary", _summary(result), f"verdict-{number}"))
         if data["solids"][number] is not None:
             parts.append(_section(f"{more}worn part", _viewer(number), f"part-{number}"))
         if number == 0:
             holders = "".join(map(_chart_holder, data["charts"]))
             parts.append(_section("Curves", '<div class="grid">' + holders + "</div>", "curves"))
+        parts.append(_section(f"{more}method and assumptions", _method(result), f"method-{number}"))
         parts.append(_section(f"{more}inspection of the part and model", _inspection(result), f"inspection-{number}"))
         parts.append(_section(f"{more}measured changes", _changes(result), f"changes-{number}"))
         parts.append(_section(f"{more}figures", _figures(result), f"figures-{number}"))
@@ -128,23 +128,28 @@ def _table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
     return f'<div class="scroll"><table{kind}>{top}<tbody>{"".join(lines)}</tbody></table></div>'
 
 
-def _verdict(result: Result) -> str:
-    numbers = result.summary()
-    mark = "good" if numbers["finished"] else "bad"
-    html = f'<p class="{mark}"><strong>{escape(result.state[:1].upper() + result.state[1:])}.</strong></p>'
-    judged = numbers.get("verdict")
-    if isinstance(judged, Mapping):
-        rows = []
-        for name, item in judged.items():
-            value, error = item.get("value"), item.get("error")
-            shown = "none" if value is None else f"{value:.5g} {UNITS.get(name, '')}"
-            rows.append((
-                name.replace("_", " "), shown, "not known" if error is None else text.percent(error),
-                str(item.get("dominated_by") or ""), str(item.get("status") or ""), str(item.get("reason") or ""),
-            ))  # fmt: skip
-        head = ("quantity", "value", "total error", "dominated by", "status", "why")
-        html += _table(rows, head)
-    return html + _table(text.lines(result))
+def _summary(result: Result) -> str:
+    """What `show` prints, and every number below it to unfold."""
+    mark = "good" if result.finished else "bad"
+    html = f'<pre class="{mark}">{escape(chr(10).join(text.brief(result)))}</pre>'
+    return f"{html}<details><summary>every number</summary>{_table(text.lines(result))}</details>"
+
+
+def _method(result: Result) -> str:
+    """One paragraph on how the numbers came about and what they take for granted."""
+    scene, facts = json.loads(result.provenance["scene"]), result.facts
+    contacts = scene.get("contacts") or {"contact": scene.get("contact") or {}}
+    laws = ", ".join(sorted({str(one.get("law", "jenkins")) for one in contacts.values()}))
+    wear = (scene.get("wear") or {}).get("law")
+    said = [
+        f"The structure is linear: {facts.full_dofs} degrees of freedom with small displacements and linear elasticity"
+        + (f", reduced to {facts.model_dofs}" if facts.model_dofs != facts.full_dofs else "") + ".",
+        f"Its contact has {facts.contact_pairs} pairs of the law {laws}. The motion is a sum of the harmonics "
+        f"{', '.join(map(str, result.harmonics))}, balanced with the contact forces over one cycle.",
+        f"Wear follows the law {wear}, in steps of many cycles." if wear and result.wear_steps else "",
+        "Friction, stiffness and wear coefficient are inputs: their scatter is in none of the errors.",
+    ]  # fmt: skip
+    return f"<p>{escape(' '.join(filter(None, said)))}</p>"
 
 
 def _number(value: Any) -> str:

@@ -111,9 +111,10 @@ def plan(file: SceneFile) -> Plan:
         modes: int | None = 0
     else:
         built = file.mesh_scene
-        part = built.geometry.part if isinstance(built, PartScene) else None
-        if part is not None and is_file(part):
-            raise ValueError(f'geometry.part: "{part}" is a file of your own, which a plan does not run: run the scene')
+        tables = [built.geometry] if isinstance(built, PartScene) else getattr(built, "bodies", {}).values()
+        for part in (table.part for table in tables):
+            if part is not None and is_file(part):
+                raise ValueError(f'part = "{part}" is a file of your own, which a plan does not run: run the scene')
         with tempfile.TemporaryDirectory() as folder:
             mesh, node_sets = make_mesh(file, Path(folder))
         elements, nodes = int(mesh.nelements), mesh.doflocs.shape[1]

@@ -31,6 +31,22 @@ def plan(source: Source, overrides: Overrides = ()) -> planning.Plan:
     return planning.plan(read_scene(source, overrides))
 
 
+def picture(source: Source, path: AnyPath, overrides: Overrides = ()) -> Path:
+    """Draw a scene before it is run: bodies, contacts in colour, what is held, loads as arrows; its path.
+
+    Raises  SceneError: the scene has no mesh, or asks for what cannot be; RenderingUnavailable
+    """
+    from tempfile import TemporaryDirectory
+
+    from tribodyn.workflows.pictures import scene_picture
+
+    file = read_scene(source, overrides)
+    with TemporaryDirectory() as folder:
+        mesh, node_sets = modelling.make_mesh(file, Path(folder))
+        part = modelling.make_part(file.mesh_scene, mesh, node_sets, file.folder)
+    return scene_picture.draw(file.mesh_scene, part, Path(path))
+
+
 def build(source: Source, overrides: Overrides = (), *, progress: Report = None) -> Model:
     """The nonlinear problem of a scene, reduced and ready to be solved, with the part that it was made from."""
     return modelling.build(read_scene(source, overrides), None, reporter(progress))
