@@ -359,7 +359,7 @@ class Gradient:
         stretched = 0.0
         if base is not None and before is not None and base is not before:
             stretched = -np.einsum("qnc,nc->q", l, balance.loaded(base - before))
-        if posed.model.basis is own.basis:  # the same coordinates
+        if posed.model.interface.B is own.interface.B:  # the same coordinates
             sides = _sides(posed, balance, None)
             total = np.zeros(len(self.quantities)) + stretched
             forces = zip(self._forces(posed, sides), self._forces(Posed.of(balance), self._sides), strict=True)
