@@ -54,6 +54,7 @@ class Rules:
     # difference of one-sided derivatives over their size from which on they are two, and size over the largest of all
     # parameters by one step that counts
     corner: float = 1e-2
+    of_gap: float = 1e-6  # step of a gap over the largest displacement
     seen: float = 1e-3
 
 
@@ -229,7 +230,6 @@ class Gradient:
     def _adjoints(self) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
         """l (n_quantity, n_contact, n_coeff), w of each harmonic (n, n_quantity), and q_f - B w."""
         basis, state = self.balance.basis, self.state
-        linear = self.balance.linearise(state)
         jac = state.cycle.jacobian
         assert jac is not None
         shape = state.flat.shape
@@ -259,7 +259,7 @@ class Gradient:
             own = [side.adjoint(side.C.conj().T @ seen[:, i]) for i, side in enumerate(self._sides)]
             through = basis.to_real(np.stack([side.B @ v for side, v in zip(self._sides, own, strict=True)], axis=-1))
             right = q.of_x + transposed(jac, q.of_force) + departed(through)
-            solved = self._transposed_solve(lambda v: v - departed(compliant(v)), right, linear.active)
+            solved = self._transposed_solve(lambda v: v - departed(compliant(v)), right)
             amplitudes = basis.to_complex(solved)
             fields.append(
                 [
@@ -275,9 +275,7 @@ class Gradient:
             weights -= np.stack([residual.apply(v) for v in found])
         return np.reshape(found, (-1, *shape)), w, weights
 
-    def _transposed_solve(
-        self, product: Callable[[np.ndarray], np.ndarray], right: np.ndarray, active: np.ndarray
-    ) -> np.ndarray:
+    def _transposed_solve(self, product: Callable[[np.ndarray], np.ndarray], right: np.ndarray) -> np.ndarray:
         """l with product(l) = right: by GMRES, refined once."""
         solution, left = np.zeros_like(right), right
         size = float(np.linalg.norm(right))
@@ -315,14 +313,13 @@ class Gradient:
         return total
 
     def by_gap(self) -> np.ndarray:
-        """(n_quantity, n_pair) dq / d gap of each pair [1/m]: a gap is a shift of x, so f_p = - df/dx e_n."""
-        contact, basis = self.balance.contact, self.balance.basis
-        if "n" not in contact.components or not basis.has_static:
-            return np.zeros((len(self.quantities), contact.n_pair))
-        jac = self.state.cycle.jacobian
-        assert jac is not None
-        opened = -jac[:, :, contact.components.index("n") * basis.n_coeff].reshape(self.state.x.shape)
-        return np.einsum("qpch,pch->qp", self.force_weights, opened)
+        """(n_quantity, n_pair) dq / d gap of each pair [1/m]."""
+        balance = self.balance
+        if "n" not in balance.contact.components or not balance.basis.has_static:
+            return np.zeros((len(self.quantities), balance.contact.n_pair))
+        step, gap = RULES.of_gap * float(np.abs(self.state.x).max()), balance.contact.gap
+        sides = (replace(Posed.of(balance), contact=balance.contact.with_gap(gap + side)) for side in (step, -step))
+        return self.by_pairs(Change("gap", step, *sides))
 
     def _moved(self, posed: Posed, sides: list[_Side]) -> list[np.ndarray]:
         """Coordinates under the loads of a problem and this g."""
