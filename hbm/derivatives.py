@@ -219,12 +219,12 @@ class Gradient:
 
     @cached_property
     def _sides(self) -> list[_Side]:
-        return _sides(Posed.of(self.balance), self.balance, self.state.omega)
+        return _sides(self.own, self.balance, self.state.omega)
 
     @cached_property
     def u(self) -> list[np.ndarray]:
         """Coordinates (n,) of each harmonic."""
-        return self._moved(Posed.of(self.balance), self._sides)
+        return self._moved(self.own, self._sides)
 
     @cached_property
     def _adjoints(self) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
@@ -318,8 +318,13 @@ class Gradient:
         if "n" not in balance.contact.components or not balance.basis.has_static:
             return np.zeros((len(self.quantities), balance.contact.n_pair))
         step, gap = RULES.of_gap * float(np.abs(self.state.x).max()), balance.contact.gap
-        sides = (replace(Posed.of(balance), contact=balance.contact.with_gap(gap + side)) for side in (step, -step))
-        return self.by_pairs(Change("gap", step, *sides))
+        above, below = (replace(self.own, contact=balance.contact.with_gap(gap + side)) for side in (step, -step))
+        return self.by_pairs(Change("gap", step, above, below))
+
+    @cached_property
+    def own(self) -> Posed:
+        """The problem that is solved."""
+        return Posed.of(self.balance)
 
     def _moved(self, posed: Posed, sides: list[_Side]) -> list[np.ndarray]:
         """Coordinates under the loads of a problem and this g."""
@@ -359,7 +364,7 @@ class Gradient:
         if posed.model.interface.B is own.interface.B:  # the same coordinates
             sides = _sides(posed, balance, None)
             total = np.zeros(len(self.quantities)) + stretched
-            forces = zip(self._forces(posed, sides), self._forces(Posed.of(balance), self._sides), strict=True)
+            forces = zip(self._forces(posed, sides), self._forces(self.own, self._sides), strict=True)
             for i, (h, (new, old)) in enumerate(zip(balance.basis.harmonics, forces, strict=True)):
                 changed = new - old
                 if sides[i].system is not self._sides[i].system:
@@ -367,7 +372,7 @@ class Gradient:
                 total += np.real(w[i].conj().T @ changed)
             return total
         x, y = self._seen(posed, _sides(posed, balance, omega))
-        x_own, y_own = self._seen(Posed.of(balance), self._sides)
+        x_own, y_own = self._seen(self.own, self._sides)
         seen = np.stack([q.of_output for q in self.quantities])
         return np.einsum("qnc,nc->q", l, x - x_own) + np.einsum("qnc,nc->q", seen, y - y_own)
 
@@ -430,7 +435,8 @@ def _explicit(gradient: Gradient, changes: Sequence[Change], by_pair: Sequence[s
     """At a fixed frequency: dq / dp (n_quantity, n_column) of the changes, of the gap of every pair and of changes
     `by_pair`, pair by pair; one-sided derivatives of the changes.
     """
-    above, below = (np.reshape([side[i] for side in map(gradient.by, changes)], (len(changes), -1)).T for i in (0, 1))
+    both = np.reshape([gradient.by(change) for change in changes], (len(changes), 2, len(gradient.quantities)))
+    above, below = both[:, 0].T, both[:, 1].T
     each = [gradient.by_pairs(change) for change in changes if change.name in by_pair]
     return np.concatenate([(above + below) / 2, gradient.by_gap(), *each], axis=1), above, below
 
