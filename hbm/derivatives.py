@@ -54,6 +54,7 @@ class Rules:
     # difference of one-sided derivatives over their size from which on they are two, and size over the largest of all
     # parameters by one step that counts
     corner: float = 1e-2
+    of_gap: float = 1e-6  # step of a gap over the largest displacement
     seen: float = 1e-3
 
 
@@ -218,18 +219,17 @@ class Gradient:
 
     @cached_property
     def _sides(self) -> list[_Side]:
-        return _sides(Posed.of(self.balance), self.balance, self.state.omega)
+        return _sides(self.own, self.balance, self.state.omega)
 
     @cached_property
     def u(self) -> list[np.ndarray]:
         """Coordinates (n,) of each harmonic."""
-        return self._moved(Posed.of(self.balance), self._sides)
+        return self._moved(self.own, self._sides)
 
     @cached_property
     def _adjoints(self) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
         """l (n_quantity, n_contact, n_coeff), w of each harmonic (n, n_quantity), and q_f - B w."""
         basis, state = self.balance.basis, self.state
-        linear = self.balance.linearise(state)
         jac = state.cycle.jacobian
         assert jac is not None
         shape = state.flat.shape
@@ -259,7 +259,7 @@ class Gradient:
             own = [side.adjoint(side.C.conj().T @ seen[:, i]) for i, side in enumerate(self._sides)]
             through = basis.to_real(np.stack([side.B @ v for side, v in zip(self._sides, own, strict=True)], axis=-1))
             right = q.of_x + transposed(jac, q.of_force) + departed(through)
-            solved = self._transposed_solve(lambda v: v - departed(compliant(v)), right, linear.active)
+            solved = self._transposed_solve(lambda v: v - departed(compliant(v)), right)
             amplitudes = basis.to_complex(solved)
             fields.append(
                 [
@@ -275,9 +275,7 @@ class Gradient:
             weights -= np.stack([residual.apply(v) for v in found])
         return np.reshape(found, (-1, *shape)), w, weights
 
-    def _transposed_solve(
-        self, product: Callable[[np.ndarray], np.ndarray], right: np.ndarray, active: np.ndarray
-    ) -> np.ndarray:
+    def _transposed_solve(self, product: Callable[[np.ndarray], np.ndarray], right: np.ndarray) -> np.ndarray:
         """l with product(l) = right: by GMRES, refined once."""
         solution, left = np.zeros_like(right), right
         size = float(np.linalg.norm(right))
@@ -315,14 +313,18 @@ class Gradient:
         return total
 
     def by_gap(self) -> np.ndarray:
-        """(n_quantity, n_pair) dq / d gap of each pair [1/m]: a gap is a shift of x, so f_p = - df/dx e_n."""
-        contact, basis = self.balance.contact, self.balance.basis
-        if "n" not in contact.components or not basis.has_static:
-            return np.zeros((len(self.quantities), contact.n_pair))
-        jac = self.state.cycle.jacobian
-        assert jac is not None
-        opened = -jac[:, :, contact.components.index("n") * basis.n_coeff].reshape(self.state.x.shape)
-        return np.einsum("qpch,pch->qp", self.force_weights, opened)
+        """(n_quantity, n_pair) dq / d gap of each pair [1/m]."""
+        balance = self.balance
+        if "n" not in balance.contact.components or not balance.basis.has_static:
+            return np.zeros((len(self.quantities), balance.contact.n_pair))
+        step, gap = RULES.of_gap * float(np.abs(self.state.x).max()), balance.contact.gap
+        above, below = (replace(self.own, contact=balance.contact.with_gap(gap + side)) for side in (step, -step))
+        return self.by_pairs(Change("gap", step, above, below))
+
+    @cached_property
+    def own(self) -> Posed:
+        """The problem that is solved."""
+        return Posed.of(self.balance)
 
     def _moved(self, posed: Posed, sides: list[_Side]) -> list[np.ndarray]:
         """Coordinates under the loads of a problem and this g."""
@@ -359,10 +361,10 @@ class Gradient:
         stretched = 0.0
         if base is not None and before is not None and base is not before:
             stretched = -np.einsum("qnc,nc->q", l, balance.loaded(base - before))
-        if posed.model.basis is own.basis:  # the same coordinates
+        if posed.model.interface.B is own.interface.B:  # the same coordinates
             sides = _sides(posed, balance, None)
             total = np.zeros(len(self.quantities)) + stretched
-            forces = zip(self._forces(posed, sides), self._forces(Posed.of(balance), self._sides), strict=True)
+            forces = zip(self._forces(posed, sides), self._forces(self.own, self._sides), strict=True)
             for i, (h, (new, old)) in enumerate(zip(balance.basis.harmonics, forces, strict=True)):
                 changed = new - old
                 if sides[i].system is not self._sides[i].system:
@@ -370,7 +372,7 @@ class Gradient:
                 total += np.real(w[i].conj().T @ changed)
             return total
         x, y = self._seen(posed, _sides(posed, balance, omega))
-        x_own, y_own = self._seen(Posed.of(balance), self._sides)
+        x_own, y_own = self._seen(self.own, self._sides)
         seen = np.stack([q.of_output for q in self.quantities])
         return np.einsum("qnc,nc->q", l, x - x_own) + np.einsum("qnc,nc->q", seen, y - y_own)
 
@@ -433,7 +435,8 @@ def _explicit(gradient: Gradient, changes: Sequence[Change], by_pair: Sequence[s
     """At a fixed frequency: dq / dp (n_quantity, n_column) of the changes, of the gap of every pair and of changes
     `by_pair`, pair by pair; one-sided derivatives of the changes.
     """
-    above, below = (np.reshape([side[i] for side in map(gradient.by, changes)], (len(changes), -1)).T for i in (0, 1))
+    both = np.reshape([gradient.by(change) for change in changes], (len(changes), 2, len(gradient.quantities)))
+    above, below = both[:, 0].T, both[:, 1].T
     each = [gradient.by_pairs(change) for change in changes if change.name in by_pair]
     return np.concatenate([(above + below) / 2, gradient.by_gap(), *each], axis=1), above, below
 

@@ -134,10 +134,8 @@ class Varying:
         """Whether the model is reduced anew: the stress of a part that spins is that of its contact at rest."""
         if self._scales(key):
             return False
-        section = key.partition(".")[0]
-        return section in ("material", "materials", "springs", "wheel") or (
-            self._spins and section in ("contact", "contacts", "loads")
-        )
+        of_stress = ("contact.", "contacts.", "loads.static.") if self._spins else ()
+        return key.startswith(("material.", "materials.", "springs.", "wheel.", *of_stress))
 
     def _scales(self, key: str) -> bool:
         """Whether stiffness or mass of the reduced model is proportional to it: of a part of one material alone."""

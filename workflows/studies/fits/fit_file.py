@@ -21,7 +21,7 @@ from threadpoolctl import threadpool_limits
 from tribodyn.hbm import derivatives, newton
 from tribodyn.hbm.balance import State
 from tribodyn.hbm.continuation.operating_point import OperatingPoint
-from tribodyn.hbm.derivatives import Change, NoDerivative, Posed
+from tribodyn.hbm.derivatives import Change, Derivatives, NoDerivative, Posed
 from tribodyn.hbm.wear.history import LIFE_SHARE, WearHistory, cycles_to_preload
 from tribodyn.reduction.linear import linear_modes
 from tribodyn.workflows.run import joints, modelling, settings, wear_run
@@ -355,6 +355,7 @@ class Answers:
     def __init__(self, file: SceneFile, model: modelling.Model, near: Answers | None = None):
         self.file, self.model, self._near = file, model, {} if near is None else near._points
         self._points: dict[tuple[Place, float], OperatingPoint] = {}
+        self._derived: dict[tuple[Place | None, float], Derivatives] = {}
         self._runs: dict[float, WearHistory] = {}
 
     def all_to(self, asked: Mapping[str, Asked | CurveTarget]) -> np.ndarray:
@@ -380,31 +381,36 @@ class Answers:
             return [(up - down) / (2 * side[1]) for (up, down), side in zip(both, sides, strict=True)]
         if known.of in ("life", "work"):
             raise NoDerivative("a life is followed again")
-        balance, place = self.model.balance.with_load(known.load), known.at
-        changes = [
-            Change(name, step, Posed.of(above.model.balance), Posed.of(below.model.balance))
-            for name, step, above, below in sides
-        ]
-        options = settings.newton_options(self.file.scene)
-        if known.of == "preload" and place is None:
-            balance, state = balance.with_load(0.0), self._rest
-            found = derivatives.at_frequency(balance, state, settings.OUTPUT, changes, options=options)
-        else:
-            place = place or Place(peak=1.0)
-            state = self._point(place, known.load).state
-            share, take = place.peak, derivatives.at_frequency
-            if share == 1.0:
-                take = derivatives.at_peak
-            found = take(balance, state, settings.OUTPUT, changes, options=options)
-            if share is not None and share != 1.0:  # rides beside the peak
-                peak = self._point(Place(peak=1.0), known.load).state
-                moves = derivatives.at_peak(balance, peak, settings.OUTPUT, changes, options=options).slopes[0]
-                ride = np.outer(found.by_frequency, 2 * np.pi * share * moves)
-                found = replace(found, slopes=found.slopes + ride)
+        place = known.at or (None if known.of == "preload" else Place(peak=1.0))
+        if (place, known.load) not in self._derived:
+            self._derived[place, known.load] = self._derivatives(place, known.load, sides)
+        found = self._derived[place, known.load]
         wanted = "frequency" if known.of == "peak frequency" else known.of
         if wanted not in found.names:
             return [0.0] * len(sides)
         return [float(slope) for slope in found.slopes[found.names.index(wanted)]]
+
+    def _derivatives(self, place: Place | None, load: float, sides: Sequence[Side]) -> Derivatives:
+        """Of a cycle at a place, at rest where there is none; raises NoDerivative."""
+        balance, options = self.model.balance, settings.newton_options(self.file.scene)
+        changes = [
+            Change(name, step, Posed.of(above.model.balance), Posed.of(below.model.balance))
+            for name, step, above, below in sides
+        ]
+        if place is None:
+            return derivatives.at_frequency(
+                balance.with_load(0.0), self._rest, settings.OUTPUT, changes, options=options
+            )
+        balance, state = balance.with_load(load), self._point(place, load).state
+        if place.peak == 1.0:
+            return derivatives.at_peak(balance, state, settings.OUTPUT, changes, options=options)
+        found = derivatives.at_frequency(balance, state, settings.OUTPUT, changes, options=options)
+        if place.peak is not None:  # beside a peak, and moves with it
+            peak = self._point(Place(peak=1.0), load).state
+            moves = derivatives.at_peak(balance, peak, settings.OUTPUT, changes, options=options).slopes[0]
+            ride = np.outer(found.by_frequency, 2 * np.pi * place.peak * moves)
+            found = replace(found, slopes=found.slopes + ride)
+        return found
 
     def to(self, name: str, known: Asked) -> float:
         """The scene's number beside a measured one; raises SolveFailed, naming it, where there is none."""

@@ -1,0 +1,92 @@
+"""tribodyn study derivatives: exact laws of scaling, scenes solved again, and what cannot be."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tribodyn as td
+from tests.helpers.coarse_scenes import BEAM, BLADE, RIG
+from tribodyn.hbm import derivatives as exact
+from tribodyn.hbm.threads import limited
+from tribodyn.workflows.command import main as cli
+from tribodyn.workflows.run.progress import Progress
+from tribodyn.workflows.run.varying import Varying, keys
+from tribodyn.workflows.scene import scene_file
+
+LOCATED = "harmonics.transitions=located"
+COARSE = {
+    "beam": (*BEAM, "geometry.n_patch=5", "response.method=adaptive", LOCATED),
+    "blade": (*BLADE, "response.method=adaptive"),
+    "rig": (*RIG, LOCATED),
+}
+
+
+@pytest.fixture(scope="module")
+def beam():
+    return td.studies.derivatives("beam", overrides=COARSE["beam"])
+
+
+def test_the_laws_of_scaling_hold(beam):
+    """Of a contact of Jenkins elements without gap: all loads times c are all displacements times c.
+
+    All mass times c, damping as a ratio, is all time times sqrt(c); all stiffness times c, loads too, time over sqrt(c)
+    """
+    rows, names = beam.elasticities, beam.found.names
+    wanted = {"frequency": 0.0, "amplitude": 1.0, "phase": 0.0, "energy": 2.0, "preload": 1.0, "wear rate": 2.0}
+    loads = sum(row for key, row in rows.items() if key.startswith("loads."))
+    np.testing.assert_allclose(loads, [wanted[name] for name in names], atol=2e-6)
+    heavier = [-0.5 if name == "frequency" else 0.0 for name in names]
+    np.testing.assert_allclose(rows["material.density"], heavier, atol=1e-6)
+    stiffer = sum(row for key, row in rows.items() if key.endswith(("_stiffness", "young")))
+    softens = {"frequency": 0.5, "amplitude": -1.0, "phase": 0.0, "energy": -1.0, "preload": 0.0, "wear rate": -1.0}
+    np.testing.assert_allclose(stiffer, [softens[name] for name in names], atol=1e-5)
+
+
+def test_it_is_told_in_words_numbers_and_a_picture(beam, tmp_path):
+    assert beam.seconds > 0
+    lines = beam.lines()
+    assert any("contact.friction" in line for line in lines)
+    record = json.loads(json.dumps(beam.record()))
+    friction = record["derivatives"]["contact.friction"]["amplitude"]
+    ratio = friction * 0.5 / record["quantities"]["amplitude"]
+    assert record["elasticities"]["contact.friction"]["amplitude"] == pytest.approx(ratio)
+    assert all(path.stat().st_size > 0 for path in beam.write(tmp_path))
+
+
+@pytest.mark.parametrize("name", ["beam", "blade", pytest.param("rig", marks=pytest.mark.slow)])
+def test_derivatives_of_a_scene_are_those_of_scenes_solved_again(name, monkeypatch):
+    """At a fixed frequency, and along the peak, whose own frequency is rounded more."""
+    file = scene_file.read(name, COARSE[name])
+    along = td.studies.derivatives(file, only=("contact.friction", "damping.modal")).found
+    value, step, omega = keys(file.scene), 2e-5, along.state.omega
+    fixed = td.studies.derivatives(file, at=omega / (2 * np.pi), only=along.parameters).found
+    # peaks whose difference is to be seen need to be found more exactly than one that is derived
+    monkeypatch.setattr(exact, "RULES", replace(exact.RULES, at_peak=1e-9))
+
+    def solved(key, factor):
+        with limited(1):
+            balance = Varying(file.changed(f"{key}={value[key] * factor!r}"), Progress()).model.balance
+            there = exact.at_frequency(balance, fixed.state, "response", ())
+            return there.values, exact.at_peak(balance, along.state, "response", ()).values
+
+    for i, key in enumerate(along.parameters):
+        sides = {factor: solved(key, factor) for factor in (1 + step, 1 - step, 1 + step / 2, 1 - step / 2)}
+        for which, found, error in ((0, fixed, 1e-5), (1, along, 2e-4)):
+            wide, narrow = ((sides[1 + h][which] - sides[1 - h][which]) / (2 * h) for h in (step, step / 2))
+            kept = len(wide)  # all but the wear rate
+            # second derivatives jump where a transition comes or goes: the error of a difference is linear in its step
+            difference = (2 * narrow - wide) / found.values[:kept]
+            elasticity = found.slopes[:kept, i] * value[key] / found.values[:kept]
+            size = np.maximum(np.abs(difference), 0.1)  # below this the differences are rounding
+            assert (np.abs(elasticity - difference) <= error * size).all(), (key, elasticity, difference)
+
+
+def test_an_unknown_key_is_one_sentence(capsys):
+    with pytest.raises(SystemExit) as end:
+        cli.main(["study", "derivatives", "beam", "--only", "contact.color"])
+    assert end.value.code == 2
+    assert "contact.color is no number that a response depends on" in capsys.readouterr().err
