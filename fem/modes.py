@@ -39,14 +39,11 @@ class StaticDivergence(ValueError):
     """The structure is unstable at rest."""
 
 
-def modes(
-    K: Any, M: Any, n: int, sigma: float | None = None, factor: Factor | None = None
-) -> tuple[np.ndarray, np.ndarray]:
+def modes(K: Any, M: Any, n: int, factor: Factor | None = None) -> tuple[np.ndarray, np.ndarray]:
     """The n lowest modes, mass-normalised.
 
     K, M : (N, N) sparse or dense symmetric [N/m], [kg], M positive definite, K positive semidefinite
-    sigma : shift [rad^2/s^2] below the wanted modes; by default 0, or a little below where K is singular
-    factor : factorisation of K - sigma M that exists already
+    factor : factorisation of K that exists already; where K is singular it is shifted a little
     Returns omega (n,) ascending [rad/s], 0 for rigid-body modes to rounding; phi (N, n) [1/sqrt(kg)], each with its
         first large entry positive
     Raises  ValueError where n is not between 1 and N, or the iteration does not converge; StaticDivergence where a
@@ -58,15 +55,14 @@ def modes(
     if size <= EIGEN.dense_below or 2 * n >= size or not issparse(K):
         values, phi = eigh(_dense(K), _dense(M), subset_by_index=[0, n - 1])
     else:
-        if factor is None:
-            factor, sigma = _factorise_shifted(K, M, sigma)
+        factor, sigma = _factorise_shifted(K, M) if factor is None else (factor, 0.0)
         with threadpool_limits(1):  # two BLAS pools that wait for each other make this many times slower
             try:
                 values, phi = eigsh(
                     K,
                     k=n,
                     M=M,
-                    sigma=sigma or 0.0,
+                    sigma=sigma,
                     OPinv=LinearOperator(K.shape, matvec=factor.solve, dtype=float),
                     v0=np.random.default_rng(0).standard_normal(size),
                     maxiter=EIGEN.restarts,
@@ -147,10 +143,8 @@ def frequencies(values: np.ndarray, K: Any, M: Any) -> np.ndarray:
     return np.sqrt(np.clip(values, 0, None))
 
 
-def _factorise_shifted(K: Any, M: Any, sigma: float | None) -> tuple[Factor, float]:
-    """Factorisation of K - sigma M, with a small negative shift where K alone is singular."""
-    if sigma is not None:
-        return factorise(K - sigma * M if sigma else K, definite=sigma <= 0), sigma
+def _factorise_shifted(K: Any, M: Any) -> tuple[Factor, float]:
+    """Factorisation of K - sigma M, sigma zero or a small negative shift where K alone is singular."""
     try:
         return factorise(K), 0.0
     except ValueError:

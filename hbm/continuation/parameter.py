@@ -7,7 +7,7 @@ continuation takes either a balance (it then steps in frequency) or a Parameter.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -66,6 +66,13 @@ def load(balance: HarmonicBalance, omega: float) -> Parameter:
     return Parameter(LOAD, balance.with_load, omega)
 
 
+def gap(balance: HarmonicBalance, omega: float) -> Parameter:
+    """Opening added to the gap of every pair alike [m], at one frequency [rad/s]."""
+    initial = balance.contact.gap
+    scale = _length(balance, omega)
+    return Parameter("gap offset", lambda value: balance.with_gap(initial + value), omega, scale, "m")
+
+
 def wear(balance: HarmonicBalance, omega: float, depth: np.ndarray) -> Parameter:
     """Fraction of a worn depth (n_pair,) [m] that is added to the gap, at one frequency [rad/s].
 
@@ -78,6 +85,36 @@ def wear(balance: HarmonicBalance, omega: float, depth: np.ndarray) -> Parameter
     initial = balance.contact.gap
     scale = _length(balance, omega) / deepest
     return Parameter("wear fraction", lambda value: balance.with_gap(initial + value * depth), omega, scale)
+
+
+def stiffness(balance: HarmonicBalance, omega: float) -> Parameter:
+    """Factor on all contact springs, at one frequency [rad/s]."""
+    contact = balance.contact
+    return Parameter(
+        "stiffness factor",
+        lambda value: balance.with_contact(
+            contact.with_parameters(lambda p: replace(p, stiffness=value * p.stiffness))
+        ),
+        omega,
+    )
+
+
+def number(balance: HarmonicBalance, omega: float, name: str) -> Parameter:
+    """Factor on one of the contact laws' own numbers, such as friction, at one frequency [rad/s].
+
+    It acts in every joint whose law has that number. Raises ValueError where none has
+    """
+    contact = balance.contact
+    known = sorted({own for joint in contact.joints for own in joint.parameters.numbers})
+    if name not in known:
+        raise ValueError(f"no contact law here has a number {name}: there are {', '.join(known) or 'none'}")
+
+    def make(value: float) -> HarmonicBalance:
+        return balance.with_contact(
+            contact.with_parameters(lambda p: p.scaled(name, value) if name in p.numbers else p)
+        )
+
+    return Parameter(f"{name} factor", make, omega)
 
 
 def _length(balance: HarmonicBalance, omega: float) -> float:
