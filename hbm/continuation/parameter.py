@@ -99,22 +99,21 @@ def stiffness(balance: HarmonicBalance, omega: float) -> Parameter:
     )
 
 
-def number(balance: HarmonicBalance, omega: float, name: str) -> Parameter:
-    """Factor on one of the contact laws' own numbers, such as friction, at one frequency [rad/s].
+def friction(balance: HarmonicBalance, omega: float) -> Parameter:
+    """Factor on the coefficient of friction of every law that has one, at one frequency [rad/s].
 
-    It acts in every joint whose law has that number. Raises ValueError where none has
+    Raises ValueError where none has
     """
-    contact = balance.contact
-    known = sorted({own for joint in contact.joints for own in joint.parameters.numbers})
-    if name not in known:
-        raise ValueError(f"no contact law here has a number {name}: there are {', '.join(known) or 'none'}")
+    contact, name = balance.contact, "friction"
+    if not any(name in joint.parameters.numbers for joint in contact.joints):
+        raise ValueError("no contact law here has a coefficient of friction to change")
 
     def make(value: float) -> HarmonicBalance:
         return balance.with_contact(
             contact.with_parameters(lambda p: p.scaled(name, value) if name in p.numbers else p)
         )
 
-    return Parameter(f"{name} factor", make, omega)
+    return Parameter("friction factor", make, omega)
 
 
 def _length(balance: HarmonicBalance, omega: float) -> float:

@@ -181,12 +181,7 @@ def test_derivative_with_respect_to_a_parameter(make):
     base = newton.solve_from_rest(balance, omega)
     assert base.converged
     depth = np.array([1e-5, 2e-5, 0.0])
-    if make == "wear":
-        path = parameter.wear(balance, omega, depth)
-    elif make == "friction":
-        path = parameter.number(balance, omega, "friction")
-    else:
-        path = getattr(parameter, make)(balance, omega)
+    path = getattr(parameter, make)(balance, omega, *([depth] if make == "wear" else []))
     at = {"load": 1.0, "gap": 0.0, "wear": 0.0, "stiffness": 1.0, "friction": 1.0}[make]
     change = {"load": 0.01, "gap": 1e-7, "wear": 0.01, "stiffness": 0.01, "friction": 0.01}[make]
     moved = newton.solve(*path.place(at + change), base.state.x, newton.NewtonOptions(tolerance=1e-11))
