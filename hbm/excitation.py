@@ -50,8 +50,3 @@ class Excitation:
             if h == 0 and name in vectors:
                 force += np.real(value) * vectors[name]
         return force
-
-    def scaled(self, factor: float, dynamic_only: bool = True) -> Excitation:
-        """The same excitation with its harmonics >= 1 (or all) times a factor."""
-        loads = {(h, n): v * factor if h or not dynamic_only else v for (h, n), v in self.loads.items()}
-        return Excitation(loads, self.base)

@@ -9,7 +9,6 @@ Source  minimally bordered systems, Griewank and Reddien 1984, Govaerts 2000; di
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -113,13 +112,11 @@ def track_fold(
     omega: float,
     x: np.ndarray,
     options: FoldOptions | None = None,
-    on_point: Callable[[int, int], None] | None = None,
 ) -> FoldCurve:
     """Follow a fold of the frequency response from `start` of a parameter towards `stop`.
 
     path : the second parameter, such as `parameter.load(balance, omega)`; its own frequency is not used
     omega, x (n_pair, n_component, n_coeff) : the fold at `start`, or near it, as a Branch lists it [rad/s], [m]
-    on_point : called with points done and points allowed
     Returns the line of folds; it may turn back at a cusp and then ends where it passes `start` or `stop`
     Raises  ValueError where there is no fold near the place given
     """
@@ -163,8 +160,6 @@ def track_fold(
         line.append(there)
         step = float(np.clip(surface.next_step(here, there, step), options.min_step, options.max_step))
         here = there
-        if on_point is not None:
-            on_point(len(line), options.max_points)
     return surface.curve(line, end)
 
 

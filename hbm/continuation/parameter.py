@@ -7,7 +7,7 @@ continuation takes either a balance (it then steps in frequency) or a Parameter.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -66,6 +66,13 @@ def load(balance: HarmonicBalance, omega: float) -> Parameter:
     return Parameter(LOAD, balance.with_load, omega)
 
 
+def gap(balance: HarmonicBalance, omega: float) -> Parameter:
+    """Opening added to the gap of every pair alike [m], at one frequency [rad/s]."""
+    initial = balance.contact.gap
+    scale = _length(balance, omega)
+    return Parameter("gap offset", lambda value: balance.with_gap(initial + value), omega, scale, "m")
+
+
 def wear(balance: HarmonicBalance, omega: float, depth: np.ndarray) -> Parameter:
     """Fraction of a worn depth (n_pair,) [m] that is added to the gap, at one frequency [rad/s].
 
@@ -78,6 +85,35 @@ def wear(balance: HarmonicBalance, omega: float, depth: np.ndarray) -> Parameter
     initial = balance.contact.gap
     scale = _length(balance, omega) / deepest
     return Parameter("wear fraction", lambda value: balance.with_gap(initial + value * depth), omega, scale)
+
+
+def stiffness(balance: HarmonicBalance, omega: float) -> Parameter:
+    """Factor on all contact springs, at one frequency [rad/s]."""
+    contact = balance.contact
+    return Parameter(
+        "stiffness factor",
+        lambda value: balance.with_contact(
+            contact.with_parameters(lambda p: replace(p, stiffness=value * p.stiffness))
+        ),
+        omega,
+    )
+
+
+def friction(balance: HarmonicBalance, omega: float) -> Parameter:
+    """Factor on the coefficient of friction of every law that has one, at one frequency [rad/s].
+
+    Raises ValueError where none has
+    """
+    contact, name = balance.contact, "friction"
+    if not any(name in joint.parameters.numbers for joint in contact.joints):
+        raise ValueError("no contact law here has a coefficient of friction to change")
+
+    def make(value: float) -> HarmonicBalance:
+        return balance.with_contact(
+            contact.with_parameters(lambda p: p.scaled(name, value) if name in p.numbers else p)
+        )
+
+    return Parameter("friction factor", make, omega)
 
 
 def _length(balance: HarmonicBalance, omega: float) -> float:

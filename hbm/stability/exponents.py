@@ -161,8 +161,6 @@ def stability(
 def mark(
     problem: HarmonicBalance | Parameter,
     branch: Branch,
-    method: str = "hill",
-    n_modes: int | None = None,
     on_point: Callable[[int, int], None] | None = None,
 ) -> BranchStability:
     """Stability of every converged point of a branch, and the bifurcations between neighbouring points.
@@ -181,7 +179,7 @@ def mark(
         balance, omega = path.place(float(branch.parameter[i]))
         flat = branch.contact[i]
         state = balance.evaluate(omega, flat.reshape(balance.contact.n_pair, -1, flat.shape[1]))
-        return stability(balance, state, method, n_modes)
+        return stability(balance, state)
 
     found = processes.shared(at, count, None if on_point is None else lambda done: on_point(done, count))
     changes = [
@@ -193,7 +191,7 @@ def mark(
     def located(k: int) -> Bifurcation:
         i, sides = changes[k]
         ends = [Direction(branch.contact[j], float(branch.parameter[j])) for j in (i, i + 1)]
-        return _locate(path, i, sides, (ends[0], ends[1]), method, n_modes)
+        return _locate(path, i, sides, (ends[0], ends[1]))
 
     return BranchStability(
         stable=np.array([s is not None and s.stable for s in found]),
@@ -203,12 +201,7 @@ def mark(
 
 
 def _locate(
-    path: Parameter,
-    i: int,
-    sides: tuple[Stability, Stability],
-    ends: tuple[Direction, Direction],
-    method: str,
-    n_modes: int | None,
+    path: Parameter, i: int, sides: tuple[Stability, Stability], ends: tuple[Direction, Direction]
 ) -> Bifurcation:
     """Where the exponents that change sides have, on average, a real part of zero.
 
@@ -224,7 +217,7 @@ def _locate(
     if kind != FOLD and r0 * r1 < 0:
 
         def growth(balance: HarmonicBalance, state: State) -> float:
-            return float(stability(balance, state, method, n_modes).exponents.real[low:high].mean())
+            return float(stability(balance, state).exponents.real[low:high].mean())
 
         share, value = crossing.locate(path, *ends, growth, (r0, r1)) or (share, value)
     return Bifurcation(i + share, value, kind)

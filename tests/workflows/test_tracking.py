@@ -84,7 +84,8 @@ def test_a_fold_against_the_load_is_that_of_a_branch_traced_anew(
 
 
 @pytest.mark.parametrize(
-    ("against", "start", "stop"), [("load", "1", "0.9"), ("gap", "0 um", "20 um"), ("stiffness", "1", "1.1")]
+    ("against", "start", "stop"),
+    [("load", "1", "0.9"), ("gap", "0 um", "20 um"), ("stiffness", "1", "1.1"), ("friction", "1", "0.9")],
 )
 def test_peaks_are_those_of_the_problem_made_anew(
     against: str, start: str, stop: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -102,9 +103,11 @@ def test_peaks_are_those_of_the_problem_made_anew(
         balance = balance.with_load(last)
     elif against == "gap":
         balance = balance.with_gap(balance.contact.gap + last)
-    else:
+    elif against == "stiffness":
         stiffer = balance.contact.with_parameters(lambda p: replace(p, stiffness=last * p.stiffness))
         balance = balance.with_contact(stiffer)
+    else:
+        balance = balance.with_contact(balance.contact.with_parameters(lambda p: p.scaled("friction", last)))
     peak = settings.peak_of(file.scene).first(balance)
     assert found["frequency_hz"][-1] == pytest.approx(peak.state.omega / (2 * np.pi), rel=1e-5)
     assert found["amplitude_m"][-1] == pytest.approx(peak.amplitude, rel=1e-5)

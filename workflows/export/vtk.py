@@ -15,7 +15,7 @@ import numpy as np
 
 from tribodyn.extras import package
 from tribodyn.hbm.harmonics import HarmonicBasis
-from tribodyn.workflows.pictures.view import grid_of
+from tribodyn.workflows.pictures.view import grid_of, polygons
 from tribodyn.workflows.result.faces import meetings_of, worn_off
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.states import State, instant_status, over_a_cycle, shown_states, state_of
@@ -120,9 +120,8 @@ def contact_surface(result: Result, state: State) -> Any:
     pv = package("pyvista")
 
     patch = result.patch
-    faces = np.column_stack([np.full(len(patch.faces), patch.faces.shape[1]), patch.faces]).ravel()
     split = result.facts.share_of_body_1
-    surface = pv.PolyData(patch.points - split * state.depth[:, None] * patch.frames[:, 2], faces)
+    surface = pv.PolyData(patch.points - split * state.depth[:, None] * patch.frames[:, 2], polygons(patch.faces))
     fields: dict[str, np.ndarray] = {"depth": state.depth, "area": patch.area, "gap": patch.gap + state.depth}
     if state.pressure is not None:
         fields["pressure"] = state.pressure

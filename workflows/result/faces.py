@@ -13,7 +13,7 @@ from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from tribodyn.geometry.placing import rotation
-from tribodyn.workflows.result.result import PartMesh, Patch, Result
+from tribodyn.workflows.result.result import PartMesh, Patch, Result, connected
 
 
 @dataclass(frozen=True)
@@ -123,14 +123,8 @@ def worn_off(meetings: Sequence[Meeting], depth: np.ndarray, n_node: int) -> np.
 
 def bodies(part: PartMesh) -> np.ndarray:
     """(n_node,) number of the connected piece of the mesh that each node belongs to, from 0; -1 where none does."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    n = len(part.points)
-    first = np.repeat(part.cells[:, 0], part.cells.shape[1])
-    links = coo_matrix((np.ones(part.cells.size), (first, part.cells.ravel())), shape=(n, n))
-    piece = connected_components(links, directed=False)[1]
-    found, used = np.full(n, -1), np.unique(part.cells)
+    piece = connected(part.cells, len(part.points))
+    found, used = np.full(len(piece), -1), np.unique(part.cells)
     found[used] = np.unique(piece[used], return_inverse=True)[1]
     return found
 

@@ -21,6 +21,12 @@ PEAKS = 3  # of a response that does not wear, shown in pictures
 SAME_PLANE = 0.95  # cosine between the normals of faces from which on they are drawn in one plane
 
 
+def connected(cells: np.ndarray, n: int) -> np.ndarray:
+    """(n,) number of the piece that each of n points belongs to; cells : (n_cell, n_corner) what joins them."""
+    links = coo_matrix((np.ones(cells.size), (np.repeat(cells[:, 0], cells.shape[1]), cells.ravel())), shape=(n, n))
+    return np.asarray(connected_components(links, directed=False)[1])
+
+
 @dataclass(frozen=True)
 class PartMesh:
     """The mesh of the part as pictures need it.
@@ -74,10 +80,7 @@ class Patch:
     @property
     def face_of(self) -> np.ndarray:
         """(n_pair,) number of the connected face that each pair belongs to, from 0, in the order of the pairs."""
-        n = len(self.points)
-        first = np.repeat(self.faces[:, 0], self.faces.shape[1])
-        links = coo_matrix((np.ones(self.faces.size), (first, self.faces.ravel())), shape=(n, n))
-        return np.asarray(connected_components(links, directed=False)[1])
+        return connected(self.faces, len(self.points))
 
     @property
     def in_one_plane(self) -> bool:

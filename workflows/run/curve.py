@@ -27,18 +27,15 @@ def follow_response(
     scene: Scene,
     balance: HarmonicBalance,
     advance: Callable[[float, str], None],
-    highest: float = np.inf,
     folds: bool = True,
 ) -> Branch:
     """The response curve of the unworn contact by the scene's continuation method, its highest peaks solved.
 
-    highest : frequency [rad/s] at which it ends, if that of the scene's range is higher
     folds : whether a curve on which a sweep jumps is followed round its folds, where its highest peak may be; not where
         the scene itself names a method that sweeps, such as `method = "natural"`
     """
     method, options = continuation.load(scene.response.method_name), settings.response_options(scene)
     low, high = settings.response_range(scene)
-    high = max(low, min(high, highest))
     asked = scene.response
     if asked.control == "phase":
         assert isinstance(asked.amplitude, tuple)
