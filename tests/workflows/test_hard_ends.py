@@ -100,7 +100,7 @@ killed_runs.go_on(Path(sys.argv[1]), tuple(words))
 
 @pytest.mark.slow
 def test_one_run_through_all_of_it_ends_as_if_nothing_had_happened(tmp_path: Path) -> None:
-    """Killed, its folder taken, its checkpoint damaged, its disk full; resumed each time, the same to the bit."""
+    """Killed, its folder claimed by another run, its checkpoint damaged, its disk full; resumed, all the same."""
     overrides = (
         *TINY[:5],
         "verdict.enabled=false",
