@@ -256,9 +256,7 @@ def relative_map(sector: Sector, index: int) -> tuple[np.ndarray, int]:
     return S @ np.concatenate([right.conj().T, follow], axis=1), len(right) + len(accessories)
 
 
-def stuck_ritz(
-    system: SecondOrderSystem, B: np.ndarray, springs: np.ndarray, n_modes: int | None = None
-) -> np.ndarray:
+def stuck_ritz(system: SecondOrderSystem, B: np.ndarray, springs: np.ndarray, n_modes: int | None = None) -> np.ndarray:
     """Basis (n, m) of a dense system: modes with its contact stuck, and its static shapes under a unit force on every
     contact row, under every load and under every output.
 
