@@ -54,5 +54,5 @@ def _library() -> Any:
         raise ValueError(
             '--scheduler needs the package distributed: install it with pip install "tribodyn[cluster]"'
         ) from None
-    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a lost scheduler is told in one sentence
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what is lost is told in one sentence
     return distributed
