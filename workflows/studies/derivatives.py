@@ -51,13 +51,13 @@ class ResponseDerivatives:
     def elasticities(self) -> dict[str, np.ndarray]:
         """Key -> (n_quantity,) d ln q / d ln p; of the phase d q / d ln p [rad]; the strongest on the amplitude first.
 
-        The gap of a joint, which is zero for most, counts by the micrometre: d ln q / d gap [1/um]
+        The gap of a joint, which is zero for most, counts by the micrometre: d ln q / d gap [%/um]
         """
         f, size = self.found, self._size
         rows = {key: f.slopes[:, i] * value / size for i, (key, value) in enumerate(self.at.items())}
         for joint, pairs in self.joints.items():
             if f.pairs["gap"][:, pairs].any():
-                rows[f"gap of {joint}, by um"] = f.pairs["gap"][:, pairs].sum(axis=1) * MICROMETRE / size
+                rows[f"gap of {joint}, by um"] = f.pairs["gap"][:, pairs].sum(axis=1) * 100 * MICROMETRE / size
         first = f.names.index("amplitude")
         return dict(sorted(rows.items(), key=lambda row: -abs(row[1][first])))
 
