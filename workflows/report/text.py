@@ -133,6 +133,12 @@ def warnings(result: Result) -> Iterator[str]:
     if found["peak_is_stable"] is False and not found["wear_steps"]:
         yield f"this peak is unstable, no vibration remains there; {_stable(found)}"
     if (wear := result.wear) is not None:
+        if wear.in_time[:1].any():
+            height, work = measured(wear.amplitude[0], "m", 2), measured(wear.energy[0].sum(), "J", 2)
+            yield f"the unworn peak is unstable: a machine leaves it for {height} and {work} a cycle on average"
+        if found["unstable_cycles"]:
+            share = percent(found["unstable_cycles"])
+            yield f'the motion is unstable for {share} of the cycles; wear.motion = "machine" follows a machine there'
         for row in wear.jumps:
             before, after = (measured(hertz, "Hz", 4) for hertz in wear.frequency[row : row + 2])
             when = measured(wear.cycles[row + 1], "cycles")

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tribodyn.hbm.continuation.branch import amplitude as vibration
 from tribodyn.hbm.continuation.parameter import FREQUENCY
 from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.wear.events import events
 from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload, cycles_to_share
+from tribodyn.hbm.wear.state_stability import unstable_share
 from tribodyn.workflows.result import verdict
 
 if TYPE_CHECKING:
@@ -31,7 +33,9 @@ def summary(result: Result) -> dict[str, Any]:
     life_cycles : until the preload had fallen to LIFE_SHARE of its first value, None if it has not; see `life`
     energy_J, volume_m3 : friction work and worn volume, accumulated
     wear_steps, hbm_solves : steps taken and balance solves spent on wear
-    peak_hz, peak_m, preload_N : [first, last] of the wear run, or the peak of the response curve without one
+    peak_hz, peak_m, preload_N : [first, last] of the wear run, or the peak of the response curve without one; the peak
+        is that of the balance, also where a machine leaves it
+    unstable_cycles : share of the cycles worn along an unstable motion of the balance, None where it is not known
     peak_at_end : whether that peak is no peak, but an end of the response curve
     load_factor : [least, largest] factor on the vibrating loads, where it was found under control, else None; the peak
         is then where it takes least per amplitude
@@ -131,7 +135,15 @@ def _life_share(result: Result) -> float:
 
 def _wear(result: Result) -> dict[str, Any]:
     names = ["depth_max_m", "depth_mean_m", "cycles", "separated_cycles", "life_cycles"]
-    names += ["first_lift_cycles", "first_loss_cycles", "energy_J", "volume_m3", "surface_volumes_m3", "hbm_solves"]
+    names += [
+        "unstable_cycles",
+        "first_lift_cycles",
+        "first_loss_cycles",
+        "energy_J",
+        "volume_m3",
+        "surface_volumes_m3",
+        "hbm_solves",
+    ]
     wear, patch = result.wear, result.patch
     if wear is None or patch is None or not len(wear.cycles):
         return dict.fromkeys(names)
@@ -151,6 +163,7 @@ def _wear(result: Result) -> dict[str, Any]:
         "energy_J": float(wear.work.sum()),
         "volume_m3": volume,
         "hbm_solves": int(wear.solves.sum()),
+        "unstable_cycles": None if wear.growth is None else unstable_share(wear),
         "wear_end": str(wear.end),
     }
 
@@ -161,7 +174,9 @@ def _peak(result: Result) -> dict[str, Any]:
         ends = [0, -1]
         return {
             "peak_hz": [float(w) for w in wear.omega[ends] / (2 * np.pi)],
-            "peak_m": [float(a) for a in wear.amplitude[ends]],
+            "peak_m": [
+                float(vibration(wear.response[row, 0]) if wear.in_time[row] else wear.amplitude[row]) for row in ends
+            ],
             "preload_N": [float(n) for n in wear.preload[ends]],
             "peak_at_end": None,
         }
