@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from scipy.sparse import csr_matrix, eye_array, vstack
 
-from tribodyn.fem.elements import coordinates
-from tribodyn.geometry.sources.directions import Directions
+if TYPE_CHECKING:
+    from tribodyn.geometry.sources.directions import Directions
+
 
 AXES = "xyz"
 
@@ -113,7 +114,7 @@ class ClampAlong:
     def build(self, mesh: Any, node_sets: Mapping[str, np.ndarray]) -> Following:
         """The largest displacement along each direction in terms of the others."""
         nodes, n = named(node_sets, self.nodes), 3 * mesh.doflocs.shape[1]
-        rows = self.system.at(coordinates(mesh)[nodes])[:, list(self.axes)]  # nodes, axes, 3
+        rows = self.system.at(mesh.doflocs.T[nodes])[:, list(self.axes)]  # nodes, axes, 3
         dofs = np.broadcast_to(3 * nodes[:, None, None] + np.arange(3), rows.shape).reshape(-1, 3)
         rows = rows.reshape(-1, 3)
         k = np.arange(len(rows))

@@ -6,6 +6,7 @@ homotopy                              a number led to its goal in steps that New
 rest                                  the preloaded state that friction begins from
 mistuning                             wheels whose blades differ
 outcome                               how a solve or a run ended
+derivatives                           what a solution changes by with every number of it
 threads, processes                    how many threads may work, and a second process that shares the work
 contact/                              joints and their laws
 linear/                               compliance of the structure where it touches

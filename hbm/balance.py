@@ -487,7 +487,7 @@ def _reference(
     Where body and springs are both zero, as of a mass on a cubic spring, the reference is the inertia at omega_max. All
     that of few contacts only (`most` unknowns): where many stick, all would depart from a reference not their own
     """
-    if springs.size * basis.n_coeff > most:
+    if not 0 < springs.size * basis.n_coeff <= most:
         return springs
     body = body_stiffness(model, basis)
     if not (springs + body).all():

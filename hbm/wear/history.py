@@ -130,8 +130,8 @@ class WearHistory:
     end : why the run ended; its text is a sentence
     preload_at_rest : (n_row,) static normal force of the whole contact without the harmonic loads [N]; nan where the
         end of the run does not depend on it
-    growth : (n_row,) of the perturbation of the balance's motion that grows fastest, per radian, by Hill's method; nan
-        where it is not known, None where it is nowhere
+    growth : (n_row,) of the perturbation of the balance's motion that grows fastest, per radian, by Hill's method, less
+        rounding; nan where it is not known, None where it is nowhere
     periods : (n_row,) marched in time, where a machine leaves the motion of the balance: energy, normal_force, preload
         and amplitude then are means over its own, while omega, displacement, force and response stay the balance's;
         zero elsewhere. None in a run that is nowhere marched, as the four below
@@ -172,6 +172,14 @@ class WearHistory:
     def in_time(self) -> np.ndarray:
         """(n_row,) whether the row's motion is one in time that a machine makes, and not that of the balance."""
         return np.zeros(len(self.cycles), bool) if self.periods is None else self.periods > 0
+
+    @property
+    def unstable_share(self) -> float | None:
+        """Share of the cycles worn along a motion of the balance that a machine leaves; None where it is not known."""
+        if self.growth is None:
+            return None
+        left = (self.growth > 0) & ~self.in_time
+        return float(self.cycles_in_step[left].sum()) / float(self.cycles_in_step.sum() or 1.0)
 
     @property
     def jumps(self) -> np.ndarray:

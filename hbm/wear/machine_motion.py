@@ -28,7 +28,6 @@ from tribodyn.hbm.time.time_integration import PeriodicMotion
 from tribodyn.hbm.wear import law as wear_law
 from tribodyn.hbm.wear.evolution import Means, WearProblem, WearState
 from tribodyn.hbm.wear.history import WearRow
-from tribodyn.hbm.wear.state_stability import grows
 
 GAMMA = 1 - 1 / np.sqrt(2)
 
@@ -113,7 +112,7 @@ class MachineMotion:
 
     def of(self, state: WearState) -> WearState:
         """A state of the balance with the rates of the machine's motion; as it is where that is the balance's own."""
-        if not self._serves or state.failure or not (self._always or bool(grows(np.array(state.growth)))):
+        if not self._serves or state.failure or not (self._always or state.growth > 0):
             self._followers, self._moving = [], np.zeros(0)
             return state
         self._moving = np.concatenate([f.kept() for f in self._followers]) if self._followers else np.zeros(0)

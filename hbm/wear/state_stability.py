@@ -7,11 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from tribodyn.hbm.stability import exponents
 from tribodyn.hbm.wear.evolution import WearProblem, WearState
-from tribodyn.hbm.wear.history import WearHistory
 
 
 @dataclass(frozen=True)
@@ -31,6 +28,8 @@ RULES = GrowthRules()
 def with_growth(problem: WearProblem, state: WearState, always: bool = False) -> WearState:
     """The state with the growth of its perturbations per radian of the vibration, the largest of all its duties.
 
+    Above 0 a perturbation grows: what Hill's method takes for rounding is taken off
+
     always : of balances of any size, too; nan stays where it is not known: no solution, no exponents, too many unknowns
     """
     balance = problem.balance
@@ -40,21 +39,7 @@ def with_growth(problem: WearProblem, state: WearState, always: bool = False) ->
     try:
         for duty, point in zip(problem.mission, state.points, strict=True):
             found = exponents.stability(problem.in_duty(duty, state.depth), point.state)
-            growth = max(growth, float(found.exponents[0].real) / found.omega)
+            growth = max(growth, float(found.exponents[0].real) / found.omega - exponents.RULES.neutral_growth)
     except ValueError:  # a model without exponents
         return state
     return replace(state, growth=growth)
-
-
-def grows(growth: np.ndarray) -> np.ndarray:
-    """Whether perturbations grow, by the growth per radian; not where it is nan."""
-    found: np.ndarray = growth > exponents.RULES.neutral_growth
-    return found
-
-
-def unstable_share(worn: WearHistory) -> float:
-    """Share of the cycles that were worn along a motion of the balance that a machine leaves."""
-    if worn.growth is None:
-        return 0.0
-    left = grows(worn.growth) & ~worn.in_time
-    return float(worn.cycles_in_step[left].sum()) / float(worn.cycles_in_step.sum() or 1.0)

@@ -83,6 +83,7 @@ def result(n_row: int = 9, nx: int = 8) -> Result:
         energy=energy,
         preload=6e3 * (1 - t),
         preload_at_rest=5e3 * (1 - t),
+        growth=0.1 * t - 0.05,
         normal_force=np.outer(6e3 * (1 - t), where.area / where.area.sum()),
         status=np.where(t[:, None] * np.ones(n_pair) < 0.6, 3, 6).astype(np.int64),
         omega=omega_row,

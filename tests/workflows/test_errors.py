@@ -15,7 +15,6 @@ import tribodyn as td
 from tests.proof import reference
 from tribodyn.hbm.outcome import CONVERGED, Outcome, SolveEnd
 from tribodyn.hbm.stability.stays import MULTIPLIERS
-from tribodyn.hbm.wear.state_stability import unstable_share
 from tribodyn.workflows.errors import accuracy, in_time, measure, refine, verdict
 from tribodyn.workflows.errors.accuracy import Bound
 from tribodyn.workflows.errors.in_time import Finding
@@ -26,11 +25,12 @@ from tribodyn.workflows.scene import scene_file
 
 SMALL = (
     "harmonics.kept=[0, 1]", "geometry.n_patch=5", "geometry.n_length=4", "geometry.n_height=1", "reduction.modes=4",
-    "wear.tolerance=10 %", "response.points=30", "verdict.in_time=false",
+    "wear.tolerance=10 %", "response.points=30", "verdict.in_time=false", "wear.motion=balance",
 )  # fmt: skip
 TINY = (
     "harmonics.kept=[0, 1]", "geometry.n_patch=3", "geometry.n_length=3", "geometry.n_height=1", "reduction.modes=5",
-    "response.points=20", "harmonics.samples=64", "pictures.renders=false", "verdict.in_time=false",
+    "response.points=20", "harmonics.samples=64", "pictures.renders=false", "wear.motion=balance",
+    "verdict.in_time=false",
 )  # fmt: skip
 OF_STATE = ("peak_frequency", "amplitude", "energy", "preload")
 
@@ -127,7 +127,7 @@ def test_depth_and_life_are_those_of_a_finer_wear_run() -> None:
     there = td.run(finer, overrides=["verdict.enabled=false"])
     assert there.summary()["life_cycles"] == pytest.approx(combined["life"].refined, rel=1e-6)
     assert result.wear is not None
-    stated(result, unstable_share(result.wear))
+    stated(result, result.wear.unstable_share or 0.0)
 
 
 def test_a_coarser_mesh_is_worn_where_a_finer_one_takes_too_much_work() -> None:
@@ -142,9 +142,9 @@ def test_a_coarser_mesh_is_worn_where_a_finer_one_takes_too_much_work() -> None:
     assert rows(judged, Refinement.COMBINED)["life"].refined == pytest.approx(there.summary()["life_cycles"], rel=1e-6)
     assert result.wear is not None
     assert result.wear.growth is not None
-    stated(judged, unstable_share(result.wear))
+    stated(judged, result.wear.unstable_share or 0.0)
     left = replace(result.wear, growth=np.where(np.arange(len(result.wear.growth)) < 2, 1e-3, -1e-3))
-    assert unstable_share(left) == pytest.approx(left.cycles_in_step[:2].sum() / left.cycles_in_step.sum())
+    assert left.unstable_share == pytest.approx(left.cycles_in_step[:2].sum() / left.cycles_in_step.sum())
 
 
 def stated(result: td.Result, unstable: float) -> None:

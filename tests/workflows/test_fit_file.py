@@ -26,7 +26,7 @@ from tribodyn.workflows.studies.fits.identification import Measured, Parameter, 
 BEAM = (
     "harmonics.kept=[0, 1]",
     "geometry.n_patch=3", "reduction.modes=5", "harmonics.samples=32", "harmonics.transitions=sampled",
-    "response.points=20", "wear.tolerance=20 %", "wear.at=700 Hz",
+    "response.points=20", "wear.tolerance=20 %", "wear.at=700 Hz", "wear.motion=balance",
 )  # fmt: skip
 
 

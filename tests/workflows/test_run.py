@@ -303,7 +303,15 @@ def test_curves_of_the_worn_contact_walk_to_the_free_one(finished: Result, tmp_p
 
 def test_the_error_controlled_rule_runs_from_a_scene(tmp_path: Path) -> None:
     mission = 'wear.mission=[{at = "peak", share = "60 %"}, {at = "98 % of peak", share = "40 %"}]'
-    overrides = [*SMALL, "wear.rule=error_controlled", "wear.step=", "wear.at=", "wear.max_steps=3", mission]
+    overrides = [
+        *SMALL,
+        "wear.rule=error_controlled",
+        "wear.step=",
+        "wear.at=",
+        "wear.max_steps=3",
+        "wear.motion=balance",
+        mission,
+    ]
     result = pipeline.run(read("beam", overrides), tmp_path, Progress())
     wear, patch = result.wear, result.patch
     assert wear is not None

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from time import process_time
 
-from tribodyn.hbm.wear.state_stability import unstable_share
 from tribodyn.workflows.errors import in_time
 from tribodyn.workflows.errors.in_time import Finding
 from tribodyn.workflows.errors.measure import OF_WEAR, Table, at_given_frequency, measure
@@ -61,7 +60,7 @@ def _statement(
     own = [row for row in table.rows if row.quantity == name]
     error, why = error_of(own, table.worn_ratio if name in OF_WEAR else table.ratio, options)
     dominated = dominating(own)
-    unstable = 0.0 if result.wear is None or name not in OF_WEAR else unstable_share(result.wear)
+    unstable = (result.wear.unstable_share or 0.0) if result.wear is not None and name in OF_WEAR else 0.0
     error = None if error is None else error + unstable  # what a machine wears there instead is not known
     if unstable > options.largest:
         return Statement(value, error, dominated, Status.UNSTABLE, f"for {unstable:.0%} of the cycles")

@@ -70,6 +70,11 @@ def _response_in_brief(result: Result, found: dict[str, Any], judged: dict[str, 
         ends = [abs(result.driving_force or 1.0) * factor for factor in found["load_factor"]]
         force = [f"{end:.3g} times the loads" if result.driving_force is None else measured(end, "N") for end in ends]
         shown.append(f"force     {force[0]} to {force[1]}, found")
+    if found["harmonics_error"] is not None:
+        shown.append(f"harmonics chosen, estimated truncation error {percent(found['harmonics_error'])}")
+    if found["shear_spread"] is not None:
+        spread, there = percent(found["shear_spread"]), percent(found["shear_spread_at_peak"])
+        shown.append(f"load path changes the amplitude by up to {spread}, {there} at the peak")
     if found["bifurcations"]:
         places = ", ".join(f"{one['kind']} at {measured(one['hz'], 'Hz', 4)}" for one in found["bifurcations"])
         shown.append(f"stability {found['unstable_points']} unstable points; {places}")

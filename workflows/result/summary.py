@@ -13,7 +13,6 @@ from tribodyn.hbm.harmonics import HarmonicBasis
 from tribodyn.hbm.outcome import BranchEnd
 from tribodyn.hbm.wear.events import events
 from tribodyn.hbm.wear.history import LIFE_SHARE, cycles_to_preload, cycles_to_share
-from tribodyn.hbm.wear.state_stability import unstable_share
 from tribodyn.workflows.result import verdict
 
 if TYPE_CHECKING:
@@ -163,7 +162,7 @@ def _wear(result: Result) -> dict[str, Any]:
         "energy_J": float(wear.work.sum()),
         "volume_m3": volume,
         "hbm_solves": int(wear.solves.sum()),
-        "unstable_cycles": None if wear.growth is None else unstable_share(wear),
+        "unstable_cycles": wear.unstable_share,
         "wear_end": str(wear.end),
     }
 

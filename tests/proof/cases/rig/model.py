@@ -11,7 +11,7 @@ from tribodyn.hbm.balance import State
 from tribodyn.reduction.model import ReducedModel
 from tribodyn.workflows.run.failure import SolveFailed
 from tribodyn.workflows.run.modelling import Model
-from tribodyn.workflows.run.reuse import Bench, reaction
+from tribodyn.workflows.run.reuse import Bench
 from tribodyn.workflows.scene.scene_file import SceneError, SceneFile
 from tribodyn.workflows.scene.schema import PartScene
 from tribodyn.workflows.scene.source import read_scene
@@ -140,7 +140,7 @@ class Rig:
             float(balance.energy(state).sum()),
             float(np.ptp(sliding)) / 2,
             balance.preload(state),
-            reaction(self.file, model, state),
+            _reaction(self.file, model, state),
             float(np.linalg.norm(output[1:])),
         )
 
@@ -161,3 +161,10 @@ def check(file: SceneFile) -> None:
     ):
         if missing:
             raise SceneError(f"{file.name}: the fits and the study of the rig need {key}")
+
+
+def _reaction(file: SceneFile, model: Model, state: State) -> float:
+    """Static force at the prescribed nodes of a scene in a solved state of its model [N]."""
+    given, found = next(iter(file.part_scene.prescribed.values())), model.balance.model.info.reaction
+    assert found is not None
+    return float(found.force(given.displacement, state.cycle.force[:, :, 0]).sum())
