@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -164,3 +166,10 @@ def test_what_fuzz_has_found_is_refused(scene: str, override: str, sentence: str
     with pytest.raises(SceneError) as caught:
         scene_file.read(scene, [override])
     assert sentence in str(caught.value)
+
+
+def test_the_scene_of_a_result_of_another_version_is_refused_in_one_sentence() -> None:
+    kept = json.loads(read("beam").scene.model_dump_json())
+    assert scene_file.from_json(json.dumps(kept)) == read("beam").scene
+    with pytest.raises(SceneError, match=r"of another version of tribodyn \(.*colour\): run it again"):
+        scene_file.from_json(json.dumps(kept | {"colour": 1}))

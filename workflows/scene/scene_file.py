@@ -145,9 +145,13 @@ def kind_of(data: dict[str, Any]) -> type[Scene]:
 
 
 def from_json(text: str) -> Scene:
-    """The scene that a result holds, as `Scene.model_dump_json` wrote it."""
+    """The scene that a result holds, as `Scene.model_dump_json` wrote it; raises SceneError for another version's."""
     data = json.loads(text)
-    return kind_of(data).model_validate(data)
+    try:
+        return kind_of(data).model_validate(data)
+    except ValidationError as trouble:
+        key = ".".join(map(str, trouble.errors()[0]["loc"]))
+        raise SceneError(f"the scene of this result is of another version of tribodyn ({key}): run it again") from None
 
 
 def _override(data: dict[str, Any], text: str) -> None:
