@@ -229,7 +229,7 @@ def _alien(error: BaseException) -> str:
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next
     file = "" if trace is None else trace.tb_frame.f_code.co_filename
-    own = "tribodyn" in file or str(ROOT) in file
+    own = "site-packages" not in file and ("tribodyn" in file or str(ROOT) in file)  # the environment lies in the tree
     if not own or not isinstance(error, ValueError):
         return f"{Path(file).name}:{trace.tb_lineno if trace else 0}"
     return ""
