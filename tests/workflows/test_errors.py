@@ -103,6 +103,15 @@ def test_an_error_that_nobody_measured_is_not_known() -> None:
     assert verdict.error_of([], None)[0] is None
 
 
+def test_a_life_is_dominated_by_what_changed_it_most() -> None:
+    def row(refinement: Refinement, quantity: str, change: float) -> Change:
+        return Change(refinement, quantity, None, None, change, "")
+
+    for quantity, expected in (("life", Refinement.COMBINED), ("energy", Refinement.WEAR_STEPS)):
+        both = [row(Refinement.COMBINED, quantity, 0.12), row(Refinement.WEAR_STEPS, quantity, 0.02)]
+        assert verdict.dominating(both) == expected
+
+
 def test_what_is_above_a_limit_of_work_is_not_measured() -> None:
     """Limits count unknowns and DOFs; harmonics and modes are measured all the same."""
     limits = replace(DEFAULT, max_unknowns=10)

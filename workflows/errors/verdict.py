@@ -95,9 +95,10 @@ def error_of(rows: Sequence[Change], ratio: float | None, options: Options = DEF
 
 
 def dominating(rows: Sequence[Change]) -> str | None:
-    """The single refinement that changed a quantity most."""
-    single = [row for row in rows if row.refinement != Refinement.COMBINED and row.relative is not None]
-    return max(single, key=lambda row: row.relative or 0.0).refinement if single else None
+    """The single refinement that changed a quantity most; of wear, whose mesh is not refined alone, or the combined."""
+    known = [row for row in rows if row.relative is not None]
+    counted = [row for row in known if row.refinement != Refinement.COMBINED or row.quantity in OF_WEAR]
+    return max(counted, key=lambda row: row.relative or 0.0).refinement if counted else None
 
 
 def _absent(name: str, table: Table, result: Result) -> str:

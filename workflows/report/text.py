@@ -10,9 +10,10 @@ from tribodyn.workflows.result.facts import Stage
 from tribodyn.workflows.result.readable import UNKNOWN, digits, measured, rounded
 from tribodyn.workflows.result.result import Result
 from tribodyn.workflows.result.summary import LARGEST_BEND, first_lost, order_of_line, size_of
-from tribodyn.workflows.result.verdict import NAMES, UNITS, Statement, Status, loaded
+from tribodyn.workflows.result.verdict import NAMES, UNITS, Refinement, Statement, Status, loaded
 
 Lines = list[tuple[str, str]]
+TOGETHER = "mesh, modes and harmonics together"
 MOST_JOINTS = 4  # named contacts that a summary has a line each for
 
 
@@ -114,7 +115,8 @@ def _errors_in_brief(judged: dict[str, Statement]) -> list[str]:
             continue
         if one.stated:
             value, error = measured(one.value, UNITS[name], digits(one.error)), percent(one.error or 0.0)
-            shown.append(f"{label:15} {value:19} {error:8} {one.dominated_by or one.reason}")
+            by = TOGETHER if one.dominated_by == Refinement.COMBINED else one.dominated_by or one.reason
+            shown.append(f"{label:15} {value:19} {error:8} {by}")
             continue
         known = one.status == Status.NOT_KNOWN
         value = measured(one.value, UNITS[name], _of(judged, name)) if known else "not reported"

@@ -32,10 +32,8 @@ TABLE = ("gap in m", "asperities per m2 and per m of gap, or per m2 where there 
 HEIGHTS = 101  # at which asperities stand
 ROWS = 128  # depths beyond yield at which radius and plastic depth are tabulated, equidistant in their root
 TURNS = 2  # cycles marched, the last of which counts
-AREA, CURVE = (
-    5,
-    13,
-)  # places in a packed row: area, and E*, 8 G*, onset, top, root of R, then the table and the asperities
+# places in a packed row: area; E*, 8 G*, onset, top, root of R, then the table and the asperities
+AREA, CURVE = 5, 13
 PRESSED = CURVE + 5 + 4 * (ROWS + 1)
 
 
