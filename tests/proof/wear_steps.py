@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from time import process_time
@@ -21,12 +22,20 @@ from tribodyn.workflows.run import modelling, wear_run
 from tribodyn.workflows.run.progress import Progress
 from tribodyn.workflows.run.references import delta_max, free_deflection
 from tribodyn.workflows.scene import scene_file
-from tribodyn.workflows.studies.published import WearStep, published_wear_steps
 
 THESIS_STEPS = (0.1, 0.05, 0.02, 0.01, 0.005)  # of delta_max, tables 4.2 and 4.4
 FINER_STEPS = (0.0025, 0.001, 0.0005)  # ours
 TOLERANCES = (0.1, 0.03, 0.02, 0.01)
 REFERENCE_TOLERANCES = (0.003, 0.001)
+WearStep = tuple[int, int, float, float]
+"""Wear iterations, seconds, largest depth [mm], its error against the finest step."""
+
+
+def published_wear_steps(file: scene_file.SceneFile) -> dict[float, WearStep]:
+    """Published wear runs by the largest depth of a step over delta_max; empty where the scene has none beside it."""
+    path = file.folder / f"{file.name}.published.toml"
+    rows = tomllib.loads(path.read_text(encoding="utf-8")).get("wear_step", []) if path.is_file() else []
+    return {float(r["step"]): (r["wear_steps"], r["seconds"], r["depth_mm"], r["depth_error"]) for r in rows}
 
 
 @dataclass(frozen=True)

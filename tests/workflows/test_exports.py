@@ -18,6 +18,7 @@ from scipy.io import loadmat
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridReader
 
+from tests.helpers.nodes_of_pairs import node_of_pair
 from tests.helpers.synthetic_result import LENGTH, WIDTH, block, result
 from tribodyn.reduction import foreign
 from tribodyn.reduction.nastran_matrix import read_op4
@@ -282,8 +283,8 @@ def test_both_faces_of_a_contact_inside_the_mesh() -> None:
     assert patch is not None
     (meeting,) = faces.meetings_of(given)
     first, second = meeting.faces
-    np.testing.assert_array_equal(first.node_of_pair, patch.nodes)
-    np.testing.assert_allclose(part.points[second.node_of_pair], patch.points)
+    np.testing.assert_array_equal(node_of_pair(first), patch.nodes)
+    np.testing.assert_allclose(part.points[node_of_pair(second)], patch.points)
     assert (second.nodes < patch.nodes.min()).all()
     assert (first.share, second.share) == (0.25, 0.75)
     moved = faces.worn_off((meeting,), np.full(len(patch.area), 1e-3), len(part.points))

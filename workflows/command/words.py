@@ -53,9 +53,3 @@ def make_room(out: Path | None, endings: Sequence[str] = ()) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ValueError(f"--out {out}: no folder can be made at {folder}, {str(error.strerror).lower()}") from None
-
-
-def print_lines(lines: list[tuple[str, str]]) -> None:
-    """Names and values in two columns."""
-    for name, value in lines:
-        print(f"{name:14} {value}")

@@ -21,12 +21,11 @@ class Near:
     """When a node of the mesh belongs to a face of pairs.
 
     plane : how far above or below the plane of a polygon of pairs it may lie, of its size; inside : outside its edges
-    same : how far a weight may be from one where node and pair coincide; none : a weight below this is none
+    none : a weight below this is none
     """
 
     plane: float = 0.05
     inside: float = 1e-4
-    same: float = 1e-4
     none: float = 1e-9
 
 
@@ -51,15 +50,6 @@ class Face:
     weights: csr_matrix
     share: float
     turn: np.ndarray | None = None
-
-    @property
-    def node_of_pair(self) -> np.ndarray:
-        """(n_pair,) node of the mesh that stands where the pair does, -1 where none does."""
-        found = np.full(len(self.points), -1)
-        at = self.weights.tocoo()
-        here = at.data > 1 - NEAR.same
-        found[at.col[here]] = self.nodes[at.row[here]]
-        return found
 
     def worn_off(self, depth: np.ndarray, n_node: int) -> np.ndarray:
         """(n_node, 3) how far each node of the mesh is moved inward by a total depth (n_pair,) [m]."""

@@ -4,21 +4,10 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from tribodyn.workflows.scene.scene_file import SceneFile
-
-WearStep = tuple[int, int, float, float]
-"""Wear iterations, seconds, largest depth [mm], its error against the finest step."""
-
-
-def published_wear_steps(file: SceneFile) -> dict[float, WearStep]:
-    """Published wear runs by the largest depth of a step over delta_max; empty where the scene has none beside it."""
-    rows = _beside(file).get("wear_step", [])
-    return {float(r["step"]): (r["wear_steps"], r["seconds"], r["depth_mm"], r["depth_error"]) for r in rows}
 
 
 @dataclass(frozen=True)
@@ -36,23 +25,15 @@ class PublishedBackbone:
 
 def published_backbone(file: SceneFile) -> PublishedBackbone | None:
     """The table [backbone] beside a scene, None where there is none; raises ValueError for one that is incomplete."""
-    table = _beside(file).get("backbone")
+    path = file.folder / f"{file.name}.published.toml"
+    table = tomllib.loads(path.read_text(encoding="utf-8")).get("backbone") if path.is_file() else None
     if table is None:
         return None
     try:
         columns = [np.array(table[name], float) for name in ("modal_amplitude", "frequency_hz", "damping")]
         source = str(table["source"])
     except (KeyError, TypeError, ValueError) as error:
-        raise ValueError(f"{_path(file)}: [backbone] needs source, modal_amplitude, frequency_hz, damping") from error
+        raise ValueError(f"{path}: [backbone] needs source, modal_amplitude, frequency_hz, damping") from error
     if len({len(c) for c in columns}) > 1 or len(columns[0]) < 2 or (np.diff(columns[0]) <= 0).any():
-        raise ValueError(f"{_path(file)}: [backbone] needs columns of one length, modal_amplitude rising")
+        raise ValueError(f"{path}: [backbone] needs columns of one length, modal_amplitude rising")
     return PublishedBackbone(source, *columns)
-
-
-def _path(file: SceneFile) -> Path:
-    return file.folder / f"{file.name}.published.toml"
-
-
-def _beside(file: SceneFile) -> dict[str, Any]:
-    path = _path(file)
-    return tomllib.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}

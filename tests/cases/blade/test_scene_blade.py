@@ -9,6 +9,7 @@ import pytest
 import scipy.linalg as sla
 
 from tests.helpers.coarse_scenes import BLADE as COARSE
+from tests.helpers.nodes_of_pairs import node_of_pair
 from tests.helpers.pictures import assert_not_blank
 from tribodyn.fem.constraints import named
 from tribodyn.fem.elasticity import assemble
@@ -72,7 +73,7 @@ def test_field_of_the_sector_meets_its_neighbour(finished):
     """From the displacement of all nodes: what the right face sees of the left face of the blade behind is x."""
     wear, patch, part, fields = finished.wear, finished.patch, finished.part, finished.fields
     wheel = render_wheel.wheel_of(finished)
-    left = meetings_of(finished)[0].faces[1].node_of_pair
+    left = node_of_pair(meetings_of(finished)[0].faces[1])
     assert part.points[left] == pytest.approx(wheel.blade(patch.points, 1), abs=1e-12)
     basis = HarmonicBasis((0, 1))
     for row, field in zip(fields.row, fields.displacement, strict=True):
@@ -103,7 +104,7 @@ def test_forces_on_both_faces_balance_in_the_full_sector(finished, folder):
     model = built(folder)
     wheel, patch, wear = render_wheel.wheel_of(finished), finished.patch, finished.wear
     _, K = assemble(model.part.mesh, part_reduction.material(model_scene()))
-    left = meetings_of(finished)[0].faces[1].node_of_pair
+    left = node_of_pair(meetings_of(finished)[0].faces[1])
     clamp = named(model.part.node_sets, "clamp")
     row = int(finished.fields.row[0])
     field = finished.fields.displacement[0, ..., 0]

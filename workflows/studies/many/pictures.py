@@ -37,7 +37,9 @@ def panes(found: StudyTable) -> Figure:
         if name in found.columns and np.isfinite(found.columns[name]).any()
     }  # fmt: skip
     if not there:
-        raise ValueError(f"{found.name}: no run is complete, there is nothing to draw")
+        done = found.count("complete")
+        lack = f"none of {done} complete rows has a peak inside the range" if done else "no run is complete"
+        raise ValueError(f"{found.name}: {lack}, there is nothing to draw")
     influence = found.influence()
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(3.4 * len(found.varied) + 0.8, 2.6 * len(there) + 0.3), layout="constrained")

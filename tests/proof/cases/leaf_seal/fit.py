@@ -20,9 +20,9 @@ import numpy as np
 from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
+from tests.proof.joint_springs import JointSprings, joint_springs
 from tribodyn.workflows.scene.schema import PartScene
 from tribodyn.workflows.scene.source import read_scene
-from tribodyn.workflows.studies.fits.joint_springs import JointSprings, joint_springs
 
 PUBLISHED = {
     "leaf alone": (0.00, 0.00, 1.00, 1.71, 2.44, 3.96, 4.78, 5.73, 6.00, 7.11),

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tests.proof.cases.rig.published import OPEN, STUCK
+from tests.proof.joint_springs import JointSprings, joint_springs
 from tests.proof.mode_matching import match_kinds
 from tribodyn.workflows.scene.scene_file import SceneFile
-from tribodyn.workflows.studies.fits.joint_springs import JointSprings, joint_springs
 
 KINDS = ("tangential", "normal", "twisting")
 STATIONS = (1, 2, 3, 4)

@@ -1,0 +1,16 @@
+"""Which node of the mesh stands where a pair of a contact does."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tribodyn.workflows.result.faces import Face
+
+
+def node_of_pair(face: Face) -> np.ndarray:
+    """(n_pair,) node of the mesh that stands where the pair does, -1 where none does."""
+    found = np.full(len(face.points), -1)
+    at = face.weights.tocoo()
+    here = at.data > 1 - 1e-4
+    found[at.col[here]] = face.nodes[at.row[here]]
+    return found
